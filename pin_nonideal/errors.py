@@ -1,0 +1,120 @@
+"""The exceptions of pin_nonideal.
+
+Every error derives from `PinNonidealError` and from the built-in exception that a caller expects
+(`ValueError`, `KeyError`, `RuntimeError`, `OSError`).  A message says what must hold, what came, and what to do.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+
+class PinNonidealError(Exception):
+    """Root of all errors raised by this package."""
+
+    def __str__(self) -> str:
+        # KeyError would print the repr of its message; every class here prints the message itself.
+        return str(self.args[0]) if self.args else ""
+
+
+class InputError(PinNonidealError, ValueError):
+    """An argument has a wrong shape, unit, sign or value."""
+
+
+class UnknownNameError(PinNonidealError, KeyError):
+    """A frame, joint, robot, key or method of that name does not exist."""
+
+
+class LoadingError(PinNonidealError, ValueError):
+    """A file cannot be turned into a scene."""
+
+
+class SingularMassError(PinNonidealError, ValueError):
+    """The mass matrix M(q) is not positive definite (massless or negative links)."""
+
+
+class OutputError(PinNonidealError, OSError):
+    """A file cannot be written or read back."""
+
+
+class RunError(PinNonidealError, RuntimeError):
+    """A run stopped early.
+
+    Attributes:
+        trajectory: what was computed up to the failure (`pin_nonideal.Trajectory`), or None outside of a run.
+        time: time of the failure [s], or None.
+    """
+
+    def __init__(self, message: str, *, time: float | None = None) -> None:
+        super().__init__(message)
+        self.time = time
+        self.trajectory: Any = None
+
+
+class InconsistentConstraintsError(RunError):
+    """Constraints contradict each other: no acceleration satisfies A a = b."""
+
+
+class LoopClosureError(RunError):
+    """No configuration near the given one satisfies the holonomic constraints.
+
+    Attributes:
+        gaps: remaining gap of each constraint by name [m or rad].
+    """
+
+    def __init__(self, message: str, *, gaps: dict[str, float], time: float | None = None) -> None:
+        super().__init__(message, time=time)
+        self.gaps = gaps
+
+
+class NonFiniteError(RunError):
+    """A state, force or acceleration became infinite or not a number."""
+
+
+class FrictionParadoxError(RunError):
+    """The friction law and the dynamics have no common solution, or several (Painleve's paradox).
+
+    Attributes:
+        time: time of the paradox [s].
+        element: name of the frictional element, or names joined by commas.
+        determinant: det(I - d lam' / d lam) of the implicit reaction equation.
+    """
+
+    def __init__(self, message: str, *, element: str, determinant: float, time: float | None = None) -> None:
+        super().__init__(message, time=time)
+        self.element = element
+        self.determinant = determinant
+
+
+class StepSizeError(RunError):
+    """The step size needed for the asked tolerance fell below the spacing of floating-point numbers."""
+
+
+class UserFunctionError(RunError):
+    """A function passed by the user raised, or returned a value of wrong shape or not finite."""
+
+
+class RunInterrupted(RunError, KeyboardInterrupt):
+    """Ctrl-C stopped the run; `trajectory` holds what was computed."""
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """Suffix that points at the closest known name, for messages about unknown names.
+
+    Args:
+        name: what was asked for.
+        names: what exists.
+
+    Returns:
+        `; nearest: "..."` or, when nothing is close, `; known: ...` with up to eight names.
+    """
+    known = list(names)
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    if close:
+        return f'; nearest: "{close[0]}"'
+    if not known:
+        return "; there is none"
+    shown = ", ".join(f'"{n}"' for n in known[:8])
+    return f"; known: {shown}" + (", ..." if len(known) > 8 else "")
