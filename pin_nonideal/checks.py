@@ -1,0 +1,216 @@
+"""Checks at the door: every number, name and function a user passes is looked at once, here.
+
+The inner loop trusts what has passed.  Each helper takes `what`, the words that name the argument in its
+message.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError, nearest
+
+Vector3 = tuple[float, float, float]
+
+AXES: dict[str, Vector3] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def label(description: Any) -> str:
+    """Words that name a description in a message: its class and, when it has one, its name.
+
+    Args:
+        description: any object, with or without an attribute `name`.
+    """
+    kind = type(description).__name__
+    name = getattr(description, "name", None)
+    return f'{kind} "{name}"' if isinstance(name, str) and name else kind
+
+
+def number(what: str, value: Any) -> float:
+    """A finite real number as a float.
+
+    Raises:
+        InputError: `value` is no real number, or NaN, or infinite.
+    """
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (Real, np.ndarray)):
+        raise InputError(f"{what} must be a number; got {value!r}")
+    if isinstance(value, np.ndarray) and (value.ndim != 0 or value.dtype.kind not in "fiu"):
+        raise InputError(f"{what} must be one number; got an array of shape {value.shape}")
+    result = float(value)
+    if not math.isfinite(result):
+        raise InputError(f"{what} must be finite; got {result}")
+    return result
+
+
+def nonnegative(what: str, value: Any) -> float:
+    """A finite number >= 0.
+
+    Raises:
+        InputError: it is negative or no finite number.
+    """
+    result = number(what, value)
+    if result < 0.0:
+        raise InputError(f"{what} must not be negative; got {result:g}")
+    return result
+
+
+def positive(what: str, value: Any) -> float:
+    """A finite number > 0.
+
+    Raises:
+        InputError: it is zero, negative or no finite number.
+    """
+    result = number(what, value)
+    if result <= 0.0:
+        raise InputError(f"{what} must be positive; got {result:g}")
+    return result
+
+
+def count(what: str, value: Any, *, least: int = 0) -> int:
+    """An integer >= `least`.
+
+    Raises:
+        InputError: it is no integer, or too small.
+    """
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
+        raise InputError(f"{what} must be an integer; got {value!r}")
+    if value < least:
+        raise InputError(f"{what} must be at least {least}; got {value}")
+    return int(value)
+
+
+def text(what: str, value: Any) -> str:
+    """A name: a string that is not empty.
+
+    Raises:
+        InputError: it is no string, or empty.
+    """
+    if not isinstance(value, str):
+        raise InputError(f"{what} must be a name (a string); got {value!r}")
+    if not value.strip():
+        raise InputError(f"{what} must be a name; got an empty string")
+    return value
+
+
+def optional_text(what: str, value: Any) -> str | None:
+    """A name or None.
+
+    Raises:
+        InputError: it is neither None nor a string that is not empty.
+    """
+    return None if value is None else text(what, value)
+
+
+def choice(what: str, value: Any, allowed: Sequence[Any]) -> Any:
+    """One of `allowed`.
+
+    Raises:
+        InputError: it is another value; the message lists the allowed ones.
+    """
+    if not any(value is a or (isinstance(value, type(a)) and value == a) for a in allowed):
+        names = [a for a in allowed if isinstance(a, str)]
+        hint = nearest(value, names) if isinstance(value, str) else ""
+        raise InputError(f"{what} must be one of {', '.join(map(repr, allowed))}; got {value!r}{hint}")
+    return value
+
+
+def array(what: str, value: Any, shape: Sequence[int | None]) -> NDArray[np.float64]:
+    """A finite array of the given shape, copied and read-only.
+
+    Args:
+        what: words for messages.
+        value: anything NumPy can turn into an array of floats.
+        shape: expected shape; None leaves a length free.
+
+    Raises:
+        InputError: wrong shape, not numbers, or not finite.
+    """
+    wanted = (
+        "(" + ", ".join("n" if s is None else str(s) for s in shape) + ("," if len(shape) == 1 else "") + ")"
+    )
+    try:
+        given = np.asarray(value)
+    except (TypeError, ValueError):
+        given = np.asarray(None)
+    if given.dtype.kind not in "fiu":
+        raise InputError(f"{what} must be an array of numbers of shape {wanted}; got {value!r}")
+    result = np.array(given, dtype=float)
+    if result.ndim != len(shape) or any(
+        s is not None and s != n for s, n in zip(shape, result.shape, strict=True)
+    ):
+        raise InputError(f"{what} must have shape {wanted}; got shape {result.shape}")
+    if not np.isfinite(result).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
+        place = f"entry [{', '.join(map(str, where))}] is" if where else "got"
+        raise InputError(f"{what} must be finite; {place} {result[where]}")
+    result.setflags(write=False)
+    return result
+
+
+def function(what: str, value: Any, signature: str) -> Callable[..., Any]:
+    """Something that can be called.
+
+    Args:
+        what: words for messages.
+        value: the candidate.
+        signature: how it will be called, shown in the message.
+
+    Raises:
+        InputError: it cannot be called.
+    """
+    if not callable(value):
+        raise InputError(f"{what} must be a function {signature}; got {value!r}")
+    result: Callable[..., Any] = value
+    return result
+
+
+def unit_axis(what: str, value: Any) -> Vector3:
+    """An axis as a unit vector.
+
+    Args:
+        what: words for messages.
+        value: "x", "y", "z", or three numbers of any nonzero length.
+
+    Raises:
+        InputError: another string, a wrong shape, or a vector of no length.
+    """
+    if isinstance(value, str):
+        if value not in AXES:
+            raise InputError(f'{what} must be "x", "y", "z" or three numbers; got {value!r}')
+        return AXES[value]
+    vector = array(what, value, (3,))
+    largest = float(np.abs(vector).max())
+    if largest == 0.0:
+        raise InputError(f"{what} must have a direction; got three zeros")
+    scaled = vector / largest
+    x, y, z = (float(c) for c in scaled / math.sqrt(float(scaled @ scaled)))
+    return (x, y, z)
+
+
+def axis_triad(axis: Vector3) -> tuple[Vector3, Vector3, Vector3]:
+    """Right-handed unit vectors (t1, t2, axis) that every row across an axis is written in.
+
+    t1 starts from the coordinate axis that follows, cyclically, the largest component of `axis`; so "z" gives
+    (x, y, z), "x" gives (y, z, x) and "y" gives (z, x, y).
+
+    Args:
+        axis: unit vector.
+    """
+    n = np.asarray(axis, dtype=float)
+    start = np.zeros(3)
+    start[(int(np.argmax(np.abs(n))) + 1) % 3] = 1.0
+    t1 = start - (start @ n) * n
+    t1 /= math.sqrt(float(t1 @ t1))
+    t2 = np.cross(n, t1)
+    return (_triple(t1), _triple(t2), _triple(n))
+
+
+def _triple(vector: NDArray[np.float64]) -> Vector3:
+    x, y, z = (float(c) + 0.0 for c in vector)
+    return (x, y, z)
