@@ -1,0 +1,277 @@
+"""The explicit equation of motion, Eq. (40), on plain arrays.
+
+A system with mass matrix M and given force F obeys constraints A a = b, with redundant rows allowed, and on
+every virtual displacement w (A w = 0) the force of constraint F_c does the prescribed work w^T F_c = w^T C,
+Eq. (9).  Then
+
+    M a = F + F_ideal + F_nonideal                                             Eq. (40)
+    F_ideal    = R B^+ (b - A M^-1 F)                                          Eq. (39)
+    F_nonideal = R (I - B^+ B) R^-1 C                                          Eq. (39)
+
+with M = R R^T, B = A R^-T and B^+ = J B^T = (B^T B + V V^T)^-1 B^T, Eqs. (33) and (41)-(46).  The paper takes
+the symmetric root R = M^(1/2); any factor gives the same forces, so R is the Cholesky factor here.
+
+Source: F. E. Udwadia, R. E. Kalaba, P. Phohomsiri, "Mechanical systems with nonideal constraints: explicit
+equations without the use of generalized inverses", J. Appl. Mech. 71 (2004).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import InconsistentConstraintsError, InputError, NonFiniteError, SingularMassError
+
+Array = NDArray[np.floating[Any]]
+
+# A row is redundant when, at unit length, no more than this is left of it outside the span of the others.
+# Rows made from kinematics carry rounding of about 1e-13, which a smaller tolerance would take for rows;
+# a row with more left than this still determines its acceleration to about 1e-6.
+RANK_TOLERANCE = 1e-10
+# A row this small beside the longest one is the rounding of a row that vanishes (a planar loop closed in 3D).
+ZERO_ROW = 1e-14
+# Redundant rows contradict when they miss b by more than this part of the accelerations in play: a hundred
+# times the remainder that a redundant row may have, so that rounding alone never raises.
+RESIDUAL_TOLERANCE = 1e-8
+# A refinement gains as many digits as one response has right, few at worst when M has condition 1e12.
+REFINEMENTS = 2
+# M[i, j] and M[j, i] may differ by this part of sqrt(M[i, i] M[j, j]); sums in another order differ by 1e-15.
+SYMMETRY_TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Acceleration and forces of constraint at one instant.
+
+    The multipliers belong to the total motion, M a = F + C + A^T lam, so that
+    A^T lam = F_ideal + F_nonideal - C.  When rows are redundant they are not unique: `lam` is the shortest
+    vector, in the row order and the row scale of the given A.  The forces are unique.
+
+    Attributes:
+        a: acceleration, (n,).
+        F_ideal: ideal part of the force of constraint, (n,), Eq. (39).
+        F_nonideal: nonideal part of the force of constraint, (n,), Eq. (39).
+        lam: multipliers of the rows of A, (m,).
+        rank: number of independent rows of A, the paper's k.
+        modes: mode of each frictional element of a scene, +1 or -1 for slip, 0 for stick; empty without any.
+    """
+
+    a: Array
+    F_ideal: Array
+    F_nonideal: Array
+    lam: Array
+    rank: int
+    modes: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
+
+
+def solve(
+    M: ArrayLike,
+    F: ArrayLike,
+    A: ArrayLike | None = None,
+    b: ArrayLike | None = None,
+    C: ArrayLike | None = None,
+) -> Solution:
+    """Acceleration and forces of constraint by Eq. (40).
+
+    Units follow from the coordinates: for a joint angle, F in N m and M in kg m^2; for a length, N and kg.
+
+    Args:
+        M: mass matrix, (n, n), symmetric and positive definite; its condition may reach 1e12.
+        F: given force, (n,).
+        A: constraint rows, (m, n); redundant, zero and repeated rows are allowed.
+        b: right-hand side of A a = b, (m,).
+        C: force that prescribes the work of the force of constraint on virtual displacements, (n,), Eq. (9);
+            None for ideal constraints.
+
+    Returns:
+        The `Solution`; with it M a = F + C + A^T lam and A^T lam = F_ideal + F_nonideal - C.
+
+    Raises:
+        InputError: a shape does not fit, a value is not finite, or M is not symmetric.
+        SingularMassError: M is not positive definite.
+        InconsistentConstraintsError: no acceleration satisfies A a = b.
+        NonFiniteError: the numbers are so large or small that the result overflows.
+
+    Source: Eqs. (3)-(7), (39), (40).
+    """
+    M, F, A, b, C = _checked(M, F, A, b, C)
+    mass_scale = np.sqrt(np.diag(M))  # makes the coordinates' units alike: metres, radians
+    R = np.linalg.cholesky(M)  # M = R R^T
+    with np.errstate(over="ignore", invalid="ignore"):
+        row_scale, chosen, E = _independent_rows(A / mass_scale)
+        A_k, b_k, rank = A[chosen], b[chosen], len(chosen)  # A = E A_k: redundant rows left out
+        B = _solve_lower(R, A_k.T).T  # Eq. (7)
+        Q, T = np.linalg.qr(B.T)  # B^T = Q T: the Gram-Schmidt of Eqs. (12)-(14), so B^+ = Q T^-T
+
+        def respond(f: Array, r: Array) -> tuple[Array, Array]:
+            """The a and lam of M a = f + A_k^T lam, A_k a = r, for several columns f and r at once."""
+            a_s = _solve_lower(R, f)  # Eq. (5)
+            c = _solve_lower(T.T, r - B @ a_s)
+            a = np.linalg.solve(R.T, a_s + Q @ c)  # Eq. (40), scaled: a_s + B^+ (r - B a_s)
+            return a, np.linalg.solve(T, c)
+
+        # Eq. (40) is linear in (F, b) and C: the first column is the ideal motion, the second what C adds.
+        f, r = np.column_stack([F, C]), np.column_stack([b_k, np.zeros(rank)])
+        a, lam_k = respond(f, r)
+        # Light links make M^-1 f huge where a constraint then holds it back.  What is still out of balance is
+        # small, so its response brings back the digits lost in that difference.
+        for _ in range(REFINEMENTS):
+            more_a, more_lam = respond(f - M @ a + A_k.T @ lam_k, r - A_k @ a)
+            a, lam_k = a + more_a, lam_k + more_lam
+
+        F_ideal = A_k.T @ lam_k[:, 0]  # Eq. (39)
+        F_nonideal = C + A_k.T @ lam_k[:, 1]  # Eq. (39)
+        total = a[:, 0] + a[:, 1]
+        Q_E, T_E = np.linalg.qr(E)
+        lam = Q_E @ _solve_lower(T_E.T, lam_k[:, 0] + lam_k[:, 1])  # the shortest lam with E^T lam = lam_k
+
+    if not (np.isfinite(total).all() and np.isfinite(lam).all()):
+        raise NonFiniteError("acceleration must be finite, got an overflow; change the units of M, F or A")
+    if rank < len(A):
+        free = np.linalg.solve(R.T, _solve_lower(R, F + C))  # Eq. (1), with C
+        in_play = np.linalg.norm(mass_scale * total) + np.linalg.norm(mass_scale * free)
+        _check_consistent(A, b, total, E, chosen, row_scale, float(in_play))
+    return Solution(total, F_ideal, F_nonideal, lam, rank)
+
+
+def _independent_rows(A: Array) -> tuple[Array, list[int], Array]:
+    """Rows of A that span all of its rows, by Gram-Schmidt with pivoting on rows of unit length.
+
+    Deciding on A instead of B = A R^-T keeps the condition of M out of the decision: both have the same rank.
+
+    Args:
+        A: rows in coordinates of like units, (m, n).
+
+    Returns:
+        Length of each row (for vanishing rows the largest entry of A), (m,); the k chosen rows; and E,
+        (m, k), with A = E A[chosen].
+    """
+    m, n = A.shape
+    largest = float(np.abs(A).max(initial=0.0)) or 1.0  # taken out first: squares of 1e200 overflow
+    length = np.linalg.norm(A / largest, axis=1)
+    vanishing = length <= ZERO_ROW * length.max(initial=0.0)
+    length[vanishing] = 1.0
+    remainder = np.where(vanishing[:, None], 0.0, A / largest / length[:, None])
+    length *= largest
+
+    L = np.zeros((m, min(m, n)))  # unit rows = L times orthonormal rows
+    chosen: list[int] = []
+    for k in range(min(m, n)):
+        left = np.linalg.norm(remainder, axis=1)
+        pivot = int(np.argmax(left))
+        if left[pivot] <= RANK_TOLERANCE:
+            break
+        direction = remainder[pivot] / left[pivot]
+        L[:, k] = remainder @ direction
+        remainder -= np.outer(L[:, k], direction)
+        remainder[pivot] = 0.0
+        L[chosen, k] = 0.0
+        chosen.append(pivot)
+    L = L[:, : len(chosen)]
+    E = np.linalg.solve(L[chosen].T, L.T).T * (length[:, None] / length[chosen])
+    return length, chosen, E
+
+
+def _solve_lower(L: Array, X: Array) -> Array:
+    """L^-1 X by forward substitution.
+
+    Turned upside down L is upper triangular, and in an upper triangular matrix `numpy.linalg.solve` finds
+    nothing to exchange or eliminate: it substitutes, which keeps light and heavy coordinates apart.
+    """
+    return np.linalg.solve(L[::-1, ::-1], X[::-1])[::-1]
+
+
+def _check_consistent(
+    A: Array, b: Array, a: Array, E: Array, chosen: list[int], row_scale: Array, in_play: float
+) -> None:
+    """Raise when a row that was left out as redundant is not satisfied by the others."""
+    residual = A @ a - b
+    dropped = np.ones(len(A), dtype=bool)
+    dropped[chosen] = False
+    demanded = float(np.max(np.abs(b[chosen]) / row_scale[chosen], initial=0.0))
+    excess = np.where(dropped, np.abs(residual) / row_scale, 0.0)
+    worst = int(np.argmax(excess))
+    if excess[worst] <= RESIDUAL_TOLERANCE * (in_play + demanded):
+        return
+    weight = np.abs(E[worst]) * row_scale[chosen] / row_scale[worst]
+    rows = sorted([worst, *(chosen[j] for j in np.flatnonzero(weight > RESIDUAL_TOLERANCE))])
+    if len(rows) == 1:
+        raise InconsistentConstraintsError(
+            f"row {worst} of A is zero: b[{worst}] must be 0, got {b[worst]:.6g}; correct b or drop the row"
+        )
+    listed = ", ".join(str(i) for i in rows[:-1]) + f" and {rows[-1]}"
+    raise InconsistentConstraintsError(
+        f"constraint rows {listed} contradict each other: A a - b must be 0,"
+        f" got {residual[worst]:.1e} in row {worst}; correct b or drop a row"
+    )
+
+
+def _checked(
+    M: ArrayLike, F: ArrayLike, A: ArrayLike | None, b: ArrayLike | None, C: ArrayLike | None
+) -> tuple[Array, Array, Array, Array, Array]:
+    """The arguments of `solve` as arrays of fitting shapes, absent ones filled in."""
+    M = _numbers("M", M)
+    if M.ndim != 2 or M.shape[0] != M.shape[1] or M.shape[0] == 0:
+        raise InputError(f"M must have shape (n, n) with n >= 1, got {M.shape}; pass the mass matrix")
+    n = M.shape[0]
+    if (A is None) != (b is None):
+        given, absent = ("A", "b") if b is None else ("b", "A")
+        raise InputError(f"A and b must come together, got {given} without {absent}; pass {absent} as well")
+    F = _numbers("F", F)
+    A = np.zeros((0, n)) if A is None else _numbers("A", A)
+    b = np.zeros(0) if b is None else _numbers("b", b)
+    C = np.zeros(n) if C is None else _numbers("C", C)
+    if F.shape != (n,):
+        raise InputError(f"F must have shape ({n},) to fit M, got {F.shape}; one force a coordinate")
+    if A.ndim != 2 or A.shape[1] != n:
+        raise InputError(f"A must have shape (m, {n}) to fit M, got {A.shape}; one row a constraint")
+    if b.shape != (len(A),):
+        raise InputError(f"b must have shape ({len(A)},) to fit A, got {b.shape}; one value a row of A")
+    if C.shape != (n,):
+        raise InputError(f"C must have shape ({n},) to fit M, got {C.shape}; one force a coordinate")
+    _check_mass(M)
+    return M / 2.0 + M.T / 2.0, F, A, b, C
+
+
+def _numbers(name: str, value: ArrayLike) -> Array:
+    """`value` as an array of finite floats."""
+    try:
+        raw = np.asarray(value)
+        array = np.array(raw, dtype=np.float64) if raw.dtype.kind in "iuf" else None
+    except ValueError:  # rows of unequal length
+        array = None
+    if array is None:
+        raise InputError(f"{name} must hold real numbers, got {type(value).__name__}; pass floats")
+    if not np.isfinite(array).all():
+        where = ", ".join(str(i) for i in np.argwhere(~np.isfinite(array))[0])
+        bad = array[~np.isfinite(array)][0]
+        raise InputError(f"{name} must be finite, got {bad} at {name}[{where}]; check how it is computed")
+    return array
+
+
+def _check_mass(M: Array) -> None:
+    """Raise unless M is symmetric and positive definite beyond rounding."""
+    n = len(M)
+    diagonal = np.sqrt(np.abs(np.diag(M)))
+    gap = np.abs(M - M.T) - SYMMETRY_TOLERANCE * np.outer(diagonal, diagonal)
+    i, j = (int(k) for k in np.unravel_index(np.argmax(gap), gap.shape))
+    if gap[i, j] > 0.0:
+        i, j = min(i, j), max(i, j)
+        raise InputError(
+            f"M must be symmetric, got M[{i}, {j}] = {M[i, j]:.6g} but M[{j}, {i}] = {M[j, i]:.6g};"
+            " mirror the triangle that was computed"
+        )
+    try:
+        left = np.diag(np.linalg.cholesky(M)) ** 2 / np.diag(M)  # of each diagonal entry, after elimination
+        definite = bool((left > n * np.finfo(float).eps).all())
+    except np.linalg.LinAlgError:
+        definite = False
+    if not definite:
+        eigenvalues = np.linalg.eigvalsh(M)
+        raise SingularMassError(
+            f"M must be positive definite, got smallest eigenvalue {eigenvalues[0]:.3e}"
+            f" (largest {eigenvalues[-1]:.3e}); give every link a positive mass and inertia"
+        )
