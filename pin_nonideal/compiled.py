@@ -1,0 +1,54 @@
+"""The door to the compiled core: loaded after Pinocchio, and refused with a reason when the two do not fit.
+
+The core is linked to the libraries of one minor version of the `pin` wheel.  Beside another one it would read
+models and data laid out differently in memory, so that is an error at import and not a matter of luck.
+"""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from types import ModuleType
+
+import pinocchio
+
+_AGAIN = 'run "pip install --force-reinstall --no-deps ." in the checkout to build it again'
+
+
+def load_core() -> ModuleType:
+    """The compiled module `pin_nonideal._core`, checked against the Pinocchio of this environment.
+
+    Returns:
+        The module.
+
+    Raises:
+        ImportError: the core is missing, does not load, or was built for another minor version of `pin`.
+    """
+    # Pinocchio is imported first: it registers the conversion of its Python models that the core relies on.
+    found = str(pinocchio.__version__)
+    try:
+        core = importlib.import_module("pin_nonideal._core")
+    except ModuleNotFoundError:
+        raise ImportError(_missing()) from None
+    except ImportError as error:
+        raise ImportError(
+            f"the compiled core of pin_nonideal does not load beside Pinocchio {found} ({error}); {_AGAIN}"
+        ) from error
+    # A source folder named _core imports as an empty namespace package when nothing is compiled.
+    if getattr(core, "__file__", None) is None:
+        raise ImportError(_missing())
+    built = str(core.pinocchio_version)
+    if built.split(".")[:2] != found.split(".")[:2]:
+        raise ImportError(
+            f"the compiled core of pin_nonideal was built for Pinocchio {built}, and "
+            f'Pinocchio {found} is installed; run "pip install pin=={built}", or {_AGAIN}'
+        )
+    return core
+
+
+def _missing() -> str:
+    folder = Path(__file__).parent
+    return (
+        f"the compiled core of pin_nonideal is missing in {folder}: this is the source folder, imported "
+        'because Python runs in its parent; run "pip install -e ." there, or start Python in another folder'
+    )
