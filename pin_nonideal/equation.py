@@ -125,8 +125,7 @@ def solve(
         F_ideal = A_k.T @ lam_k[:, 0]  # Eq. (39)
         F_nonideal = C + A_k.T @ lam_k[:, 1]  # Eq. (39)
         total = a[:, 0] + a[:, 1]
-        Q_E, T_E = np.linalg.qr(E)
-        lam = Q_E @ _solve_lower(T_E.T, lam_k[:, 0] + lam_k[:, 1])  # the shortest lam with E^T lam = lam_k
+        lam = _spread(E, lam_k[:, 0] + lam_k[:, 1])
 
     if not (np.isfinite(total).all() and np.isfinite(lam).all()):
         raise NonFiniteError("acceleration must be finite, got an overflow; change the units of M, F or A")
@@ -167,12 +166,20 @@ def _independent_rows(A: Array) -> tuple[Array, list[int], Array]:
         direction = remainder[pivot] / left[pivot]
         L[:, k] = remainder @ direction
         remainder -= np.outer(L[:, k], direction)
-        remainder[pivot] = 0.0
-        L[chosen, k] = 0.0
+        remainder[pivot] = 0.0  # exactly, so that L[chosen] is lower triangular
         chosen.append(pivot)
     L = L[:, : len(chosen)]
     E = np.linalg.solve(L[chosen].T, L.T).T * (length[:, None] / length[chosen])
     return length, chosen, E
+
+
+def _spread(E: Array, lam_k: Array) -> Array:
+    """The shortest lam with E^T lam = lam_k, so that A^T lam = A_k^T lam_k: redundant rows share the load."""
+    Q, T = np.linalg.qr(E)
+    lam = Q @ _solve_lower(T.T, lam_k)
+    lam += Q @ _solve_lower(T.T, lam_k - E.T @ lam)  # rows of very different scale lose digits in the first
+    lam[~E.any(axis=1)] = 0.0  # rows that vanish carry nothing
+    return lam
 
 
 def _solve_lower(L: Array, X: Array) -> Array:
