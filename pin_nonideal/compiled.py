@@ -12,7 +12,7 @@ from types import ModuleType
 
 import pinocchio
 
-_AGAIN = 'run "pip install --force-reinstall --no-deps ." in the checkout to build it again'
+_AGAIN = 'run "pip install ." in the checkout, which builds the core for the Pinocchio that it needs'
 
 
 def load_core() -> ModuleType:
@@ -41,7 +41,7 @@ def load_core() -> ModuleType:
     if built.split(".")[:2] != found.split(".")[:2]:
         raise ImportError(
             f"the compiled core of pin_nonideal was built for Pinocchio {built}, and "
-            f'Pinocchio {found} is installed; run "pip install pin=={built}", or {_AGAIN}'
+            f"Pinocchio {found} is installed; {_AGAIN}"
         )
     return core
 
@@ -49,6 +49,7 @@ def load_core() -> ModuleType:
 def _missing() -> str:
     folder = Path(__file__).parent
     return (
-        f"the compiled core of pin_nonideal is missing in {folder}: this is the source folder, imported "
-        'because Python runs in its parent; run "pip install -e ." there, or start Python in another folder'
+        f"the compiled core of pin_nonideal is missing in {folder}: this is the source folder, "
+        'imported because Python runs in its parent; run "pip install -e ." there, or start Python in '
+        "another folder"
     )
