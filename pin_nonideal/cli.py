@@ -171,19 +171,24 @@ def _write(run: Any, writers: list[tuple[Path, Callable[[Any, Path], Any]]]) -> 
 
 
 def _parameters(settings: Sequence[str]) -> dict[str, Any]:
-    """KEY=VALUE words as keyword arguments; values are read as YAML scalars (numbers, true, text)."""
-    import yaml
-
+    """KEY=VALUE words as keyword arguments."""
     parameters: dict[str, Any] = {}
     for word in settings:
         key, separator, text = word.partition("=")
         if not separator or not key.isidentifier():
             raise InputError(f'--set needs KEY=VALUE, for example --set N=40; got "{word}"')
-        try:
-            parameters[key] = yaml.safe_load(text)
-        except yaml.YAMLError:
-            raise InputError(f'--set {key}: "{text}" is no number, true, false or plain text') from None
+        parameters[key] = _value(text)
     return parameters
+
+
+def _value(text: str) -> int | float | bool | str:
+    """A whole number, a number, true or false; anything else is text."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return {"true": True, "false": False}.get(text, text)
 
 
 def _list(options: argparse.Namespace) -> int:
