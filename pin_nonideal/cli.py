@@ -17,6 +17,7 @@ from typing import Any
 import pin_nonideal as pn
 
 from .errors import InputError, OutputError, PinNonidealError, RunError, RunInterrupted
+from .loading import robots
 
 EXIT_ERROR = 2
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
@@ -87,7 +88,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--save", type=Path, metavar="FILE", help="write the arrays (.npz)")
     run.set_defaults(command=_run)
 
-    listing = commands.add_parser("list", help="names that run and info accept")
+    listing = commands.add_parser("list", help="robots of the package, by name")
     listing.set_defaults(command=_list)
 
     info = commands.add_parser("info", help="joints, loops, rows, rank, mobility and what is skipped")
@@ -193,8 +194,10 @@ def _value(text: str) -> int | float | bool | str:
 
 def _list(options: argparse.Namespace) -> int:
     del options
-    for name in pn.robots():
-        print(name)
+    listed = robots()
+    width = max((len(name) for name, _ in listed), default=0)
+    for name, description in listed:
+        print(f"{name:{width}}  {description}".rstrip())
     return 0
 
 

@@ -1,4 +1,8 @@
-"""What the Markdown files show works: Python blocks compile, marked ones run, links lead somewhere."""
+"""What the Markdown files show works: Python blocks compile, marked ones run, links lead somewhere.
+
+Marks are HTML comments right above a block: `runs` for a block that runs, after the ones before it in the
+same document, and `file: NAME` for the text of a file that they read.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +17,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCK = re.compile(
-    r"^(?:<!-- (?P<mark>[a-z: ]+) -->\n)?```(?P<language>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL
+    r"^(?:<!-- (?P<mark>[a-z:._ ]+) -->\n)?```(?P<language>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL
 )
 LINK = re.compile(r"\]\((?!https?:|mailto:|#)([^)#\s]+)")
 RUN_SECONDS = 120
@@ -56,12 +60,19 @@ def test_python_block_compiles(block: Block) -> None:
     compile(block.text, name(block), "exec")
 
 
-@pytest.mark.parametrize("block", RUNNABLE, ids=name)
-def test_marked_python_block_runs(block: Block, tmp_path: Path) -> None:
-    script = tmp_path / "block.py"
-    script.write_text(block.text, encoding="utf-8")
+@pytest.mark.parametrize("document", sorted({block.document for block in RUNNABLE}))
+def test_marked_python_blocks_run(document: str, tmp_path: Path) -> None:
+    for block in blocks():
+        if block.document == document and block.mark.startswith("file: "):
+            (tmp_path / block.mark.removeprefix("file: ")).write_text(block.text, encoding="utf-8")
+    script = ""
+    for block in RUNNABLE:
+        if block.document == document:
+            # Line numbers of a traceback are those of the document: two lines for the mark and the fence.
+            script += "\n" * (block.line + 1 - script.count("\n")) + block.text
+    (tmp_path / "document.py").write_text(script, encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, script.name],
+        [sys.executable, "document.py"],
         cwd=tmp_path,
         capture_output=True,
         text=True,
