@@ -14,6 +14,8 @@ from typing import NamedTuple
 
 import pytest
 
+from pin_nonideal.loading import load, robots
+
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCK = re.compile(
@@ -88,6 +90,21 @@ def test_links_lead_to_files(path: Path) -> None:
         link for link in LINK.findall(path.read_text(encoding="utf-8")) if not (path.parent / link).exists()
     ]
     assert broken == []
+
+
+def test_the_folder_of_the_robots_page_loads(tmp_path: Path) -> None:
+    files = {(b.document, b.mark): b.text for b in blocks() if b.mark.startswith("file: ")}
+    (tmp_path / "robot.urdf").write_text(files["first_use.md", "file: linkage.urdf"], encoding="utf-8")
+    (tmp_path / "robot.yaml").write_text(files["robots.md", "file: robot.yaml"], encoding="utf-8")
+    scene = load(tmp_path)
+    assert [c.name for c in scene.constraints] == ["loop"]
+    assert [law.joint for law in scene.laws] == ["rocker_joint"]
+    assert len(scene.forces) == 1
+
+
+def test_every_robot_is_in_the_table() -> None:
+    text = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
+    assert [name for name, _ in robots() if f"| `{name}` |" not in text] == []
 
 
 def test_the_two_commands_of_the_readme_are_marked() -> None:
