@@ -1,0 +1,219 @@
+"""From a name or a path to a Scene."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .assembly import scene_arguments
+from .errors import InputError, LoadingError, UnknownNameError, nearest
+from .generators import GENERATORS
+from .mjcf import read_mjcf
+from .robot_yaml import MODEL_KEYS, Table, check_keys, optional_string, read_yaml
+from .scene import Scene
+from .urdf import RobotFile, read_mimics, read_urdf
+
+FILE_PARAMETERS = ("free_flyer", "package_dirs", "merge_ball_joints")
+
+
+def load(name: str | os.PathLike[str], **parameters: Any) -> Scene:
+    """Loads a robot as a scene.
+
+    `name` is one of
+
+    - a robot of this package (`robots()` lists them), such as "four_bar";
+    - a path to a folder with robot.urdf and, beside it, robot.yaml (loops, laws, contacts, initial state);
+    - a path to a .urdf file, or to a .xml file in MJCF;
+    - a robot of example-robot-data, such as "panda".
+
+    URDF damping and friction become `JointFriction` laws, mimic joints become `JointCoupling`, three
+    revolutes that make a ball joint around massless links become one spherical joint.  `scene.notes` says
+    what was done.
+
+    Args:
+        name: see above.
+        **parameters: of a generated robot, such as N for "n_four_bar"; of URDF files and folders:
+        `free_flyer` (bool, a
+            floating base), `package_dirs` (folders for package:// paths), `merge_ball_joints` (bool, True).
+
+    Returns:
+        The scene; `simulate` takes it.
+
+    Raises:
+        UnknownNameError: no robot of that name.
+        LoadingError: a file is missing, truncated, malformed, or states something that cannot be honored.
+        SingularMassError: the mass matrix at the initial configuration is not positive definite.
+        InputError: an unknown parameter, or a bad value of one.
+    """
+    text = os.fspath(name)
+    if not isinstance(text, str) or not text:
+        raise InputError(f"name must be the name of a robot or a path; got {name!r}")
+    path = Path(text).expanduser()
+    folders = robot_folders()
+    if text in folders:
+        return _load_folder(folders[text], parameters)
+    if path.is_dir():
+        return _load_folder(path, parameters)
+    if (
+        path.is_file()
+        or path.suffix in (".urdf", ".xml", ".mjcf")
+        or isinstance(name, Path)
+        or os.sep in text
+    ):
+        return _load_file(path, parameters)
+    check_parameters(parameters, (), text)
+    return Scene(**scene_arguments(_example_robot(text, list(folders)), {}, text))
+
+
+def robots() -> list[tuple[str, str]]:
+    """The robots of this package, as (name, one line on what it is), in alphabetical order."""
+    return [
+        (name, optional_string(read_yaml(folder / "robot.yaml"), "description", f'"{name}"') or "")
+        for name, folder in sorted(robot_folders().items())
+    ]
+
+
+def robot_folders() -> dict[str, Path]:
+    """Folders of this package's robots by name: installed with the package, or beside it in a checkout."""
+    here = Path(__file__).resolve().parent
+    for base in (here / "robots", here.parent / "robots"):
+        if base.is_dir():
+            return {p.name: p for p in base.iterdir() if (p / "robot.yaml").is_file()}
+    return {}
+
+
+def check_parameters(parameters: dict[str, Any], known: tuple[str, ...], name: str) -> None:
+    """Raises on a parameter that the robot does not take.
+
+    Raises:
+        InputError: names the nearest known one.
+    """
+    for key in parameters:
+        if key not in known:
+            raise InputError(f'robot "{name}" takes no parameter "{key}"{nearest(key, known)}')
+
+
+def _file_options(parameters: dict[str, Any], name: str) -> tuple[dict[str, Any], bool]:
+    check_parameters(parameters, FILE_PARAMETERS, name)
+    for key in ("free_flyer", "merge_ball_joints"):
+        if not isinstance(parameters.get(key, False), bool):
+            raise InputError(f"{key} must be True or False; got {parameters[key]!r}")
+    options = {k: v for k, v in parameters.items() if k != "merge_ball_joints"}
+    if isinstance(options.get("package_dirs"), (str, Path)):
+        options["package_dirs"] = [options["package_dirs"]]
+    return options, parameters.get("merge_ball_joints", True)
+
+
+def _load_file(path: Path, parameters: dict[str, Any]) -> Scene:
+    if not path.is_file():
+        raise LoadingError(f'no file or folder "{path}"; give a path that exists, or the name of a robot')
+    if path.suffix == ".urdf":
+        options, merge = _file_options(parameters, path.name)
+        return Scene(**scene_arguments(read_urdf(path, **options), {}, path.stem, merge=merge))
+    if path.suffix in (".xml", ".mjcf"):
+        check_parameters(parameters, (), path.name)
+        return Scene(**scene_arguments(read_mjcf(path), {}, path.stem, merge=False))
+    raise LoadingError(
+        f'"{path}" must be a folder, a .urdf file or a .xml file (MJCF); got "{path.suffix or path.name}"'
+    )
+
+
+def _load_folder(folder: Path, parameters: dict[str, Any]) -> Scene:
+    """A folder with robot.yaml, robot.urdf, or both."""
+    name = folder.resolve().name
+    yaml_path = folder / "robot.yaml"
+    table = read_yaml(yaml_path) if yaml_path.is_file() else {}
+    entry = table.get("model") or {}
+    if not isinstance(entry, dict):
+        raise LoadingError(
+            f'"{yaml_path}": model must be a table with keys out of {", ".join(MODEL_KEYS)}; got {entry!r}'
+        )
+    check_keys(entry, MODEL_KEYS, f'"{yaml_path}": model')
+    kinds = [k for k in ("urdf", "example_robot_data", "generator") if k in entry]
+    if len(kinds) > 1:
+        raise LoadingError(
+            f'"{yaml_path}": model must name one of urdf, example_robot_data, generator; '
+            f"got {', '.join(kinds)}"
+        )
+    for key in kinds:
+        optional_string(entry, key, f'"{yaml_path}": model')
+    if "generator" in entry:
+        return _generated(entry, table, parameters, name, yaml_path)
+    if "example_robot_data" in entry:
+        check_parameters(parameters, (), name)
+        robot = _example_robot(entry["example_robot_data"], [])
+        return Scene(**scene_arguments(robot, table, name))
+    return _from_urdf(folder, entry, table, parameters, name)
+
+
+def _from_urdf(folder: Path, entry: Table, table: Table, parameters: dict[str, Any], name: str) -> Scene:
+    urdf = folder / entry.get("urdf", "robot.urdf")
+    if not urdf.resolve().is_relative_to(folder.resolve()):
+        raise LoadingError(f'model: urdf must lie in the folder "{folder}"; got "{entry["urdf"]}"')
+    if not urdf.is_file():
+        others = ", ".join(f'"{p}"' for p in sorted(folder.glob("*.urdf"))[:3])
+        hint = f"; load {others} by its path" if others else ""
+        raise LoadingError(f'"{folder}" must hold a {urdf.name}; there is none{hint}')
+    options, merge = _file_options(parameters, name)
+    options.setdefault("free_flyer", _flag(entry, "free_flyer", name))
+    return Scene(**scene_arguments(read_urdf(urdf, **options), table, name, merge=merge))
+
+
+def _flag(entry: Table, key: str, name: str) -> bool:
+    value = entry.get(key, False)
+    if not isinstance(value, bool):
+        raise LoadingError(f'robot.yaml of "{name}": model: {key} must be true or false; got {value!r}')
+    return value
+
+
+def _generated(entry: Table, table: Table, parameters: dict[str, Any], name: str, path: Path) -> Scene:
+    """A robot that a function of this package builds from parameters."""
+    key = entry["generator"]
+    if key not in GENERATORS:
+        raise LoadingError(f'"{path}": no generator "{key}"{nearest(key, GENERATORS)}')
+    defaults = entry.get("parameters") or {}
+    if not isinstance(defaults, dict):
+        raise LoadingError(f'"{path}": model: parameters must be a table; got {defaults!r}')
+    generator: Callable[..., RobotFile] = GENERATORS[key]
+    known = tuple(generator.__kwdefaults__ or ())
+    check_keys(defaults, known, f'"{path}": model: parameters')
+    check_parameters(parameters, known, name)
+    return Scene(**scene_arguments(generator(**{**defaults, **parameters}), table, name))
+
+
+def _example_robot(name: str, others: list[str]) -> RobotFile:
+    """A robot of example-robot-data, with its reference posture.
+
+    Raises:
+        UnknownNameError: neither this package nor example-robot-data has it.
+        LoadingError: example-robot-data has it but cannot load it.
+    """
+    try:
+        from example_robot_data import robots_loader
+    except ImportError as error:
+        raise LoadingError(
+            f'robot "{name}" may be one of example-robot-data, which cannot be imported ({error}); '
+            "pip install example-robot-data-loaders"
+        ) from None
+    if name not in robots_loader.ROBOTS:
+        raise UnknownNameError(f'no robot "{name}"{nearest(name, [*others, *robots_loader.ROBOTS])}')
+    try:
+        loader = robots_loader.loader(name)
+    except Exception as error:  # the loaders raise whatever their parsers raise
+        raise LoadingError(
+            f'example-robot-data cannot load "{name}": {" ".join(str(error).split())}'
+        ) from error
+    robot = loader.robot
+    constraints = [c for c in read_mimics(Path(loader.df_path)) if _has_joints(robot.model, c)]
+    return RobotFile(
+        robot.model, robot.visual_model, robot.collision_model, constraints, q0=np.array(robot.q0)
+    )
+
+
+def _has_joints(model: Any, constraint: Any) -> bool:
+    names = [getattr(constraint, key, None) for key in ("joint", "joint1", "joint2")]
+    return all(model.existJointName(n) for n in names if n is not None)
