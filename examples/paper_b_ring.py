@@ -96,12 +96,15 @@ class Ring:
         y = model.addJoint(x, pin.JointModelPY(), pin.SE3.Identity(), "y")
         model.appendBodyToJoint(y, pin.Inertia(self.mass, np.zeros(3), np.zeros((3, 3))), pin.SE3.Identity())
         law = self.prescribed if reaction is None else self.from_reactions
+        q0, v0 = self.at(0.0, 0.0)
         return pn.Scene(
             model,
             constraints=[
                 pn.UserConstraint(self.rows, 1, residual=self.residual, rate=self.rate, name="ring")
             ],
             laws=[pn.UserLaw(law, reaction=reaction, name="rubbing")],
+            q0=q0,
+            v0=v0,
         )
 
     def at(self, angle, speed):

@@ -108,12 +108,15 @@ class Incline:
         x = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "x")
         y = model.addJoint(x, pin.JointModelPY(), pin.SE3.Identity(), "y")
         model.appendBodyToJoint(y, pin.Inertia(self.mass, np.zeros(3), np.zeros((3, 3))), pin.SE3.Identity())
+        q0, v0 = self.at(0.0, 0.0)
         return pn.Scene(
             model,
             constraints=[
                 pn.UserConstraint(self.rows, 1, residual=self.residual, rate=self.rate, name="plane")
             ],
             laws=[pn.UserLaw(self.from_reactions, reaction="ideal", name="friction")],
+            q0=q0,
+            v0=v0,
         )
 
     def at(self, s, speed):
