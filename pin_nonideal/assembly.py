@@ -64,6 +64,7 @@ def scene_arguments(robot: RobotFile, table: Table, name: str, *, merge: bool = 
         )
     q0, v0 = _initial(robot, table.get("initial"), where)
     q0, v0 = _lock(robot, table, q0, v0, where)
+    robot.constraints = [c for c in robot.constraints if _still_moves(robot.model, c, where)]
     motors = strings(table, "name_mot", where) or [m for m in robot.motors if robot.model.existJointName(m)]
     for motor in motors:
         _joint(robot.model, motor, f"{where}: name_mot")
@@ -105,7 +106,7 @@ def dissipation(model: Any, taken: Sequence[Any], notes: list[str]) -> list[Join
         notes: receives a note for each replacement, and for each joint that has no single velocity.
     """
     given = {law.joint for law in taken if isinstance(law, JointFriction)}
-    result = []
+    result, replaced = [], []
     for j in range(1, model.njoints):
         dofs = slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])
         viscous, dry = model.damping[dofs], model.upperDryFrictionLimit[dofs]
@@ -113,7 +114,7 @@ def dissipation(model: Any, taken: Sequence[Any], notes: list[str]) -> list[Join
         if not (viscous.any() or dry.any()):
             continue
         if joint in given:
-            notes.append(f'joint "{joint}": its law replaces the damping and friction of the robot\'s file')
+            replaced.append(joint)
         elif model.nvs[j] != 1:
             notes.append(
                 f'joint "{joint}" has {model.nvs[j]} axes: damping and friction of the robot\'s file '
@@ -125,6 +126,10 @@ def dissipation(model: Any, taken: Sequence[Any], notes: list[str]) -> list[Join
                     joint, coulomb=float(dry[0]), viscous=float(viscous[0]), name=f"{joint} dynamics"
                 )
             )
+    if replaced:
+        notes.append(
+            "laws given replace the damping and friction of the robot's file in " + ", ".join(replaced)
+        )
     return result
 
 
@@ -261,6 +266,24 @@ def _lock(
     robot.visual = next(remaining) if robot.visual is not None else None
     robot.collision = next(remaining) if robot.collision is not None else None
     return q, v
+
+
+def _still_moves(model: Any, constraint: Any, where: str) -> bool:
+    """Whether a constraint of the robot's file has its joints; one whose joints are all locked is met
+    already.
+
+    Raises:
+        LoadingError: one of two coupled joints is locked and the other is not.
+    """
+    keys = ("joint", "joint1", "joint2")
+    names = [getattr(constraint, key) for key in keys if hasattr(constraint, key)]
+    gone = [n for n in names if not model.existJointName(n)]
+    if gone and len(gone) < len(names):
+        left = next(n for n in names if n not in gone)
+        raise LoadingError(
+            f'{where}: joint "{left}" follows the locked joint "{gone[0]}"; lock both or neither'
+        )
+    return not gone
 
 
 def _actuation(model: Any, entry: Any, motors: Sequence[str], where: str) -> Any:
