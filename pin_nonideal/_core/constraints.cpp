@@ -1,0 +1,326 @@
+#include "constraints.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pn {
+
+namespace {
+
+struct Pose {  // a frame in the world
+    const Body& body;
+    int joint;
+    Mat3 R;
+    Vec3 x;
+    const Mechanism& m;
+
+    Pose(const State& s, const Frame& f)
+        : body(s.terms.body[f.joint]), joint(f.joint), R(body.R * f.R), x(body.ref + body.p + body.R * f.p),
+          m(s.mechanism) {}
+    const Vec3& omega() const { return body.v.ang; }
+    const Vec3& alpha() const { return body.a.ang; }
+    Vec3 velocity(const Vec3& at) const { return velocity_at(body, at); }
+    Vec3 acceleration(const Vec3& at) const { return acceleration_at(m, body, at, joint); }
+};
+
+Vec3 logarithm(const Mat3& R) {  // rotation vector
+    const Eigen::Quaterniond q(R);
+    const double n = q.vec().norm();
+    if (n < 1e-12) return 2.0 * q.vec();
+    const double angle = 2.0 * std::atan2(n, q.w());
+    const double wrapped = angle > M_PI ? angle - 2.0 * M_PI : angle;
+    return (wrapped / n) * q.vec();
+}
+
+// Row k: velocity of frame 1's origin along e, seen from body 2 (e is fixed in body 2).
+void point_row(const Pose& a, const Pose& b, const Vec3& e, double offset, int k, RowValues& out) {
+    const Vec3 u = a.velocity(a.x) - b.velocity(a.x);
+    const Vec3 w = a.acceleration(a.x) - b.acceleration(a.x) - 2.0 * b.omega().cross(u);
+    out.wrench[k] = {e, a.x, Vec3::Zero()};
+    out.residual[k] = e.dot(a.x - b.x) - offset;
+    out.rate[k] = e.dot(u);
+    out.drift[k] = e.dot(w);
+}
+
+double wrap(double x, double period) { return period > 0.0 ? std::remainder(x, period) : x; }
+
+double joint_angle(const Joint& j, const VecX& q) {
+    return j.unbounded ? std::atan2(q[j.iq + 1], q[j.iq]) : q[j.iq];
+}
+
+// Sliding of body 1 against the plane of body 2 at a contact point that moves with rate c_rate.
+void contact_row(const Pose& a, const Pose& b, const Vec3& e, const Vec3& c, const Vec3& c_rate, int k,
+                 RowValues& out) {
+    const Vec3 va = a.velocity(c), vb = b.velocity(c), u = va - vb;
+    const Vec3 du = a.acceleration(c) + a.omega().cross(c_rate - va) - b.acceleration(c) -
+                    b.omega().cross(c_rate - vb) - b.omega().cross(u);
+    out.wrench[k] = {e, c, Vec3::Zero()};
+    out.residual[k] = 0.0;
+    out.rate[k] = e.dot(u);
+    out.drift[k] = e.dot(du);
+}
+
+struct Evaluate {
+    const State& s;
+    RowValues& out;
+
+    void operator()(const PointRows& c) const {
+        const Pose a(s, c.frame1), b(s, c.frame2);
+        for (size_t k = 0; k < c.axes.size(); ++k) point_row(a, b, b.R.col(c.axes[k]), c.offset, k, out);
+    }
+
+    void operator()(const FrameRows& c) const {
+        const Pose a(s, c.frame1), b(s, c.frame2);
+        const Vec3 gap = logarithm(b.R.transpose() * a.R), omega = a.omega() - b.omega();
+        const Vec3 alpha = a.alpha() - b.alpha() - b.omega().cross(omega);
+        for (int k = 0; k < 3; ++k) {
+            const Vec3 e = b.R.col(k);
+            point_row(a, b, e, 0.0, k, out);
+            out.wrench[k + 3] = {Vec3::Zero(), a.x, e};
+            out.residual[k + 3] = gap[k];
+            out.rate[k + 3] = e.dot(omega);
+            out.drift[k + 3] = e.dot(alpha);
+        }
+    }
+
+    void operator()(const HingeRows& c) const {
+        const Pose a(s, c.frame1), b(s, c.frame2);
+        for (int k = 0; k < 3; ++k) point_row(a, b, b.R.col(k), 0.0, k, out);
+        // The axis e of frame 1 stays normal to n1 and n2 of frame 2; the angle between the axes scales the residual,
+        // so that it tells the gap also when they point apart.
+        const Vec3 e = a.R * c.axis, axis2 = b.R * c.axis, omega = a.omega() - b.omega();
+        const double sine = e.cross(axis2).norm(), cosine = e.dot(axis2), angle = std::atan2(sine, cosine);
+        const double stretch = sine > 1e-9 ? angle / sine : 1.0;
+        const Vec3 normals[2] = {b.R * c.normal1, b.R * c.normal2};
+        for (int k = 0; k < 2; ++k) {
+            const Vec3& n = normals[k];
+            const Vec3 w = e.cross(n);
+            const Vec3 dw = a.omega().cross(e).cross(n) + e.cross(b.omega().cross(n));
+            out.wrench[k + 3] = {Vec3::Zero(), a.x, w};
+            out.residual[k + 3] = stretch * n.dot(e);
+            if (sine <= 1e-9 && cosine < 0.0) out.residual[k + 3] = k == 0 ? M_PI : 0.0;
+            out.rate[k + 3] = w.dot(omega);
+            out.drift[k + 3] = w.dot(a.alpha() - b.alpha()) + dw.dot(omega);
+        }
+    }
+
+    void operator()(const DistanceRows& c) const {
+        const Pose a(s, c.frame1), b(s, c.frame2);
+        const Jet length = evaluate(c.length, s.t);
+        const Vec3 d = a.x - b.x;
+        const double distance = d.norm();
+        const Vec3 n = distance > 0.0 ? Vec3(d / distance) : Vec3::UnitX();
+        const Vec3 u = a.velocity(a.x) - b.velocity(b.x);
+        const double along = n.dot(u);
+        out.wrench[0] = {n, a.x, Vec3::Zero()};
+        out.residual[0] = distance - length[0];
+        out.rate[0] = along - length[1];
+        out.drift[0] = n.dot(a.acceleration(a.x) - b.acceleration(b.x)) - length[2];
+        if (distance > 0.0) out.drift[0] += (u.squaredNorm() - along * along) / distance;
+    }
+
+    void operator()(const KnifeRows& c) const {
+        const Pose a(s, c.frame1);
+        const Vec3 e = a.R * c.axis, u = a.velocity(a.x);
+        out.wrench[0] = {e, a.x, Vec3::Zero()};
+        out.residual[0] = 0.0;
+        out.rate[0] = e.dot(u);
+        out.drift[0] = e.dot(a.acceleration(a.x)) + a.omega().cross(e).dot(u);
+    }
+
+    void operator()(const RollingRows& c) const {
+        const Pose a(s, c.frame1), b(s, c.frame2);
+        const Vec3 n = b.R * c.normal, dn = b.omega().cross(n);
+        Vec3 down = -n, ddown = -dn;  // unit vector from the center to the contact, and its rate
+        double support = 1.0;
+        if (!c.sphere) {
+            const Vec3 e = a.R * c.axle, de = a.omega().cross(e);
+            const double ne = n.dot(e);
+            const Vec3 w = n - ne * e, dw = dn - (dn.dot(e) + n.dot(de)) * e - ne * de;
+            support = w.norm();
+            down = -w / support;
+            ddown = -(dw - w * (w.dot(dw) / (support * support))) / support;
+        }
+        const Vec3 contact = a.x + c.radius * down, rate = a.velocity(a.x) + c.radius * ddown;
+        contact_row(a, b, b.R * c.tangent1, contact, rate, 0, out);
+        contact_row(a, b, b.R * c.tangent2, contact, rate, 1, out);
+        contact_row(a, b, n, contact, rate, 2, out);
+        out.residual[2] = n.dot(a.x - b.x) - c.radius * support;
+    }
+
+    void operator()(const HingeSlipRows& c) const {
+        const Pose a(s, c.frame1), b(s, c.frame2);
+        const Vec3 e = a.R * c.axis, omega = a.omega() - b.omega();
+        out.wrench[0] = {Vec3::Zero(), a.x, e};
+        out.residual[0] = 0.0;
+        out.rate[0] = e.dot(omega);
+        out.drift[0] = e.dot(a.alpha() - b.alpha()) + a.omega().cross(e).dot(omega);
+    }
+
+    void operator()(const ContactSlipRows& c) const {
+        const Pose a(s, c.frame1), b(s, c.frame2);
+        const Vec3 n = b.R * c.normal, contact = a.x - c.radius * n;
+        const Vec3 rate = a.velocity(a.x) - c.radius * b.omega().cross(n);
+        contact_row(a, b, b.R * c.tangent1, contact, rate, 0, out);
+        contact_row(a, b, b.R * c.tangent2, contact, rate, 1, out);
+    }
+
+    void operator()(const CouplingRows& c) const {
+        const Joint &j1 = s.mechanism.joints[c.joint1], &j2 = s.mechanism.joints[c.joint2];
+        if (!out.has_A) {
+            out.A(0, j1.iv) = 1.0;
+            out.A(0, j2.iv) = -c.ratio;
+        }
+        const double gap = joint_angle(j1, s.q) - c.ratio * joint_angle(j2, s.q) - c.offset;
+        out.residual[0] = c.position ? wrap(gap, c.period) : 0.0;
+        out.rate[0] = s.v[j1.iv] - c.ratio * s.v[j2.iv];
+        out.drift[0] = 0.0;
+    }
+
+    void operator()(const MotionRows& c) const {
+        const Joint& j = s.mechanism.joints[c.joint];
+        const Jet f = evaluate(c.function, s.t);
+        if (!out.has_A) out.A(0, j.iv) = 1.0;
+        out.residual[0] = wrap(joint_angle(j, s.q) - f[0], c.period);
+        out.rate[0] = s.v[j.iv] - f[1];
+        out.drift[0] = -f[2];
+    }
+
+    void operator()(const UserRows& c) const {
+        c.rows(s.t, s.q, s.v, out.A, out.b);
+        for (int k = 0; k < out.rows; ++k) out.drift[k] = -out.b[k];
+        if (c.residual) {
+            c.residual(s.t, s.q, out.scratch);
+            for (int k = 0; k < out.rows; ++k) out.residual[k] = out.scratch[k];
+        }
+        if (c.rate) {
+            c.rate(s.t, s.q, s.v, out.scratch);
+            for (int k = 0; k < out.rows; ++k) out.rate[k] = out.scratch[k];
+        }
+    }
+
+    void operator()(const DofRows& c) const {
+        for (int k = 0; k < c.count; ++k) {
+            if (!out.has_A) out.A(k, c.dof + k) = 1.0;
+            out.rate[k] = s.v[c.dof + k];
+        }
+    }
+
+    void operator()(const UserSlipRow& c) const {
+        c.direction(s.t, s.q, out.scratch);
+        out.A.row(0) = out.scratch.transpose();
+        out.residual[0] = 0.0;
+        out.rate[0] = out.scratch.dot(s.v);
+        // The direction's own rate, by a difference along the motion: d(n(t, q))/dt . v.
+        const double h = 1e-6;
+        VecX ahead(s.q.size()), row(s.v.size());
+        const VecX step = h * s.v, back = -step;
+        retract(s.mechanism, s.q.data(), step.data(), ahead.data());
+        c.direction(s.t + h, ahead, row);
+        const double forward = row.dot(s.v);
+        retract(s.mechanism, s.q.data(), back.data(), ahead.data());
+        c.direction(s.t - h, ahead, row);
+        out.drift[0] = (forward - row.dot(s.v)) / (2.0 * h);
+    }
+};
+
+template <class T, class = void>
+struct HasFrames : std::false_type {};
+template <class T>
+struct HasFrames<T, std::void_t<decltype(std::declval<T>().frame1)>> : std::true_type {};
+
+}  // namespace
+
+void RowValues::resize(int n, int nv, bool is_geometric) {
+    rows = n;
+    geometric = is_geometric;
+    wrench.assign(is_geometric ? n : 0, Wrench{Vec3::Zero(), Vec3::Zero(), Vec3::Zero()});
+    drift.assign(n, 0.0);
+    residual.assign(n, 0.0);
+    rate.assign(n, 0.0);
+    if (is_geometric) return;
+    A = MatX::Zero(n, nv);
+    b = VecX::Zero(n);
+    scratch = VecX::Zero(std::max(n, nv));
+}
+
+bool is_geometric(const Kind& kind) {
+    return std::visit([](const auto& k) { return HasFrames<std::decay_t<decltype(k)>>::value; }, kind);
+}
+
+const Frame* frame1(const Kind& kind) {
+    return std::visit([](const auto& k) -> const Frame* {
+        if constexpr (HasFrames<std::decay_t<decltype(k)>>::value) return &k.frame1;
+        return nullptr;
+    }, kind);
+}
+
+const Frame* frame2(const Kind& kind) {
+    return std::visit([](const auto& k) -> const Frame* {
+        if constexpr (HasFrames<std::decay_t<decltype(k)>>::value) return &k.frame2;
+        return nullptr;
+    }, kind);
+}
+
+bool has_constant_rows(const Kind& kind) {
+    return std::holds_alternative<CouplingRows>(kind) || std::holds_alternative<MotionRows>(kind) ||
+           std::holds_alternative<DofRows>(kind);
+}
+
+int row_count(const Kind& kind, int user_size) {
+    struct Count {
+        int user;
+        int operator()(const PointRows& c) const { return static_cast<int>(c.axes.size()); }
+        int operator()(const FrameRows&) const { return 6; }
+        int operator()(const HingeRows&) const { return 5; }
+        int operator()(const RollingRows&) const { return 3; }
+        int operator()(const UserRows&) const { return user; }
+        int operator()(const DofRows& c) const { return c.count; }
+        int operator()(const ContactSlipRows&) const { return 2; }
+        int operator()(const DistanceRows&) const { return 1; }
+        int operator()(const KnifeRows&) const { return 1; }
+        int operator()(const CouplingRows&) const { return 1; }
+        int operator()(const MotionRows&) const { return 1; }
+        int operator()(const HingeSlipRows&) const { return 1; }
+        int operator()(const UserSlipRow&) const { return 1; }
+    };
+    return std::visit(Count{user_size}, kind);
+}
+
+void evaluate(const Kind& kind, const State& s, RowValues& out) { std::visit(Evaluate{s, out}, kind); }
+
+void fill_A(const Block& block, const Terms& terms, const RowValues& values, double* A) {
+    const int r = static_cast<int>(block.kept.size()), n = static_cast<int>(block.support.size());
+    if (!values.geometric) {
+        for (int l = 0; l < n; ++l)
+            for (int k = 0; k < r; ++k) A[l * r + k] = values.A(block.kept[k], block.support[l]);
+        return;
+    }
+    std::fill(A, A + static_cast<size_t>(r) * n, 0.0);
+    for (int k = 0; k < r; ++k) {
+        const Wrench& w = values.wrench[block.kept[k]];
+        // About the reference points of the two bodies (they differ when the bodies belong to different trees).
+        const Force f1{w.force, w.couple + (w.point - terms.body[block.joint1].ref).cross(w.force)};
+        const Force f2{w.force, w.couple + (w.point - terms.body[block.joint2].ref).cross(w.force)};
+        for (const Block::Entry& e : block.entries)
+            A[e.place * r + k] = e.sign > 0.0 ? dot(terms.J[e.dof], f1) : -dot(terms.J[e.dof], f2);
+    }
+}
+
+void scale_rows(const Mechanism& m, const Terms& terms, const Block& block, const double* A, double* B) {
+    const int r = static_cast<int>(block.kept.size()), n = static_cast<int>(block.support.size());
+    std::copy(A, A + static_cast<size_t>(r) * n, B);
+    for (int l = 0; l < n; ++l) {
+        const int dof = block.support[l];
+        const double* row = terms.L.data() + m.row_offset[dof];
+        double* x = B + l * r;
+        for (int p = block.parent[l], s = 1; p >= 0; p = block.parent[p], ++s) {
+            double* y = B + p * r;
+            for (int k = 0; k < r; ++k) y[k] -= row[s] * x[k];
+        }
+        const double d = terms.inv_sqrt_D[dof];
+        for (int k = 0; k < r; ++k) x[k] *= d;
+    }
+}
+
+}  // namespace pn

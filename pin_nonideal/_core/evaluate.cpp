@@ -1,0 +1,397 @@
+// The evaluation of Eq. (40) at one state, and the choice of independent rows.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "program.hpp"
+
+namespace pn {
+
+namespace {
+
+// Rows that were found dependent must be met by the solution all the same, to this part of their terms.
+constexpr double consistency_tolerance = 1e-6;
+// Pivots of M that differ by more than this (bodies of very unequal mass, or massless ones) cost the row equations
+// the same factor in accuracy; two passes of refinement give it back.
+constexpr double refined_pivot_ratio = 1e6;
+constexpr int refinement_passes = 2;
+
+void zero(std::vector<Force>& f) { std::fill(f.begin(), f.end(), Force{Vec3::Zero(), Vec3::Zero()}); }
+
+// Support of a block: the dofs of its rows and all their ancestors, descending.
+void find_support(const Mechanism& m, const std::vector<int>& dofs, Block& block) {
+    std::vector<char> in(m.nv, 0);
+    for (int dof : dofs)
+        for (int d = dof; d >= 0 && !in[d]; d = m.dof_parent[d]) in[d] = 1;
+    std::vector<int> place(m.nv, -1);
+    for (int d = m.nv - 1; d >= 0; --d)
+        if (in[d]) {
+            place[d] = static_cast<int>(block.support.size());
+            block.support.push_back(d);
+        }
+    for (int d : block.support) block.parent.push_back(m.dof_parent[d] < 0 ? -1 : place[m.dof_parent[d]]);
+    if (!is_geometric(block.kind)) return;
+    // A differs from zero only on dofs that move one body and not the other.
+    const std::vector<int> d1 = m.dofs_of(block.joint1), d2 = m.dofs_of(block.joint2);
+    for (int d : d1)
+        if (std::find(d2.begin(), d2.end(), d) == d2.end()) block.entries.push_back({place[d], d, 1.0});
+    for (int d : d2)
+        if (std::find(d1.begin(), d1.end(), d) == d1.end()) block.entries.push_back({place[d], d, -1.0});
+}
+
+std::vector<int> moved_dofs(const Mechanism& m, const Block& block) {
+    if (is_geometric(block.kind)) {
+        std::vector<int> dofs = m.dofs_of(block.joint1);
+        for (int d : m.dofs_of(block.joint2)) dofs.push_back(d);
+        return dofs;
+    }
+    if (const auto* c = std::get_if<CouplingRows>(&block.kind))
+        return {m.joints[c->joint1].iv, m.joints[c->joint2].iv};
+    if (const auto* c = std::get_if<MotionRows>(&block.kind)) return {m.joints[c->joint].iv};
+    if (const auto* c = std::get_if<DofRows>(&block.kind)) {
+        std::vector<int> dofs;
+        for (int k = 0; k < c->count; ++k) dofs.push_back(c->dof + k);
+        return dofs;
+    }
+    std::vector<int> all(m.nv);
+    for (int k = 0; k < m.nv; ++k) all[k] = k;
+    return all;
+}
+
+}  // namespace
+
+std::string Failure::encode(Kind k, double t, const std::vector<int>& e, double x) {
+    std::string text = std::to_string(static_cast<int>(k));
+    char number[40];
+    for (double value : {t, x}) {
+        std::snprintf(number, sizeof number, " %.17g", value);
+        text += number;
+    }
+    for (int element : e) text += " " + std::to_string(element);
+    return text;
+}
+
+void Program::finish() {
+    int row = 0;
+    entries = 0;
+    for (size_t i = 0; i < blocks.size(); ++i) {
+        Block& block = blocks[i];
+        block.values = static_cast<int>(i);
+        block.row = row;
+        row += static_cast<int>(block.kept.size());
+        block.support.clear();
+        block.parent.clear();
+        block.entries.clear();
+        find_support(mechanism, moved_dofs(mechanism, block), block);
+        block.offset = static_cast<int>(entries);
+        entries += block.support.size() * block.kept.size();
+    }
+    layout = layout_rows(blocks, mechanism.nv);
+    for (const Friction& f : frictions) {
+        needs_reactions |= f.reaction != Reaction::none;
+        needs_joint_reactions |= f.reaction != Reaction::none && f.joint > 0;
+    }
+    for (const UserLaw& law : user_laws) {
+        needs_reactions |= law.reaction != Reaction::none;
+        needs_joint_reactions |= law.reaction != Reaction::none;
+    }
+    for (const Friction& f : frictions)
+        needs_joint_reactions |= f.load == Friction::Load::user;
+    for (Drag& d : drags) d.dofs = mechanism.dofs_of(d.frame.joint);
+    driven = !forces.empty() || !std::holds_alternative<NoActuation>(actuation);
+    for (const GivenForce& f : forces)
+        has_body_forces |= std::holds_alternative<SpringDamper>(f) || std::holds_alternative<FrameWrench>(f);
+}
+
+Workspace::Workspace(const Program& p) {
+    const int nv = p.mechanism.nv, n = static_cast<int>(p.mechanism.joints.size());
+    terms.allocate(p.mechanism);
+    for (VecX* x : {&tau, &external, &F, &C, &C_smooth, &base_C, &a, &scaled, &scaled_free, &trial, &work, &held_torque,
+                    &override_torque})
+        *x = VecX::Zero(nv);
+    values.resize(p.blocks.size());
+    for (size_t i = 0; i < p.blocks.size(); ++i) {
+        values[i].resize(p.blocks[i].total, nv, is_geometric(p.blocks[i].kind));
+        values[i].constant_A = has_constant_rows(p.blocks[i].kind);
+    }
+    A.assign(p.entries, 0.0);
+    B.assign(p.entries, 0.0);
+    for (VecX* x : {&b, &r, &miss, &lam, &lam_step, &lam_shared}) *x = VecX::Zero(p.layout.rows);
+    rows.allocate(p.layout, static_cast<int>(p.blocks.size()), nv);
+    body_force.resize(n);
+    reaction_body.resize(n);
+    zero(body_force);
+    zero(reaction_body);
+    motion.assign(n, Motion{Vec3::Zero(), Vec3::Zero()});
+    momentum.assign(n, Force{Vec3::Zero(), Vec3::Zero()});
+    const size_t elements = p.frictions.size();
+    mode.assign(elements, 1);
+    limit.assign(elements, 0.0);
+    load.assign(elements, 0.0);
+    slip_direction.assign(elements, Vec3::UnitX());
+    slip_force.assign(elements, Vec3::Zero());
+    user_C.assign(p.user_laws.size(), VecX::Zero(nv));
+    z = VecX::Zero(p.states);
+    dz = VecX::Zero(p.states);
+    law_force.assign(p.law_names.size(), VecX::Zero(nv));
+    const size_t unknowns = elements + p.user_laws.size() * nv;
+    for (VecX* x : {&unknown, &image, &newton_step}) *x = VecX::Zero(unknowns);
+    want_rows(p, *this);
+}
+
+void want_rows(const Program& p, Workspace& w) {
+    const int constraint_rows = p.constraints < static_cast<int>(p.blocks.size())
+                                    ? p.blocks[p.constraints].row : p.layout.rows;
+    for (int r = 0; r < p.layout.rows; ++r) w.rows.wanted[r] = r < constraint_rows;
+    for (size_t e = 0; e < p.frictions.size(); ++e) {
+        const Block& block = p.blocks[p.frictions[e].block];
+        if (w.mode[e] == 0)
+            for (size_t k = 0; k < block.kept.size(); ++k) w.rows.wanted[block.row + k] = 1;
+    }
+    w.rows.use_wanted(p.blocks);
+}
+
+void factor_mass(const Program& p, Workspace& w, double t) {
+    const int dof = factorize(p.mechanism, w.terms);
+    if (dof < 0) return;
+    if (!w.terms.q.allFinite() || !std::isfinite(w.terms.M[p.mechanism.row_offset[dof]]))
+        throw Failure(Failure::Kind::not_finite, t);
+    throw Failure(Failure::Kind::singular_mass, t, {dof});
+}
+
+void evaluate_rows(const Program& p, Workspace& w, double t, const VecX& v) {
+    const State state{p.mechanism, w.terms, t, w.terms.q, v};
+    for (size_t i = 0; i < p.blocks.size(); ++i) {
+        const Block& block = p.blocks[i];
+        RowValues& values = w.values[i];
+        evaluate(block.kind, state, values);
+        for (size_t k = 0; k < block.kept.size(); ++k) w.b[block.row + k] = -values.drift[block.kept[k]];
+        if (values.has_A) continue;
+        fill_A(block, w.terms, values, w.A.data() + block.offset);
+        values.has_A = values.constant_A;
+    }
+}
+
+void scale_rows(const Program& p, Workspace& w) {
+    for (int i : w.rows.blocks) {
+        const Block& block = p.blocks[i];
+        scale_rows(p.mechanism, w.terms, block, w.A.data() + block.offset, w.B.data() + block.offset);
+    }
+}
+
+// x := R^-1 x, then x and the multipliers of Eq. (40) in scaled coordinates for rows that miss r = b - A a' or, given
+// x = 0, A a = r; x ends as an acceleration.
+static void constrained_solve(const Program& p, Workspace& w, VecX& x, const VecX& b, VecX& lam) {
+    solve_R(p.mechanism, w.terms, x);  // a_s' = R^-1 (F + C)
+    if (!w.rows.blocks.empty()) {
+        for (int i : w.rows.blocks) {
+            const Block& block = p.blocks[i];
+            multiply(block, w.B, x, w.r);
+            for (size_t k = 0; k < block.kept.size(); ++k) w.r[block.row + k] = b[block.row + k] - w.r[block.row + k];
+        }
+        solve_rows(p.layout, w.rows, w.r, lam);
+        for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.B, lam, x);  // Eq. (40), scaled
+    }
+    solve_Rt(p.mechanism, w.terms, x);
+}
+
+void solve_motion(const Program& p, Workspace& w, const VecX& force) {
+    w.a = force;
+    constrained_solve(p, w, w.a, w.b, w.lam);
+    if (w.rows.blocks.empty() || !w.rows.refine) return;
+    for (int pass = 0; pass < refinement_passes; ++pass) {  // what the equations still miss is solved for again
+        multiply_M(p.mechanism, w.terms, w.a, w.scaled);
+        w.scaled_free = force - w.scaled;
+        for (int i : w.rows.blocks) {
+            const Block& block = p.blocks[i];
+            add_transpose(block, w.A, w.lam, w.scaled_free);
+            multiply(block, w.A, w.a, w.r);
+            for (size_t k = 0; k < block.kept.size(); ++k) w.miss[block.row + k] = w.b[block.row + k] - w.r[block.row + k];
+        }
+        constrained_solve(p, w, w.scaled_free, w.miss, w.lam_step);
+        w.a += w.scaled_free;
+        w.lam += w.lam_step;
+    }
+}
+
+void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    ++w.evaluations;
+    kinematics(p.mechanism, w.terms, q, v);
+    inertia(p.mechanism, w.terms);
+    factor_mass(p, w, t);
+    w.F = -w.terms.nle;
+    if (p.driven || w.has_override) {
+        given_forces(p, w, t, w.terms.q, v);
+        w.F += w.tau + w.external;
+    }
+    if (!p.blocks.empty()) {
+        evaluate_rows(p, w, t, v);
+        if (!w.rows.blocks.empty()) {
+            scale_rows(p, w);
+            factor_rows(p.layout, p.blocks, w.B, w.rows);
+            ++w.factorizations;
+            w.rows.refine = w.terms.D.maxCoeff() > refined_pivot_ratio * w.terms.D.minCoeff();
+        }
+    }
+    if (!p.has_laws()) {
+        solve_motion(p, w, w.F);
+    } else {
+        smooth_laws(p, w, t, w.terms.q, v);
+        if (p.needs_reactions) {
+            solve_reactions(p, w, t, w.terms.q, v);
+        } else {
+            w.C = w.C_smooth;
+            w.trial = w.F + w.C;
+            solve_motion(p, w, w.trial);
+        }
+        // What sticks has no acceleration at all, not one that rounds to zero.
+        for (size_t e = 0; e < p.frictions.size(); ++e)
+            if (w.mode[e] == 0)
+                if (const auto* d = std::get_if<DofRows>(&p.blocks[p.frictions[e].block].kind))
+                    for (int k = 0; k < d->count; ++k) w.a[d->dof + k] = 0.0;
+    }
+    if (!w.a.allFinite()) throw Failure(Failure::Kind::not_finite, t);
+}
+
+// Residual of the dependent rows; the worst block, or -1 when all are met.
+static int contradicting_block(const Program& p, Workspace& w, double& worst) {
+    int found = -1;
+    double excess = 1.0;
+    const double reach = w.a.cwiseAbs().maxCoeff() + 1e-9;  // accelerations in play
+    for (int i : w.rows.blocks) {
+        const Block& block = p.blocks[i];
+        const int n = static_cast<int>(block.kept.size());
+        for (int k = 0; k < n; ++k) {
+            const int row = block.row + k;
+            if (!w.rows.wanted[row] || w.rows.active[row]) continue;
+            double sum = -w.b[row], size = std::abs(w.b[row]);
+            const double* A = w.A.data() + block.offset + k;
+            for (size_t l = 0; l < block.support.size(); ++l) {
+                const double term = A[l * n] * w.a[block.support[l]];
+                sum += term;
+                size += std::abs(term);
+            }
+            const double allowed = consistency_tolerance * (size + 1e-3 * reach);
+            if (std::abs(sum) > allowed * excess) {
+                excess = std::abs(sum) / allowed;
+                worst = sum;
+                found = i;
+            }
+        }
+    }
+    return found;
+}
+
+void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    evaluate(p, w, t, q, v);
+    if (w.rows.blocks.empty()) return;
+    double residual = 0.0;
+    const bool decided = !w.rows.orthogonal && (!w.rows.redundant || contradicting_block(p, w, residual) < 0);
+    if (decided) return;
+    decide_rows(p.layout, p.blocks, w.B, w.rows);
+    factor_rows(p.layout, p.blocks, w.B, w.rows);
+    ++w.factorizations;
+    w.trial = w.F + w.C;
+    if (p.needs_reactions) solve_reactions(p, w, t, w.terms.q, v);
+    else if (p.has_laws()) solve_motion(p, w, w.trial);
+    else solve_motion(p, w, w.F);
+    const int block = contradicting_block(p, w, residual);
+    if (block < 0) return;
+    // Name the contradicting block and those that share its dofs and carry the largest multipliers.
+    std::vector<int> blame{block};
+    double largest = -1.0;
+    int other = -1;
+    for (int i : w.rows.blocks) {
+        if (i == block) continue;
+        const double size = w.lam.segment(p.blocks[i].row, p.blocks[i].kept.size()).cwiseAbs().maxCoeff();
+        if (size > largest) { largest = size; other = i; }
+    }
+    if (other >= 0) blame.push_back(other);
+    throw Failure(Failure::Kind::inconsistent, t, blame, residual);
+}
+
+void share_multipliers(const Program& p, Workspace& w) {
+    w.lam_shared = w.lam;
+    if (!w.rows.redundant) return;
+    // A_dependent = W A_active; x + W^T y = lam with least |x|^2 + |y|^2 is y = (I + W W^T)^-1 W lam, x = lam - W^T y.
+    std::vector<int> dependent;
+    for (int r = 0; r < p.layout.rows; ++r)
+        if (w.rows.wanted[r] && !w.rows.active[r]) dependent.push_back(r);
+    const int d = static_cast<int>(dependent.size());
+    MatX W(d, p.layout.rows);
+    VecX column(p.mechanism.nv), unit = VecX::Zero(p.layout.rows), products(p.layout.rows), weights(p.layout.rows);
+    for (int k = 0; k < d; ++k) {
+        column.setZero();
+        products.setZero();
+        unit[dependent[k]] = 1.0;
+        for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.B, unit, column);
+        unit[dependent[k]] = 0.0;
+        for (int i : w.rows.blocks) multiply(p.blocks[i], w.B, column, products);
+        solve_rows(p.layout, w.rows, products, weights);
+        W.row(k) = weights.transpose();
+    }
+    const MatX S = MatX::Identity(d, d) + W * W.transpose();
+    const VecX y = S.ldlt().solve(W * w.lam);
+    w.lam_shared -= W.transpose() * y;
+    for (int k = 0; k < d; ++k) w.lam_shared[dependent[k]] = y[k];
+}
+
+static void to_user_rows(const Program& p, const VecX& kept, VecX& out) {
+    out = VecX::Zero(p.user_rows);
+    for (int i = 0; i < p.constraints; ++i) {
+        const Block& block = p.blocks[i];
+        for (size_t k = 0; k < block.kept.size(); ++k) out[block.user_row + block.kept[k]] = kept[block.row + k];
+    }
+}
+
+void split_forces(const Program& p, Workspace& w, Split& out) {
+    const int nv = p.mechanism.nv;
+    const VecX a = w.a, lam = w.lam;
+    share_multipliers(p, w);
+    to_user_rows(p, w.lam_shared, out.lam);
+    out.C = p.has_laws() ? w.C : VecX(VecX::Zero(nv));
+    VecX total = VecX::Zero(nv);
+    bool sticks = false;
+    for (size_t i = 0; i < p.blocks.size(); ++i) {
+        if (!w.rows.block_used[i]) continue;
+        const bool constraint = static_cast<int>(i) < p.constraints;
+        sticks |= !constraint;
+        add_transpose(p.blocks[i], w.A, w.lam_shared, constraint ? total : out.C);  // C holds what sticks as well
+    }
+    // Ideal part: the same rows without C and without what sticks.
+    const RowSystem saved = w.rows;
+    if (sticks) {
+        for (int r = 0; r < p.layout.rows; ++r)
+            if (r >= p.blocks[p.constraints].row) w.rows.wanted[r] = 0;
+        w.rows.use_wanted(p.blocks);
+        if (!w.rows.blocks.empty()) {
+            scale_rows(p, w);
+            decide_rows(p.layout, p.blocks, w.B, w.rows);
+            factor_rows(p.layout, p.blocks, w.B, w.rows);
+        }
+    }
+    if (p.has_laws()) solve_motion(p, w, w.F);
+    share_multipliers(p, w);
+    out.F_ideal = VecX::Zero(nv);
+    for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.A, w.lam_shared, out.F_ideal);
+    if (w.rows.blocks.empty()) w.lam_shared.setZero();
+    to_user_rows(p, w.lam_shared, out.lam_ideal);
+    out.F_nonideal = total - out.F_ideal + out.C;  // Eq. (39)
+    w.rows = saved;
+    if (sticks) scale_rows(p, w);
+    w.a = a;
+    w.lam = lam;
+}
+
+void violations(const Program& p, const Workspace& w, double& position, double& velocity) {
+    position = velocity = 0.0;
+    for (int i = 0; i < p.constraints; ++i) {
+        const RowValues& values = w.values[i];
+        for (int k = 0; k < values.rows; ++k) {
+            position = std::max(position, std::abs(values.residual[k]));
+            velocity = std::max(velocity, std::abs(values.rate[k]));
+        }
+    }
+}
+
+}  // namespace pn

@@ -1,0 +1,209 @@
+#include "integrators.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "tableaux.hpp"
+
+namespace pn {
+
+Method method_named(const std::string& name) {
+    using K = Method::Kind;
+    namespace tb = tableau;
+    if (name == "dop853") return {K::dop853, 12, 8, true, tb::dop853_A, tb::dop853_B, tb::dop853_C};
+    if (name == "dopri5") return {K::dopri5, 6, 5, true, tb::dopri5_A, tb::dopri5_B, tb::dopri5_C};
+    if (name == "rk4") return {K::rk4, 4, 4, false, tb::rk4_A, tb::rk4_B, tb::rk4_C};
+    if (name == "semi_implicit_euler") return {K::semi_implicit_euler, 1, 1, false, nullptr, nullptr, nullptr};
+    if (name == "moreau") return {K::moreau, 1, 1, false, nullptr, nullptr, nullptr};
+    throw std::invalid_argument("unknown method " + name);
+}
+
+System::System(const Program& program, Workspace& workspace, bool with_energy)
+    : p(program), w(workspace), energy(with_energy), nq(p.mechanism.nq), nv(p.mechanism.nv), nz(p.states),
+      nw(with_energy ? 3 + static_cast<int>(p.law_names.size()) : 0), ny(nq + nv + nz + nw),
+      q_buffer(VecX::Zero(nq)), v_buffer(VecX::Zero(nv)) {}
+
+void System::derivative(double t, const VecX& y, VecX& dy) {
+    q_buffer = y.head(nq);
+    v_buffer = y.segment(nq, nv);
+    if (nz > 0) w.z = y.segment(nq + nv, nz);
+    evaluate(p, w, t, q_buffer, v_buffer);
+    collect(y, dy);
+}
+
+void System::collect(const VecX& y, VecX& dy) {
+    configuration_rate(p.mechanism, y.data(), y.data() + nq, dy.data());
+    dy.segment(nq, nv) = w.a;
+    if (nz > 0) dy.segment(nq + nv, nz) = w.dz;
+    if (energy) {
+        v_buffer = y.segment(nq, nv);
+        powers(p, w, v_buffer, dy.data() + nq + nv + nz);
+    }
+}
+
+void powers(const Program& p, Workspace& w, const VecX& v, double* out) {
+    out[0] = p.driven ? v.dot(w.tau) : 0.0;
+    out[1] = p.driven ? v.dot(w.external) : 0.0;
+    out[2] = 0.0;
+    if (!w.rows.blocks.empty()) {
+        w.work.setZero();
+        for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.A, w.lam, w.work);
+        out[2] = v.dot(w.work);
+    }
+    if (!p.has_laws()) return;
+    law_forces(p, w, v);
+    for (size_t l = 0; l < p.law_names.size(); ++l) out[3 + l] = v.dot(w.law_force[l]);
+}
+
+Stepper::Stepper(const Method& m, System& s) : method(m), system(s) {
+    const int stages = m.kind == Method::Kind::dop853 ? 16 : std::max(m.stages, 1);
+    K.assign(stages, VecX::Zero(s.ny));
+    for (VecX* x : {&y0, &y1, &stage, &error5, &error3, &f1, &probe_, &probe_rate_}) *x = VecX::Zero(s.ny);
+    tangent = VecX::Zero(2 * s.nv + s.nz);
+    scale_ = tangent;
+    dense.assign(m.kind == Method::Kind::dop853 ? 7 : 4, VecX::Zero(s.ny));
+}
+
+void Stepper::step(double t, double size) {
+    t0 = t;
+    h = size;
+    has_dense = false;
+    if (method.kind == Method::Kind::semi_implicit_euler) {
+        // v1 = v0 + h a(q0, v0), q1 = q0 moved by h v1; z and work by Euler's rule.
+        const int nq = system.nq, nv = system.nv;
+        y1 = y0 + h * K[0];
+        system.v_buffer = h * y1.segment(nq, nv);
+        retract(system.p.mechanism, y0.data(), system.v_buffer.data(), y1.data());
+        return;
+    }
+    const double* a = method.A;
+    for (int i = 1; i < method.stages; ++i) {
+        stage = y0;
+        for (int j = 0; j < i; ++j, ++a)
+            if (*a != 0.0) stage += (h * *a) * K[j];
+        system.derivative(t + method.C[i] * h, stage, K[i]);
+    }
+    y1 = y0;
+    for (int j = 0; j < method.stages; ++j)
+        if (method.B[j] != 0.0) y1 += (h * method.B[j]) * K[j];
+    normalize(system.p.mechanism, y1.data());
+}
+
+void Stepper::magnitude(const VecX& y, VecX& out) const {
+    for (const Chart& c : system.p.mechanism.charts) {
+        const int turning = c.kind == Chart::Kind::pose ? 3 : c.kind == Chart::Kind::plane ? 2 : 0;
+        const int n = c.kind == Chart::Kind::vector ? c.n : c.kind == Chart::Kind::pose ? 6
+                      : c.kind == Chart::Kind::circle ? 1 : 3;
+        for (int k = 0; k < n; ++k) {  // an angle of a rotation counts as one radian
+            const bool plain = c.kind == Chart::Kind::vector || k < turning;
+            out[c.iv + k] = std::max(out[c.iv + k], plain ? std::abs(y[c.iq + k]) : 1.0);
+        }
+    }
+    const int nq = system.nq, nv = system.nv;
+    for (int k = 0; k < nv + system.nz; ++k) out[nv + k] = std::max(out[nv + k], std::abs(y[nq + k]));
+}
+
+double Stepper::norm(const VecX& dy, const VecX& scale, const VecX& y) {
+    const int nq = system.nq, nv = system.nv, n = 2 * nv + system.nz;
+    ambient_to_tangent(system.p.mechanism, y.data(), dy.data(), tangent.data());
+    tangent.segment(nv, nv + system.nz) = dy.segment(nq, nv + system.nz);
+    double sum = 0.0;
+    for (int k = 0; k < n; ++k) {
+        const double x = tangent[k] / scale[k];
+        sum += x * x;
+    }
+    return std::sqrt(sum / n);
+}
+
+double Stepper::error_norm(double rtol, const VecX& atol) {
+    scale_.setZero();
+    magnitude(y0, scale_);
+    magnitude(y1, scale_);
+    scale_ = atol + rtol * scale_;
+    error5.setZero();
+    if (method.kind == Method::Kind::dopri5) {
+        for (int j = 0; j < 6; ++j) error5 += (h * tableau::dopri5_E[j]) * K[j];
+        error5 += (h * tableau::dopri5_E[6]) * f1;
+        return norm(error5, scale_, y0);
+    }
+    error3.setZero();
+    for (int j = 0; j < 12; ++j) {
+        if (tableau::dop853_E5[j] != 0.0) error5 += tableau::dop853_E5[j] * K[j];
+        if (tableau::dop853_E3[j] != 0.0) error3 += tableau::dop853_E3[j] * K[j];
+    }
+    const double e5 = norm(error5, scale_, y0), e3 = norm(error3, scale_, y0);
+    if (e5 == 0.0 && e3 == 0.0) return 0.0;
+    return std::abs(h) * e5 * e5 / std::sqrt(e5 * e5 + 0.01 * e3 * e3);
+}
+
+void Stepper::make_dense() {
+    if (has_dense) return;
+    has_dense = true;
+    const VecX delta = y1 - y0;
+    if (method.kind == Method::Kind::dop853) {
+        const double* a = tableau::dop853_A_dense;
+        K[12] = f1;
+        for (int i = 0; i < 3; ++i) {
+            stage = y0;
+            for (int j = 0; j < 13 + i; ++j, ++a)
+                if (*a != 0.0) stage += (h * *a) * K[j];
+            system.derivative(t0 + tableau::dop853_C_dense[i] * h, stage, K[13 + i]);
+        }
+        dense[0] = delta;
+        dense[1] = h * K[0] - delta;
+        dense[2] = 2.0 * delta - h * (f1 + K[0]);
+        for (int i = 0; i < 4; ++i) {
+            dense[3 + i].setZero();
+            for (int j = 0; j < 16; ++j) dense[3 + i] += (h * tableau::dop853_D[16 * i + j]) * K[j];
+        }
+        return;
+    }
+    if (method.kind == Method::Kind::dopri5) {
+        for (int i = 0; i < 4; ++i) {
+            dense[i] = (h * tableau::dopri5_P[4 * 6 + i]) * f1;
+            for (int j = 0; j < 6; ++j) dense[i] += (h * tableau::dopri5_P[4 * j + i]) * K[j];
+        }
+        return;
+    }
+    dense[0] = delta;  // cubic through both ends and their rates
+    dense[1] = h * K[0] - delta;
+    dense[2] = 2.0 * delta - h * (f1 + K[0]);
+}
+
+void Stepper::interpolate(double s, VecX& y) const {
+    if (method.kind == Method::Kind::dopri5) {
+        y = y0 + s * (dense[0] + s * (dense[1] + s * (dense[2] + s * dense[3])));
+    } else {
+        const int n = method.kind == Method::Kind::dop853 ? 7 : 3;
+        y.setZero();
+        for (int i = n - 1; i >= 0; --i) {  // ((...) (1 - s)) s, alternating from the last coefficient
+            y += dense[i];
+            y *= i % 2 == 0 ? s : 1.0 - s;
+        }
+        y += y0;
+    }
+    normalize(system.p.mechanism, y.data());
+}
+
+double Stepper::initial_step(double t, const VecX& y, double rtol, const VecX& atol, double limit) {
+    scale_.setZero();
+    magnitude(y, scale_);
+    scale_ = atol + rtol * scale_;
+    VecX plain = y;
+    for (const Chart& c : system.p.mechanism.charts)
+        if (c.kind != Chart::Kind::vector) plain.segment(c.iq, 1).setZero();
+    const double d0 = norm(plain, scale_, y), d1 = norm(K[0], scale_, y);
+    double h0 = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1;
+    h0 = std::min(h0, limit);
+    probe_ = y + h0 * K[0];
+    normalize(system.p.mechanism, probe_.data());
+    system.derivative(t + h0, probe_, probe_rate_);
+    probe_rate_ -= K[0];
+    const double d2 = norm(probe_rate_, scale_, y) / h0;
+    const double top = std::max(d1, d2);
+    const double h1 = top <= 1e-15 ? std::max(1e-6, h0 * 1e-3) : std::pow(0.01 / top, 1.0 / method.order);
+    return std::min({100.0 * h0, h1, limit});
+}
+
+}  // namespace pn

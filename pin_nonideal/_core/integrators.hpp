@@ -1,0 +1,69 @@
+// Explicit Runge-Kutta methods as data, and one stepping routine on the flat state y = (q, v, z, work).
+//
+// q is integrated in ambient coordinates (a quaternion as four numbers): the right-hand side extends smoothly off the
+// unit sphere, so the order is kept, and lengths are restored at the step's end.
+#pragma once
+
+#include <string>
+
+#include "program.hpp"
+
+namespace pn {
+
+struct Method {
+    enum class Kind { dop853, dopri5, rk4, semi_implicit_euler, moreau } kind;
+    int stages = 0, order = 0;
+    bool adaptive = false;
+    const double *A = nullptr, *B = nullptr, *C = nullptr;
+};
+
+Method method_named(const std::string& name);
+
+// The right-hand side of y' = f(t, y) and its storage.
+struct System {
+    const Program& p;
+    Workspace& w;
+    bool energy = false;  // integrate the powers of the ledger
+    int nq, nv, nz, nw, ny;
+
+    System(const Program& program, Workspace& workspace, bool with_energy);
+    void derivative(double t, const VecX& y, VecX& dy);
+    // dy from the evaluation that the workspace holds.
+    void collect(const VecX& y, VecX& dy);
+    auto q(VecX& y) const { return y.head(nq); }
+    auto v(VecX& y) const { return y.segment(nq, nv); }
+
+    VecX q_buffer, v_buffer;
+};
+
+// Power of actuation, given forces, constraints, and each law, at the evaluation in the workspace.
+void powers(const Program& p, Workspace& w, const VecX& v, double* out);
+
+struct Stepper {
+    Method method;
+    System& system;
+    std::vector<VecX> K;  // stage derivatives; K[0] at the step's start
+    VecX y0, y1, stage, error5, error3, tangent;
+    std::vector<VecX> dense;  // coefficients of the interpolant
+    VecX f1;                  // derivative at the step's end
+    double t0 = 0.0, h = 0.0;
+    bool has_dense = false;
+    Stepper(const Method& m, System& s);
+
+    // y1 = one step of size h from (t0, y0); K[0] must hold the derivative there.
+    void step(double t, double size);
+    // Norm of the error estimate, 1 at the tolerance.
+    double error_norm(double rtol, const VecX& atol);
+    // Interpolant over the step; needs f1 for all methods. Leaves the workspace at other states.
+    void make_dense();
+    void interpolate(double theta, VecX& y) const;
+    double initial_step(double t, const VecX& y, double rtol, const VecX& atol, double limit);
+
+private:
+    // Largest size so far of each tangent coordinate, velocity and state.
+    void magnitude(const VecX& y, VecX& out) const;
+    double norm(const VecX& dy, const VecX& scale, const VecX& y);
+    VecX scale_, probe_, probe_rate_;
+};
+
+}  // namespace pn

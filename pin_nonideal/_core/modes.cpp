@@ -1,0 +1,279 @@
+#include "modes.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+
+namespace pn {
+
+namespace {
+
+constexpr int outer_limit = 100;          // of limits that depend on the load
+constexpr double limit_tolerance = 1e-12; // relative change of the limits at which the outer iteration ends
+constexpr double slack = 1e-9;            // part of the limit by which a mode may miss its condition by rounding
+
+// Free elements F solve W_FF f_F = -(alpha0 + W_FB f_B)_F with least norm.
+void solve_free(const MatX& W, const VecX& alpha0, const std::vector<char>& is_free, VecX& f) {
+    std::vector<int> list;
+    for (int i = 0; i < f.size(); ++i)
+        if (is_free[i]) list.push_back(i);
+    const int n = static_cast<int>(list.size());
+    if (n == 0) return;
+    MatX WF(n, n);
+    VecX r(n);
+    for (int i = 0; i < n; ++i) {
+        r[i] = -alpha0[list[i]];
+        for (int j = 0; j < f.size(); ++j)
+            if (!is_free[j]) r[i] -= W(list[i], j) * f[j];
+        for (int j = 0; j < n; ++j) WF(i, j) = W(list[i], list[j]);
+    }
+    Eigen::CompleteOrthogonalDecomposition<MatX> cod(n, n);
+    cod.setThreshold(1e-11);
+    cod.compute(WF);
+    const VecX x = cod.solve(r);
+    for (int i = 0; i < n; ++i) f[list[i]] = x[i];
+}
+
+// One direction each: block principal pivoting, single (least index) once it fails to make progress.
+VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s) {
+    const int n = static_cast<int>(s.size());
+    VecX f = VecX::Zero(n);
+    std::vector<char> is_free(n, 1);
+    int fewest = n + 1, patience = 10;
+    for (int it = 0; it < 200 + 50 * n; ++it) {
+        solve_free(W, alpha0, is_free, f);
+        const VecX alpha = alpha0 + W * f;
+        const double size = alpha0.cwiseAbs().maxCoeff() + (W * f.cwiseAbs()).cwiseAbs().maxCoeff();
+        std::vector<int> wrong;
+        for (int i = 0; i < n; ++i) {
+            const bool outside = is_free[i] && std::abs(f[i]) > s[i] * (1.0 + 1e-13);
+            const bool drives = !is_free[i] && alpha[i] * f[i] > 1e-13 * size * std::abs(f[i]);
+            if (outside || drives) wrong.push_back(i);
+        }
+        if (wrong.empty()) return f;
+        if (static_cast<int>(wrong.size()) < fewest) {
+            fewest = static_cast<int>(wrong.size());
+            patience = 10;
+        } else if (--patience < 0) {
+            wrong.assign(1, wrong.back());
+        }
+        for (int i : wrong) {
+            if (is_free[i]) f[i] = f[i] > 0.0 ? s[i] : -s[i];
+            is_free[i] = !is_free[i];
+        }
+    }
+    return f;
+}
+
+// Disks and balls: block Gauss-Seidel, each block by its own radius; converges linearly.
+VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s) {
+    const int n = static_cast<int>(alpha0.size());
+    VecX f = VecX::Zero(n);
+    for (int sweep = 0; sweep < 20000; ++sweep) {
+        double change = 0.0, size = 0.0;
+        for (int e = 0, at = 0; e < static_cast<int>(dims.size()); at += dims[e], ++e) {
+            const int d = dims[e];
+            const MatX D = W.block(at, at, d, d);
+            const VecX old = f.segment(at, d);
+            const VecX r = alpha0.segment(at, d) + W.middleRows(at, d) * f - D * old;
+            // min x^T D x / 2 + r^T x in |x| <= s: x = -(D + m I)^-1 r with the least m >= 0.
+            Eigen::SelfAdjointEigenSolver<MatX> eigen(D);
+            const VecX c = eigen.eigenvectors().transpose() * r, l = eigen.eigenvalues();
+            const double tiny = 1e-14 * std::max(l.cwiseAbs().maxCoeff(), 1e-300);
+            const auto length = [&](double m) {
+                double sum = 0.0;
+                for (int k = 0; k < d; ++k) {
+                    const double x = c[k] / std::max(l[k] + m, tiny);
+                    sum += x * x;
+                }
+                return std::sqrt(sum);
+            };
+            double m = 0.0;
+            if (length(0.0) > s[e]) {
+                double low = 0.0, high = s[e] > 0.0 ? c.norm() / s[e] + l.cwiseAbs().maxCoeff() : 0.0;
+                for (int k = 0; k < 200 && high - low > 1e-16 * high; ++k) {
+                    m = 0.5 * (low + high);
+                    (length(m) > s[e] ? low : high) = m;
+                }
+            }
+            VecX x = VecX::Zero(d);
+            if (s[e] > 0.0) {
+                for (int k = 0; k < d; ++k) x -= (c[k] / std::max(l[k] + m, tiny)) * eigen.eigenvectors().col(k);
+            }
+            change = std::max(change, (x - old).cwiseAbs().maxCoeff());
+            size = std::max(size, x.cwiseAbs().maxCoeff());
+            f.segment(at, d) = x;
+        }
+        if (change <= 1e-14 * size) break;
+    }
+    return f;
+}
+
+struct Candidates {
+    const Program& p;
+    Workspace& w;
+    double t;
+    const VecX &q, &v;
+    const std::vector<int>& list;
+    std::vector<int> dims;
+    int rows = 0;
+
+    Candidates(const Program& program, Workspace& ws, double time, const VecX& qq, const VecX& vv,
+               const std::vector<int>& elements)
+        : p(program), w(ws), t(time), q(qq), v(vv), list(elements) {
+        for (int e : list) {
+            dims.push_back(p.frictions[e].dim);
+            rows += dims.back();
+        }
+    }
+
+    const Block& block(int e) const { return p.blocks[p.frictions[e].block]; }
+
+    // Slip accelerations of the evaluation at hand.
+    VecX accelerations() const {
+        VecX alpha(rows);
+        int at = 0;
+        for (int e : list) {
+            const Block& b = block(e);
+            multiply(b, w.A, w.a, w.r);
+            for (size_t k = 0; k < b.kept.size(); ++k) alpha[at++] = w.r[b.row + k] - w.b[b.row + k];
+        }
+        return alpha;
+    }
+
+    // W: slip accelerations per unit of each friction force, after the ideal rows.
+    MatX responses() {
+        MatX W(rows, rows);
+        VecX force(p.mechanism.nv), unit = VecX::Zero(p.layout.rows);
+        const VecX b = w.b;
+        w.b.setZero();
+        int column = 0;
+        for (int e : list) {
+            const Block& from = block(e);
+            for (size_t k = 0; k < from.kept.size(); ++k, ++column) {
+                force.setZero();
+                unit[from.row + k] = 1.0;
+                add_transpose(from, w.A, unit, force);
+                unit[from.row + k] = 0.0;
+                solve_motion(p, w, force);
+                W.col(column) = accelerations();
+            }
+        }
+        w.b = b;
+        return 0.5 * (W + W.transpose());
+    }
+
+    void apply_modes(const std::vector<signed char>& modes) {
+        for (size_t i = 0; i < list.size(); ++i) w.mode[list[i]] = modes[i];
+        want_rows(p, w);
+        w.warm = false;
+        begin_step(p, w, t, q, v);
+    }
+
+    // Modes that the forces f of the program mean: what is below its limit sticks.
+    std::vector<signed char> modes_of(const VecX& f, const VecX& alpha, const VecX& limits, double size) {
+        std::vector<signed char> modes(list.size(), sticking);
+        for (size_t i = 0, at = 0; i < list.size(); at += dims[i], ++i) {
+            const auto fe = f.segment(at, dims[i]);
+            const auto ae = alpha.segment(at, dims[i]);
+            if (fe.norm() < limits[i] * (1.0 - 1e-13) || ae.norm() <= 1e-12 * size) continue;
+            if (dims[i] == 1) {
+                modes[i] = ae[0] > 0.0 ? 1 : -1;
+            } else {
+                modes[i] = 1;
+                Vec3 d = Vec3::Zero();
+                d.head(dims[i]) = ae.normalized();
+                w.slip_direction[list[i]] = d;
+            }
+        }
+        return modes;
+    }
+};
+
+}  // namespace
+
+VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& limits) {
+    if (alpha0.size() == 0) return VecX::Zero(0);
+    if (std::all_of(dims.begin(), dims.end(), [](int d) { return d == 1; })) return box_program(W, alpha0, limits);
+    return ball_program(W, alpha0, dims, limits);
+}
+
+Vec3 friction_force(const Program& p, const Workspace& w, int e) {
+    const Friction& f = p.frictions[e];
+    if (w.mode[e] != sticking) return w.slip_force[e];
+    Vec3 force = Vec3::Zero();
+    for (int k = 0; k < f.dim; ++k) force[k] = w.lam[p.blocks[f.block].row + k];
+    return force;
+}
+
+double static_limit(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
+    const Friction& f = p.frictions[e];
+    if (f.reaction == Reaction::total) w.load[e] = load_limit(p, w, f, t, q, v);
+    return w.load[e] * f.static_ratio;
+}
+
+bool at_rest(const Program& p, const Workspace& w, int e, const VecX& v) {
+    if (w.mode[e] == sticking) return true;
+    const Friction& f = p.frictions[e];
+    const RowValues& values = w.values[f.block];
+    double square = 0.0;
+    for (int k = 0; k < f.dim; ++k) square += values.rate[k] * values.rate[k];
+    return std::sqrt(square) <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
+}
+
+void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                   const std::vector<int>& candidates) {
+    Candidates c(p, w, t, q, v, candidates);
+    if (candidates.empty()) {
+        want_rows(p, w);
+        begin_step(p, w, t, q, v);
+        return;
+    }
+    // Without any friction of the candidates: alpha0, W, and first limits from the load there.
+    c.apply_modes(std::vector<signed char>(candidates.size(), unloaded));
+    VecX alpha0 = c.accelerations();
+    VecX limits(candidates.size());
+    for (size_t i = 0; i < candidates.size(); ++i) limits[i] = static_limit(p, w, candidates[i], t, q, v);
+    const MatX W = c.responses();
+    std::vector<signed char> modes(candidates.size(), unloaded);
+    double change = 0.0;
+    for (int it = 0; it < outer_limit; ++it) {
+        const VecX f = friction_program(W, alpha0, c.dims, limits);
+        const VecX alpha = alpha0 + W * f;
+        const double size = alpha0.cwiseAbs().maxCoeff() + 1e-300;
+        const auto next = c.modes_of(f, alpha, limits, size);
+        const bool same = next == modes;
+        modes = next;
+        c.apply_modes(modes);
+        // The motion with these modes: does everything keep its condition?
+        const VecX actual = c.accelerations();
+        VecX forces(c.rows), loads(candidates.size());
+        bool consistent = true;
+        for (size_t i = 0, at = 0; i < candidates.size(); at += c.dims[i], ++i) {
+            const int e = candidates[i];
+            const Vec3 fe = friction_force(p, w, e);
+            forces.segment(at, c.dims[i]) = fe.head(c.dims[i]);
+            loads[i] = static_limit(p, w, e, t, q, v);
+            if (modes[i] == sticking) {
+                consistent &= fe.norm() <= loads[i] * (1.0 + slack) + 1e-300;
+            } else {
+                const double along = c.dims[i] == 1 ? modes[i] * actual[at]
+                    : actual.segment(at, c.dims[i]).dot(w.slip_direction[e].head(c.dims[i]));
+                consistent &= along >= -1e-9 * size;
+                // What slips feels kinetic friction from now on.
+                loads[i] = w.limit[e];
+            }
+        }
+        change = 0.0;
+        for (int i = 0; i < loads.size(); ++i)
+            change = std::max(change, std::abs(loads[i] - limits[i]) / std::max(loads[i], 1e-300));
+        if (consistent && (same || change <= limit_tolerance || !p.needs_reactions)) return;
+        alpha0 = actual - W * forces;
+        limits = loads;
+    }
+    throw Failure(Failure::Kind::paradox, t, candidates, change);
+}
+
+}  // namespace pn

@@ -1,0 +1,37 @@
+// Stick and slip. With the forces f of all elements at rest as unknowns, their slip accelerations are
+// alpha = alpha0 + W f, W the Delassus matrix of their directions after the constraints. f opposes slip within its
+// limits: |f| <= s, and f = -s alpha / |alpha| where alpha is not zero. For given limits this is a convex program in a
+// box (a disk or ball for elements of several directions), solved for all elements at once; limits that depend on the
+// load wrap it in an outer iteration.
+#pragma once
+
+#include "program.hpp"
+
+namespace pn {
+
+// Slip slower than this part of the scene's speed is rest: rounding of the located event.
+constexpr double rest_speed = 1e-11;
+
+struct ModeChange {
+    int element;
+    signed char before, after;
+};
+
+// min f^T W f / 2 + alpha0^T f with |f_e| <= s_e: f for elements whose directions lie one after the other (dims[e]
+// rows each). Exact (principal pivoting) for elements of one direction.
+VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& limits);
+
+// Finds the modes of the candidate elements together, at rest along their directions; the workspace ends evaluated
+// there with the new modes.
+void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                   const std::vector<int>& candidates);
+
+// Friction force of an element in the evaluation at hand: the multiplier of what sticks, the law's force of what slips.
+Vec3 friction_force(const Program& p, const Workspace& w, int element);
+// Largest force with which an element can stick now.
+double static_limit(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
+
+// Elements at rest at (q, v), as far as their slip speeds tell (rows must be evaluated).
+bool at_rest(const Program& p, const Workspace& w, int element, const VecX& v);
+
+}  // namespace pn

@@ -1,0 +1,91 @@
+#include "projection.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pn {
+
+namespace {
+
+// x := R^-T B^T (B B^T)^-1 r, the least move in the metric of M that changes A x by r.
+void least_move(const Program& p, Workspace& w, VecX& x) {
+    solve_rows(p.layout, w.rows, w.r, w.lam);
+    x.setZero();
+    for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.B, w.lam, x);
+    solve_Rt(p.mechanism, w.terms, x);
+}
+
+void refactor(const Program& p, Workspace& w, double t) {
+    inertia(p.mechanism, w.terms);
+    factor_mass(p, w, t);
+    scale_rows(p, w);
+    factor_rows(p.layout, p.blocks, w.B, w.rows);
+    ++w.factorizations;
+}
+
+// Negative residuals or rates of the rows in use; returns the largest.
+double gather(const Program& p, Workspace& w, bool position) {
+    double largest = 0.0;
+    for (int i : w.rows.blocks) {
+        const Block& block = p.blocks[i];
+        const RowValues& values = w.values[i];
+        for (size_t k = 0; k < block.kept.size(); ++k) {
+            const double x = position ? values.residual[block.kept[k]] : values.rate[block.kept[k]];
+            w.r[block.row + k] = -x;
+            if (w.rows.active[block.row + k]) largest = std::max(largest, std::abs(x));
+        }
+    }
+    return largest;
+}
+
+void look(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    kinematics(p.mechanism, w.terms, q, v);
+    evaluate_rows(p, w, t, v);
+}
+
+}  // namespace
+
+double scene_size(const Workspace& w) {
+    double square = 1.0;
+    for (const Body& b : w.terms.body) square = std::max(square, (b.ref + b.p).squaredNorm());
+    return std::sqrt(square);
+}
+
+bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
+    if (w.rows.blocks.empty()) return false;
+    look(p, w, t, q, v);
+    const double floor = projection_floor * scene_size(w);
+    bool moved = false;
+    double last = gather(p, w, true);
+    for (int it = 0; it < projection_limit && last > floor; ++it) {
+        least_move(p, w, w.scaled);
+        w.trial = w.scaled;
+        retract(p.mechanism, q.data(), w.trial.data(), q.data());
+        moved = true;
+        look(p, w, t, q, v);
+        const double now = gather(p, w, true);
+        if (!(now < 0.1 * last) && now > floor) refactor(p, w, t);
+        if (it > 3 && now > 0.5 * last) break;  // as good as rounding allows
+        last = now;
+    }
+    const double speed = std::max(1.0, v.cwiseAbs().maxCoeff());
+    last = gather(p, w, false);
+    for (int it = 0; it < projection_limit && last > projection_floor * speed; ++it) {
+        least_move(p, w, w.scaled);
+        v += w.scaled;
+        moved = true;
+        look(p, w, t, q, v);
+        const double now = gather(p, w, false);
+        if (!(now < 0.1 * last)) refactor(p, w, t);
+        if (it > 1 && now > 0.5 * last) break;
+        last = now;
+    }
+    for (size_t e = 0; e < p.frictions.size(); ++e)  // what sticks has exactly no velocity
+        if (w.mode[e] == sticking)
+            if (const auto* d = std::get_if<DofRows>(&p.blocks[p.frictions[e].block].kind))
+                for (int k = 0; k < d->count; ++k) v[d->dof + k] = 0.0;
+    if (moved) ++w.projections;
+    return moved;
+}
+
+}  // namespace pn

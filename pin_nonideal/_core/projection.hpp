@@ -1,0 +1,20 @@
+// Back onto the constraints after a step: phi(q, t) = 0 by Newton's method and A v + phi_t = 0 by one solve, both in
+// the metric of M, with the factors of the step's last evaluation.
+#pragma once
+
+#include "program.hpp"
+
+namespace pn {
+
+// Residuals below this part of the scene's size are rounding: a few hundred operations of unit roundoff.
+constexpr double projection_floor = 2e-14;
+constexpr int projection_limit = 12;
+
+// Moves q and v; returns false when nothing had to move. The workspace must hold factors near (t, q); afterwards its
+// rows are those of the new state, its factors are not.
+bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
+
+// Size of the scene: the largest distance of a body from the world's origin, at least 1 m.
+double scene_size(const Workspace& w);
+
+}  // namespace pn

@@ -1,0 +1,228 @@
+#include "simulation.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pn {
+
+namespace {
+
+constexpr double safety = 0.9, shrink_limit = 0.2, growth_limit = 10.0;
+
+}  // namespace
+
+Simulation::Simulation(const Program& program, Workspace& workspace, const Options& options, Recording& recording)
+    : p(program), w(workspace), o(options), out(recording), system(program, workspace, options.record.energy),
+      stepper(options.method, system), recorder(system, options.record, recording) {
+    t_end = o.t0 + o.duration;
+    for (VecX* x : {&y, &derivative, &probe_, &probe_rate_}) *x = VecX::Zero(system.ny);
+    q_ = VecX::Zero(system.nq);
+    v_ = VecX::Zero(system.nv);
+    pulls.assign(p.frictions.size(), 0);
+    indeterminate.assign(p.frictions.size(), 0);
+}
+
+void Simulation::tick(double now) {
+    if (o.tick && (++ticks & 15) == 0) o.tick(now);
+}
+
+// --- Actuation and stops ------------------------------------------------------------------------------------------
+
+void Simulation::sample_control(double now) {
+    const auto* sampled = std::get_if<SampledTorque>(&p.actuation);
+    if (!sampled || w.has_override) return;
+    if (w.has_held && now < o.t0 + next_period * sampled->period) return;
+    q_ = y.head(system.nq);
+    v_ = y.segment(system.nq, system.nv);
+    sampled->function(now, q_, v_, w.held_torque);
+    w.has_held = true;
+    next_period = static_cast<long>(std::floor((now - o.t0) / sampled->period * (1.0 + 1e-14) + 1e-9)) + 1;
+    // The torque jumps here: the derivative is taken anew.
+    begin_step(p, w, now, q_, v_);
+    system.collect(y, derivative);
+}
+
+double Simulation::next_stop(double now) const {
+    double stop = t_end;
+    if (const auto* sampled = std::get_if<SampledTorque>(&p.actuation))
+        stop = std::min(stop, o.t0 + next_period * sampled->period);
+    if (const auto* table = std::get_if<TorqueTable>(&p.actuation)) {
+        const auto next = std::upper_bound(table->times.begin(), table->times.end(), now);
+        if (next != table->times.end()) stop = std::min(stop, *next);
+    }
+    return stop;
+}
+
+// --- Samples --------------------------------------------------------------------------------------------------------
+
+void Simulation::emit(double at, const VecX& state, bool evaluated) {
+    if (!out.t.empty() && at <= out.t.back()) return;
+    recorder.sample(at, state, evaluated);
+}
+
+// Samples of the output grid before t_now, from the interpolant of the last step.
+void Simulation::emit_between(double t_now) {
+    while (o.output_dt > 0.0 && next_sample < t_now - 1e-12 * std::max(1.0, std::abs(t_now))) {
+        stepper.make_dense();
+        stepper.interpolate((next_sample - stepper.t0) / stepper.h, probe_);
+        q_ = probe_.head(system.nq);
+        v_ = probe_.segment(system.nq, system.nv);
+        if (!w.rows.blocks.empty()) {
+            project(p, w, next_sample, q_, v_);
+            probe_.head(system.nq) = q_;
+            probe_.segment(system.nq, system.nv) = v_;
+        }
+        emit(next_sample, probe_, false);
+        next_sample = o.t0 + ++samples * o.output_dt;
+    }
+}
+
+// --- Steps ----------------------------------------------------------------------------------------------------------
+
+double Simulation::energy_at(const VecX& state) {
+    q_ = state.head(system.nq);
+    v_ = state.segment(system.nq, system.nv);
+    kinematics(p.mechanism, w.terms, q_, v_);
+    inertia(p.mechanism, w.terms);
+    return kinetic_energy(p.mechanism, w.terms, v_) + potential_energy(p.mechanism, w.terms);
+}
+
+void Simulation::settle(double at, VecX& state, VecX& rate) {
+    double before = 0.0;
+    if (o.record.energy && !w.rows.blocks.empty()) before = energy_at(state);
+    q_ = state.head(system.nq);
+    v_ = state.segment(system.nq, system.nv);
+    if (system.nz > 0) w.z = state.segment(system.nq + system.nv, system.nz);
+    const bool moved = project(p, w, at, q_, v_);
+    state.head(system.nq) = q_;
+    state.segment(system.nq, system.nv) = v_;
+    begin_step(p, w, at, q_, v_);
+    system.collect(state, rate);
+    if (moved && o.record.energy)
+        pending_energy = kinetic_energy(p.mechanism, w.terms, v_) + potential_energy(p.mechanism, w.terms) - before;
+    else pending_energy = 0.0;
+}
+
+void Simulation::start(const VecX& q0, const VecX& v0) {
+    t = o.t0;
+    y.setZero();
+    y.head(system.nq) = q0;
+    y.segment(system.nq, system.nv) = v0;
+    if (system.nz > 0) y.segment(system.nq + system.nv, system.nz) = w.z;
+    next_sample = o.t0 + o.output_dt;
+    samples = 1;
+    w.has_held = false;
+    w.warm = false;
+    next_period = 0;
+    sample_control(t);
+    switch_modes(t, y, -1);
+    out.events.clear();
+    emit(t, y, true);
+    report_pulls(t);
+}
+
+void Simulation::run(const VecX& q0, const VecX& v0) {
+    start(q0, v0);
+    if (o.method.kind == Method::Kind::moreau) {
+        step_in_time(t_end, o.dt);
+        return;
+    }
+    h = o.dt;
+    if (o.method.adaptive) {
+        stepper.K[0] = derivative;
+        h = stepper.initial_step(t, y, o.rtol, o.atol, t_end - t);
+        begin_step(p, w, t, q_ = y.head(system.nq), v_ = y.segment(system.nq, system.nv));
+    }
+    while (t < t_end) {
+        sample_control(t);
+        double stop = next_stop(t);
+        if (!o.method.adaptive) {  // the fixed grid, whatever events cut out of it
+            const double k = std::floor((t - o.t0) / o.dt * (1.0 + 1e-14) + 1e-9) + 1.0;
+            stop = std::min(stop, o.t0 + k * o.dt);
+        }
+        advance_to(stop);
+    }
+}
+
+// One accepted step, or one that ends at an event, not beyond `stop`.
+void Simulation::advance_to(double stop) {
+    const double remaining = stop - t;
+    double size = o.method.adaptive ? h : remaining;
+    bool last = false;
+    if (size >= remaining * (1.0 - 1e-10)) {
+        size = remaining;
+        last = true;
+    } else if (size > 0.5 * remaining) {
+        size = 0.5 * remaining;  // two even steps instead of a long and a tiny one
+    }
+    stepper.y0 = y;
+    stepper.K[0] = derivative;
+    double error = 0.0;
+    try {
+        stepper.step(t, size);
+        if (!stepper.y1.allFinite()) throw Failure(Failure::Kind::not_finite, t + size);
+        if (o.method.kind == Method::Kind::dop853) error = stepper.error_norm(o.rtol, o.atol);
+        if (error <= 1.0) {
+            settle(t + size, stepper.y1, stepper.f1);
+            if (o.method.kind == Method::Kind::dopri5) error = stepper.error_norm(o.rtol, o.atol);
+        }
+    } catch (const Failure& failure) {
+        // A stage may leave the domain where the step is too long; a shorter one decides whether it is the motion.
+        if (!o.method.adaptive || size < 1e-10 * std::max(1.0, std::abs(t)) ||
+            failure.kind == Failure::Kind::interrupted)
+            throw;
+        error = 1e4;
+    }
+    if (!(error <= 1.0)) {
+        ++out.rejected;
+        const double factor = std::isfinite(error) ? safety * std::pow(error, -1.0 / o.method.order) : 0.0;
+        h = size * std::max(shrink_limit, factor);
+        last_rejected = true;
+        if (h < 4.0 * std::abs(std::nextafter(t, t_end) - t)) throw Failure(Failure::Kind::step_size, t);
+        q_ = y.head(system.nq);
+        v_ = y.segment(system.nq, system.nv);
+        tick(t);
+        return;
+    }
+    if (o.method.adaptive) {
+        double factor = error == 0.0 ? growth_limit : std::min(growth_limit, safety * std::pow(error, -1.0 / o.method.order));
+        if (last_rejected) factor = std::min(1.0, factor);
+        last_rejected = false;
+        if (!(last && factor * size < h)) h = size * std::max(factor, shrink_limit);
+    }
+    const bool event = locate_event();
+    ++out.steps;
+    t = event || !last ? stepper.t0 + stepper.h : stop;
+    recorder.moved_energy += pending_energy;
+    remember_directions();
+    emit_between(t);
+    y = stepper.y1;
+    derivative = stepper.f1;
+    tick(t);
+    if (event && trigger_element != no_trigger) {
+        switch_modes(t, y, trigger_element);
+        emit(t, y, true);
+        return;
+    }
+    report_pulls(t);
+    const bool on_grid = o.output_dt > 0.0 && std::abs(next_sample - t) <= 1e-12 * std::max(1.0, std::abs(t));
+    if (o.output_dt == 0.0 || on_grid || t >= t_end) {
+        if (on_grid) next_sample = o.t0 + ++samples * o.output_dt;
+        q_ = y.head(system.nq);
+        v_ = y.segment(system.nq, system.nv);
+        if (stepper.has_dense) evaluate(p, w, t, q_, v_);
+        emit(t, y, true);
+    }
+}
+
+void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, const Options& options, Recording& out) {
+    try {
+        Simulation(p, w, options, out).run(q0, v0);
+    } catch (const Failure& failure) {
+        out.failure = failure;
+    } catch (...) {
+        out.error = std::current_exception();
+    }
+}
+
+}  // namespace pn

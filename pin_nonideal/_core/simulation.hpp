@@ -1,0 +1,81 @@
+// The time loop: steps, projection, events, samples.
+#pragma once
+
+#include <functional>
+
+#include "modes.hpp"
+#include "projection.hpp"
+#include "recorder.hpp"
+
+namespace pn {
+
+struct Options {
+    Method method;
+    double t0 = 0.0, duration = 0.0;
+    double rtol = 1e-8, dt = 0.0, output_dt = 0.0;  // output_dt 0: every accepted step
+    VecX atol;                                      // 2 nv + states
+    RecordOptions record;
+    std::function<void(double t)> tick;  // progress and interruption, called now and then
+};
+
+// Runs into `out`; failures end the run there and keep the samples.
+void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, const Options& options, Recording& out);
+
+class Simulation {
+public:
+    Simulation(const Program& p, Workspace& w, const Options& options, Recording& out);
+    void run(const VecX& q0, const VecX& v0);
+
+private:
+    // Chatter: this many events within this time make the run go on by time stepping for a while.
+    static constexpr int chatter_events = 60;
+    static constexpr double chatter_time = 1e-4;
+    static constexpr int chatter_steps = 50;
+
+    void start(const VecX& q0, const VecX& v0);
+    void sample_control(double t);
+    double next_stop(double t) const;
+    void advance_to(double stop);
+    // Brings the step's end onto the constraints and evaluates there.
+    void settle(double t, VecX& y, VecX& derivative);
+    double energy_at(const VecX& y);
+    void emit_between(double t_end);
+    void emit(double t, const VecX& y, bool evaluated);
+    void tick(double t);
+
+    // Events.
+    static constexpr int no_trigger = -2;
+    struct Watch { int element; bool slip; };
+    double margin(const Watch& watch, double t, const VecX& y);  // negative past the event; evaluated state
+    std::vector<Watch> crossed();
+    bool locate_event();
+    bool release_indeterminate();
+    void remember_directions();
+    void switch_modes(double t, VecX& y, int trigger);
+    void report_pulls(double t);
+
+    // Time stepping at velocity level.
+    void moreau_step(double h);
+    void step_in_time(double stop, double dt);
+
+    const Program& p;
+    Workspace& w;
+    const Options& o;
+    Recording& out;
+    System system;
+    Stepper stepper;
+    Recorder recorder;
+    double t = 0.0, h = 0.0, t_end = 0.0;
+    VecX y, derivative, q_, v_, probe_, probe_rate_;
+    long samples = 0;  // of the output grid, so far
+    long ticks = 0;
+    double next_sample = 0.0;
+    std::vector<double> recent_events;
+    std::vector<char> pulls, indeterminate;
+    bool last_rejected = false;
+    double pending_energy = 0.0;  // moved by the projection that ends the step
+    int trigger_element = -1;
+    long next_period = 0;
+};
+
+}  // namespace pn

@@ -1,0 +1,308 @@
+#include "terms.hpp"
+
+#include <cmath>
+
+namespace pn {
+
+namespace {
+
+// Rotation by the angle with this sine and cosine about a unit axis.
+Mat3 rotation(const Joint& j, double c, double s) {
+    Mat3 R;
+    switch (j.axis_index) {
+        case 0: R << 1, 0, 0, 0, c, -s, 0, s, c; break;
+        case 1: R << c, 0, s, 0, 1, 0, -s, 0, c; break;
+        case 2: R << c, -s, 0, s, c, 0, 0, 0, 1; break;
+        default: {
+            const Vec3& a = j.axis;
+            const double t = 1.0 - c;
+            R << t * a[0] * a[0] + c, t * a[0] * a[1] - s * a[2], t * a[0] * a[2] + s * a[1],
+                 t * a[0] * a[1] + s * a[2], t * a[1] * a[1] + c, t * a[1] * a[2] - s * a[0],
+                 t * a[0] * a[2] - s * a[1], t * a[1] * a[2] + s * a[0], t * a[2] * a[2] + c;
+        }
+    }
+    return R;
+}
+
+// R0 turned about the joint's axis, touching only the columns that change.
+void turn(const Joint& j, const Mat3& R0, double c, double s, Mat3& R) {
+    if (j.axis_index < 0) {
+        R.noalias() = R0 * rotation(j, c, s);
+        return;
+    }
+    const int k = j.axis_index, a = (k + 1) % 3, b = (k + 2) % 3;
+    R.col(k) = R0.col(k);
+    R.col(a) = c * R0.col(a) + s * R0.col(b);
+    R.col(b) = c * R0.col(b) - s * R0.col(a);
+}
+
+Vec3 axis_in_world(const Joint& j, const Mat3& R) {
+    if (j.axis_index >= 0) return R.col(j.axis_index);
+    return R * j.axis;
+}
+
+// Columns for a dof that turns about direction w through the body's origin, or slides along it.
+Motion turning(const Body& b, const Vec3& w) { return {b.p.cross(w), w}; }
+Motion sliding(const Vec3& w) { return {w, Vec3::Zero()}; }
+
+Motion relative_velocity(const Joint& j, const std::vector<Motion>& J, const VecX& v) {
+    Motion r = v[j.iv] * J[j.iv];
+    for (int k = 1; k < j.nv; ++k) r += v[j.iv + k] * J[j.iv + k];
+    return r;
+}
+
+// Placement of the joint's moving frame; fills R, p and the reference of body b.
+void place(const Joint& j, const Body& parent, const VecX& q, Body& b, const JointMotion& foreign) {
+    const bool is_root = j.parent == 0;
+    Mat3 R0;
+    Vec3 p0;
+    if (is_root) {
+        R0 = j.R0;
+        p0 = j.p0;
+    } else {
+        R0.noalias() = parent.R * j.R0;
+        p0 = parent.p + parent.R * j.p0;
+    }
+    const double* x = q.data() + j.iq;
+    switch (j.kind) {
+        case JointKind::revolute:
+        case JointKind::helical: {
+            const double c = j.unbounded ? x[0] : std::cos(x[0]), s = j.unbounded ? x[1] : std::sin(x[0]);
+            turn(j, R0, c, s, b.R);
+            b.p = p0;
+            if (j.kind == JointKind::helical) {
+                const double angle = j.unbounded ? std::atan2(x[1], x[0]) : x[0];
+                b.p += (j.pitch * angle) * axis_in_world(j, R0);
+            }
+            break;
+        }
+        case JointKind::prismatic:
+            b.R = R0;
+            b.p = p0 + x[0] * axis_in_world(j, R0);
+            break;
+        case JointKind::spherical:
+            b.R.noalias() = R0 * Eigen::Quaterniond(x[3], x[0], x[1], x[2]).toRotationMatrix();
+            b.p = p0;
+            break;
+        case JointKind::free_flyer:
+            b.R.noalias() = R0 * Eigen::Quaterniond(x[6], x[3], x[4], x[5]).toRotationMatrix();
+            b.p = p0 + R0 * Vec3(x[0], x[1], x[2]);
+            break;
+        case JointKind::planar: {
+            Mat3 turned;
+            turned << x[2], -x[3], 0, x[3], x[2], 0, 0, 0, 1;
+            b.R.noalias() = R0 * turned;
+            b.p = p0 + R0 * Vec3(x[0], x[1], 0.0);
+            break;
+        }
+        case JointKind::translation:
+            b.R = R0;
+            b.p = p0 + R0 * Vec3(x[0], x[1], x[2]);
+            break;
+        case JointKind::other:
+            b.R.noalias() = R0 * foreign.R;
+            b.p = p0 + R0 * foreign.p;
+            break;
+    }
+    if (is_root) {  // the reference point of this tree is here
+        b.ref = b.p;
+        b.p.setZero();
+    } else {
+        b.ref = parent.ref;
+    }
+}
+
+// Columns J of the joint's dofs in world axes.
+void columns(const Joint& j, const Body& b, const JointMotion& foreign, Motion* J) {
+    switch (j.kind) {
+        case JointKind::revolute: J[0] = turning(b, axis_in_world(j, b.R)); break;
+        case JointKind::helical: {
+            const Vec3 w = axis_in_world(j, b.R);
+            J[0] = turning(b, w);
+            J[0].lin += j.pitch * w;
+            break;
+        }
+        case JointKind::prismatic: J[0] = sliding(axis_in_world(j, b.R)); break;
+        case JointKind::spherical:
+            for (int k = 0; k < 3; ++k) J[k] = turning(b, b.R.col(k));
+            break;
+        case JointKind::free_flyer:
+            for (int k = 0; k < 3; ++k) {
+                J[k] = sliding(b.R.col(k));
+                J[k + 3] = turning(b, b.R.col(k));
+            }
+            break;
+        case JointKind::planar:
+            J[0] = sliding(b.R.col(0));
+            J[1] = sliding(b.R.col(1));
+            J[2] = turning(b, b.R.col(2));
+            break;
+        case JointKind::translation:
+            for (int k = 0; k < 3; ++k) J[k] = sliding(b.R.col(k));
+            break;
+        case JointKind::other:
+            for (int k = 0; k < j.nv; ++k) {
+                J[k] = turning(b, b.R * foreign.S.col(k).tail<3>());
+                J[k].lin += b.R * foreign.S.col(k).head<3>();
+            }
+            break;
+    }
+}
+
+}  // namespace
+
+void Terms::allocate(const Mechanism& m) {
+    body.assign(m.joints.size(), Body{});
+    body[0].a = {-m.gravity, Vec3::Zero()};
+    J.assign(m.nv, Motion{Vec3::Zero(), Vec3::Zero()});
+    Ag.assign(m.nv, Force{Vec3::Zero(), Vec3::Zero()});
+    nle = VecX::Zero(m.nv);
+    L.assign(m.row_entries, 0.0);
+    M.assign(m.row_entries, 0.0);
+    D = VecX::Zero(m.nv);
+    inv_sqrt_D = VecX::Zero(m.nv);
+    q = VecX::Zero(m.nq);
+    foreign = m.make_foreign();
+}
+
+void kinematics(const Mechanism& m, Terms& w, const VecX& q, const VecX& v) {
+    w.q = q;
+    normalize(m, w.q.data());
+    const int n = static_cast<int>(m.joints.size());
+    for (int i = 1; i < n; ++i) {
+        const Joint& j = m.joints[i];
+        Body& b = w.body[i];
+        const Body& parent = w.body[j.parent];
+        if (j.kind == JointKind::other) w.foreign->evaluate(i, w.q, v, w.foreign_motion);
+        place(j, parent, w.q, b, w.foreign_motion);
+        b.v = parent.v;
+        b.a = parent.a;
+        if (j.nv == 0) continue;
+        Motion* J = w.J.data() + j.iv;
+        columns(j, b, w.foreign_motion, J);
+        const Motion r = relative_velocity(j, w.J, v);
+        b.v += r;
+        b.a += cross(b.v, r);
+        if (j.kind == JointKind::other) {
+            const Motion& c = w.foreign_motion.bias;
+            Motion bias = turning(b, b.R * c.ang);
+            bias.lin += b.R * c.lin;
+            b.a += bias;
+        }
+    }
+}
+
+void inertia(const Mechanism& m, Terms& w) {
+    const int n = static_cast<int>(m.joints.size());
+    for (int i = 1; i < n; ++i) {
+        const Joint& j = m.joints[i];
+        Body& b = w.body[i];
+        const Vec3 c = b.p + b.R * j.com;
+        b.Y.mass = j.mass;
+        b.Y.first = j.mass * c;
+        b.Y.second.noalias() = (b.R * j.inertia) * b.R.transpose();
+        const double xx = c[0] * b.Y.first[0], yy = c[1] * b.Y.first[1], zz = c[2] * b.Y.first[2];
+        b.Y.second(0, 0) += yy + zz;
+        b.Y.second(1, 1) += xx + zz;
+        b.Y.second(2, 2) += xx + yy;
+        const double xy = c[0] * b.Y.first[1], xz = c[0] * b.Y.first[2], yz = c[1] * b.Y.first[2];
+        b.Y.second(0, 1) -= xy;
+        b.Y.second(1, 0) -= xy;
+        b.Y.second(0, 2) -= xz;
+        b.Y.second(2, 0) -= xz;
+        b.Y.second(1, 2) -= yz;
+        b.Y.second(2, 1) -= yz;
+        b.f = b.Y * b.a;
+        b.f += cross(b.v, b.Y * b.v);
+    }
+    for (int i = n - 1; i > 0; --i) {
+        const Joint& j = m.joints[i];
+        const Body& b = w.body[i];
+        for (int dof = j.iv + j.nv - 1; dof >= j.iv; --dof) {
+            w.nle[dof] = dot(w.J[dof], b.f);
+            w.Ag[dof] = b.Y * w.J[dof];
+            double* row = w.M.data() + m.row_offset[dof];
+            for (int k = dof; k >= 0; k = m.dof_parent[k]) *row++ = dot(w.J[k], w.Ag[dof]);
+            w.M[m.row_offset[dof]] += m.armature[dof];
+        }
+        if (j.parent != 0) {
+            w.body[j.parent].Y += b.Y;
+            w.body[j.parent].f += b.f;
+        }
+    }
+}
+
+int factorize(const Mechanism& m, Terms& w) {
+    // From the leaves to the root: row k eliminates itself from the rows of its ancestors.
+    w.L = w.M;
+    for (int k = m.nv - 1; k >= 0; --k) {
+        double* row = w.L.data() + m.row_offset[k];
+        const double pivot = row[0];
+        if (!(pivot > 0.0)) return k;
+        w.D[k] = pivot;
+        w.inv_sqrt_D[k] = 1.0 / std::sqrt(pivot);
+        const double inverse = 1.0 / pivot;
+        const int depth = m.depth[k];
+        for (int s = 1, i = m.dof_parent[k]; i >= 0; ++s, i = m.dof_parent[i]) {
+            const double factor = row[s] * inverse;
+            double* target = w.L.data() + m.row_offset[i];
+            for (int t = s; t <= depth; ++t) target[t - s] -= factor * row[t];
+            row[s] = factor;  // entries to the left of s are no longer read as M
+        }
+    }
+    return -1;
+}
+
+void solve_R(const Mechanism& m, const Terms& w, VecX& x) {
+    for (int k = m.nv - 1; k >= 0; --k) {
+        const double* row = w.L.data() + m.row_offset[k];
+        const double xk = x[k];
+        if (xk == 0.0) continue;
+        for (int i = m.dof_parent[k], s = 1; i >= 0; i = m.dof_parent[i], ++s) x[i] -= row[s] * xk;
+        x[k] = xk * w.inv_sqrt_D[k];
+    }
+}
+
+void solve_Rt(const Mechanism& m, const Terms& w, VecX& x) {
+    for (int k = 0; k < m.nv; ++k) {
+        const double* row = w.L.data() + m.row_offset[k];
+        double xk = x[k] * w.inv_sqrt_D[k];
+        for (int i = m.dof_parent[k], s = 1; i >= 0; i = m.dof_parent[i], ++s) xk -= row[s] * x[i];
+        x[k] = xk;
+    }
+}
+
+void multiply_M(const Mechanism& m, const Terms& w, const VecX& x, VecX& y) {
+    y.setZero();
+    for (int k = 0; k < m.nv; ++k) {
+        const double* row = w.M.data() + m.row_offset[k];
+        y[k] += row[0] * x[k];
+        for (int i = m.dof_parent[k], s = 1; i >= 0; i = m.dof_parent[i], ++s) {
+            y[k] += row[s] * x[i];
+            y[i] += row[s] * x[k];
+        }
+    }
+}
+
+double kinetic_energy(const Mechanism& m, Terms& w, const VecX& v) {
+    double twice = 0.0;
+    for (int k = 0; k < m.nv; ++k) {
+        const double* row = w.M.data() + m.row_offset[k];
+        double sum = 0.5 * row[0] * v[k];
+        for (int i = m.dof_parent[k], s = 1; i >= 0; i = m.dof_parent[i], ++s) sum += row[s] * v[i];
+        twice += 2.0 * sum * v[k];
+    }
+    return 0.5 * twice;
+}
+
+double potential_energy(const Mechanism& m, const Terms& w) {
+    double energy = 0.0;
+    for (size_t i = 1; i < m.joints.size(); ++i) {
+        const Body& b = w.body[i];
+        const Vec3 com = b.ref + b.p + b.R * m.joints[i].com;
+        energy -= m.joints[i].mass * m.gravity.dot(com);
+    }
+    return energy;
+}
+
+}  // namespace pn

@@ -1,0 +1,298 @@
+"""What the replay draws: shapes on joints, from Pinocchio's geometry or, when there is none, from the joints.
+
+A shape is a primitive with its dimensions or a triangle mesh.  Triangles come from coal, which has already read
+every mesh format that Pinocchio reads; COLLADA files are opened once more for the colors of their parts, which
+coal does not keep.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Color = tuple[float, float, float, float]
+
+# Vertices closer than this part of the mesh's diagonal are one vertex: STL files repeat each of them.
+WELD = 1e-5
+COLLADA = "{http://www.collada.org/2005/11/COLLADASchema}"
+
+# Colors of drawn links, taken in turn, and of the joints between them.
+LINK_COLORS: tuple[Color, ...] = (
+    (0.31, 0.47, 0.65, 1.0),
+    (0.93, 0.58, 0.25, 1.0),
+    (0.36, 0.62, 0.51, 1.0),
+    (0.80, 0.42, 0.45, 1.0),
+    (0.56, 0.49, 0.70, 1.0),
+    (0.85, 0.70, 0.33, 1.0),
+)
+JOINT_COLOR: Color = (0.27, 0.30, 0.35, 1.0)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A primitive or a mesh in its own axes.
+
+    Attributes:
+        kind: "box", "ellipsoid", "cylinder", "capsule", "cone", "plane" or "mesh".
+        size: dimensions [m]. Box: three edges. Ellipsoid: three radii. Cylinder, cone and capsule: radius and
+            length along z (the capsule's without its caps). Plane: empty, it is the plane z = 0. Mesh: empty.
+        vertices: corners of a mesh [m], (nv, 3).
+        triangles: indices of a mesh, (nf, 3).
+        parts: number of triangles and color of consecutive parts of a mesh; None is the visual's own color.
+    """
+
+    kind: str
+    size: tuple[float, ...] = ()
+    vertices: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    triangles: Indices = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
+    parts: tuple[tuple[int, Color | None], ...] = ()
+
+    def half_extent(self) -> tuple[Array, Array]:
+        """Center and half edges of the bounding box in the shape's axes [m], (3,) each; zero for a plane."""
+        if self.kind == "mesh":
+            low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
+            return (low + high) / 2.0, (high - low) / 2.0
+        if self.kind == "plane":
+            return np.zeros(3), np.zeros(3)
+        if self.kind == "ellipsoid":
+            return np.zeros(3), np.array(self.size)
+        if self.kind == "box":
+            return np.zeros(3), np.array(self.size) / 2.0
+        radius, length = self.size
+        caps = radius if self.kind == "capsule" else 0.0
+        return np.zeros(3), np.array([radius, radius, length / 2.0 + caps])
+
+
+@dataclass(frozen=True)
+class Visual:
+    """A shape fixed to a joint.
+
+    Attributes:
+        name: name of the geometry object or of what is drawn in its place.
+        joint: index of the joint that carries it, 0 for the world.
+        placement: placement of the shape in the joint's frame.
+        shape: what is drawn.
+        color: red, green, blue and opacity, 0 to 1.
+    """
+
+    name: str
+    joint: int
+    placement: pin.SE3
+    shape: Shape
+    color: Color
+
+
+def visuals_of(geometry_model: pin.GeometryModel) -> list[Visual]:
+    """One visual for each object of a geometry model."""
+    visuals = []
+    for item in geometry_model.geometryObjects:
+        shape, offset = shape_of(item.geometry, None if item.overrideMaterial else item.meshPath)
+        red, green, blue, opacity = (float(value) for value in item.meshColor)
+        color = (red, green, blue, opacity)
+        visuals.append(Visual(item.name, int(item.parentJoint), item.placement * offset, shape, color))
+    return visuals
+
+
+def shape_of(geometry: Any, mesh_path: str | None = None) -> tuple[Shape, pin.SE3]:
+    """The shape of a coal geometry, with the placement of the shape's axes in the geometry's.
+
+    Args:
+        geometry: any coal geometry; one without a drawing of its own (an octree) is drawn as its bounding box.
+        mesh_path: file that a mesh was read from, for the colors of its parts.
+    """
+    kind = type(geometry).__name__
+    here = pin.SE3.Identity()
+    if kind == "Box":
+        return Shape("box", _tuple(2.0 * geometry.halfSide)), here
+    if kind == "Sphere":
+        return Shape("ellipsoid", (float(geometry.radius),) * 3), here
+    if kind == "Ellipsoid":
+        return Shape("ellipsoid", _tuple(geometry.radii)), here
+    if kind in ("Cylinder", "Capsule", "Cone"):
+        return Shape(kind.lower(), (float(geometry.radius), 2.0 * float(geometry.halfLength))), here
+    if kind in ("Plane", "Halfspace"):
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), geometry.n).matrix()
+        return Shape("plane"), pin.SE3(turn, geometry.n * geometry.d)
+    if kind == "TriangleP":
+        return _mesh(np.array([geometry.a, geometry.b, geometry.c]), np.array([[0, 1, 2]])), here
+    if hasattr(geometry, "num_tris") and geometry.num_tris > 0:
+        corners = [(t[0], t[1], t[2]) for t in map(geometry.tri_indices, range(geometry.num_tris))]
+        return _mesh(geometry.vertices(), np.array(corners), mesh_path), here
+    if hasattr(geometry, "num_polygons") and geometry.num_polygons > 0:
+        corners = [(t[0], t[1], t[2]) for t in map(geometry.polygons, range(geometry.num_polygons))]
+        return _mesh(geometry.points(), np.array(corners)), here
+    geometry.computeLocalAABB()
+    box = geometry.aabb_local
+    return Shape("box", _tuple(box.max_ - box.min_)), pin.SE3(np.eye(3), (box.max_ + box.min_) / 2.0)
+
+
+def _tuple(values: Any) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)
+
+
+def _mesh(vertices: Array, triangles: Indices, path: str | None = None) -> Shape:
+    """A mesh with equal vertices welded and flat triangles dropped; parts keep their colors."""
+    vertices = np.asarray(vertices, dtype=np.float64)
+    colors = collada_parts(Path(path)) if path and path.lower().endswith(".dae") else []
+    if sum(count for count, _ in colors) != len(triangles):
+        colors = [(len(triangles), None)]
+    part = np.repeat(np.arange(len(colors)), [count for count, _ in colors])
+
+    cell = WELD * max(float(np.linalg.norm(np.ptp(vertices, axis=0))), 1e-12)
+    _, first, inverse = np.unique(
+        np.round(vertices / cell).astype(np.int64), axis=0, return_index=True, return_inverse=True
+    )
+    triangles = inverse.ravel()[triangles]
+    a, b, c = triangles.T
+    kept = (a != b) & (b != c) & (c != a)
+    sizes = np.bincount(part[kept], minlength=len(colors))
+    parts = tuple((int(size), color) for size, (_, color) in zip(sizes, colors, strict=True) if size)
+    return Shape("mesh", vertices=vertices[first], triangles=triangles[kept], parts=parts)
+
+
+def collada_parts(path: Path) -> list[tuple[int, Color | None]]:
+    """Number of triangles and color of each part of a COLLADA file, in the order of its scene.
+
+    A part with a texture or without a material has color None. Triangles with two equal corners do not count:
+    the mesh reader drops them. A file that cannot be read has no parts.
+    """
+    try:
+        root = ElementTree.parse(path).getroot()
+        geometries = {item.get("id"): item for item in root.iter(COLLADA + "geometry")}
+        colors = _material_colors(root)
+        parts = []
+        for scene in root.iter(COLLADA + "visual_scene"):
+            for node in scene.findall(COLLADA + "node"):
+                for instance in _instances(node):
+                    bound = {
+                        item.get("symbol"): (item.get("target") or "")[1:]
+                        for item in instance.iter(COLLADA + "instance_material")
+                    }
+                    mesh = geometries[(instance.get("url") or "")[1:]].find(COLLADA + "mesh")
+                    for count, symbol in _triangle_counts(mesh):
+                        parts.append((count, colors.get(bound.get(symbol, ""))))
+    except (OSError, ElementTree.ParseError, KeyError, ValueError, IndexError, AttributeError):
+        return []
+    return parts
+
+
+def _instances(node: ElementTree.Element) -> Iterator[ElementTree.Element]:
+    """Geometries of a node, then of its children."""
+    yield from node.findall(COLLADA + "instance_geometry")
+    for child in node.findall(COLLADA + "node"):
+        yield from _instances(child)
+
+
+def _triangle_counts(mesh: Any) -> Iterator[tuple[int, str | None]]:
+    """Triangles that are not flat, and material symbol, of each group of a COLLADA mesh."""
+    sources = {item.get("id"): item for item in mesh.findall(COLLADA + "source")}
+    vertices = {item.get("id"): item.find(COLLADA + "input") for item in mesh.findall(COLLADA + "vertices")}
+    for group in mesh.findall(COLLADA + "triangles"):
+        inputs = group.findall(COLLADA + "input")
+        stride = 1 + max(int(item.get("offset")) for item in inputs)
+        corner = next(item for item in inputs if item.get("semantic") == "VERTEX")
+        source = sources[vertices[corner.get("source")[1:]].get("source")[1:]]
+        points = np.array((source.find(COLLADA + "float_array").text or "").split(), dtype=float).reshape(-1, 3)
+        index = np.array((group.find(COLLADA + "p").text or "").split(), dtype=np.int64)
+        a, b, c = points[index.reshape(-1, 3, stride)[:, :, int(corner.get("offset"))]].transpose(1, 0, 2)
+        flat = np.all(a == b, axis=1) | np.all(b == c, axis=1) | np.all(c == a, axis=1)
+        yield int(np.count_nonzero(~flat)), group.get("material")
+
+
+def _material_colors(root: ElementTree.Element) -> dict[str, Color]:
+    """Diffuse color of each material of a COLLADA file that has one."""
+    effects: dict[str, Color] = {}
+    for effect in root.iter(COLLADA + "effect"):
+        color = effect.find(f".//{COLLADA}diffuse/{COLLADA}color")
+        if color is not None and color.text:
+            red, green, blue = (float(value) for value in color.text.split()[:3])
+            effects[effect.get("id") or ""] = (red, green, blue, 1.0)
+    materials: dict[str, Color] = {}
+    for material in root.iter(COLLADA + "material"):
+        instance = material.find(COLLADA + "instance_effect")
+        key = "" if instance is None else (instance.get("url") or "")[1:]
+        if key in effects:
+            materials[material.get("id") or ""] = effects[key]
+    return materials
+
+
+def sticks(model: pin.Model, ends: list[tuple[int, Array]], size: float) -> list[Visual]:
+    """Visuals for a model without geometry: a bar from joint to joint, a hub at each joint, a ball for a point mass.
+
+    Args:
+        model: the model.
+        ends: points on bodies that bars lead to as well, as joint index and position in its frame [m], (3,).
+        size: diagonal of the model, which sets the thickness [m].
+    """
+    radius = 0.013 * size
+    points: list[list[Array]] = [[] for _ in range(model.njoints)]
+    for joint in range(1, model.njoints):
+        points[int(model.parents[joint])].append(np.asarray(model.jointPlacements[joint].translation))
+    for joint, point in ends:
+        points[joint].append(np.asarray(point))
+
+    visuals: list[Visual] = []
+    for joint in range(1, model.njoints):
+        color = LINK_COLORS[(joint - 1) % len(LINK_COLORS)]
+        name = str(model.names[joint])
+        lever = np.asarray(model.inertias[joint].lever)
+        reach = points[joint] or [
+            np.asarray(frame.placement.translation) for frame in model.frames if frame.parentJoint == joint
+        ]
+        reach = [point for point in reach if np.linalg.norm(point) > radius]
+        if not reach and np.linalg.norm(lever) > radius:
+            reach = [2.0 * lever]  # a uniform bar ends at twice the distance of its center of mass
+        for number, point in enumerate(reach):
+            visuals.append(Visual(f"{name} bar {number}", joint, *_bar(point, radius), color))
+        if not reach and model.inertias[joint].mass > 0.0:
+            ball = Shape("ellipsoid", (2.2 * radius,) * 3)
+            visuals.append(Visual(f"{name} mass", joint, pin.SE3(np.eye(3), lever), ball, color))
+        else:
+            visuals.append(_hub(model, joint, radius))
+    return visuals
+
+
+def _bar(end: Array, radius: float) -> tuple[pin.SE3, Shape]:
+    """A rounded bar from the origin to a point."""
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end).matrix()
+    return pin.SE3(turn, end / 2.0), Shape("capsule", (radius, float(np.linalg.norm(end))))
+
+
+def _hub(model: pin.Model, joint: int, radius: float) -> Visual:
+    """The mark of a joint: a drum along a revolute axis, a block on a prismatic one, else a ball."""
+    name = f"{model.names[joint]} joint"
+    axis, turning = joint_axis(model, joint)
+    if axis is None:
+        ball = Shape("ellipsoid", (1.7 * radius,) * 3)
+        return Visual(name, joint, pin.SE3.Identity(), ball, JOINT_COLOR)
+    turn = pin.SE3(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis).matrix(), np.zeros(3))
+    shape = Shape("cylinder", (1.6 * radius, 3.4 * radius))
+    if not turning:
+        shape = Shape("box", (3.4 * radius, 3.4 * radius, 5.0 * radius))
+    return Visual(name, joint, turn, shape, JOINT_COLOR)
+
+
+def joint_axis(model: pin.Model, joint: int) -> tuple[Array | None, bool]:
+    """Axis of a joint of one degree of freedom in its own frame, (3,), and whether it turns; None without one."""
+    if model.joints[joint].nv != 1:
+        return None, False
+    data = model.joints[joint].createData()
+    model.joints[joint].calc(data, pin.neutral(model)[_slice(model, joint)])
+    linear, angular = np.split(np.asarray(data.S).ravel(), 2)
+    turning = bool(np.linalg.norm(angular) > 0.0)
+    axis = angular if turning else linear
+    return axis / np.linalg.norm(axis), turning
+
+
+def _slice(model: pin.Model, joint: int) -> slice:
+    start = int(model.joints[joint].idx_q)
+    return slice(start, start + int(model.joints[joint].nq))
