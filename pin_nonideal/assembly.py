@@ -269,8 +269,8 @@ def _lock(
 
 
 def _still_moves(model: Any, constraint: Any, where: str) -> bool:
-    """Whether a constraint of the robot's file has its joints; one whose joints are all locked is met
-    already.
+    """Whether a constraint of the robot's file still has its joints (with all of them locked it is met
+    already).
 
     Raises:
         LoadingError: one of two coupled joints is locked and the other is not.
