@@ -1,8 +1,8 @@
 """What the replay shows of constraints: marks where bodies meet, and arrows of the forces there.
 
-The arrow at an anchor is the reaction on the body of frame1, from the anchor's rows of `lam`; when the run holds
-`lam_ideal` as well it is split into its ideal and its nonideal part.  `F_nonideal` (and, in a scene without
-anchors, `F_ideal`) is drawn at the joints of one degree of freedom.
+The arrow at an anchor is the reaction on the body of frame1, from the anchor's rows of `lam`; when the run
+holds `lam_ideal` as well it is split into its ideal and its nonideal part.  `F_nonideal` (and, in a scene
+without anchors, `F_ideal`) is drawn at the joints of one degree of freedom.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from .checks import axis_triad
+from .checks import axis_triad, unit_axis
 from .constraints import Distance, FrameAnchor, HingeAnchor, PointAnchor, Rolling
 from .contacts import PointContact
 from .forces import SpringDamper
@@ -150,9 +150,10 @@ def _reaction(scene: Scene, motion: Motion, name: str, kind: str, item: Any, lam
     if isinstance(item, Distance):
         mark = _mark(scene, name, "rod", item.frame1, item.frame2)
         origin = motion.point(mark.joint1, mark.point1)
-        return [Arrow(name, kind, "N", lam[:, :1] * _unit(origin - motion.point(mark.joint2, mark.point2)), origin)]
+        along = _unit(origin - motion.point(mark.joint2, mark.point2))
+        return [Arrow(name, kind, "N", lam[:, :1] * along, origin)]
     if isinstance(item, (Rolling, PointContact)):
-        t1, t2, normal = np.array(axis_triad(item.normal))  # type: ignore[arg-type]
+        t1, t2, normal = (np.array(axis) for axis in axis_triad(unit_axis("normal", item.normal)))
         local = lam[:, -1:] * normal
         if lam.shape[1] == 3:
             local = local + lam[:, :1] * t1 + lam[:, 1:2] * t2
@@ -169,7 +170,7 @@ def _reaction(scene: Scene, motion: Motion, name: str, kind: str, item: Any, lam
 def _unit(vectors: Array) -> Array:
     """Vectors of length one; zero stays zero."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0))
 
 
 def _turned(model: pin.Model, motion: Motion, frame: str | None, local: Array) -> Array:
@@ -182,7 +183,7 @@ def _turned(model: pin.Model, motion: Motion, frame: str | None, local: Array) -
 
 
 def _joint_forces(model: pin.Model, motion: Motion, kind: str, force: Array) -> list[Arrow]:
-    """Generalized force at each joint of one degree of freedom: along a prismatic axis, about a revolute one."""
+    """Generalized force at each joint of one degree of freedom, along or about its axis."""
     arrows: list[Arrow] = []
     largest = float(np.abs(force).max(initial=0.0))
     for joint in range(1, model.njoints):

@@ -1,8 +1,8 @@
 """What the replay draws: shapes on joints, from Pinocchio's geometry or, when there is none, from the joints.
 
-A shape is a primitive with its dimensions or a triangle mesh.  Triangles come from coal, which has already read
-every mesh format that Pinocchio reads; COLLADA files are opened once more for the colors of their parts, which
-coal does not keep.
+A shape is a primitive with its dimensions or a triangle mesh.  Triangles come from coal, which has already
+read every mesh format that Pinocchio reads; COLLADA files are opened once more for the colors of their parts,
+which coal does not keep.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def shape_of(geometry: Any, mesh_path: str | None = None) -> tuple[Shape, pin.SE
     """The shape of a coal geometry, with the placement of the shape's axes in the geometry's.
 
     Args:
-        geometry: any coal geometry; one without a drawing of its own (an octree) is drawn as its bounding box.
+        geometry: any coal geometry; one without a drawing of its own (octree) becomes its bounding box.
         mesh_path: file that a mesh was read from, for the colors of its parts.
     """
     kind = type(geometry).__name__
@@ -201,7 +201,8 @@ def _triangle_counts(mesh: Any) -> Iterator[tuple[int, str | None]]:
         stride = 1 + max(int(item.get("offset")) for item in inputs)
         corner = next(item for item in inputs if item.get("semantic") == "VERTEX")
         source = sources[vertices[corner.get("source")[1:]].get("source")[1:]]
-        points = np.array((source.find(COLLADA + "float_array").text or "").split(), dtype=float).reshape(-1, 3)
+        numbers = (source.find(COLLADA + "float_array").text or "").split()
+        points = np.array(numbers, dtype=float).reshape(-1, 3)
         index = np.array((group.find(COLLADA + "p").text or "").split(), dtype=np.int64)
         a, b, c = points[index.reshape(-1, 3, stride)[:, :, int(corner.get("offset"))]].transpose(1, 0, 2)
         flat = np.all(a == b, axis=1) | np.all(b == c, axis=1) | np.all(c == a, axis=1)
@@ -226,7 +227,7 @@ def _material_colors(root: ElementTree.Element) -> dict[str, Color]:
 
 
 def sticks(model: pin.Model, ends: list[tuple[int, Array]], size: float) -> list[Visual]:
-    """Visuals for a model without geometry: a bar from joint to joint, a hub at each joint, a ball for a point mass.
+    """Visuals for a model without geometry: bars from joint to joint, hubs at joints, balls for point masses.
 
     Args:
         model: the model.
@@ -282,7 +283,7 @@ def _hub(model: pin.Model, joint: int, radius: float) -> Visual:
 
 
 def joint_axis(model: pin.Model, joint: int) -> tuple[Array | None, bool]:
-    """Axis of a joint of one degree of freedom in its own frame, (3,), and whether it turns; None without one."""
+    """Axis of a joint of one degree of freedom in its own frame, (3,), and whether it turns; else None."""
     if model.joints[joint].nv != 1:
         return None, False
     data = model.joints[joint].createData()

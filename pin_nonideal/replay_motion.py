@@ -30,8 +30,8 @@ class Motion:
 
     Attributes:
         times: time of each frame [s], (n,), from the first to the last sample of the run.
-        poses: placement of each joint in the world as x, y, z, qx, qy, qz, qw, (n, njoints, 7); joint 0 is the
-            world itself.
+        poses: placement of each joint in the world as x, y, z, qx, qy, qz, qw, (n, njoints, 7); joint 0 is
+            the world itself.
         before: sample of the run before each frame, (n,).
         part: how far the frame lies between that sample and the next, 0 to 1, (n,).
     """
@@ -169,8 +169,15 @@ def view(model: pin.Model, motion: Motion, visuals: list[Visual], marks: list[tu
     heights = points @ up
     lowest = float(heights[:, 0].min())
     ground = 0.0 if -0.02 * size <= lowest <= size else float(heights.min()) - 0.03 * size
-    follow = _diagonal(points) > 4.0 * size
-    return View(up, _direction(points, up), _outermost(points[:, 0]), _outermost(points), size, ground, follow)
+    return View(
+        up=up,
+        direction=_direction(points, up),
+        start=_outermost(points[:, 0]),
+        motion=_outermost(points),
+        size=size,
+        ground=ground,
+        follow=_diagonal(points) > 4.0 * size,
+    )
 
 
 def _diagonal(points: Array) -> float:
@@ -183,7 +190,8 @@ def _outermost(points: Array) -> Array:
     cloud = points.reshape(-1, 3)
     grid = np.array(list(product((-1.0, -0.5, 0.0, 0.5, 1.0), repeat=3)))
     shell = grid[np.abs(grid).max(axis=1) == 1.0]
-    return cloud[np.unique(np.argmax(cloud @ (shell / np.linalg.norm(shell, axis=1, keepdims=True)).T, axis=0))]
+    reach = cloud @ (shell / np.linalg.norm(shell, axis=1, keepdims=True)).T
+    return np.asarray(cloud[np.unique(np.argmax(reach, axis=0))])
 
 
 def _direction(points: Array, up: Array) -> Array:

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Plots by name, or by a title "what [unit]" and curves by label, (nt,) each.
+Chosen = Sequence[str | tuple[str, Mapping[str, Array]]]
+
 # Curves of one plot when joints are not chosen: as many as can be told apart.
 MAX_CURVES = 8
 # A plot of the replay keeps the extremes of every curve in so many intervals of time.
@@ -103,7 +106,7 @@ def positions(model: pin.Model, q: Array) -> list[Coordinate]:
 
 
 def velocities(model: pin.Model, v: Array, per: str = "/s") -> list[Coordinate]:
-    """Components of a velocity or, with `per` "/s\u00b2", of an acceleration.
+    """Components of a velocity or, with `per` "/s²", of an acceleration.
 
     Args:
         model: the model.
@@ -132,14 +135,14 @@ def velocities(model: pin.Model, v: Array, per: str = "/s") -> list[Coordinate]:
     return found
 
 
-def plots_of(run: Trajectory, chosen: Sequence[str | tuple[str, Mapping[str, Array]]] | None) -> list[Plot]:
+def plots_of(run: Trajectory, chosen: Chosen | None) -> list[Plot]:
     """Plots by name.
 
     Args:
         run: the run.
-        chosen: "energy", "work", "violation", "reactions", "q", "v", "a", the name of a joint (its position and
-            its velocity), or a pair of a title "what [unit]" and curves by label, (nt,) each. None: energy,
-            violation, reactions and q, as far as the run has them.
+        chosen: "energy", "work", "violation", "reactions", "q", "v", "a", the name of a joint (its position
+            and its velocity), or a pair of a title "what [unit]" and curves by label, (nt,) each. None:
+            energy, violation, reactions and q, as far as the run has them.
 
     Raises:
         UnknownNameError: no plot and no joint has that name.
@@ -190,7 +193,7 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
     if name == "v":
         return _by_unit("Velocity", t, velocities(model, run.v))
     if name == "a":
-        return _by_unit("Acceleration", t, velocities(model, run.a, "/s\u00b2"))
+        return _by_unit("Acceleration", t, velocities(model, run.a, "/s²"))
     place = [c for c in positions(model, run.q) if c.joint == name]
     rate = [c for c in velocities(model, run.v) if c.joint == name]
     return _by_unit(name, t, place) + _by_unit(f"{name}, velocity", t, rate)
@@ -235,7 +238,5 @@ def mode_bands(t: Array, modes: NDArray[np.int8]) -> list[list[tuple[float, floa
     for column in np.asarray(modes).T:
         starts = np.concatenate([[0], np.flatnonzero(np.diff(column)) + 1])
         ends = np.append(starts[1:], len(t) - 1)
-        bands.append(
-            [(float(t[i]), float(t[j]), int(column[i])) for i, j in zip(starts, ends, strict=True)]
-        )
+        bands.append([(float(t[i]), float(t[j]), int(column[i])) for i, j in zip(starts, ends, strict=True)])
     return bands
