@@ -52,7 +52,7 @@ class ReplayPage:
         Raises:
             OutputError: the file cannot be written.
         """
-        return write_whole(Path(path), self.text)
+        return write_whole(Path(path), self.text.encode(), "the replay")
 
     def _repr_html_(self) -> str:
         page = html.escape(self.text, quote=True)
@@ -99,8 +99,13 @@ def replay(
     return page if path is None else page.save(path)
 
 
-def write_whole(path: Path, text: str) -> Path:
-    """Writes a text file under a temporary name beside it and renames it, so that no half of it is ever seen.
+def write_whole(path: Path, content: bytes, what: str) -> Path:
+    """Writes a file under a temporary name beside it and renames it, so that no half of it is ever seen.
+
+    Args:
+        path: the file.
+        content: all of it.
+        what: words for the message.
 
     Raises:
         OutputError: the folder does not exist or cannot be written, or `path` is a folder.
@@ -108,23 +113,23 @@ def write_whole(path: Path, text: str) -> Path:
     try:
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:40]}.", suffix=".part")
     except OSError as error:
-        raise OutputError(_cannot_write(path, error)) from error
+        raise OutputError(_cannot_write(path, what, error)) from error
     try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
         os.chmod(temporary, 0o666 & ~_umask())
         os.replace(temporary, path)
     except BaseException as error:
         Path(temporary).unlink(missing_ok=True)
         if isinstance(error, OSError):
-            raise OutputError(_cannot_write(path, error)) from error
+            raise OutputError(_cannot_write(path, what, error)) from error
         raise
     return path
 
 
-def _cannot_write(path: Path, error: OSError) -> str:
+def _cannot_write(path: Path, what: str, error: OSError) -> str:
     reason = error.strerror or type(error).__name__
-    return f'cannot write the replay to "{path}": {reason}; name a file in a folder that can be written'
+    return f'cannot write {what} to "{path}": {reason}; name a file in a folder that can be written'
 
 
 def _umask() -> int:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .replay_forces import Arrow, arrows_of, marks_of
 from .replay_geometry import Shape, Visual, sticks, visuals_of
 from .replay_motion import sample, view
-from .replay_signals import Chosen, mode_bands, plots_of
+from .replay_signals import Chosen, element_names, mode_bands, plots_of
 
 if TYPE_CHECKING:
     from .trajectory import Trajectory
@@ -170,10 +170,8 @@ def _modes(run: Trajectory) -> list[dict[str, Any]]:
     """Bands of the elements that stick or slip, with their names."""
     if run.modes is None or not np.size(run.modes):
         return []
-    names = list(getattr(run.scene, "element_names", ()))
-    bands = mode_bands(run.t, run.modes)
-    names += [f"element {number}" for number in range(len(names), len(bands))]
-    return [{"name": name, "runs": runs} for name, runs in zip(names, bands, strict=False)]
+    pairs = zip(element_names(run), mode_bands(run.t, run.modes), strict=True)
+    return [{"name": name, "runs": runs} for name, runs in pairs]
 
 
 def _subtitle(run: Trajectory) -> str:

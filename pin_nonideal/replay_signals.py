@@ -227,6 +227,13 @@ def _largest(curves: dict[str, Array]) -> dict[str, Array]:
     return {label: values for label, values in curves.items() if label in rank}
 
 
+def element_names(run: Trajectory) -> list[str]:
+    """Names of the elements that stick or slip, one for each column of the run's `modes`."""
+    names = [str(name) for name in getattr(run.scene, "element_names", ())]
+    count = run.modes.shape[1]
+    return names[:count] + [f"element {number}" for number in range(len(names), count)]
+
+
 def mode_bands(t: Array, modes: NDArray[np.int8]) -> list[list[tuple[float, float, int]]]:
     """Intervals of constant mode of each element, as (start [s], end [s], mode).
 

@@ -66,7 +66,12 @@ struct Evaluate {
 
     void operator()(const PointRows& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
-        for (size_t k = 0; k < c.axes.size(); ++k) point_row(a, b, b.R.col(c.axes[k]), c.offset, k, out);
+        for (size_t k = 0; k < c.axes.size(); ++k) point_row(a, b, b.R.col(c.axes[k]), 0.0, k, out);
+    }
+
+    void operator()(const ContactRow& c) const {
+        const Pose a(s, c.frame1), b(s, c.frame2);
+        point_row(a, b, b.R * c.normal, c.radius, 0, out);
     }
 
     void operator()(const FrameRows& c) const {
@@ -271,6 +276,7 @@ int row_count(const Kind& kind, int user_size) {
     struct Count {
         int user;
         int operator()(const PointRows& c) const { return static_cast<int>(c.axes.size()); }
+        int operator()(const ContactRow&) const { return 1; }
         int operator()(const FrameRows&) const { return 6; }
         int operator()(const HingeRows&) const { return 5; }
         int operator()(const RollingRows&) const { return 3; }

@@ -22,10 +22,14 @@ struct Frame {  // a frame fixed to the body of a joint (0: the world)
     Vec3 p = Vec3::Zero();
 };
 
-struct PointRows {  // e . (x1 - x2) = offset for axes e of frame 2
+struct PointRows {  // e . (x1 - x2) = 0 for axes e of frame 2
     Frame frame1, frame2;
     std::vector<int> axes;
-    double offset = 0.0;
+};
+struct ContactRow {  // height of a sphere's (or point's) center over the plane of frame 2 equals its radius
+    Frame frame1, frame2;
+    Vec3 normal;
+    double radius;
 };
 struct FrameRows {  // origins and axes coincide
     Frame frame1, frame2;
@@ -82,7 +86,7 @@ struct UserSlipRow {
     std::function<void(double t, const VecX& q, VecX& row)> direction;
 };
 
-using Kind = std::variant<PointRows, FrameRows, HingeRows, DistanceRows, KnifeRows, RollingRows, CouplingRows,
+using Kind = std::variant<PointRows, ContactRow, FrameRows, HingeRows, DistanceRows, KnifeRows, RollingRows, CouplingRows,
                           MotionRows, UserRows, DofRows, HingeSlipRows, ContactSlipRows, UserSlipRow>;
 
 struct Wrench {  // force at a point of the world, and couple

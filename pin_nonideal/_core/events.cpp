@@ -216,13 +216,12 @@ void Simulation::remember_directions() {
     }
 }
 
+// A maintained contact that would have to pull, told once each time it begins.
 void Simulation::report_pulls(double at) {
-    for (size_t e = 0; e < p.frictions.size(); ++e) {
-        const Friction& f = p.frictions[e];
-        if (f.load != Friction::Load::contact) continue;
-        const bool pull = w.lam[p.blocks[f.anchor].row] < 0.0;
-        if (pull && !pulls[e]) out.events.push_back({at, Event::Kind::pull, static_cast<int>(e)});
-        pulls[e] = pull;
+    for (size_t i = 0; i < p.contacts.size(); ++i) {
+        const bool pull = w.lam[p.blocks[p.contacts[i]].row] < 0.0;
+        if (pull && !pulls[i]) out.events.push_back({at, Event::Kind::pull, p.contacts[i]});
+        pulls[i] = pull;
     }
 }
 

@@ -361,8 +361,14 @@ NB_MODULE(_core, m) {
     nb::class_<Builder>(m, "Builder")
         .def(nb::init<nb::object>())
         .def("add_point", [](Builder& b, const std::string& name, const FrameTuple& f1, const FrameTuple& f2,
-                             std::vector<int> axes, double offset) {
-            return b.add(name, PointRows{frame_of(f1), frame_of(f2), std::move(axes), offset}, true);
+                             std::vector<int> axes) {
+            return b.add(name, PointRows{frame_of(f1), frame_of(f2), std::move(axes)}, true);
+        })
+        .def("add_contact", [](Builder& b, const std::string& name, const FrameTuple& f1, const FrameTuple& f2,
+                               const std::vector<double>& normal, double radius) {
+            const int block = b.add(name, ContactRow{frame_of(f1), frame_of(f2), vec3(normal), radius}, true);
+            b.p->contacts.push_back(block);
+            return block;
         })
         .def("add_frame", [](Builder& b, const std::string& name, const FrameTuple& f1, const FrameTuple& f2) {
             return b.add(name, FrameRows{frame_of(f1), frame_of(f2)}, true);

@@ -58,6 +58,7 @@ struct Program {
     Mechanism mechanism;
     std::vector<Block> blocks;  // constraints first, then directions of friction
     int constraints = 0;        // number of constraint blocks
+    std::vector<int> contacts;  // blocks of contacts, whose multiplier should press
     int user_rows = 0;          // rows of all constraint descriptions
     RowLayout layout;
     size_t entries = 0;         // of A and B

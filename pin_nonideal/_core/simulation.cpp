@@ -18,7 +18,7 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
     for (VecX* x : {&y, &derivative, &probe_, &probe_rate_}) *x = VecX::Zero(system.ny);
     q_ = VecX::Zero(system.nq);
     v_ = VecX::Zero(system.nv);
-    pulls.assign(p.frictions.size(), 0);
+    pulls.assign(p.contacts.size(), 0);
     indeterminate.assign(p.frictions.size(), 0);
 }
 
