@@ -103,7 +103,9 @@ def test_axis_triads_of_the_coordinate_axes_are_cyclic():
 def test_axis_triads_are_right_handed_and_orthonormal(vector):
     axis = checks.unit_axis("axis", vector)
     triad = np.array(checks.axis_triad(axis))
-    np.testing.assert_allclose(triad @ triad.T, np.eye(3), atol=1e-14)  # a few roundings of numbers of size one
+    np.testing.assert_allclose(
+        triad @ triad.T, np.eye(3), atol=1e-14
+    )  # a few roundings of numbers of size one
     assert np.linalg.det(triad) == pytest.approx(1.0, abs=1e-14)
     np.testing.assert_array_equal(triad[2], np.array(axis) + 0.0)
 
@@ -154,7 +156,7 @@ REFUSED = {
     ),
     "axis misspelled": (
         lambda: HingeAnchor("a", axis="w"),
-        "HingeAnchor: axis must be \"x\", \"y\", \"z\" or three numbers; got 'w'",
+        'HingeAnchor: axis must be "x", "y", "z" or three numbers; got \'w\'',
     ),
     "axis of two numbers": (
         lambda: KnifeEdge("a", axis=[1, 0]),
