@@ -76,7 +76,8 @@ def plot(
             _mark_events(axes, run)
     grid[-1, 0].set_xlabel("time [s]")
     grid[-1, 0].set_xlim(*_limits(run))
-    figure.suptitle(str(run.scene.name), fontsize=12, fontweight="semibold", x=0.01, ha="left")
+    figure.align_ylabels()
+    figure.suptitle(str(run.scene.name), fontsize=12, fontweight="bold", x=0.01, ha="left")
     if path is not None:
         _save(figure, Path(path))
     return figure
@@ -109,10 +110,10 @@ def _mark_events(axes: Axes, run: Trajectory) -> None:
     width = 0.8 if len(run.events) <= CROWD else 0.3
     for event in run.events:
         style = EVENT_STYLES[kinds.index(str(event.kind)) % len(EVENT_STYLES)]
-        axes.axvline(float(event.time), color="#94a3b8", lw=width, ls=style, zorder=0.5)
+        axes.axvline(float(event.time), color="#cbd5e1", lw=width, ls=style, zorder=0.5)
     if kinds and axes.get_subplotspec().rowspan.start == 0:  # type: ignore[union-attr]
         styles = [EVENT_STYLES[number % len(EVENT_STYLES)] for number in range(len(kinds))]
-        lines = [axes.plot([], [], color="#94a3b8", lw=1.0, ls=style)[0] for style in styles]
+        lines = [axes.plot([], [], color="#cbd5e1", lw=1.2, ls=style)[0] for style in styles]
         handles, labels = axes.get_legend_handles_labels()
         axes.legend(
             [*handles, *lines],

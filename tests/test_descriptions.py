@@ -1,4 +1,4 @@
-"""Descriptions are checked at the door: what is accepted is normalized, what is refused says why, word by word."""
+"""Descriptions are checked at the door: what is accepted is normalized, what is refused says why."""
 
 from __future__ import annotations
 
@@ -175,7 +175,8 @@ REFUSED = {
     "zero length": (lambda: Distance("a", "b", 0.0), "Distance: length must be positive; got 0"),
     "length to the world": (
         lambda: Distance("a"),
-        "Distance: length must be given when frame2 is None (frame1 starts at distance zero from its own start); "
+        "Distance: length must be given when frame2 is None (frame1 starts at distance zero from its own "
+        "start); "
         "pass a length or a second frame",
     ),
     "ratio of zero": (
@@ -197,15 +198,18 @@ REFUSED = {
     ),
     "static below kinetic": (
         lambda: JointFriction("j", mu=0.1, static_ratio=0.9),
-        "JointFriction: static_ratio must be at least 1 (static friction is never below kinetic friction); got 0.9",
+        "JointFriction: static_ratio must be at least 1 (static friction is never below kinetic friction); "
+        "got 0.9",
     ),
     "static below kinetic in a contact": (
         lambda: PointContact("foot", mu=0.1, static_ratio=0.5),
-        "PointContact: static_ratio must be at least 1 (static friction is never below kinetic friction); got 0.5",
+        "PointContact: static_ratio must be at least 1 (static friction is never below kinetic friction); "
+        "got 0.5",
     ),
     "friction that does nothing": (
         lambda: JointFriction("j", radius=0.1),
-        "JointFriction: one of coulomb, mu, preload, viscous must be positive; all are zero, so leave the law out",
+        "JointFriction: one of coulomb, mu, preload, viscous must be positive; all are zero, "
+        "so leave the law out",
     ),
     "span of zero": (
         lambda: JointFriction("j", mu=1, span=0),

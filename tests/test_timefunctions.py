@@ -1,4 +1,4 @@
-"""Functions of time: values against SciPy and closed forms, derivatives against differences, refusals word by word."""
+"""Functions of time: values against SciPy and closed forms, derivatives against differences."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_polynomial_runs_from_low_power_to_high():
 def test_spline_is_the_cubic_spline_of_scipy(ends):
     ours, theirs = spline(TIMES, VALUES, ends), CubicSpline(TIMES, VALUES, bc_type=ends)
     for t in np.linspace(TIMES[0], TIMES[-1], 41):
-        # The tridiagonal system is diagonally dominant: both solutions are good to rounding of numbers up to 100.
+        # The tridiagonal system is diagonally dominant: both are good to rounding of numbers up to 100.
         np.testing.assert_allclose(ours(t), [theirs(t), theirs(t, 1), theirs(t, 2)], rtol=1e-12, atol=1e-12)
 
 

@@ -553,7 +553,7 @@ NB_MODULE(_core, m) {
         })
         .def("finish", [](Builder& b) { b.p->finish(); })
         .def_prop_ro("states", [](Builder& b) { return b.p->states; })
-        .def("runner", [](Builder& b) { return std::make_unique<Runner>(b.p); });
+        .def("runner", [](Builder& b) { return new Runner(b.p); }, nb::rv_policy::take_ownership);
 
     nb::class_<Runner>(m, "Runner")
         .def("acceleration", &Runner::acceleration, "q"_a, "v"_a, "t"_a = 0.0, "tau"_a.none() = nb::none())

@@ -1,0 +1,313 @@
+"""simulate and rollout: a scene and a length of time in, a Trajectory out."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .checks import array, choice, count, nonnegative, number, positive
+from .errors import InputError, PinNonidealError, RunError, RunInterrupted, UserFunctionError, nearest
+from .lowering import core
+from .scene import Scene
+from .trajectory import Event, Stats, Trajectory
+
+Array = NDArray[np.float64]
+
+ADAPTIVE = ("dop853", "dopri5")
+FIXED = ("rk4", "semi_implicit_euler", "moreau")
+SCIPY = ("Radau", "BDF", "LSODA")
+RECORDS = ("a", "forces", "energy", "power")
+FIELDS = {"F_ideal": "forces", "F_nonideal": "forces", "lam": "forces", "lam_ideal": "forces"}
+EVENT_KINDS = ("stick", "slip", "reverse", "pull", "chatter")
+DEFAULT_RTOL, DEFAULT_ATOL = 1e-8, 1e-10
+
+
+def simulate(
+    scene: Scene,
+    duration: float,
+    q: ArrayLike | None = None,
+    v: ArrayLike | None = None,
+    *,
+    t0: float = 0.0,
+    method: str = "dop853",
+    rtol: float | None = None,
+    atol: ArrayLike | None = None,
+    dt: float | None = None,
+    output_dt: float | None = None,
+    record: str | Sequence[str] = (),
+    progress: bool | None = None,
+) -> Trajectory:
+    """Integrates a scene in time, on its constraints.
+
+    Adaptive methods keep the local error of every coordinate below atol + rtol |y|; the state is put back on the
+    constraints after every step, so that violations stay at rounding.  Dry friction sticks and slips at located
+    events.
+
+    Args:
+        scene: what to simulate.
+        duration: length of time [s].
+        q: initial configuration, (nq,); the scene's when None.  It is projected onto the constraints first.
+        v: initial velocity, (nv,); the scene's when None.
+        t0: initial time [s].
+        method: "dop853" (order 8) or "dopri5" (order 5), adaptive; "rk4", "semi_implicit_euler" or "moreau" (time
+            stepping at velocity level), fixed dt; "Radau", "BDF" or "LSODA" by SciPy, for stiff scenes.
+        rtol: relative tolerance of adaptive methods, 1e-8 when None.
+        atol: absolute tolerance, a number or an array (2 nv,) for positions and velocities, 1e-10 when None.
+        dt: step of the fixed-step methods [s].
+        output_dt: time between samples [s]; every accepted step when None.  Events are samples as well.
+        record: any of "a", "forces", "energy", "power", or names of fields that they fill.
+        progress: progress bar on standard error; None shows it on a terminal only.
+
+    Returns:
+        The Trajectory.
+
+    Raises:
+        InputError: an argument does not fit.
+        LoopClosureError: the initial state cannot be put on the constraints.
+        RunError: the run stopped early; its `trajectory` holds the samples up to there.
+        RunInterrupted: Ctrl-C; the same.
+    """
+    if not isinstance(scene, Scene):
+        raise InputError(f"simulate: scene must be a Scene; got {type(scene).__name__}")
+    options = _options(scene, duration, t0, method, rtol, atol, dt, output_dt, record)
+    q0, v0 = scene.project(q, v, options["t0"]) if (q is not None or v is not None or t0) else scene.initial_state()
+    if method in SCIPY:
+        from .stiff import simulate_stiff
+
+        return simulate_stiff(scene, q0, v0, options)
+    bar = _progress_bar(progress, options)
+    options["tick"] = bar.update if bar else None
+    begin = time.perf_counter()
+    try:
+        raw = scene.new_runner().simulate(q0, v0, scene.z0, options)
+    finally:
+        if bar:
+            bar.close()
+    return _finish(scene, raw, options, time.perf_counter() - begin)
+
+
+def rollout(
+    scene: Scene,
+    states: tuple[ArrayLike, ArrayLike],
+    duration: float,
+    *,
+    t0: float = 0.0,
+    method: str = "dop853",
+    rtol: float | None = None,
+    atol: ArrayLike | None = None,
+    dt: float | None = None,
+    output_dt: float | None = None,
+    record: str | Sequence[str] = (),
+    threads: int = 1,
+) -> list[Trajectory]:
+    """Runs many initial states in native threads; each result is bitwise that of its own `simulate`.
+
+    Args:
+        scene: what to simulate.
+        states: (q, v), shapes (n, nq) and (n, nv).
+        duration: length of time [s].
+        t0: initial time [s].
+        method: one of the core's methods (not SciPy's).
+        rtol: relative tolerance.
+        atol: absolute tolerance, a number or an array (2 nv,).
+        dt: step of the fixed-step methods [s].
+        output_dt: time between samples [s]; every accepted step when None.
+        record: as in `simulate`.
+        threads: number of native threads.
+
+    Returns:
+        One Trajectory a state.
+
+    Raises:
+        InputError: an argument does not fit.
+        RunError: a run stopped early; `trajectory` of the first one that did, and `index` tells which.
+    """
+    threads = count("rollout: threads", threads, least=1)
+    if not isinstance(states, tuple) or len(states) != 2:
+        raise InputError("rollout: states must be a pair (q, v) of shapes (n, nq) and (n, nv)")
+    model = scene.model
+    q, v = (array(f"rollout: {k}", x, (None, n)) for k, x, n in zip("qv", states, (model.nq, model.nv), strict=True))
+    if len(q) != len(v):
+        raise InputError(f"rollout: q and v must have as many rows; got {len(q)} and {len(v)}")
+    if method in SCIPY:
+        raise InputError(f'rollout: method must be one of the core\'s; "{method}" runs in SciPy')
+    options = _options(scene, duration, t0, method, rtol, atol, dt, output_dt, record)
+    starts = [scene.project(a, b, options["t0"]) for a, b in zip(q, v, strict=True)]
+    options["tick"] = None
+    begin = time.perf_counter()
+    q0, v0 = (np.ascontiguousarray([s[i] for s in starts]).reshape(len(starts), -1) for i in (0, 1))
+    raws = scene.roll_out(q0, v0, options, threads)
+    wall = time.perf_counter() - begin
+    results = []
+    for i, raw in enumerate(raws):
+        try:
+            results.append(_finish(scene, raw, options, wall))
+        except RunError as error:
+            error.index = i
+            raise
+    return results
+
+
+def _options(
+    scene: Scene, duration: Any, t0: Any, method: Any, rtol: Any, atol: Any, dt: Any, output_dt: Any, record: Any
+) -> dict[str, Any]:
+    methods = (*ADAPTIVE, *FIXED, *SCIPY)
+    if not isinstance(method, str) or method not in methods:
+        hint = nearest(method, methods) if isinstance(method, str) else ""
+        raise InputError(f"simulate: method must be one of {', '.join(methods)}; got {method!r}{hint}")
+    if method in FIXED:
+        if dt is None:
+            raise InputError(f'simulate: method "{method}" needs a step dt')
+    elif dt is not None:
+        raise InputError(f'simulate: method "{method}" chooses its own steps; leave dt out, or set output_dt')
+    nv = scene.model.nv
+    tolerance = np.full(2 * nv + scene.z0.size, DEFAULT_ATOL)
+    if atol is not None:
+        given = np.asarray(atol)
+        if given.ndim == 0:
+            tolerance[:] = nonnegative("simulate: atol", atol)
+        else:
+            tolerance[: 2 * nv] = array("simulate: atol", atol, (2 * nv,))
+            if (tolerance < 0.0).any():
+                raise InputError(f"simulate: atol must not be negative; got {tolerance.min():g}")
+    relative = DEFAULT_RTOL if rtol is None else nonnegative("simulate: rtol", rtol)
+    if relative == 0.0 and not (tolerance > 0.0).all():
+        raise InputError("simulate: rtol and atol must not both be zero; set one of them")
+    wanted = {record} if isinstance(record, str) else set(record)
+    groups = set()
+    for name in wanted:
+        groups.add(FIELDS.get(name, name))
+        choice("simulate: record", FIELDS.get(name, name), RECORDS)
+    return {
+        "method": method,
+        "duration": positive("simulate: duration", duration),
+        "t0": number("simulate: t0", t0),
+        # Below a few units of rounding no step can meet its tolerance.
+        "rtol": max(relative, 1e-14) if relative else 0.0,
+        "atol": np.ascontiguousarray(np.maximum(tolerance, 1e-300)),
+        "dt": 0.0 if dt is None else positive("simulate: dt", dt),
+        "output_dt": 0.0 if output_dt is None else positive("simulate: output_dt", output_dt),
+        **{key: key in groups for key in RECORDS},
+    }
+
+
+def _finish(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: float) -> Trajectory:
+    """Shapes the core's flat arrays; raises what stopped the run, with the trajectory attached."""
+    trajectory = shaped(scene, raw, options, wall)
+    error = raw["error"]
+    if error is not None:
+        last = float(trajectory.t[-1]) if len(trajectory) else options["t0"]
+        if isinstance(error, KeyboardInterrupt):
+            stopped: RunError = RunInterrupted(
+                f"the run was interrupted at t = {last:.4g} s; the trajectory up to there is in error.trajectory",
+                time=last,
+            )
+            cause: BaseException | None = None
+        elif isinstance(error, RunError):
+            stopped, cause = error, error.__cause__
+        elif isinstance(error, PinNonidealError):
+            raise error
+        else:
+            stopped = UserFunctionError(f"a function of the scene failed at t = {last:.4g} s: {error}", time=last)
+            cause = error if isinstance(error, BaseException) else None
+        stopped.time = last if stopped.time is None else stopped.time
+        stopped.trajectory = trajectory
+        raise stopped from cause
+    if raw["failure"] is not None:
+        failure = scene.failure(raw["failure"])
+        if isinstance(failure, RunError):
+            message = f"{failure}; the trajectory up to there is in error.trajectory"
+            failure.args = (message, *failure.args[1:])
+            failure.trajectory = trajectory
+        raise failure
+    return trajectory
+
+
+def shaped(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: float) -> Trajectory:
+    """A Trajectory from the core's flat arrays.
+
+    Args:
+        scene: the scene that ran.
+        raw: arrays by name.
+        options: what was asked for.
+        wall: wall time [s].
+    """
+    nt = len(raw["t"])
+    model = scene.model
+    elements, laws = len(scene.element_names), scene.law_names
+
+    def table(key: str, width: int) -> Array:
+        result: Array = raw[key].reshape(nt, width)
+        return result
+
+    m = max((s.stop for s in scene.constraint_slices.values()), default=0)
+    fields: dict[str, Any] = {}
+    if options["a"]:
+        fields["a"] = table("a", model.nv)
+    if options["forces"]:
+        for key, width in (("F_ideal", model.nv), ("F_nonideal", model.nv), ("lam", m), ("lam_ideal", m)):
+            fields[key] = table(key, width)
+    columns = ["actuation", "forces", "constraints", *_columns(laws)]
+    if options["power"]:
+        fields["power"] = dict(zip(columns, table("power", len(columns)).T, strict=True))
+    if options["energy"]:
+        numbers = table("energy", len(columns) + 3)
+        ledger = {"kinetic": numbers[:, 0], "potential": numbers[:, 1], "total": numbers[:, 0] + numbers[:, 1]}
+        ledger |= dict(zip([*columns, "projection"], numbers[:, 2:].T, strict=True))
+        done = numbers[:, 2:].sum(axis=1)
+        ledger["balance"] = ledger["total"] - ledger["total"][:1] - done
+        fields["energy"] = ledger
+    if scene.z0.size:
+        fields["z"] = table("z", scene.z0.size)
+    contacts = list(scene.constraint_slices)
+    names = {3: contacts}
+    events = [
+        Event(t, EVENT_KINDS[kind], names.get(kind, scene.element_names)[element]) for t, kind, element in raw["events"]
+    ]
+    counters = ("steps", "rejected", "evaluations", "factorizations", "projections", "iterations")
+    return Trajectory(
+        t=raw["t"],
+        q=table("q", model.nq),
+        v=table("v", model.nv),
+        violation=raw["violation"],
+        violation_rate=raw["violation_rate"],
+        modes=table("modes", elements).astype(np.int8) if elements else None,
+        events=events,
+        stats=Stats(**{key: int(raw[key]) for key in counters}, wall_s=wall),
+        scene=scene,
+        element_names=list(scene.element_names),
+        name=scene.name,
+        **fields,
+    )
+
+
+def _columns(laws: Sequence[str]) -> list[str]:
+    """Law names as ledger columns that no other column bears."""
+    taken = {"kinetic", "potential", "total", "actuation", "forces", "constraints", "projection", "balance"}
+    return [f"law {name}" if name in taken else name for name in laws]
+
+
+class _Bar:
+    def __init__(self, total: float, t0: float) -> None:
+        from tqdm import tqdm
+
+        self._t0 = t0
+        self._bar = tqdm(total=total, unit="s", bar_format="{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]")
+
+    def update(self, t: float) -> None:
+        self._bar.n = t - self._t0
+        self._bar.refresh()
+
+    def close(self) -> None:
+        self._bar.close()
+
+
+def _progress_bar(progress: bool | None, options: dict[str, Any]) -> _Bar | None:
+    shown = sys.stderr.isatty() if progress is None else progress
+    return _Bar(options["duration"], options["t0"]) if shown else None
+

@@ -1,0 +1,223 @@
+"""Trajectory: what a run leaves behind, as arrays on one time line."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+import zipfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import LoadingError, OutputError
+
+Array = NDArray[np.float64]
+
+FORMAT = 1
+REQUIRED = ("t", "q", "v", "violation", "violation_rate")
+OPTIONAL = ("a", "F_ideal", "F_nonideal", "lam", "lam_ideal", "z", "modes")
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened between two smooth stretches of motion.
+
+    Attributes:
+        time: when [s].
+        kind: "stick", "slip" or "reverse" of a frictional element, "pull" of a contact whose normal force turned
+            negative, "chatter" where a cluster of events was bridged by time stepping.
+        element: name of the law or contact.
+    """
+
+    time: float
+    kind: str
+    element: str
+
+
+@dataclass(frozen=True)
+class Stats:
+    """Counters of a run.
+
+    Attributes:
+        steps: accepted steps.
+        rejected: rejected steps.
+        evaluations: evaluations of Eq. (40).
+        factorizations: factorizations of the constraint rows.
+        projections: projections that moved the state.
+        iterations: passes of the implicit reaction equation.
+        wall_s: wall time [s].
+    """
+
+    steps: int = 0
+    rejected: int = 0
+    evaluations: int = 0
+    factorizations: int = 0
+    projections: int = 0
+    iterations: int = 0
+    wall_s: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Samples of a run; what was not recorded is None.
+
+    Attributes:
+        t: times [s], (nt,).
+        q: configurations, (nt, nq).
+        v: velocities, (nt, nv).
+        violation: largest |residual| over all rows [m or rad], (nt,).
+        violation_rate: largest |rate| over all rows [m/s or rad/s], (nt,).
+        a: accelerations, (nt, nv); record "a".
+        F_ideal: ideal part of the force of constraint, (nt, nv), Eq. (39); record "forces".
+        F_nonideal: nonideal part, (nt, nv), Eq. (39); record "forces".  What sticks is part of it.
+        lam: multipliers of all rows in M a = F + C + A^T lam, (nt, m); record "forces".
+        lam_ideal: multipliers of the ideal part alone, (nt, m); record "forces".
+        energy: ledger by column [J]: "kinetic", "potential", "total", then the work done since the start by
+            "actuation", "forces", "constraints", each law, and "projection"; "balance" is what is left and
+            must be zero.  Record "energy".
+        power: power by column [W]: "actuation", "forces", "constraints", each law.  Record "power".
+        z: states of laws, (nt, nz), or None without any.
+        modes: mode of each frictional element, +1 or -1 for slip, 0 for stick, (nt, ne).
+        events: events in order of time.
+        stats: counters.
+        scene: the scene that ran; None after `load`.
+        element_names: names of the columns of `modes`.
+        name: of the scene.
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    violation: Array
+    violation_rate: Array
+    a: Array | None = None
+    F_ideal: Array | None = None
+    F_nonideal: Array | None = None
+    lam: Array | None = None
+    lam_ideal: Array | None = None
+    energy: dict[str, Array] | None = None
+    power: dict[str, Array] | None = None
+    z: Array | None = None
+    modes: NDArray[np.int8] | None = None
+    events: list[Event] = field(default_factory=list)
+    stats: Stats = field(default_factory=Stats)
+    scene: Any = None
+    element_names: list[str] = field(default_factory=list)
+    name: str = ""
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __str__(self) -> str:
+        s = self.stats
+        span = f"{self.t[0]:g} to {self.t[-1]:g} s" if len(self.t) else "empty"
+        lines = [
+            f"{self.name or 'trajectory'}: {span}, {len(self.t)} samples",
+            f"  steps {s.steps} ({s.rejected} rejected), evaluations {s.evaluations}, "
+            f"projections {s.projections}, reaction passes {s.iterations}",
+            f"  violation {self.violation.max(initial=0.0):.1e}, rate {self.violation_rate.max(initial=0.0):.1e}",
+        ]
+        if self.energy is not None and len(self.t):
+            shown = ", ".join(f"{k} {x[-1]:.6g}" for k, x in self.energy.items() if k != "balance")
+            lines.append(f"  energy [J]: {shown}; balance {np.abs(self.energy['balance']).max():.1e}")
+        if self.events:
+            kinds = sorted({e.kind for e in self.events})
+            counts = ", ".join(f"{sum(e.kind == k for e in self.events)} {k}" for k in kinds)
+            lines.append(f"  events: {counts}")
+        lines.append(f"  wall time {s.wall_s:.3g} s")
+        return "\n".join(lines)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Writes all arrays to one .npz file; an existing file is replaced whole or not at all.
+
+        Args:
+            path: file name; ".npz" is appended when it is missing.
+
+        Returns:
+            The path written.
+
+        Raises:
+            OutputError: the file cannot be written.
+        """
+        target = Path(os.fspath(path))
+        if target.suffix != ".npz":
+            target = target.with_name(target.name + ".npz")
+        arrays: dict[str, Any] = {key: getattr(self, key) for key in REQUIRED}
+        arrays |= {key: getattr(self, key) for key in OPTIONAL if getattr(self, key) is not None}
+        for group in ("energy", "power"):
+            table = getattr(self, group)
+            if table is not None:
+                arrays |= {f"{group}/{i}": x for i, x in enumerate(table.values())}
+        header = {
+            "format": FORMAT,
+            "name": self.name,
+            "element_names": self.element_names,
+            "events": [[e.time, e.kind, e.element] for e in self.events],
+            "stats": vars(self.stats),
+            "energy": None if self.energy is None else list(self.energy),
+            "power": None if self.power is None else list(self.power),
+        }
+        arrays["header"] = np.array(json.dumps(header))
+        temporary = None
+        try:
+            handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+            with os.fdopen(handle, "wb") as file:
+                np.savez_compressed(file, **arrays)
+            os.replace(temporary, target)
+        except OSError as error:
+            raise OutputError(f'cannot write "{target}": {error.strerror or error}; choose a writable path') from error
+        finally:
+            if temporary is not None and os.path.exists(temporary):
+                with contextlib.suppress(OSError):
+                    os.unlink(temporary)
+        return target
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Trajectory:
+        """Reads a file written by `save`; nothing in it is executed.
+
+        Args:
+            path: file name.
+
+        Returns:
+            The trajectory, without its scene.
+
+        Raises:
+            LoadingError: the file is missing, truncated, or no trajectory.
+        """
+        source = Path(os.fspath(path))
+        try:
+            with np.load(source, allow_pickle=False) as file:
+                arrays = {key: file[key] for key in file.files}
+            header = json.loads(str(arrays.pop("header")))
+            if header.get("format") != FORMAT:
+                raise LoadingError(f'"{source}" must have format {FORMAT}; it has {header.get("format")}')
+            missing = [key for key in REQUIRED if key not in arrays]
+            if missing:
+                raise LoadingError(f'"{source}" is no complete trajectory: {", ".join(missing)} missing')
+            tables = {
+                group: None if header[group] is None
+                else {name: arrays[f"{group}/{i}"] for i, name in enumerate(header[group])}
+                for group in ("energy", "power")
+            }
+            events = [Event(float(t), str(kind), str(element)) for t, kind, element in header["events"]]
+            return cls(
+                **{key: arrays.get(key) for key in (*REQUIRED, *OPTIONAL)},
+                **tables,
+                events=events,
+                stats=Stats(**header["stats"]),
+                element_names=list(header["element_names"]),
+                name=str(header["name"]),
+            )
+        except LoadingError:
+            raise
+        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+            raise LoadingError(
+                f'cannot read a trajectory from "{source}": {type(error).__name__}: {error}; '
+                "it must be an .npz file written by Trajectory.save"
+            ) from error

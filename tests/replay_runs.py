@@ -1,0 +1,131 @@
+"""Runs with known numbers, for the replay and the figures: no simulation stands between cause and picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.constraints import PointAnchor
+
+STEP = 1e-6  # for rates by central differences: their error is near 1e-9
+
+
+def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -> Any:
+    """A run that follows q(t), with what `simulate` without record gives, changed by `fields`."""
+    t = np.asarray(t, dtype=float)
+    configurations = np.array([q(x) for x in t])
+    rates = [pin.difference(model, q(x - STEP), q(x + STEP)) / (2 * STEP) for x in t]
+    scene = SimpleNamespace(
+        model=model,
+        visual_model=fields.pop("visual_model", None),
+        collision_model=None,
+        name=fields.pop("name", model.name),
+        constraints=fields.pop("constraints", []),
+        laws=[],
+        contacts=fields.pop("contacts", []),
+        forces=fields.pop("given_forces", []),
+        q0=configurations[0],
+        v0=np.asarray(rates[0]),
+        constraint_slices=fields.pop("constraint_slices", {}),
+        element_names=fields.pop("element_names", []),
+    )
+    values: dict[str, Any] = {
+        "t": t,
+        "q": configurations,
+        "v": np.array(rates),
+        "violation": np.zeros(len(t)),
+        "violation_rate": np.zeros(len(t)),
+        "modes": np.zeros((len(t), 0), dtype=np.int8),
+        "events": [],
+        "stats": {"steps": 10, "wall_s": 0.001},
+        "scene": scene,
+    }
+    values |= dict.fromkeys(("a", "F_ideal", "F_nonideal", "lam", "energy", "power", "z"))
+    return SimpleNamespace(**values | fields)
+
+
+def jointed(*joints: Any, name: str = "chain", lever: float = 0.2) -> pin.Model:
+    """A chain of joints along x, 0.4 m apart, with bodies of 1 kg."""
+    model = pin.Model()
+    model.name = name
+    parent, place = 0, pin.SE3.Identity()
+    for number, joint in enumerate(joints):
+        parent = model.addJoint(parent, joint, place, f"j{number}")
+        inertia = pin.Inertia(1.0, np.array([lever, 0.0, 0.0]), 0.01 * np.eye(3))
+        model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+        place = pin.SE3(np.eye(3), np.array([0.4, 0.0, 0.0]))
+    return model
+
+
+def add_frame(model: pin.Model, name: str, joint: int, place: Any, turn: Any = None) -> None:
+    """A frame fixed to a joint."""
+    placement = pin.SE3(np.eye(3) if turn is None else turn, np.asarray(place, dtype=float))
+    model.addFrame(pin.Frame(name, joint, 0, placement, pin.FrameType.OP_FRAME))
+
+
+def panda(count: int = 31, duration: float = 0.5) -> Any:
+    """The Panda arm with its meshes on a smooth path, with friction torques and a mode that changes."""
+    import example_robot_data
+
+    robot = example_robot_data.load("panda")
+    model, visual_model = pin.buildReducedModel(robot.model, robot.visual_model, [8, 9], robot.q0)
+    start, sweep = np.array([0.0, -0.5, 0.0, -1.5, 0.0, 1.2, 0.0]), np.linspace(0.3, 1.0, 7)
+    t = np.linspace(0.0, duration, count)
+    kinetic = 0.5 * np.sin(3.0 * t) ** 2
+    return run_of(
+        model,
+        t,
+        lambda x: start + sweep * np.sin(3.0 * x),
+        name="panda",
+        visual_model=visual_model,
+        F_nonideal=-np.outer(np.cos(3.0 * t), sweep),
+        energy={"kinetic": kinetic, "potential": 2.0 - kinetic, "total": np.full(count, 2.0), "friction": -t},
+        modes=np.array([[0 if x < 0.2 else 1] for x in t], dtype=np.int8),
+        element_names=["panda_joint2"],
+        events=[SimpleNamespace(time=0.2, kind="slip", element="panda_joint2")],
+    )
+
+
+CRANK, COUPLER, ROCKER, GROUND = 0.3, 0.8, 0.6, 0.9
+
+
+def four_bar(count: int = 61, duration: float = 1.0) -> Any:
+    """A planar four-bar without geometry, closed in closed form, with a reaction of known components."""
+    model = pin.Model()
+    model.name = "four_bar"
+    for name, parent, x in (("crank", 0, 0.0), ("coupler", 1, CRANK), ("rocker", 0, GROUND)):
+        place = pin.SE3(np.eye(3), np.array([x, 0.0, 0.0]))
+        joint = model.addJoint(parent, pin.JointModelRY(), place, name)
+        body = pin.Inertia(1.0, np.array([0.2, 0.0, 0.0]), 0.01 * np.eye(3))
+        model.appendBodyToJoint(joint, body, pin.SE3.Identity())
+    add_frame(model, "coupler_tip", 2, [COUPLER, 0.0, 0.0])
+    add_frame(model, "rocker_tip", 3, [ROCKER, 0.0, 0.0])
+
+    def closed(t: float) -> Any:
+        angle = 0.6 + 0.9 * np.sin(3.0 * t)
+        pin_at = CRANK * np.exp(1j * angle)
+        reach = GROUND - pin_at  # from the crank's pin to the rocker's pivot
+        length = abs(reach)
+        turn = np.arccos((COUPLER**2 + length**2 - ROCKER**2) / (2.0 * COUPLER * length))
+        tip = pin_at + COUPLER * reach / length * np.exp(1j * turn)
+        # Positive angles about y turn x towards -z.
+        return np.array([-angle, -np.angle((tip - pin_at) / np.exp(1j * angle)), -np.angle(tip - GROUND)])
+
+    t = np.linspace(0.0, duration, count)
+    lam = np.column_stack([10.0 + t, np.zeros(count), 3.0 * np.sin(t)])
+    return run_of(
+        model,
+        t,
+        closed,
+        constraints=[PointAnchor("coupler_tip", "rocker_tip", name="loop")],
+        constraint_slices={"loop": slice(0, 3)},
+        lam=lam,
+        lam_ideal=0.75 * lam,
+        F_ideal=np.zeros((count, 3)),
+        F_nonideal=np.column_stack([0.1 + t, np.zeros(count), -0.2 * t]),
+        violation=np.full(count, 3e-15),
+    )

@@ -1,0 +1,163 @@
+"""Marks and arrows of the replay: where constraints act, in which direction, and how large."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pin_nonideal.constraints import Distance, HingeAnchor, PointAnchor, Rolling
+from pin_nonideal.contacts import PointContact
+from pin_nonideal.forces import SpringDamper
+from pin_nonideal.replay_forces import arrows_of, marks_of
+from pin_nonideal.replay_motion import sample
+
+from .replay_runs import add_frame, four_bar, jointed, run_of
+
+ROUNDING = 1e-12
+# Closure of the four-bar in closed form: a few roundings of 1 m through an arc cosine.
+CLOSURE = 1e-12
+
+
+def arrows(run: object) -> list:
+    motion = sample(run, 20.0)
+    return arrows_of(run, motion, marks_of(run.scene))
+
+
+def frames(run: object, name: str) -> list[pin.SE3]:
+    """Placement of a frame at the replay's frames."""
+    model, found = run.scene.model, []
+    data = model.createData()
+    motion = sample(run, 20.0)
+    for time in motion.times:
+        k = int(np.argmin(np.abs(run.t - time)))
+        assert run.t[k] == pytest.approx(time)
+        pin.framesForwardKinematics(model, data, run.q[k])
+        found.append(data.oMf[model.getFrameId(name)].copy())
+    return found
+
+
+def test_an_anchor_is_marked_on_both_bodies() -> None:
+    run = four_bar()
+    (mark,) = marks_of(run.scene)
+    assert (mark.name, mark.kind) == ("loop", "anchor")
+    motion = sample(run, 20.0)
+    first, second = motion.point(mark.joint1, mark.point1), motion.point(mark.joint2, mark.point2)
+    np.testing.assert_allclose(first, second, atol=CLOSURE)
+    np.testing.assert_allclose(
+        first, [place.translation for place in frames(run, "coupler_tip")], atol=ROUNDING
+    )
+
+
+def test_an_anchor_on_the_world_stays_where_its_frame_starts() -> None:
+    model = jointed(pin.JointModelRZ())
+    add_frame(model, "tip", 1, [0.4, 0.0, 0.0])
+    run = run_of(model, [0.0, 1.0], lambda t: np.array([0.5 + t]), constraints=[PointAnchor("tip")])
+    (mark,) = marks_of(run.scene)
+    assert mark.joint2 == 0
+    np.testing.assert_allclose(mark.point2, [0.4 * np.cos(0.5), 0.4 * np.sin(0.5), 0.0], atol=ROUNDING)
+    assert mark.name == "PointAnchor"
+
+
+def test_a_reaction_is_turned_from_the_second_frame_into_the_world_and_split() -> None:
+    run = four_bar()
+    by_kind = {arrow.kind: arrow for arrow in arrows(run) if arrow.name == "loop"}
+    assert set(by_kind) == {"ideal", "nonideal"}
+    samples = np.round(sample(run, 20.0).times * 60.0).astype(int)
+    expected = [
+        place.rotation @ lam for place, lam in zip(frames(run, "rocker_tip"), run.lam[samples], strict=True)
+    ]
+    np.testing.assert_allclose(by_kind["ideal"].values, 0.75 * np.array(expected), atol=ROUNDING * 10.0)
+    np.testing.assert_allclose(by_kind["nonideal"].values, 0.25 * np.array(expected), atol=ROUNDING * 10.0)
+    tips = [place.translation for place in frames(run, "coupler_tip")]
+    np.testing.assert_allclose(by_kind["ideal"].origin, tips, atol=ROUNDING)
+
+
+def test_without_a_split_the_arrow_is_the_total() -> None:
+    run = four_bar()
+    run.lam_ideal = None
+    (arrow,) = [arrow for arrow in arrows(run) if arrow.name == "loop"]
+    assert arrow.kind == "total"
+    np.testing.assert_allclose(np.linalg.norm(arrow.values[0]), np.linalg.norm(run.lam[0]))
+
+
+def test_friction_in_joints_is_a_moment_about_their_axes() -> None:
+    run = four_bar()
+    moments = {arrow.name: arrow for arrow in arrows(run) if arrow.unit == "N m"}
+    assert set(moments) == {"crank", "rocker"}  # the coupler's is zero throughout
+    assert {arrow.kind for arrow in moments.values()} == {"nonideal"}
+    np.testing.assert_allclose(moments["crank"].values, run.F_nonideal[::3, 0], atol=ROUNDING)
+    np.testing.assert_allclose(moments["crank"].axis, [0.0, 1.0, 0.0])
+    assert moments["rocker"].joint == 3
+
+
+def test_without_anchors_the_generalized_force_of_constraint_is_drawn_at_the_joints() -> None:
+    model = jointed(pin.JointModelPX(), pin.JointModelPY())
+    t = np.linspace(0.0, 1.0, 21)
+    run = run_of(model, t, lambda x: np.array([x, 2.0 * x]), F_ideal=np.column_stack([t, 0.0 * t]))
+    (arrow,) = arrows(run)
+    assert (arrow.name, arrow.kind, arrow.unit) == ("j0", "ideal", "N")
+    np.testing.assert_allclose(arrow.values, np.column_stack([t, 0 * t, 0 * t]), atol=ROUNDING)
+    np.testing.assert_allclose(arrow.origin[:, 0], t, atol=ROUNDING)
+
+
+def test_a_run_without_forces_has_no_arrows() -> None:
+    assert arrows(run_of(jointed(pin.JointModelRZ()), [0.0, 1.0], lambda t: np.array([t]))) == []
+
+
+def single(item: object, lam: list[float], joint: object = None, **fields: object) -> list:
+    """Arrows of one constraint on a body at (0.3, 0, 0.5) that carries the frames "center" and "tip"."""
+    model = jointed(joint or pin.JointModelPX())
+    add_frame(model, "center", 1, [0.3, 0.0, 0.5])
+    add_frame(model, "tip", 1, [0.4, 0.0, 0.0], turn=pin.utils.rotate("z", np.pi / 2.0))
+    add_frame(model, "base", 0, [0.0, 0.0, 0.0], turn=pin.utils.rotate("z", np.pi / 2.0))
+    name = item.name
+    contact = isinstance(item, PointContact)
+    return arrows(
+        run_of(
+            model,
+            [0.0, 1.0],
+            lambda t: np.zeros(1),
+            lam=np.array([lam, lam]),
+            constraint_slices={name: slice(0, len(lam))},
+            **{"contacts" if contact else "constraints": [item]},
+            **fields,
+        )
+    )
+
+
+@pytest.mark.parametrize(
+    ("item", "lam", "force", "origin"),
+    [
+        (PointAnchor("tip", "base", axes="xz", name="c"), [2.0, 3.0], [0.0, 2.0, 3.0], [0.4, 0.0, 0.0]),
+        (HingeAnchor("tip", "base", name="c"), [1.0, 2.0, 3.0, 8.0, 9.0], [-2.0, 1.0, 3.0], [0.4, 0.0, 0.0]),
+        (Distance("tip", "base", name="c"), [5.0], [5.0, 0.0, 0.0], [0.4, 0.0, 0.0]),
+        (Rolling("center", 0.5, axis="y", name="c"), [1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [0.3, 0.0, 0.0]),
+        (Rolling("center", 0.2, axis=None, name="c"), [1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [0.3, 0.0, 0.3]),
+        (PointContact("center", radius=0.5, mu=0.3, name="c"), [7.0], [0.0, 0.0, 7.0], [0.3, 0.0, 0.0]),
+    ],
+    ids=["point", "hinge", "distance", "disk", "sphere", "contact"],
+)
+def test_force_and_place_of_each_kind(item: object, lam: list, force: list, origin: list) -> None:
+    (arrow,) = single(item, lam)
+    np.testing.assert_allclose(arrow.values[0], force, atol=ROUNDING)
+    np.testing.assert_allclose(arrow.origin[0], origin, atol=ROUNDING)
+    assert (arrow.name, arrow.unit, arrow.kind) == ("c", "N", "total")
+
+
+def test_rods_springs_and_contacts_are_marked() -> None:
+    model = jointed(pin.JointModelRZ())
+    add_frame(model, "tip", 1, [0.4, 0.0, 0.0])
+    run = run_of(
+        model,
+        [0.0, 1.0],
+        lambda t: np.array([t]),
+        constraints=[Distance("tip", "universe", name="rod")],
+        contacts=[PointContact("tip", name="foot")],
+        given_forces=[SpringDamper("tip", stiffness=1.0, name="spring")],
+    )
+    assert [(mark.name, mark.kind) for mark in marks_of(run.scene)] == [
+        ("rod", "rod"),
+        ("foot", "contact"),
+        ("spring", "spring"),
+    ]

@@ -1,0 +1,206 @@
+"""URDF files: what Pinocchio's reader passes over in silence is an error, a note, a law or a constraint."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pin_nonideal as pn
+from pin_nonideal.errors import LoadingError
+
+from .small_robots import ARM, DATA, folder, joint, link, refuses, robot
+
+
+def test_link_with_two_parents_explains_robot_yaml(tmp_path):
+    text = robot(*ARM, joint("second", "base", "lower"))
+    with refuses(
+        'link "lower" has two parents, joints "elbow" and "second", but URDF holds trees only.'
+    ) as caught:
+        pn.load(folder(tmp_path, urdf=text))
+    assert "closed_loop: [[frame_A, frame_B]]" in str(caught.value)
+
+
+URDF_REFUSED = {
+    "two roots": (
+        robot(*ARM, link("lost")),
+        'must have one root link; got 2: "base", "lost"; join them with fixed',
+    ),
+    "ring": (
+        robot(link("a"), link("b"), joint("j", "a", "b"), joint("k", "b", "a")),
+        "must have a root link",
+    ),
+    "ring beside a tree": (
+        robot(*ARM, link("a"), link("b"), joint("j", "a", "b"), joint("k", "b", "a")),
+        "form a ring without a root",
+    ),
+    "no link": (robot(), "must hold at least one <link>; got none"),
+    "twice the same link": (robot(*ARM, link("upper")), 'link names must be unique; "upper" appears 2 times'),
+    "twice the same joint": (
+        robot(*ARM, link("x"), joint("elbow", "base", "x")),
+        'joint names must be unique; "elbow" appears 2 times',
+    ),
+    "unknown link": (
+        robot(*ARM, joint("j", "uper", "x"), link("x")),
+        'no link "uper", the parent of joint "j"; nearest: "upper"',
+    ),
+    "joint without child": (
+        robot(*ARM, '<joint name="j" type="fixed"><parent link="base"/></joint>'),
+        'joint "j" must name its child link',
+    ),
+    "link without name": (robot("<link/>"), "every <link> must have a name; one has none"),
+    "unknown joint type": (
+        robot(*ARM, link("x"), joint("j", "base", "x", kind="ball")),
+        'joint "j": type must be one of revolute, continuous, prismatic, floating, planar, fixed; got "ball"',
+    ),
+    "axis without direction": (
+        robot(*ARM, link("x"), joint("j", "base", "x", axis="0 0 0")),
+        'joint "j": axis must have a direction; got 0 0 0',
+    ),
+    "negative damping": (
+        robot(*ARM, link("x"), joint("j", "base", "x", inside='<dynamics damping="-1"/>')),
+        'joint "j": damping must not be negative; got -1',
+    ),
+    "negative mass": (
+        robot(*ARM, link("x", mass=-2.0), joint("j", "base", "x")),
+        'link "x": mass must not be negative; got -2 kg',
+    ),
+    "negative inertia": (
+        robot(*ARM, link("x", inertia=-0.1), joint("j", "base", "x")),
+        'link "x": principal moments of inertia must not be negative; got -0.1 kg m^2',
+    ),
+    "mass nan": (
+        robot(*ARM, link("x", mass="nan"), joint("j", "base", "x")),
+        'value must be finite; got "nan"',
+    ),
+    "mass a word": (
+        robot(*ARM, link("x", mass="heavy"), joint("j", "base", "x")),
+        'value must hold numbers; got "heavy"',
+    ),
+    "origin of two numbers": (
+        robot(*ARM, link("x"), joint("j", "base", "x", xyz="1 2")),
+        'xyz must hold 3 numbers; got "1 2"',
+    ),
+    "mimic of nothing": (
+        robot(*ARM, link("x"), joint("j", "base", "x", inside='<mimic joint="elbo"/>')),
+        'mimics joint "elbo", which does not exist; nearest: "elbow"',
+    ),
+    "mimic of itself": (
+        robot(*ARM, link("x"), joint("j", "base", "x", inside='<mimic joint="j"/>')),
+        "must mimic another joint; it mimics itself",
+    ),
+    "another root element": ("<sdf/>", "must have the root element <robot>; got <sdf>"),
+    "entities": (
+        '<!DOCTYPE r [<!ENTITY a "b">]>' + robot(*ARM),
+        "must not declare a DOCTYPE or entities; remove them",
+    ),
+    "empty": ("", "is truncated or not XML"),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), URDF_REFUSED.values(), ids=URDF_REFUSED)
+def test_malformed_urdf_is_refused(tmp_path, text, message):
+    with refuses(message):
+        pn.load(folder(tmp_path, urdf=text))
+
+
+def test_truncated_urdf_never_loads(tmp_path):
+    text = (DATA / "digit_like" / "robot.urdf").read_text().rstrip()
+    path = tmp_path / "robot.urdf"
+    for end in np.linspace(0, len(text) - 1, 40).astype(int):
+        path.write_text(text[:end])
+        with pytest.raises(LoadingError, match=r"truncated or not XML|must have the root element"):
+            pn.load(path)
+
+
+def test_binary_file_is_refused(tmp_path):
+    path = tmp_path / "robot.urdf"
+    path.write_bytes(b"\xff\xfe\x00robot")
+    with refuses("must be a text file in UTF-8"):
+        pn.load(path)
+
+
+def test_dynamics_tags_become_laws(tmp_path):
+    text = robot(*ARM, link("x"), joint("j", "base", "x", inside='<dynamics damping="0.3" friction="0.2"/>'))
+    scene = pn.load(folder(tmp_path, urdf=text))
+    assert [(w.joint, w.viscous, w.coulomb) for w in scene.laws] == [("j", 0.3, 0.2)]
+
+
+def test_a_law_of_robot_yaml_replaces_the_tags_and_says_so(tmp_path):
+    text = robot(*ARM, link("x"), joint("j", "base", "x", inside='<dynamics damping="0.3" friction="0.2"/>'))
+    scene = pn.load(folder(tmp_path, "laws:\n  - JointFriction: {joint: j, viscous: 1.0}\n", text))
+    assert [(w.joint, w.viscous, w.coulomb) for w in scene.laws] == [("j", 1.0, 0.0)]
+    assert any("laws given replace the damping and friction" in note for note in scene.notes)
+
+
+def test_mimic_joints_become_couplings(tmp_path):
+    mimic = '<mimic joint="elbow" multiplier="-2" offset="0.5"/>'
+    held = '<mimic joint="elbow" multiplier="0" offset="0.25"/>'
+    text = robot(
+        *ARM,
+        link("x"),
+        joint("j", "base", "x", inside=mimic),
+        link("y"),
+        joint("k", "base", "y", inside=held),
+    )
+    found = {c.name: c for c in pn.load(folder(tmp_path, urdf=text)).constraints}
+    coupling = found["j mimic"]
+    assert (coupling.joint1, coupling.joint2, coupling.ratio, coupling.offset) == ("j", "elbow", -2.0, 0.5)
+    assert found["k mimic"].function(1.0) == (0.25, 0.0, 0.0)
+
+
+def test_missing_and_broken_meshes_are_notes(tmp_path):
+    (tmp_path / "broken.stl").write_bytes(b"solid nothing")
+    shapes = "".join(
+        f'<visual><geometry><mesh filename="{name}"/></geometry></visual>'
+        for name in ("package:///lost.stl", "package://x/broken.stl", "meshes/away.dae")
+    )
+    text = robot(
+        *ARM, link("x", inside=shapes + '<visual><geometry><sphere radius="1"/></geometry></visual>')
+    )
+    text = text.replace("</robot>", joint("j", "base", "x") + "</robot>")
+    scene = pn.load(folder(tmp_path, urdf=text))
+    assert len(scene.visual_model.geometryObjects) == 1
+    assert 'mesh "package:///lost.stl" was not found; its shape is left out' in scene.notes
+    assert 'mesh "meshes/away.dae" was not found; its shape is left out' in scene.notes
+    assert any("broken.stl" in n and "cannot be read; its shape is left out" in n for n in scene.notes)
+
+
+TRIANGLE = """solid s
+facet normal 0 0 1
+outer loop
+vertex 0 0 0
+vertex 1 0 0
+vertex 0 1 0
+endloop
+endfacet
+endsolid s
+"""
+
+
+@pytest.mark.parametrize(
+    "where", ["package:///t.stl", "package://arm/t.stl", "t.stl", "package://arm/meshes/u.stl"]
+)
+def test_meshes_are_found_in_the_folder(tmp_path, where):
+    home = tmp_path / "arm"
+    (home / "meshes").mkdir(parents=True)
+    (home / "t.stl").write_text(TRIANGLE)
+    (home / "meshes" / "u.stl").write_text(TRIANGLE)
+    shape = f'<visual><geometry><mesh filename="{where}"/></geometry></visual>'
+    text = robot(*ARM, link("x", inside=shape), joint("j", "base", "x"))
+    scene = pn.load(folder(home, urdf=text))
+    assert Path(scene.visual_model.geometryObjects[0].meshPath).is_relative_to(home)
+    assert not any("mesh" in note for note in scene.notes)
+
+
+def test_meshes_are_found_in_package_folders(tmp_path):
+    (tmp_path / "packages" / "arm").mkdir(parents=True)
+    (tmp_path / "packages" / "arm" / "t.stl").write_text(TRIANGLE)
+    home = tmp_path / "home"
+    home.mkdir()
+    shape = '<visual><geometry><mesh filename="package://arm/t.stl"/></geometry></visual>'
+    text = robot(*ARM, link("x", inside=shape), joint("j", "base", "x"))
+    assert len(pn.load(folder(home, urdf=text)).visual_model.geometryObjects) == 0
+    scene = pn.load(home, package_dirs=[tmp_path / "packages"])
+    assert len(scene.visual_model.geometryObjects) == 1
