@@ -39,9 +39,9 @@ def plot(
     Args:
         run: what `simulate` returned.
         path: file to write, in the format that its ending names (.png, .pdf, .svg); None writes none.
-        what: "q", "v", "a", "energy", "work", "violation", "reactions", "modes", names of joints, or pairs of a
-            title "what [unit]" and curves by label, (nt,) each. None: q, v, energy, violation and modes, as far
-            as the run has them.
+        what: "q", "v", "a", "energy", "work", "violation", "reactions", "modes", names of joints, or pairs of
+            a title "what [unit]" and curves by label, (nt,) each. None: q, v, energy, violation and modes, as
+            far as the run has them.
 
     Returns:
         The matplotlib figure, to be changed, shown or saved.
