@@ -24,7 +24,6 @@ from .urdf import RobotFile, numbers, parse_xml, read_text
 READ = (
     "compiler",
     "option",
-    "default",
     "asset",
     "worldbody",
     "keyframe",
@@ -56,6 +55,7 @@ def read_mjcf(path: Path) -> RobotFile:
     if world is None or world.find("body") is None:
         raise LoadingError(f"{where} must have a <worldbody> with at least one <body>")
     defaults = Defaults(root)
+    defaults.write_out(root)
     notes = [f"<{e.tag}> of the MJCF file is not read" for e in root if e.tag not in (*READ, "equality")]
     joints = _prepare_bodies(world, where)
     notes += _absolute_meshes(root, path, where)
@@ -126,7 +126,7 @@ def _split(body: ElementTree.Element, own: list[ElementTree.Element]) -> None:
     attributes = dict(body.attrib)
     name = attributes["name"]
     body.clear()
-    body.attrib.update({k: v for k, v in attributes.items() if k in (*POSE, "childclass")})
+    body.attrib.update({k: v for k, v in attributes.items() if k in POSE})
     shell = body
     for i, joint in enumerate(own[:-1]):
         shell.set("name", f"{name}_{joint.get('name')}")

@@ -38,6 +38,20 @@ class Defaults:
             self._class_of[child] = child.get("class") or inherited
             self._assign(child, child.get("childclass") or inherited)
 
+    def write_out(self, root: ElementTree.Element) -> None:
+        """Gives every element of the file its attributes in full, and removes the default classes.
+
+        Args:
+            root: the `<mujoco>` element.
+        """
+        for element in self._class_of:
+            if element.tag != "body":
+                element.attrib.update(self.filled(element).attrib)
+            for key in ("class", "childclass"):
+                element.attrib.pop(key, None)
+        for default in root.findall("default"):
+            root.remove(default)
+
     def filled(self, element: ElementTree.Element, kind: str | None = None) -> ElementTree.Element:
         """A copy of the element with the attributes of its default class filled in.
 

@@ -134,7 +134,8 @@ def test_andrews_squeezer_has_the_published_inertia_forces_and_loops():
     scene = pn.load("andrews_squeezer")
     model, data = scene.model, scene.model.createData()
     p = json.loads((Path(__file__).parent / "data" / "andrews_squeezer.json").read_text())["parameters"]
-    order = [model.idx_vs[model.getJointId(n)] for n in ["beta", "theta", "gamma", "phi", "delta", "omega", "epsilon"]]
+    angles = ("beta", "theta", "gamma", "phi", "delta", "omega", "epsilon")
+    order = [model.idx_vs[model.getJointId(n)] for n in angles]
     rng = np.random.default_rng(5)
     q, v = rng.uniform(-2, 2, 7), rng.uniform(-3, 3, 7)
     state, speed = np.zeros(7), np.zeros(7)
@@ -238,7 +239,8 @@ def test_n_four_bar_has_any_number_of_windows(count):
     assert max(depths) == 2
     model, data = scene.model, scene.model.createData()
     pin.computeAllTerms(model, data, scene.q0, scene.v0)
-    # Energy of the published problem: I phi'^2 / 2 + P, I = (N+1) m L^2 / 3 + N m L^2, P = ((N+1) m / 2 + N m) g L.
+    # Energy of the published problem: I phi'^2 / 2 + P with I = (N+1) m L^2 / 3 + N m L^2 and
+    # P = ((N+1) m / 2 + N m) g L.
     inertia = ((count + 1) / 3 + count) * 2.0 * 0.25
     assert data.kinetic_energy == pytest.approx(0.5 * inertia * 9.0, rel=ROUNDING)
     assert data.potential_energy == pytest.approx(((count + 1) / 2 + count) * 2.0 * 9.81 * 0.5, rel=ROUNDING)
