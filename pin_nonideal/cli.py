@@ -212,7 +212,7 @@ def _bench(options: argparse.Namespace) -> int:
     for place in places:
         folder = place / "benchmarks"
         if (folder / "__main__.py").is_file():
-            sys.argv = ["pin-nonideal bench", *options.rest]
+            sys.argv[1:] = options.rest
             runpy.run_path(str(folder), run_name="__main__")
             return 0
     raise InputError(

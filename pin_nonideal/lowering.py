@@ -69,6 +69,21 @@ class Lowered:
     z0: Array = field(default_factory=lambda: np.zeros(0))
 
 
+@dataclass
+class ReactionNames:
+    """Names that a law may ask reactions for.
+
+    Attributes:
+        slices: rows of each constraint and contact.
+        blocks: the core's block of each.
+        joints: index of each joint.
+    """
+
+    slices: dict[str, slice]
+    blocks: dict[str, int]
+    joints: dict[str, int]
+
+
 class Reactions:
     """What the constraints exert at the instant of a law's call; valid during the call only.
 
@@ -76,8 +91,8 @@ class Reactions:
         lam: multipliers of all rows, in the order and scale of the descriptions, (m,).
     """
 
-    def __init__(self, view: Any, lowering: Lowering) -> None:
-        self._view, self._lowering = view, lowering
+    def __init__(self, view: Any, names: ReactionNames) -> None:
+        self._view, self._names = view, names
 
     @property
     def lam(self) -> Array:
@@ -94,7 +109,7 @@ class Reactions:
         Raises:
             UnknownNameError: no constraint has that name.
         """
-        slices = self._lowering.out.slices
+        slices = self._names.slices
         if name not in slices:
             raise UnknownNameError(f'no constraint "{name}" in this scene{nearest(name, slices)}')
         return self.lam[slices[name]]
@@ -111,15 +126,14 @@ class Reactions:
         Raises:
             UnknownNameError: there is no such joint or constraint.
         """
-        low = self._lowering
-        if name in low.out.blocks:
-            result: Array = self._view.of_block(low.out.blocks[name])
+        known = self._names
+        if name in known.blocks:
+            result: Array = self._view.of_block(known.blocks[name])
             return result
-        if low.model.existJointName(name):
-            result = self._view.of_joint(low.model.getJointId(name))
+        if name in known.joints:
+            result = self._view.of_joint(known.joints[name])
             return result
-        known = [*low.out.blocks, *list(low.model.names)[1:]]
-        raise UnknownNameError(f'no joint or constraint "{name}" in this scene{nearest(name, known)}')
+        raise UnknownNameError(f'no joint or constraint "{name}" in this scene{nearest(name, [*known.blocks, *known.joints])}')
 
 
 def checked(function: Callable[..., Any], who: str, *shapes: tuple[int, ...]) -> Callable[..., Any]:
@@ -144,11 +158,11 @@ def checked(function: Callable[..., Any], who: str, *shapes: tuple[int, ...]) ->
         results = []
         for part, shape in zip(parts, shapes, strict=True):
             try:
-                result = np.ascontiguousarray(part, dtype=float)
+                result = np.array(part, dtype=float, order="C")
             except (TypeError, ValueError):
                 raise UserFunctionError(f"{who} must return numbers of shape {shape}; got {part!r}") from None
             if result.shape != shape and result.size == math.prod(shape):
-                result = np.ascontiguousarray(result.reshape(shape))
+                result = result.reshape(shape)
             if result.shape != shape:
                 raise UserFunctionError(f"{who} must return shape {shape}; got shape {result.shape}")
             if not np.isfinite(result).all():
@@ -178,6 +192,8 @@ class Lowering:
         except ValueError as error:
             raise InputError(str(error)) from None
         self._rows = 0
+        joints = {name: i for i, name in enumerate(model.names) if i}
+        self._reaction_names = ReactionNames(self.out.slices, self.out.blocks, joints)
 
     # --- names ------------------------------------------------------------------------------------------------
 
@@ -421,7 +437,7 @@ class Lowering:
         """
         add = self.out.builder
         who = _who(law, name)
-        nv = self.model.nv
+        nv, names = self.model.nv, self._reaction_names
         if isinstance(law, JointFriction):
             if law.joint in constraints and not self.model.existJointName(law.joint):
                 self._anchor_friction(law, name, constraints[law.joint], who)
@@ -434,7 +450,7 @@ class Lowering:
             function = checked(law.function, f"{who}: function", *shapes)
 
             def call(t: float, q: Array, v: Array, view: Any, *z: Array) -> Any:
-                return function(t, q, v, None if view is None else Reactions(view, self), *z)
+                return function(t, q, v, None if view is None else Reactions(view, names), *z)
 
             add.add_user_law(self._law(name), law.states, law.reaction or "none", call)
             self.out.z0 = np.concatenate([self.out.z0, np.zeros(law.states)])
@@ -443,7 +459,7 @@ class Lowering:
             limit = checked(law.limit, f"{who}: limit", ())
 
             def bound(t: float, q: Array, v: Array, view: Any) -> float:
-                value = float(limit(t, q, v, Reactions(view, self)))
+                value = float(limit(t, q, v, Reactions(view, names)))
                 if value < 0.0:
                     raise UserFunctionError(f"{who}: limit must not be negative; got {value:g}")
                 return value

@@ -147,22 +147,67 @@ class Spline:
 
 
 def constant(value: float) -> Constant:
-    """f(t) = value; see `Constant`."""
+    """f(t) = value; see `Constant`.
+
+    Args:
+        value: the value, in the unit of what it drives.
+
+    Returns:
+        The function t -> (value, rate, acceleration).
+
+    Raises:
+        InputError: `value` is no finite number.
+    """
     return Constant(value)
 
 
 def sinusoid(amplitude: float, frequency: float, phase: float = 0.0, offset: float = 0.0) -> Sinusoid:
-    """f(t) = offset + amplitude sin(frequency t + phase), frequency in rad/s; see `Sinusoid`."""
+    """f(t) = offset + amplitude sin(frequency t + phase); see `Sinusoid`.
+
+    Args:
+        amplitude: in the unit of what it drives.
+        frequency: angular frequency [rad/s].
+        phase: [rad].
+        offset: mean value.
+
+    Returns:
+        The function t -> (value, rate, acceleration).
+
+    Raises:
+        InputError: one of them is no finite number.
+    """
     return Sinusoid(amplitude, frequency, phase, offset)
 
 
 def polynomial(coefficients: Sequence[float]) -> Polynomial:
-    """f(t) = c0 + c1 t + c2 t^2 + ..., coefficients from low power to high; see `Polynomial`."""
+    """f(t) = c0 + c1 t + c2 t^2 + ...; see `Polynomial`.
+
+    Args:
+        coefficients: from low power to high, at least one.
+
+    Returns:
+        The function t -> (value, rate, acceleration).
+
+    Raises:
+        InputError: there is none, or one is no finite number.
+    """
     return Polynomial(coefficients if isinstance(coefficients, tuple) else tuple(coefficients))
 
 
 def spline(times: ArrayLike, values: ArrayLike, ends: str = "clamped") -> Spline:
-    """Cubic spline through samples; see `Spline`."""
+    """Cubic spline through samples; see `Spline`.
+
+    Args:
+        times: sample times [s], increasing, shape (n,) with n >= 2.
+        values: samples, shape (n,).
+        ends: "clamped" (rate zero at both ends) or "natural" (acceleration zero at both ends).
+
+    Returns:
+        The function t -> (value, rate, acceleration).
+
+    Raises:
+        InputError: times do not increase, shapes differ, or numbers are not finite.
+    """
     return Spline(times, values, ends)  # type: ignore[arg-type]
 
 

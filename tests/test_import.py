@@ -6,12 +6,14 @@ import json
 import subprocess
 import sys
 import types
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import pinocchio
 import pytest
 
+import pin_nonideal as pn
 from pin_nonideal import compiled
 
 AGAIN = 'run "pip install ." in the checkout, which builds the core for the Pinocchio that it needs'
@@ -32,6 +34,12 @@ def test_import_is_light() -> None:
     )
     loaded -= {name.split(".")[0] for name in json.loads(done.stdout)}
     assert sorted(loaded & set(HEAVY)) == []
+
+
+def test_one_version() -> None:
+    root = Path(__file__).resolve().parent.parent
+    assert metadata.version("pin-nonideal") == pn.__version__
+    assert f"version: {pn.__version__}\n" in (root / "CITATION.cff").read_text(encoding="utf-8")
 
 
 class TestCore:

@@ -9,18 +9,16 @@ namespace {
 
 struct Pose {  // a frame in the world
     const Body& body;
-    int joint;
     Mat3 R;
     Vec3 x;
     const Mechanism& m;
 
     Pose(const State& s, const Frame& f)
-        : body(s.terms.body[f.joint]), joint(f.joint), R(body.R * f.R), x(body.ref + body.p + body.R * f.p),
-          m(s.mechanism) {}
+        : body(s.terms.body[f.joint]), R(body.R * f.R), x(body.ref + body.p + body.R * f.p), m(s.mechanism) {}
     const Vec3& omega() const { return body.v.ang; }
     const Vec3& alpha() const { return body.a.ang; }
     Vec3 velocity(const Vec3& at) const { return velocity_at(body, at); }
-    Vec3 acceleration(const Vec3& at) const { return acceleration_at(m, body, at, joint); }
+    Vec3 acceleration(const Vec3& at) const { return acceleration_at(m, body, at); }
 };
 
 Vec3 logarithm(const Mat3& R) {  // rotation vector

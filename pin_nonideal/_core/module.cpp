@@ -348,6 +348,7 @@ nb::dict hand_over(const Program& p, const Workspace& w, const Recording& r) {
 }  // namespace
 
 NB_MODULE(_core, m) {
+    nb::set_leak_warnings(false);  // a user's function may hold the scene that holds it: a cycle, not a fault
     m.attr("pinocchio_version") = PIN_NONIDEAL_PINOCCHIO_VERSION;
 
     static PyObject* core_failure = nb::exception<Failure>(m, "CoreFailure").ptr();

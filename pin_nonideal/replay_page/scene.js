@@ -184,6 +184,7 @@ class ReplayScene {
       const opened = (arrow.value / this.largest["N m"]) * Math.min(this.forceScale, 1.2);
       arrow.holder.visible = this.forcesShown && Math.abs(opened) > 0.005;
       arrow.drawing.set(opened);
+      arrow.holder.updateMatrixWorld(true);
       arrow.tip.setFromMatrixPosition(arrow.drawing.head.matrixWorld);
       return;
     }
