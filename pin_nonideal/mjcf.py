@@ -19,7 +19,8 @@ from .errors import LoadingError
 from .forces import JointSpring
 from .mjcf_equality import equality_constraints
 from .mjcf_text import Defaults, degrees_to_radians
-from .urdf import RobotFile, numbers, parse_xml, read_text
+from .urdf import RobotFile
+from .xml_files import numbers, parse_xml, read_text
 
 READ = (
     "compiler",

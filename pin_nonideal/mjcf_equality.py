@@ -12,7 +12,7 @@ from .constraints import Constraint, Distance, FrameAnchor, JointCoupling, Point
 from .errors import LoadingError, nearest
 from .mjcf_text import Defaults
 from .timefunctions import Constant
-from .urdf import numbers
+from .xml_files import numbers
 
 KINDS = ("connect", "weld", "joint", "distance")
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from . import actuation, constraints, contacts, forces, laws, timefunctions
 from .errors import InputError, LoadingError, nearest
-from .urdf import read_text
+from .xml_files import read_text
 
 COMMUNITY_KEYS = ("closed_loop", "type", "name_mot", "joint_name", "joint_type")
 OWN_KEYS = (
@@ -94,6 +94,8 @@ def _loader() -> Any:
         def construct_mapping(self, node: Any, deep: bool = False) -> Any:
             seen = set()
             for key, _ in node.value:
+                if not isinstance(key, yaml.ScalarNode):
+                    raise yaml.YAMLError(f"a key must be a word (line {key.start_mark.line + 1})")
                 if key.value in seen:
                     raise yaml.YAMLError(f'key "{key.value}" appears twice (line {key.start_mark.line + 1})')
                 seen.add(key.value)

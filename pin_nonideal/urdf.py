@@ -18,8 +18,8 @@ import pinocchio as pin
 from .constraints import Constraint, JointCoupling, PrescribedMotion
 from .errors import LoadingError, nearest
 from .timefunctions import Constant
-
-MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
+from .urdf_checks import check_urdf
+from .xml_files import numbers, parse_xml, read_text
 
 
 @dataclass
@@ -49,39 +49,6 @@ class RobotFile:
     v0: Any = None
 
 
-def read_text(path: Path) -> str:
-    """The text of a file.
-
-    Raises:
-        LoadingError: it cannot be read, or is no text.
-    """
-    try:
-        return path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise LoadingError(
-            f'"{path}" must be a text file in UTF-8; {error.reason} at byte {error.start}'
-        ) from None
-    except OSError as error:
-        raise LoadingError(f'"{path}" cannot be read: {error.strerror}') from None
-
-
-def parse_xml(text: str, path: Path, root: str) -> ElementTree.Element:
-    """The root element of an XML file.
-
-    Raises:
-        LoadingError: it is truncated or malformed, declares entities, or has another root.
-    """
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise LoadingError(f'"{path}" must not declare a DOCTYPE or entities; remove them')
-    try:
-        element = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise LoadingError(f'"{path}" is truncated or not XML: {error}; export it again') from None
-    if element.tag != root:
-        raise LoadingError(f'"{path}" must have the root element <{root}>; got <{element.tag}>')
-    return element
-
-
 def read_urdf(path: Path, *, free_flyer: bool = False, package_dirs: Sequence[str | Path] = ()) -> RobotFile:
     """Reads a URDF file.
 
@@ -98,11 +65,7 @@ def read_urdf(path: Path, *, free_flyer: bool = False, package_dirs: Sequence[st
     root = parse_xml(text, path, "robot")
     name = root.get("name") or path.parent.name
     root.set("name", name)
-    _check_tree(root, path)
-    for link in root.findall("link"):
-        _check_inertia(link, path)
-    for joint in root.findall("joint"):
-        _check_joint(joint, path)
+    check_urdf(root, path)
     notes = _resolve_meshes(root, path, package_dirs)
     xml = ElementTree.tostring(root, encoding="unicode")
     try:
@@ -125,140 +88,6 @@ def read_mimics(path: Path) -> list[Constraint]:
         LoadingError: the file is malformed, or a mimic joint follows nothing.
     """
     return _mimics(parse_xml(read_text(path), path, "robot"), path)
-
-
-def _check_tree(root: ElementTree.Element, path: Path) -> None:
-    """Each link has one parent at most, names are unique, and there is one root."""
-    links = [_attribute(e, "name", "link", path) for e in root.findall("link")]
-    joints = [_attribute(e, "name", "joint", path) for e in root.findall("joint")]
-    for kind, names in (("link", links), ("joint", joints)):
-        for n in sorted(set(names)):
-            if names.count(n) > 1:
-                raise LoadingError(
-                    f'"{path}": {kind} names must be unique; "{n}" appears {names.count(n)} times'
-                )
-    if not links:
-        raise LoadingError(f'"{path}" must hold at least one <link>; got none')
-    parent_joint: dict[str, str] = {}
-    parent_link: dict[str, str] = {}
-    for joint in root.findall("joint"):
-        joint_name = joint.get("name", "")
-        ends = {}
-        for side in ("parent", "child"):
-            element = joint.find(side)
-            link = None if element is None else element.get("link")
-            if link is None:
-                raise LoadingError(f'"{path}": joint "{joint_name}" must name its {side} link')
-            if link not in links:
-                raise LoadingError(
-                    f'"{path}": no link "{link}", the {side} of joint "{joint_name}"{nearest(link, links)}'
-                )
-            ends[side] = link
-        child = ends["child"]
-        if child in parent_joint:
-            raise LoadingError(
-                f'"{path}": link "{child}" has two parents, joints "{parent_joint[child]}" and '
-                f'"{joint_name}", but URDF holds trees only.  Keep one of the two joints; where the other '
-                "was, give each side a link on a fixed joint to serve as a frame; and close the loop in a "
-                "robot.yaml beside the URDF:\n"
-                f"  closed_loop: [[frame_A, frame_B]]\n  type: [3d]"
-            )
-        parent_joint[child] = joint_name
-        parent_link[child] = ends["parent"]
-    roots = [link for link in links if link not in parent_link]
-    if not roots:
-        raise LoadingError(
-            f'"{path}" must have a root link; every link is the child of a joint, so the joints form a ring'
-        )
-    if len(roots) > 1:
-        shown = ", ".join(f'"{r}"' for r in roots[:6])
-        raise LoadingError(
-            f'"{path}" must have one root link; got {len(roots)}: {shown}; join them with fixed joints'
-        )
-    for link in links:
-        seen = {link}
-        while link in parent_link:
-            link = parent_link[link]
-            if link in seen:
-                raise LoadingError(f'"{path}": the joints around link "{link}" form a ring without a root')
-            seen.add(link)
-
-
-def _attribute(element: ElementTree.Element, key: str, kind: str, path: Path) -> str:
-    value = element.get(key)
-    if not value:
-        raise LoadingError(f'"{path}": every <{kind}> must have a {key}; one has none')
-    return value
-
-
-def numbers(
-    element: ElementTree.Element | None, key: str, size: int, default: Sequence[float], where: str
-) -> Any:
-    """Finite numbers of an XML attribute.
-
-    Args:
-        element: the element, or None.
-        key: name of the attribute.
-        size: how many numbers it must hold.
-        default: what an absent element or attribute means.
-        where: words for messages.
-
-    Raises:
-        LoadingError: not numbers, not finite, or another count.
-    """
-    text = None if element is None else element.get(key)
-    if text is None:
-        return np.array(default, dtype=float)
-    try:
-        values = np.array([float(x) for x in text.split()])
-    except ValueError:
-        raise LoadingError(f'{where}: {key} must hold numbers; got "{text}"') from None
-    if values.size != size:
-        raise LoadingError(f'{where}: {key} must hold {size} number{"s" if size > 1 else ""}; got "{text}"')
-    if not np.isfinite(values).all():
-        raise LoadingError(f'{where}: {key} must be finite; got "{text}"')
-    return values
-
-
-def _check_inertia(link: ElementTree.Element, path: Path) -> None:
-    """Mass not negative, and a moment of inertia that a body can have."""
-    where = f'"{path}": link "{link.get("name")}"'
-    for origin in link.iter("origin"):
-        numbers(origin, "xyz", 3, (0, 0, 0), where)
-        numbers(origin, "rpy", 3, (0, 0, 0), where)
-    inertial = link.find("inertial")
-    if inertial is None:
-        return
-    mass = float(numbers(inertial.find("mass"), "value", 1, (0,), where)[0])
-    if mass < 0.0:
-        raise LoadingError(f"{where}: mass must not be negative; got {mass:g} kg")
-    element = inertial.find("inertia")
-    xx, xy, xz, yy, yz, zz = (
-        float(numbers(element, k, 1, (0,), where)[0]) for k in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    )
-    principal = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-    if principal[0] < -1e-9 * max(abs(principal[2]), abs(principal[0])):
-        raise LoadingError(
-            f"{where}: principal moments of inertia must not be negative; got {principal[0]:g} kg m^2"
-        )
-
-
-def _check_joint(joint: ElementTree.Element, path: Path) -> None:
-    """Known type, an axis with a direction, and dissipation that does not feed energy."""
-    where = f'"{path}": joint "{joint.get("name")}"'
-    kind = joint.get("type")
-    if kind not in (*MOVING, "fixed"):
-        raise LoadingError(f'{where}: type must be one of {", ".join(MOVING)}, fixed; got "{kind}"')
-    origin = joint.find("origin")
-    numbers(origin, "xyz", 3, (0, 0, 0), where)
-    numbers(origin, "rpy", 3, (0, 0, 0), where)
-    axis = numbers(joint.find("axis"), "xyz", 3, (1, 0, 0), where)
-    if kind in ("revolute", "continuous", "prismatic", "planar") and not axis.any():
-        raise LoadingError(f"{where}: axis must have a direction; got 0 0 0")
-    for key in ("damping", "friction"):
-        value = float(numbers(joint.find("dynamics"), key, 1, (0,), where)[0])
-        if value < 0.0:
-            raise LoadingError(f"{where}: {key} must not be negative; got {value:g}")
 
 
 def _mimics(root: ElementTree.Element, path: Path) -> list[Constraint]:

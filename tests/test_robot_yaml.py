@@ -128,6 +128,7 @@ YAML_REFUSED = {
     "model outside": ("model: {urdf: ../../robot.urdf}", "model: urdf must lie in the folder"),
     "not a table": ("- a\n- b", "must be a table of keys; got a list"),
     "a key twice": ("source: a\nsource: b", 'key "source" appears twice (line 2)'),
+    "a list for a key": ("? [a, b]\n: c", "a key must be a word (line 1)"),
     "an anchor": ("source: &a x\nlicence: *a", "anchors and aliases are not read (line 1)"),
     "unknown kind": (
         "constraints:\n  - PointAncor: {frame1: hand}",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +82,42 @@ URDF_REFUSED = {
     "origin of two numbers": (
         robot(*ARM, link("x"), joint("j", "base", "x", xyz="1 2")),
         'xyz must hold 3 numbers; got "1 2"',
+    ),
+    "inertial without mass": (
+        robot(*ARM, '<link name="x"><inertial><mass/><inertia/></inertial></link>', joint("j", "base", "x")),
+        'link "x": value is missing in <mass>',
+    ),
+    "inertial without inertia": (
+        robot(*ARM, '<link name="x"><inertial><mass value="1"/></inertial></link>', joint("j", "base", "x")),
+        'link "x": <inertial> must hold <mass> and <inertia>',
+    ),
+    "shape without size": (
+        robot(
+            *ARM, link("x", inside="<visual><geometry><sphere/></geometry></visual>"), joint("j", "base", "x")
+        ),
+        'link "x": radius is missing in <sphere>',
+    ),
+    "shape of negative size": (
+        robot(
+            *ARM,
+            link("x", inside='<visual><geometry><box size="1 -1 1"/></geometry></visual>'),
+            joint("j", "base", "x"),
+        ),
+        'link "x": size of <box> must be positive; got "1 -1 1"',
+    ),
+    "unknown shape": (
+        robot(
+            *ARM, link("x", inside="<visual><geometry><cone/></geometry></visual>"), joint("j", "base", "x")
+        ),
+        'link "x": <geometry> must hold one of box, cylinder, capsule, sphere, mesh; got <cone>',
+    ),
+    "joint without limit": (
+        robot(*ARM, link("x"), re.sub("<limit.*?/>", "", joint("j", "base", "x"))),
+        'joint "j": a revolute joint must have a <limit effort="..." velocity="..."/>',
+    ),
+    "limit without effort": (
+        robot(*ARM, link("x"), joint("j", "base", "x").replace('effort="1"', "")),
+        'joint "j": effort is missing in <limit>',
     ),
     "mimic of nothing": (
         robot(*ARM, link("x"), joint("j", "base", "x", inside='<mimic joint="elbo"/>')),
