@@ -36,6 +36,9 @@ def check_urdf(root: ElementTree.Element, path: Path) -> None:
         _check_link(link, path)
     for joint in root.findall("joint"):
         _check_joint(joint, path)
+    for material in root.iter("material"):
+        for color in material.findall("color"):
+            numbers(color, "rgba", 4, None, f'"{path}": material "{material.get("name")}"')
 
 
 def _check_tree(root: ElementTree.Element, path: Path) -> None:
@@ -144,9 +147,9 @@ def _check_shape(shape: ElementTree.Element, where: str) -> None:
             )
     if inner[0].tag == "mesh" and not inner[0].get("filename"):
         raise LoadingError(f"{where}: filename is missing in <mesh>")
-    color = shape.find("material/color")
-    if color is not None:
-        numbers(color, "rgba", 4, None, where)
+    for material in shape.findall("material"):
+        if not material.get("name"):
+            raise LoadingError(f"{where}: every <material> must have a name; one has none")
 
 
 def _check_joint(joint: ElementTree.Element, path: Path) -> None:

@@ -111,6 +111,18 @@ URDF_REFUSED = {
         ),
         'link "x": <geometry> must hold one of box, cylinder, capsule, sphere, mesh; got <cone>',
     ),
+    "material without name": (
+        robot(
+            *ARM,
+            link("x", inside='<visual><geometry><sphere radius="1"/></geometry><material/></visual>'),
+            joint("j", "base", "x"),
+        ),
+        'link "x": every <material> must have a name; one has none',
+    ),
+    "color of two numbers": (
+        robot(*ARM, '<material name="dim"><color rgba="0.5 0.5"/></material>'),
+        'material "dim": rgba must hold 4 numbers; got "0.5 0.5"',
+    ),
     "joint without limit": (
         robot(*ARM, link("x"), re.sub("<limit.*?/>", "", joint("j", "base", "x"))),
         'joint "j": a revolute joint must have a <limit effort="..." velocity="..."/>',
