@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .errors import InputError, OutputError
 from .replay import write_whole
-from .replay_signals import MODES, Plot, element_names, mode_bands, plots_of
+from .replay_signals import MODES, Plot, check_scene, mode_bands, plots_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,31 +53,34 @@ def plot(
     """
     from matplotlib.figure import Figure  # no pyplot: a program that draws to files needs no window system
 
-    has_modes = run.modes is not None and np.size(run.modes) > 0
+    check_scene(run, "a figure")
     if what is None:
         what = ["q", "v", *(["energy"] if run.energy else [])]
-        what += [*(["violation"] if run.scene.constraint_slices else []), *(["modes"] if has_modes else [])]
+        what += [
+            *(["violation"] if run.scene.constraint_slices else []),
+            *(["modes"] if run.modes is not None else []),
+        ]
     if not what:
         raise InputError("plot: what must name at least one plot; got none")
-    if "modes" in what and not has_modes:
+    if "modes" in what and run.modes is None:
         raise InputError('plot "modes" needs an element that sticks or slips, and this scene has none')
     plots: list[Plot | None] = []
     for item in what:
         plots += [None] if item == "modes" else plots_of(run, [item])
 
-    heights = [0.4 + 0.22 * run.modes.shape[1] if item is None else HEIGHT for item in plots]
+    heights = [0.4 + 0.22 * len(run.element_names) if item is None else HEIGHT for item in plots]
     figure = Figure(figsize=(WIDTH, sum(heights) + 0.7), layout="constrained")
     grid: Any = figure.subplots(len(plots), 1, sharex=True, squeeze=False, height_ratios=heights)
-    for axes, item in zip(grid[:, 0], plots, strict=True):
-        if item is None:
+    for axes, drawn in zip(grid[:, 0], plots, strict=True):
+        if drawn is None:
             _draw_modes(axes, run)
         else:
-            _draw_plot(axes, item)
+            _draw_plot(axes, drawn)
             _mark_events(axes, run)
     grid[-1, 0].set_xlabel("time [s]")
     grid[-1, 0].set_xlim(*_limits(run))
     figure.align_ylabels()
-    figure.suptitle(str(run.scene.name), fontsize=12, fontweight="bold", x=0.01, ha="left")
+    figure.suptitle(run.name, fontsize=12, fontweight="bold", x=0.01, ha="left")
     if path is not None:
         _save(figure, Path(path))
     return figure
@@ -127,13 +130,12 @@ def _mark_events(axes: Axes, run: Trajectory) -> None:
 
 def _draw_modes(axes: Axes, run: Trajectory) -> None:
     """A band for each element, colored by its mode."""
-    names = element_names(run)
-    bands = mode_bands(run.t, run.modes)
+    bands = [] if run.modes is None else mode_bands(run.t, run.modes)
     for row, pieces in enumerate(bands):
         spans = [(start, end - start) for start, end, _ in pieces]
         colors = [MODE_COLORS.get(mode, "#f1f5f9") for _, _, mode in pieces]
         axes.broken_barh(spans, (row - 0.35, 0.7), facecolors=colors)
-    axes.set_yticks(range(len(bands)), names)
+    axes.set_yticks(range(len(bands)), run.element_names)
     axes.set_ylim(len(bands) - 0.5, -0.5)
     axes.spines[["top", "right", "left"]].set_visible(False)
     axes.tick_params(axis="y", length=0)

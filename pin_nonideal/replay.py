@@ -24,7 +24,7 @@ import pinocchio as pin
 from .checks import positive
 from .errors import InputError, OutputError
 from .replay_payload import packed_run
-from .replay_signals import Chosen
+from .replay_signals import Chosen, check_scene
 
 if TYPE_CHECKING:
     from .trajectory import Trajectory
@@ -88,14 +88,16 @@ def replay(
         The path of the file, or the page.
 
     Raises:
-        InputError: fps is not positive, a plot was not recorded, or the run is empty or not finite.
+        InputError: fps is not positive, a plot was not recorded, or the run is empty, not finite or
+            without its scene.
         UnknownNameError: a name in `plots` is none of the above.
         OutputError: the file cannot be written.
     """
     fps = positive("replay: fps", fps)
     if title is not None and not isinstance(title, str):
         raise InputError(f"replay: title must be a string or None; got {title!r}")
-    page = ReplayPage(_page(run, fps, title or run.scene.name, plots, compress, forces))
+    check_scene(run, "a replay")
+    page = ReplayPage(_page(run, fps, title or run.name, plots, compress, forces))
     return page if path is None else page.save(path)
 
 

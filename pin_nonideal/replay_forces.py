@@ -1,8 +1,8 @@
 """What the replay shows of constraints: marks where bodies meet, and arrows of the forces there.
 
-The arrow at an anchor is the reaction on the body of frame1, from the anchor's rows of `lam`; when the run
-holds `lam_ideal` as well it is split into its ideal and its nonideal part.  `F_nonideal` (and, in a scene
-without anchors, `F_ideal`) is drawn at the joints of one degree of freedom.
+The arrow at an anchor is the reaction on the body of frame1, from the anchor's rows of `lam`, split by
+`lam_ideal` into its ideal and its nonideal part.  `F_nonideal` is drawn at the joints of one degree of
+freedom; so is `F_ideal` when no constraint has a place of its own (those of a user have none).
 """
 
 from __future__ import annotations
@@ -15,7 +15,16 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from .checks import axis_triad, unit_axis
-from .constraints import Distance, FrameAnchor, HingeAnchor, PointAnchor, Rolling
+from .constraints import (
+    Distance,
+    FrameAnchor,
+    HingeAnchor,
+    JointCoupling,
+    KnifeEdge,
+    PointAnchor,
+    PrescribedMotion,
+    Rolling,
+)
 from .contacts import PointContact
 from .forces import SpringDamper
 from .replay_geometry import joint_axis
@@ -75,96 +84,145 @@ class Arrow:
     axis: Array | None = None
 
 
+@dataclass(frozen=True)
+class _Side:
+    """One side of a constraint: a placement fixed to a joint."""
+
+    joint: int
+    placement: pin.SE3
+
+    @property
+    def point(self) -> Array:
+        return np.asarray(self.placement.translation)
+
+    def turned(self, motion: Motion, local: Array) -> Array:
+        """Vectors in the axes of this side as vectors in world axes, (n, 3)."""
+        turn = motion.rotation(self.joint) @ np.asarray(self.placement.rotation)
+        return np.asarray(np.einsum("nij,nj->ni", turn, local))
+
+
 def marks_of(scene: Scene) -> list[Mark]:
     """Marks of all anchors, rods, contacts and springs of a scene."""
+    springs = [
+        (item.name or f"spring {item.frame1}", item)
+        for item in scene.forces
+        if isinstance(item, SpringDamper)
+    ]
     marks = []
-    for name, item in _named(scene):
-        if isinstance(item, (PointAnchor, FrameAnchor, HingeAnchor)):
-            marks.append(_mark(scene, name, "anchor", item.frame1, item.frame2))
-        elif isinstance(item, Distance):
-            marks.append(_mark(scene, name, "rod", item.frame1, item.frame2))
-        elif isinstance(item, SpringDamper):
-            marks.append(_mark(scene, name, "spring", item.frame1, item.frame2))
-        elif isinstance(item, PointContact):
-            joint, point = _place(scene.model, item.frame)
-            marks.append(Mark(name, "contact", joint, point, joint, point))
+    for name, item in [*_constraints(scene), *springs]:
+        if isinstance(item, PointContact):
+            side = _side(scene.model, item.frame)
+            marks.append(Mark(name, "contact", side.joint, side.point, side.joint, side.point))
+            continue
+        sides = _sides(scene, item)
+        if sides is not None:
+            kind = {Distance: "rod", SpringDamper: "spring"}.get(type(item), "anchor")
+            first, second = sides
+            marks.append(Mark(name, kind, first.joint, first.point, second.joint, second.point))
     return marks
 
 
-def _named(scene: Scene) -> list[tuple[str, Any]]:
-    """Constraints, contacts and forces with the names that they go by."""
-    items = [*scene.constraints, *scene.contacts, *scene.forces]
-    return [(getattr(item, "name", None) or type(item).__name__, item) for item in items]
+def _constraints(scene: Scene) -> list[tuple[str, Any]]:
+    """Constraints and contacts with the names of their rows."""
+    return list(zip(scene.constraint_slices, [*scene.constraints, *scene.contacts], strict=True))
 
 
-def _place(model: pin.Model, frame: str) -> tuple[int, Array]:
-    """Joint that carries a frame, and the frame's origin in the joint's frame."""
+def _side(model: pin.Model, frame: str) -> _Side:
     found = model.frames[model.getFrameId(frame)]
-    return int(found.parentJoint), np.asarray(found.placement.translation)
+    return _Side(int(found.parentJoint), found.placement)
 
 
-def _mark(scene: Scene, name: str, kind: str, frame1: str, frame2: str | None) -> Mark:
+def _sides(scene: Scene, item: Any) -> tuple[_Side, _Side] | None:
+    """Both sides of what ties two frames; None for other constraints."""
     model = scene.model
-    joint1, point1 = _place(model, frame1)
-    if frame2 is not None:
-        return Mark(name, kind, joint1, point1, *_place(model, frame2))
+    if hasattr(item, "joint1_placement"):  # a constraint model of Pinocchio
+        return (
+            _Side(int(item.joint1_id), item.joint1_placement),
+            _Side(int(item.joint2_id), item.joint2_placement),
+        )
+    if not isinstance(item, (PointAnchor, FrameAnchor, HingeAnchor, Distance, SpringDamper)):
+        return None
+    first = _side(model, item.frame1)
+    if item.frame2 is not None:
+        return first, _side(model, item.frame2)
     data = model.createData()
-    pin.framesForwardKinematics(model, data, scene.q0)
-    return Mark(name, kind, joint1, point1, 0, np.array(data.oMf[model.getFrameId(frame1)].translation))
+    pin.forwardKinematics(model, data, scene.q0)
+    here = data.oMi[first.joint].act(first.point)
+    return first, _Side(0, pin.SE3(np.eye(3), here))
 
 
 def arrows_of(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]:
     """Arrows of the forces that the run recorded; none without record "forces"."""
     arrows: list[Arrow] = []
-    if run.lam is not None and len(run.lam):
-        ideal = getattr(run, "lam_ideal", None)
-        for name, item in _named(run.scene):
-            rows = run.scene.constraint_slices.get(name)
-            if rows is None:
-                continue
-            total = motion.of(np.asarray(run.lam)[:, rows])
-            parts = {"total": total}
-            if ideal is not None:
-                part = motion.of(np.asarray(ideal)[:, rows])
-                parts = {"ideal": part, "nonideal": total - part}
+    if run.lam is not None:
+        for name, item in _constraints(run.scene):
+            rows = run.scene.constraint_slices[name]
+            parts = {"total": motion.of(run.lam[:, rows])}
+            if run.lam_ideal is not None:
+                ideal = motion.of(run.lam_ideal[:, rows])
+                parts = {"ideal": ideal, "nonideal": parts["total"] - ideal}
             for kind, lam in parts.items():
-                arrows.extend(_reaction(run.scene, motion, name, kind, item, lam))
+                arrows += _reaction(run.scene, motion, name, kind, item, lam)
     drawn = [("nonideal", run.F_nonideal)]
-    if not any(mark.kind in ("anchor", "rod") for mark in marks):
+    if not arrows:
         drawn.append(("ideal", run.F_ideal))
     for kind, force in drawn:
-        if force is not None and len(force):
-            arrows.extend(_joint_forces(run.scene.model, motion, kind, motion.of(np.asarray(force))))
+        if force is None:
+            continue
+        joints = motion.of(force)
+        largest = float(np.abs(joints).max(initial=0.0))
+        for joint in range(1, run.scene.model.njoints):
+            values = joints[:, run.scene.model.joints[joint].idx_v]
+            if np.abs(values).max() > SMALLEST * largest:
+                arrows += _at_joint(run.scene.model, motion, None, kind, joint, values)
     return arrows
 
 
 def _reaction(scene: Scene, motion: Motion, name: str, kind: str, item: Any, lam: Array) -> list[Arrow]:
-    """The force of one constraint on the body of its first frame; none for constraints without a place."""
+    """Arrows of one constraint: the force on its first body, or the force on its joints."""
     model = scene.model
-    if isinstance(item, (PointAnchor, FrameAnchor, HingeAnchor)):
-        local = np.zeros((len(lam), 3))
-        axes = ["xyz".index(axis) for axis in getattr(item, "axes", "xyz")]
-        local[:, axes] = lam[:, : len(axes)]
-        force = _turned(model, motion, item.frame2, local)
-        return [Arrow(name, kind, "N", force, motion.point(*_place(model, item.frame1)))]
-    if isinstance(item, Distance):
-        mark = _mark(scene, name, "rod", item.frame1, item.frame2)
-        origin = motion.point(mark.joint1, mark.point1)
-        along = _unit(origin - motion.point(mark.joint2, mark.point2))
-        return [Arrow(name, kind, "N", lam[:, :1] * along, origin)]
-    if isinstance(item, (Rolling, PointContact)):
-        t1, t2, normal = (np.array(axis) for axis in axis_triad(unit_axis("normal", item.normal)))
-        local = lam[:, -1:] * normal
-        if lam.shape[1] == 3:
-            local = local + lam[:, :1] * t1 + lam[:, 1:2] * t2
-        force = _turned(model, motion, item.plane, local)
-        up = _turned(model, motion, item.plane, np.tile(normal, (len(lam), 1)))
-        if isinstance(item, Rolling) and item.axis is not None:  # a disk: its lowest point
-            axis = _turned(model, motion, item.frame, np.tile(item.axis, (len(lam), 1)))
-            up = _unit(up - np.sum(up * axis, axis=1, keepdims=True) * axis)
-        origin = motion.point(*_place(model, item.frame)) - item.radius * up
+    sides = _sides(scene, item)
+    if sides is not None:
+        first, second = sides
+        origin = motion.point(first.joint, first.point)
+        if isinstance(item, Distance):
+            force = lam[:, :1] * _unit(origin - motion.point(second.joint, second.point))
+        else:
+            axes = ["xyz".index(axis) for axis in getattr(item, "axes", "xyz")]
+            local = np.zeros((len(lam), 3))
+            local[:, axes] = lam[:, : len(axes)]
+            force = second.turned(motion, local)
         return [Arrow(name, kind, "N", force, origin)]
+    if isinstance(item, (Rolling, PointContact)):
+        return [Arrow(name, kind, "N", *_on_plane(model, motion, item, lam))]
+    if isinstance(item, KnifeEdge):
+        edge = _side(model, item.frame)
+        force = edge.turned(motion, lam[:, :1] * np.array(unit_axis("axis", item.axis)))
+        return [Arrow(name, kind, "N", force, motion.point(edge.joint, edge.point))]
+    if isinstance(item, PrescribedMotion):
+        return _at_joint(model, motion, name, kind, model.getJointId(item.joint), lam[:, 0])
+    if isinstance(item, JointCoupling):
+        driven = _at_joint(model, motion, name, kind, model.getJointId(item.joint1), lam[:, 0])
+        leading = _at_joint(model, motion, name, kind, model.getJointId(item.joint2), -item.ratio * lam[:, 0])
+        return driven + leading
     return []
+
+
+def _on_plane(
+    model: pin.Model, motion: Motion, item: Rolling | PointContact, lam: Array
+) -> tuple[Array, Array]:
+    """Force on what touches a plane, and the place where it touches, (n, 3) each."""
+    t1, t2, normal = (np.array(axis) for axis in axis_triad(unit_axis("normal", item.normal)))
+    local = lam[:, -1:] * normal
+    if lam.shape[1] == 3:
+        local = local + lam[:, :1] * t1 + lam[:, 1:2] * t2
+    body = _side(model, item.frame)
+    plane = _Side(0, pin.SE3.Identity()) if item.plane is None else _side(model, item.plane)
+    up = plane.turned(motion, np.tile(normal, (len(lam), 1)))
+    if isinstance(item, Rolling) and item.axis is not None:  # a disk: its lowest point
+        axis = body.turned(motion, np.tile(unit_axis("axis", item.axis), (len(lam), 1)))
+        up = _unit(up - np.sum(up * axis, axis=1, keepdims=True) * axis)
+    return plane.turned(motion, local), motion.point(body.joint, body.point) - item.radius * up
 
 
 def _unit(vectors: Array) -> Array:
@@ -173,30 +231,15 @@ def _unit(vectors: Array) -> Array:
     return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0))
 
 
-def _turned(model: pin.Model, motion: Motion, frame: str | None, local: Array) -> Array:
-    """Vectors in the axes of a frame as vectors in world axes, (n, 3)."""
-    if frame is None:
-        return local
-    found = model.frames[model.getFrameId(frame)]
-    turn = motion.rotation(int(found.parentJoint)) @ np.asarray(found.placement.rotation)
-    return np.asarray(np.einsum("nij,nj->ni", turn, local))
-
-
-def _joint_forces(model: pin.Model, motion: Motion, kind: str, force: Array) -> list[Arrow]:
-    """Generalized force at each joint of one degree of freedom, along or about its axis."""
-    arrows: list[Arrow] = []
-    largest = float(np.abs(force).max(initial=0.0))
-    for joint in range(1, model.njoints):
-        axis, turning = joint_axis(model, joint)
-        if axis is None:
-            continue
-        values = force[:, model.joints[joint].idx_v]
-        if np.abs(values).max() <= SMALLEST * largest:
-            continue
-        name = str(model.names[joint])
-        if turning:
-            arrows.append(Arrow(name, kind, "N m", values, joint=joint, axis=axis))
-        else:
-            force_along = (motion.rotation(joint) @ axis) * values[:, None]
-            arrows.append(Arrow(name, kind, "N", force_along, motion.poses[:, joint, :3]))
-    return arrows
+def _at_joint(
+    model: pin.Model, motion: Motion, name: str | None, kind: str, joint: int, values: Array
+) -> list[Arrow]:
+    """Generalized force on a joint of one degree of freedom, along or about its axis; else nothing."""
+    axis, turning = joint_axis(model, joint)
+    if axis is None:
+        return []
+    name = name or str(model.names[joint])
+    if turning:
+        return [Arrow(name, kind, "N m", values, joint=int(joint), axis=axis)]
+    along = motion.rotation(joint) @ axis
+    return [Arrow(name, kind, "N", along * values[:, None], motion.poses[:, joint, :3])]

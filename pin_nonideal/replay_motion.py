@@ -158,12 +158,13 @@ def view(model: pin.Model, motion: Motion, visuals: list[Visual], marks: list[tu
     coarse = Motion(motion.times[chosen], motion.poses[chosen], motion.before[chosen], motion.part[chosen])
     clouds = [coarse.point(joint, np.zeros(3)) for joint in range(1, model.njoints)]
     clouds += [coarse.point(joint, local) for joint, local in marks]
-    for item in visuals:
-        center, half = item.shape.half_extent()
-        if not half.any():
-            continue
-        for corner in product((-1.0, 1.0), repeat=3):
-            clouds.append(coarse.point(item.joint, item.placement.act(center + half * np.array(corner))))
+    moving = [visual for visual in visuals if visual.joint > 0]
+    clouds += [cloud for visual in moving for cloud in _corners(coarse, visual)]
+    reach = 1.5 * _diagonal(np.array(clouds)) if clouds else 0.0
+    for visual in visuals:
+        # A large floor would make all that moves on it small.
+        if visual.joint == 0 and np.linalg.norm(visual.shape.half_extent()[1]) < reach:
+            clouds += _corners(coarse, visual)
     points = np.array(clouds) if clouds else np.zeros((1, len(chosen), 3))
     size = _diagonal(points[:, 0])
     heights = points @ up
@@ -178,6 +179,15 @@ def view(model: pin.Model, motion: Motion, visuals: list[Visual], marks: list[tu
         ground=ground,
         follow=_diagonal(points) > 4.0 * size,
     )
+
+
+def _corners(motion: Motion, visual: Visual) -> list[Array]:
+    """Corners of the box around a visual at each frame [m], (n, 3) each; none of a plane."""
+    center, half = visual.shape.half_extent()
+    if not half.any():
+        return []
+    signs = product((-1.0, 1.0), repeat=3)
+    return [motion.point(visual.joint, visual.placement.act(center + half * np.array(s))) for s in signs]
 
 
 def _diagonal(points: Array) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from .replay_forces import Arrow, arrows_of, marks_of
 from .replay_geometry import Shape, Visual, sticks, visuals_of
 from .replay_motion import sample, view
-from .replay_signals import Chosen, element_names, mode_bands, plots_of
+from .replay_signals import Chosen, mode_bands, plots_of
 
 if TYPE_CHECKING:
     from .trajectory import Trajectory
@@ -168,9 +167,9 @@ def _stored(payload: Payload, shape: Shape) -> dict[str, Any]:
 
 def _modes(run: Trajectory) -> list[dict[str, Any]]:
     """Bands of the elements that stick or slip, with their names."""
-    if run.modes is None or not np.size(run.modes):
+    if run.modes is None:
         return []
-    pairs = zip(element_names(run), mode_bands(run.t, run.modes), strict=True)
+    pairs = zip(run.element_names, mode_bands(run.t, run.modes), strict=True)
     return [{"name": name, "runs": runs} for name, runs in pairs]
 
 
@@ -203,7 +202,6 @@ def _facts(run: Trajectory, fps: float) -> list[tuple[str, str]]:
         ("model", f"{model.name}, {model.njoints - 1} joints, nq {model.nq}, nv {model.nv}"),
         ("time", f"{run.t[0]:g} to {run.t[-1]:g} s, {len(run.t)} samples, {fps:g} frames a second"),
     ]
-    stats = run.stats if isinstance(run.stats, Mapping) else vars(run.stats)
-    for key, value in stats.items():
+    for key, value in vars(run.stats).items():
         facts.append((str(key), f"{value:g}" if isinstance(value, float) else str(value)))
     return [*facts, ("Pinocchio", str(pin.__version__))]

@@ -176,23 +176,25 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
     if name not in names and name not in joints:
         raise UnknownNameError(f'no plot and no joint "{name}"{nearest(name, [*names, *joints])}')
     if not _recorded(run, name):
-        needed = {"energy": "energy", "work": "energy", "reactions": "forces", "a": "a"}.get(name)
-        hint = f'pass record=("{needed}",) to simulate' if needed else "the scene has no constraint"
-        raise InputError(f'plot "{name}" must be recorded, and this run did not record it: {hint}')
+        if name in ("violation", "reactions") and not run.scene.constraint_slices:
+            raise InputError(f'plot "{name}" needs a constraint, and this scene has none')
+        record = {"a": "a", "reactions": "forces"}.get(name, "energy")
+        raise InputError(f'plot "{name}" must be recorded: pass record=("{record}",) to simulate')
+    energy = run.energy or {}
     if name == "energy":
-        return [Plot("Energy", "J", t, {k: run.energy[k] for k in STORED_ENERGY if k in run.energy})]
+        return [Plot("Energy", "J", t, {k: energy[k] for k in STORED_ENERGY})]
     if name == "work":
-        return [Plot("Work", "J", t, {k: v for k, v in run.energy.items() if k not in STORED_ENERGY})]
+        return [Plot("Work", "J", t, {k: v for k, v in energy.items() if k not in STORED_ENERGY})]
     if name == "violation":
         return [Plot("Constraint violation", "m, rad", t, {"largest residual": run.violation}, log=True)]
-    if name == "reactions":
+    if name == "reactions" and run.lam is not None:
         size = {k: np.linalg.norm(run.lam[:, s], axis=1) for k, s in run.scene.constraint_slices.items()}
         return [Plot("Reactions, |lam|", "N, N m", t, _largest(size))]
     if name == "q":
         return _by_unit("Position", t, positions(model, run.q))
     if name == "v":
         return _by_unit("Velocity", t, velocities(model, run.v))
-    if name == "a":
+    if name == "a" and run.a is not None:
         return _by_unit("Acceleration", t, velocities(model, run.a, "/s²"))
     place = [c for c in positions(model, run.q) if c.joint == name]
     rate = [c for c in velocities(model, run.v) if c.joint == name]
@@ -227,11 +229,21 @@ def _largest(curves: dict[str, Array]) -> dict[str, Array]:
     return {label: values for label, values in curves.items() if label in rank}
 
 
-def element_names(run: Trajectory) -> list[str]:
-    """Names of the elements that stick or slip, one for each column of the run's `modes`."""
-    names = [str(name) for name in getattr(run.scene, "element_names", ())]
-    count = run.modes.shape[1]
-    return names[:count] + [f"element {number}" for number in range(len(names), count)]
+def check_scene(run: Trajectory, what: str) -> None:
+    """Refuses a run without its scene.
+
+    Args:
+        run: the run.
+        what: what needs the scene, for the message.
+
+    Raises:
+        InputError: the run has no scene.
+    """
+    if run.scene is None:
+        raise InputError(
+            f"{what} needs the scene of the run, which a trajectory read from a file has not: "
+            "pass dataclasses.replace(run, scene=scene)"
+        )
 
 
 def mode_bands(t: Array, modes: NDArray[np.int8]) -> list[list[tuple[float, float, int]]]:

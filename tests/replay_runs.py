@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.constraints import PointAnchor
+from pin_nonideal.trajectory import Stats
 
 STEP = 1e-6  # for rates by central differences: their error is near 1e-9
 
@@ -19,6 +20,8 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
     t = np.asarray(t, dtype=float)
     configurations = np.array([q(x) for x in t])
     rates = [pin.difference(model, q(x - STEP), q(x + STEP)) / (2 * STEP) for x in t]
+    held = [*fields.get("constraints", []), *fields.get("contacts", [])]
+    names = [getattr(item, "name", None) or type(item).__name__ for item in held]
     scene = SimpleNamespace(
         model=model,
         visual_model=fields.pop("visual_model", None),
@@ -30,8 +33,7 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
         forces=fields.pop("given_forces", []),
         q0=configurations[0],
         v0=np.asarray(rates[0]),
-        constraint_slices=fields.pop("constraint_slices", {}),
-        element_names=fields.pop("element_names", []),
+        constraint_slices=fields.pop("constraint_slices", dict.fromkeys(names, slice(0, 0))),
     )
     values: dict[str, Any] = {
         "t": t,
@@ -39,12 +41,14 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
         "v": np.array(rates),
         "violation": np.zeros(len(t)),
         "violation_rate": np.zeros(len(t)),
-        "modes": np.zeros((len(t), 0), dtype=np.int8),
+        "modes": None,
+        "element_names": [],
+        "name": scene.name,
         "events": [],
-        "stats": {"steps": 10, "wall_s": 0.001},
+        "stats": Stats(steps=10, wall_s=0.001),
         "scene": scene,
     }
-    values |= dict.fromkeys(("a", "F_ideal", "F_nonideal", "lam", "energy", "power", "z"))
+    values |= dict.fromkeys(("a", "F_ideal", "F_nonideal", "lam", "lam_ideal", "energy", "power", "z"))
     return SimpleNamespace(**values | fields)
 
 

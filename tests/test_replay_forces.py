@@ -6,11 +6,20 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pin_nonideal.constraints import Distance, HingeAnchor, PointAnchor, Rolling
+from pin_nonideal.constraints import (
+    Distance,
+    HingeAnchor,
+    JointCoupling,
+    KnifeEdge,
+    PointAnchor,
+    PrescribedMotion,
+    Rolling,
+)
 from pin_nonideal.contacts import PointContact
 from pin_nonideal.forces import SpringDamper
 from pin_nonideal.replay_forces import arrows_of, marks_of
 from pin_nonideal.replay_motion import sample
+from pin_nonideal.timefunctions import constant
 
 from .replay_runs import add_frame, four_bar, jointed, run_of
 
@@ -135,14 +144,57 @@ def single(item: object, lam: list[float], joint: object = None, **fields: objec
         (Rolling("center", 0.5, axis="y", name="c"), [1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [0.3, 0.0, 0.0]),
         (Rolling("center", 0.2, axis=None, name="c"), [1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [0.3, 0.0, 0.3]),
         (PointContact("center", radius=0.5, mu=0.3, name="c"), [7.0], [0.0, 0.0, 7.0], [0.3, 0.0, 0.0]),
+        (KnifeEdge("tip", axis="y", name="c"), [6.0], [-6.0, 0.0, 0.0], [0.4, 0.0, 0.0]),
+        (PrescribedMotion("j0", constant(0.0), name="c"), [4.0], [4.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
     ],
-    ids=["point", "hinge", "distance", "disk", "sphere", "contact"],
+    ids=["point", "hinge", "distance", "disk", "sphere", "contact", "edge", "drive"],
 )
 def test_force_and_place_of_each_kind(item: object, lam: list, force: list, origin: list) -> None:
     (arrow,) = single(item, lam)
     np.testing.assert_allclose(arrow.values[0], force, atol=ROUNDING)
     np.testing.assert_allclose(arrow.origin[0], origin, atol=ROUNDING)
     assert (arrow.name, arrow.unit, arrow.kind) == ("c", "N", "total")
+
+
+def test_a_coupling_acts_on_both_joints() -> None:
+    model = jointed(pin.JointModelRZ(), pin.JointModelRX())
+    first, second = arrows(
+        run_of(
+            model,
+            [0.0, 1.0],
+            lambda t: np.array([t, t]),
+            constraints=[JointCoupling("j0", "j1", ratio=-2.0, name="gear")],
+            constraint_slices={"gear": slice(0, 1)},
+            lam=np.full((2, 1), 3.0),
+        )
+    )
+    assert [(arrow.name, arrow.unit, arrow.joint, arrow.values[0]) for arrow in (first, second)] == [
+        ("gear", "N m", 1, 3.0),
+        ("gear", "N m", 2, 6.0),
+    ]
+
+
+def test_constraints_of_pinocchio_are_drawn_like_anchors() -> None:
+    run = four_bar()
+    model = run.scene.model
+    first, second = (model.frames[model.getFrameId(name)] for name in ("coupler_tip", "rocker_tip"))
+    expected = arrows(run)
+    run.scene.constraints = [
+        pin.RigidConstraintModel(
+            pin.ContactType.CONTACT_3D,
+            model,
+            first.parentJoint,
+            first.placement,
+            second.parentJoint,
+            second.placement,
+            pin.ReferenceFrame.LOCAL,
+        )
+    ]
+    found = arrows(run)
+    assert [(arrow.name, arrow.kind) for arrow in found] == [(arrow.name, arrow.kind) for arrow in expected]
+    np.testing.assert_allclose(found[0].values, expected[0].values, atol=ROUNDING)
+    np.testing.assert_allclose(found[0].origin, expected[0].origin, atol=ROUNDING)
+    assert marks_of(run.scene)[0].kind == "anchor"
 
 
 def test_rods_springs_and_contacts_are_marked() -> None:

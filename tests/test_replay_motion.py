@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from pin_nonideal.errors import InputError
-from pin_nonideal.replay_geometry import sticks
+from pin_nonideal.replay_geometry import Shape, Visual, sticks
 from pin_nonideal.replay_motion import MAX_FRAMES, sample, view
 
 from .replay_runs import four_bar, jointed, panda, run_of
@@ -148,6 +148,17 @@ def test_the_camera_follows_what_travels_far() -> None:
     model = jointed(pin.JointModelPX(), pin.JointModelRY())
     assert seen(run_of(model, np.linspace(0.0, 1.0, 9), lambda t: np.array([30.0 * t, t]))).follow
     assert not seen(run_of(model, np.linspace(0.0, 1.0, 9), lambda t: np.array([0.1 * t, t]))).follow
+
+
+def test_a_large_floor_does_not_push_the_robot_away() -> None:
+    run = four_bar()
+    model, motion, drawn = run.scene.model, sample(run, 30.0), sticks(run.scene.model, [], 1.0)
+    here = pin.SE3.Identity()
+    floor = Visual("floor", 0, here, Shape("box", (50.0, 50.0, 0.01)), (1.0, 1.0, 1.0, 1.0))
+    stand = Visual("stand", 0, here, Shape("box", (0.2, 0.2, 1.6)), (1.0, 1.0, 1.0, 1.0))
+    alone, on_floor, on_stand = (view(model, motion, [*drawn, *more], []) for more in ([], [floor], [stand]))
+    assert on_floor.size == alone.size
+    assert on_stand.motion[:, 2].min() == pytest.approx(-0.8)
 
 
 def test_every_drawn_point_lies_within_the_outermost_ones() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -11,7 +13,6 @@ from pin_nonideal.replay_signals import (
     INTERVALS,
     MAX_CURVES,
     Plot,
-    element_names,
     mode_bands,
     plots_of,
     positions,
@@ -66,14 +67,13 @@ def test_what_cannot_be_plotted_is_refused() -> None:
     run = four_bar()
     with pytest.raises(UnknownNameError, match='no plot and no joint "energi"; nearest: "energy"'):
         plots_of(run, ["energi"])
-    message = (
-        r'"energy" must be recorded, and this run did not record it: pass record=\("energy",\) to simulate'
-    )
-    with pytest.raises(InputError, match=message):
-        plots_of(run, ["energy"])
-    message = 'plot "violation" must be recorded, and this run did not record it: the scene has no constraint'
-    with pytest.raises(InputError, match=message):
-        plots_of(panda(), ["violation"])
+    for name, record in (("energy", "energy"), ("work", "energy"), ("a", "a")):
+        message = f'plot "{name}" must be recorded: pass record=("{record}",) to simulate'
+        with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+            plots_of(run, [name])
+    for name in ("violation", "reactions"):
+        with pytest.raises(InputError, match=f'plot "{name}" needs a constraint, and this scene has none'):
+            plots_of(panda(), [name])
     message = r'curve "tip" of plot "Tip" must have shape \(61,\), one value a sample; got \(3,\)'
     with pytest.raises(InputError, match=message):
         plots_of(run, [("Tip", {"tip": np.zeros(3)})])
@@ -144,10 +144,3 @@ def test_bands_hold_a_mode_from_its_sample_to_the_next_change() -> None:
     bands = mode_bands(t, np.array([[0, 1], [0, 1], [-1, 1], [1, 1]], dtype=np.int8))
     assert bands[0] == [(0.0, 2.0, 0), (2.0, 3.0, -1), (3.0, 3.0, 1)]
     assert bands[1] == [(0.0, 3.0, 1)]
-
-
-def test_every_element_has_a_name() -> None:
-    run = panda()
-    assert element_names(run) == ["panda_joint2"]
-    run.scene.element_names = []
-    assert element_names(run) == ["element 0"]

@@ -58,7 +58,7 @@ class Orbit {
     for (const point of points) {
       const from = point.clone().sub(this.target);
       const reach = Math.max(Math.abs(from.dot(right)) / wide, Math.abs(from.dot(top)) / tall);
-      this.distance = Math.max(this.distance, from.dot(away) + 1.2 * reach);
+      this.distance = Math.max(this.distance, from.dot(away) + 1.15 * reach);
     }
     this.place();
   }

@@ -182,7 +182,7 @@ class ReplayScene {
     if (arrow.moment) {
       arrow.value = blend(arrow.values, 0, 1);
       const opened = (arrow.value / this.largest["N m"]) * Math.min(this.forceScale, 1.2);
-      arrow.holder.visible = this.forcesShown && Math.abs(opened) > 0.005;
+      arrow.holder.visible = this.forcesShown && Math.abs(opened) > 0.01;
       arrow.drawing.set(opened);
       arrow.holder.updateMatrixWorld(true);
       arrow.tip.setFromMatrixPosition(arrow.drawing.head.matrixWorld);
@@ -201,10 +201,23 @@ class ReplayScene {
     arrow.tip.copy(arrow.holder.position).addScaledVector(along, length);
   }
 
+  /** Ends of the straight arrows at some frames of the run. */
+  arrowTips() {
+    const tips = [], count = this.run.times.length, stride = Math.ceil(count / 60);
+    for (const arrow of this.arrows.filter((item) => !item.moment))
+      for (let k = 0; k < count; k += stride) {
+        this.setArrow(arrow, { k, next: k, part: 0 });
+        if (arrow.holder.visible) tips.push(arrow.tip.clone());
+      }
+    this.setTime(this.time);
+    return tips;
+  }
+
   /** Frames the motion, or the start when the camera follows. */
   resetView() {
     const { THREE, run } = this, outline = this.following ? run.view.start : run.view.motion;
-    this.orbit.frame(outline.map((point) => new THREE.Vector3(...point)), new THREE.Vector3(...run.view.direction));
+    const tips = this.following ? [] : this.arrowTips();
+    this.orbit.frame([...outline.map((point) => new THREE.Vector3(...point)), ...tips], new THREE.Vector3(...run.view.direction));
     if (this.following) { this.orbit.target.add(this.center).sub(this.startCenter); this.orbit.place(); }
   }
 

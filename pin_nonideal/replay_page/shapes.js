@@ -108,19 +108,20 @@ class StraightArrow {
 class ArcArrow {
   constructor(THREE, color, size) {
     const radius = 0.075 * size, tube = 0.0065 * size;
-    this.radius = radius; this.sweep = (300 * Math.PI) / 180; this.segments = 90; this.rings = 10;
+    Object.assign(this, { radius, tube, sweep: (300 * Math.PI) / 180, segments: 90, rings: 10 });
     const sweep = this.sweep;
     class Arc extends THREE.Curve {
       getPoint(s) { return new THREE.Vector3(radius * Math.cos(sweep * s), radius * Math.sin(sweep * s), 0); }
     }
     this.group = new THREE.Group();
-    this.tube = new THREE.TubeGeometry(new Arc(), this.segments, tube, this.rings);
+    this.arc = new THREE.TubeGeometry(new Arc(), this.segments, tube, this.rings);
     this.head = markMesh(THREE, new THREE.ConeGeometry(2.8 * tube, 7 * tube, 24), color);
-    this.group.add(markMesh(THREE, this.tube, color), this.head);
+    this.group.add(markMesh(THREE, this.arc, color), this.head);
   }
   set(part) {
     const opened = Math.min(Math.abs(part), 1), angle = opened * this.sweep;
-    this.tube.setDrawRange(0, Math.round(opened * this.segments) * this.rings * 6);
+    this.arc.setDrawRange(0, Math.round(opened * this.segments) * this.rings * 6);
+    this.head.scale.setScalar(Math.max(Math.min(1, (angle * this.radius) / (9 * this.tube)), 1e-3));
     this.head.position.set(this.radius * Math.cos(angle), this.radius * Math.sin(angle), 0);
     this.head.rotation.z = angle;
     this.group.rotation.x = part < 0 ? Math.PI : 0;

@@ -2,7 +2,7 @@
 
 const MODE_COLORS = { "1": "#fb923c", "-1": "#60a5fa", "0": "#475569" };
 const MODE_NAMES = { "1": "slip +", "-1": "slip −", "0": "stick" };
-const EVENT_COLORS = { stick: "#475569", slip: "#ea580c", impact: "#dc2626", open: "#0891b2", close: "#7c3aed" };
+const EVENT_COLORS = { stick: "#475569", slip: "#ea580c", reverse: "#7c3aed", pull: "#dc2626", chatter: "#0891b2" };
 const BAND = 11; // height of a band with its gap [pixels]
 
 class Timeline {
@@ -25,7 +25,7 @@ class Timeline {
   resize() {
     const { context: c, width, height } = fitCanvas(this.canvas);
     const widest = Math.max(0, ...this.bands.map((band) => c.measureText(band.name).width));
-    Object.assign(this, { context: c, width, height, left: this.bands.length ? Math.min(widest, 150) + 14 : 8, right: width - 8 });
+    Object.assign(this, { context: c, width, height, left: this.bands.length ? Math.min(widest, 190) + 14 : 8, right: width - 8 });
     this.track = this.run.events.length ? 17 : 10;
     if (this.shown) this.draw(...this.shown);
   }
@@ -63,7 +63,7 @@ class Timeline {
     c.lineCap = "butt";
     for (const event of this.run.events) {
       const x = this.x(event.time);
-      c.fillStyle = EVENT_COLORS[event.kind] || "#7c3aed";
+      c.fillStyle = EVENT_COLORS[event.kind] || "#64748b";
       c.beginPath(); c.moveTo(x, track - 5); c.lineTo(x - 3.5, track - 12); c.lineTo(x + 3.5, track - 12); c.fill();
     }
     this.bands.forEach((band, row) => this.drawBand(c, band, track + 8 + row * this.bandHeight));
