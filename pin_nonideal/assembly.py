@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .actuation import HoldPosition
 from .checks import array, nonnegative, number
+from .constraints import JointCoupling, PrescribedMotion
 from .errors import InputError, LoadingError, nearest
 from .inertia_checks import require_positive_mass
 from .laws import JointFriction
@@ -79,7 +80,7 @@ def scene_arguments(robot: RobotFile, table: Table, name: str, *, merge: bool = 
             *loops(table, where),
             *descriptions(table.get("constraints"), CONSTRAINTS, f"{where}: constraints"),
         ],
-        "laws": [*laws, *dissipation(robot.model, laws, notes)],
+        "laws": [*laws, *dissipation(robot.model, laws, robot.constraints, notes)],
         "contacts": descriptions(table.get("contacts"), CONTACTS, f"{where}: contacts"),
         "forces": [*robot.forces, *descriptions(table.get("forces"), FORCES, f"{where}: forces")],
         "actuation": _actuation(robot.model, table.get("actuation"), motors, f"{where}: actuation"),
@@ -94,43 +95,54 @@ def scene_arguments(robot: RobotFile, table: Table, name: str, *, merge: bool = 
     }
 
 
-def dissipation(model: Any, taken: Sequence[Any], notes: list[str]) -> list[JointFriction]:
+def dissipation(
+    model: Any, taken: Sequence[Any], couplings: Sequence[Any], notes: list[str]
+) -> list[JointFriction]:
     """Joint friction that the robot's file states, as laws.
 
     URDF has it in `<dynamics>`, MJCF in `damping` and `frictionloss`.  Pinocchio keeps these numbers in
-    `model.damping` and `model.upperDryFrictionLimit` and its forward dynamics ignores them.
+    `model.damping` and `model.upperDryFrictionLimit` and its forward dynamics ignores them.  A mimic joint
+    q = r q_leader + c hands its friction to its leader: dry friction times |r|, damping times r^2.
 
     Args:
         model: pinocchio.Model.
         taken: laws already given; a JointFriction among them replaces the file's numbers for its joint.
+        couplings: constraints of the file; its mimic joints are `JointCoupling` or, when held,
+            `PrescribedMotion`.
         notes: receives a note for each replacement, and for each joint that has no single velocity.
     """
     given = {law.joint for law in taken if isinstance(law, JointFriction)}
-    result, replaced = [], []
+    leaders = {c.joint1: (c.joint2, c.ratio) for c in couplings if isinstance(c, JointCoupling)}
+    held = {c.joint for c in couplings if isinstance(c, PrescribedMotion)}
+    dry: dict[str, float] = {}
+    viscous: dict[str, float] = {}
+    replaced: dict[str, None] = {}
     for j in range(1, model.njoints):
         dofs = slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])
-        viscous, dry = model.damping[dofs], model.upperDryFrictionLimit[dofs]
-        joint = model.names[j]
-        if not (viscous.any() or dry.any()):
+        name, damping, friction = model.names[j], model.damping[dofs], model.upperDryFrictionLimit[dofs]
+        if not (damping.any() or friction.any()):
             continue
-        if joint in given:
-            replaced.append(joint)
-        elif model.nvs[j] != 1:
+        if model.nvs[j] != 1:
             notes.append(
-                f'joint "{joint}" has {model.nvs[j]} axes: damping and friction of the robot\'s file '
+                f'joint "{name}" has {model.nvs[j]} axes: damping and friction of the robot\'s file '
                 "are left out"
             )
-        else:
-            result.append(
-                JointFriction(
-                    joint, coulomb=float(dry[0]), viscous=float(viscous[0]), name=f"{joint} dynamics"
-                )
-            )
+            continue
+        ratio = 1.0
+        for _ in leaders:
+            if name in leaders:
+                ratio *= leaders[name][1]
+                name = leaders[name][0]
+        if name in given:
+            replaced[name] = None
+        elif name not in held:
+            dry[name] = dry.get(name, 0.0) + abs(ratio) * float(friction[0])
+            viscous[name] = viscous.get(name, 0.0) + ratio**2 * float(damping[0])
     if replaced:
         notes.append(
             "laws given replace the damping and friction of the robot's file in " + ", ".join(replaced)
         )
-    return result
+    return [JointFriction(n, coulomb=dry[n], viscous=viscous[n], name=f"{n} dynamics") for n in dry]
 
 
 def _change_joints(robot: RobotFile, table: Table, where: str, notes: list[str], merge: bool) -> None:
@@ -269,8 +281,7 @@ def _lock(
 
 
 def _still_moves(model: Any, constraint: Any, where: str) -> bool:
-    """Whether a constraint of the robot's file still has its joints (with all of them locked it is met
-    already).
+    """Whether a constraint of the robot's file still has its joints; without them it is met already.
 
     Raises:
         LoadingError: one of two coupled joints is locked and the other is not.

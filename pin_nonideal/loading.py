@@ -66,7 +66,7 @@ def load(name: str | os.PathLike[str], **parameters: Any) -> Scene:
     ):
         return _load_file(path, parameters)
     check_parameters(parameters, (), text)
-    return Scene(**scene_arguments(_example_robot(text, list(folders)), {}, text))
+    return Scene(**scene_arguments(_example_robot(text, list(folders)), {}, text, merge=False))
 
 
 def robots() -> list[tuple[str, str]]:
@@ -146,7 +146,7 @@ def _load_folder(folder: Path, parameters: dict[str, Any]) -> Scene:
     if "example_robot_data" in entry:
         check_parameters(parameters, (), name)
         robot = _example_robot(entry["example_robot_data"], [])
-        return Scene(**scene_arguments(robot, table, name))
+        return Scene(**scene_arguments(robot, table, name, merge=False))
     return _from_urdf(folder, entry, table, parameters, name)
 
 
@@ -208,10 +208,15 @@ def _example_robot(name: str, others: list[str]) -> RobotFile:
             f'example-robot-data cannot load "{name}": {" ".join(str(error).split())}'
         ) from error
     robot = loader.robot
-    constraints = [c for c in read_mimics(Path(loader.df_path)) if _has_joints(robot.model, c)]
-    return RobotFile(
-        robot.model, robot.visual_model, robot.collision_model, constraints, q0=np.array(robot.q0)
-    )
+    notes = []
+    try:
+        mimics = read_mimics(Path(loader.df_path))
+    except LoadingError as error:
+        mimics = []
+        notes.append(f"mimic joints are left free: {error}")
+    constraints = [c for c in mimics if _has_joints(robot.model, c)]
+    q0 = np.array(robot.q0)
+    return RobotFile(robot.model, robot.visual_model, robot.collision_model, constraints, notes=notes, q0=q0)
 
 
 def _has_joints(model: Any, constraint: Any) -> bool:

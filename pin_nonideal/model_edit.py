@@ -52,8 +52,8 @@ class BallChain:
 def ball_chains(model: Any, keep: Collection[str] = ()) -> list[BallChain]:
     """Finds the chains of three revolutes that are ball joints.
 
-    Their axes meet in one point, consecutive ones at right angles; the two links in between carry no mass, no
-    armature and no other joint; and none has friction.
+    Their axes meet in one point, consecutive ones at right angles; the two links in between carry no mass and
+    no other joint; and none has a range, armature or friction.
 
     Args:
         model: pinocchio.Model.
@@ -107,14 +107,15 @@ def revolute_axis(model: Any, joint: int) -> Any | None:
 
 
 def _plain_revolute(model: Any, joint: int) -> bool:
+    """Whether a joint is a revolute without range, armature or friction: nothing a ball joint would lose."""
     if revolute_axis(model, joint) is None:
         return False
-    i = model.idx_vs[joint]
-    return not (
-        model.armature[i]
-        or model.damping[i]
-        or model.upperDryFrictionLimit[i]
-        or model.lowerDryFrictionLimit[i]
+    i, k = model.idx_vs[joint], model.idx_qs[joint]
+    if model.upperPositionLimit[k] > model.lowerPositionLimit[k]:
+        return False
+    return not any(
+        limit[i]
+        for limit in (model.armature, model.damping, model.lowerDryFrictionLimit, model.upperDryFrictionLimit)
     )
 
 

@@ -19,10 +19,12 @@ def link(name, mass=1.0, inertia=0.1, inside=""):
     return f'<link name="{name}">{INERTIAL.format(m=mass, i=inertia)}{inside}</link>'
 
 
-def joint(name, parent, child, kind="revolute", axis="0 0 1", xyz="0 0 0", inside=""):
+def joint(
+    name, parent, child, kind="revolute", axis="0 0 1", xyz="0 0 0", inside="", limits='lower="-3" upper="3"'
+):
     return (
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="{xyz}"/><axis xyz="{axis}"/><limit effort="1" velocity="1" lower="-3" upper="3"/>'
+        f'<origin xyz="{xyz}"/><axis xyz="{axis}"/><limit effort="1" velocity="1" {limits}/>'
         f"{inside}</joint>"
     )
 

@@ -70,6 +70,14 @@ def test_free_flyer(tmp_path):
     assert (scene.model.nq, scene.model.nv) == (9, 8)
 
 
+def test_example_robot_data_couples_mimic_joints():
+    scene = pn.load("panda")
+    assert [(c.joint1, c.joint2, c.ratio) for c in scene.constraints] == [
+        ("panda_finger_joint2", "panda_finger_joint1", 1.0)
+    ]
+    assert {law.joint: law.viscous for law in scene.laws}["panda_finger_joint1"] == 0.3 + 0.3
+
+
 def test_example_robot_data_by_name():
     scene = pn.load("double_pendulum")
     assert scene.model.nv == 2
@@ -155,15 +163,15 @@ def test_merging_keeps_places_and_energies():
     )
 
 
-def ball_robot(middle_mass=0.0, second_axis="0 1 0", xyz="0 0 0", inside=""):
+def ball_robot(middle_mass=0.0, second_axis="0 1 0", xyz="0 0 0", inside="", limits=""):
     return robot(
         *ARM,
         link("m1", middle_mass, middle_mass),
-        joint("c_rev0", "lower", "m1", axis="1 0 0"),
+        joint("c_rev0", "lower", "m1", axis="1 0 0", limits=""),
         link("m2", middle_mass, middle_mass),
-        joint("c_rev1", "m1", "m2", axis=second_axis, xyz=xyz),
+        joint("c_rev1", "m1", "m2", axis=second_axis, xyz=xyz, limits=""),
         link("ball"),
-        joint("c_rev2", "m2", "ball", inside=inside),
+        joint("c_rev2", "m2", "ball", inside=inside, limits=limits),
     )
 
 
@@ -181,10 +189,11 @@ def test_ball_joints_are_named_by_what_the_joints_share(tmp_path):
         (ball_robot(second_axis="0 1 0.1"), None),
         (ball_robot(xyz="0 0.1 0.1"), None),
         (ball_robot(inside='<dynamics damping="0.1"/>'), None),
+        (ball_robot(limits='lower="-1" upper="1"'), None),
         (ball_robot(), "name_mot: [c_rev1]"),
         (ball_robot(), "initial: {q: {c_rev2: 0.1}}"),
     ],
-    ids=["massive", "skew", "apart", "damped", "driven", "named"],
+    ids=["massive", "skew", "apart", "damped", "limited", "driven", "named"],
 )
 def test_other_chains_of_revolutes_stay(tmp_path, text, yaml):
     assert pn.load(folder(tmp_path, yaml, text)).model.nq == 5

@@ -176,6 +176,21 @@ def test_dynamics_tags_become_laws(tmp_path):
     assert [(w.joint, w.viscous, w.coulomb) for w in scene.laws] == [("j", 0.3, 0.2)]
 
 
+def test_mimic_joints_hand_their_friction_to_the_leader(tmp_path):
+    rubbing = '<mimic joint="elbow" multiplier="-2"/><dynamics damping="0.3" friction="0.2"/>'
+    follower = '<mimic joint="j"/><dynamics damping="0.5"/>'
+    text = robot(
+        *ARM,
+        link("x"),
+        joint("j", "base", "x", inside=rubbing),
+        link("y"),
+        joint("k", "base", "y", inside=follower),
+    )
+    (law,) = pn.load(folder(tmp_path, urdf=text)).laws
+    # Power: 0.3 (2 v)^2 + 0.5 (2 v)^2 and 0.2 |2 v| at an elbow speed v.
+    assert (law.joint, law.viscous, law.coulomb) == ("elbow", pytest.approx(3.2), pytest.approx(0.4))
+
+
 def test_a_law_of_robot_yaml_replaces_the_tags_and_says_so(tmp_path):
     text = robot(*ARM, link("x"), joint("j", "base", "x", inside='<dynamics damping="0.3" friction="0.2"/>'))
     scene = pn.load(folder(tmp_path, "laws:\n  - JointFriction: {joint: j, viscous: 1.0}\n", text))
