@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .checks import array, number
 from .closure import close_loops
+from .configurations import configuration
 from .constraints import KnifeEdge, Rolling, UserConstraint
 from .contacts import PointContact
 from .equation import Solution
@@ -30,8 +31,6 @@ from .lowering import Lowering, core, unique_names
 
 Array = NDArray[np.float64]
 
-# Lengths of unit quaternions and (cos, sin) pairs off by less than this are restored, by more they are an error.
-UNIT_TOLERANCE = 1e-6
 # A gap that stays above this after projection [m or rad] is a loop that does not close.
 CLOSURE_TOLERANCE = 1e-8
 # Rows below this part of the largest entry of A at random states vanish structurally, and rows whose directions
@@ -118,6 +117,7 @@ class Scene:
         self._check_user_constraints()
         self._drop_rows()
         self._runner = self._builder.runner()
+        self._nv = int(model.nv)
         self._closed: tuple[Array, Array] | None = None
 
     def __repr__(self) -> str:
@@ -279,19 +279,7 @@ class Scene:
     # --- states -----------------------------------------------------------------------------------------------
 
     def _configuration(self, q: ArrayLike, what: str) -> Array:
-        result = np.array(array(what, q, (self.model.nq,)))
-        for i, joint in enumerate(self.model.joints):
-            if i == 0 or joint.nq == joint.nv:
-                continue
-            part = result[joint.idx_q : joint.idx_q + joint.nq]
-            unit = part[-4:] if joint.nq in (4, 7) else part[-2:]
-            length = float(np.linalg.norm(unit))
-            if abs(length - 1.0) > UNIT_TOLERANCE and not (joint.nq not in (2, 4, 7)):
-                raise InputError(
-                    f'{what}: the {"quaternion" if unit.size == 4 else "(cos, sin) pair"} of joint '
-                    f'"{self.model.names[i]}" must have length 1; got {length:g}; normalize it'
-                )
-        return np.asarray(pin.normalize(self.model, result))
+        return configuration(self.model, q, what)
 
     def _velocity(self, v: ArrayLike, what: str) -> Array:
         return np.array(array(what, v, (self.model.nv,)))
@@ -448,12 +436,12 @@ class Scene:
             InputError: wrong shapes or numbers.
             InconsistentConstraintsError, FrictionParadoxError, SingularMassError: there is no solution.
         """
-        try:  # arrays of the right shape go straight to the core, which checks sizes and finiteness
-            result: Array = self._runner.acceleration(q, v, t, tau)
-            return result
+        a = np.empty(self._nv)
+        try:  # arrays of the right shape go straight to the core, which checks sizes, lengths and finiteness
+            self._runner.acceleration(q, v, t, tau, a)
         except (TypeError, ValueError, core.CoreFailure):
-            checked: Array = self._call(self._runner.acceleration, q, v, t, tau)
-            return checked
+            self._call(self._runner.acceleration, q, v, t, tau, a)
+        return a
 
     def _call(self, function: Any, q: ArrayLike, v: ArrayLike, t: float, tau: ArrayLike | None, *rest: Any) -> Any:
         q_in, v_in = self._configuration(q, "q"), self._velocity(v, "v")

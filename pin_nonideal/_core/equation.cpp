@@ -171,25 +171,32 @@ void RowSystem::use_wanted(const std::vector<Block>& all) {
     orthogonal = false;
 }
 
+constexpr int tile = 6;  // rows of an anchor at most; longer blocks are taken in parts
+
 static void gram(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
                  const std::vector<char>& use, RowSystem& s) {
     for (const RowLayout::Pair& pair : layout.pairs) {
         if (!s.block_used[pair.block1] || !s.block_used[pair.block2]) continue;
         const Block &b1 = blocks[pair.block1], &b2 = blocks[pair.block2];
         const int r1 = static_cast<int>(b1.kept.size()), r2 = static_cast<int>(b2.kept.size());
-        const bool same = pair.block1 == pair.block2;
-        for (int i = 0; i < r1; ++i) {
-            if (!use[b1.row + i]) continue;
-            for (int j = 0; j < (same ? i + 1 : r2); ++j) {
-                if (!use[b2.row + j]) continue;
-                double sum = 0.0;
-                const double *x = B.data() + b1.offset + i, *y = B.data() + b2.offset + j;
-                for (const auto& [l, k] : pair.common) sum += x[l * r1] * y[k * r2];
-                const int p1 = layout.position[b1.row + i], p2 = layout.position[b2.row + j];
-                const int hi = std::max(p1, p2), lo = std::min(p1, p2);
-                s.G[layout.start[hi] + lo] = sum;
+        const double *X = B.data() + b1.offset, *Y = B.data() + b2.offset;
+        for (int i0 = 0; i0 < r1; i0 += tile)
+            for (int j0 = 0; j0 < r2; j0 += tile) {
+                const int ni = std::min(tile, r1 - i0), nj = std::min(tile, r2 - j0);
+                double sum[tile][tile] = {};
+                for (const auto& [l, k] : pair.common) {
+                    const double *x = X + l * r1 + i0, *y = Y + k * r2 + j0;
+                    for (int i = 0; i < ni; ++i)
+                        for (int j = 0; j < nj; ++j) sum[i][j] += x[i] * y[j];
+                }
+                for (int i = 0; i < ni; ++i)
+                    for (int j = 0; j < nj; ++j) {
+                        if (!use[b1.row + i0 + i] || !use[b2.row + j0 + j]) continue;
+                        const int p1 = layout.position[b1.row + i0 + i], p2 = layout.position[b2.row + j0 + j];
+                        if (p1 >= p2) s.G[layout.start[p1] + p2] = sum[i][j];
+                        else s.G[layout.start[p2] + p1] = sum[i][j];
+                    }
             }
-        }
     }
 }
 

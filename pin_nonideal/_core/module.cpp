@@ -37,6 +37,35 @@ nb::object to_numpy(const double* data, size_t n) {
 nb::object to_numpy(const VecX& x) { return to_numpy(x.data(), x.size()); }
 nb::object to_numpy(const std::vector<double>& x) { return to_numpy(x.data(), x.size()); }
 
+// A contiguous buffer of doubles, without the detour over an array object.
+class Buffer {
+public:
+    Buffer(nb::handle object, int flags) {
+        if (PyObject_GetBuffer(object.ptr(), &view_, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | flags) != 0) {
+            PyErr_Clear();
+            throw std::invalid_argument("expected a contiguous array of floats");
+        }
+    }
+    ~Buffer() { PyBuffer_Release(&view_); }
+    Buffer(const Buffer&) = delete;
+    Buffer& operator=(const Buffer&) = delete;
+    void check(Eigen::Index n) const {
+        if (view_.ndim != 1 || view_.shape[0] != n || view_.format == nullptr || view_.format[0] != 'd')
+            throw std::invalid_argument("expected an array of floats of the model's size");
+    }
+    double* data() const { return static_cast<double*>(view_.buf); }
+
+private:
+    Py_buffer view_;
+};
+
+void read_buffer(nb::handle from, VecX& to) {
+    const Buffer buffer(from, 0);
+    buffer.check(to.size());
+    to = Eigen::Map<const VecX>(buffer.data(), to.size());
+    if (!to.allFinite()) throw std::invalid_argument("expected finite numbers");
+}
+
 void read_into(const nb::object& from, VecX& to) {
     const Array a = nb::cast<Array>(from);
     to = map(a);
@@ -132,6 +161,8 @@ std::function<void(double, const VecX&, const VecX&, VecX&)> torque_function(nb:
 
 VecX column(const Array& a) { return map(a); }
 
+constexpr double unit_tolerance = 1e-6;  // of quaternions and (cos, sin) pairs, as at Python's door
+
 struct Runner {  // a workspace and the program it belongs to
     std::shared_ptr<const Program> p;
     std::unique_ptr<Workspace> w;
@@ -140,11 +171,19 @@ struct Runner {  // a workspace and the program it belongs to
     explicit Runner(std::shared_ptr<const Program> program)
         : p(std::move(program)), w(std::make_unique<Workspace>(*p)), q(p->mechanism.nq), v(p->mechanism.nv) {}
 
+    // What does not fit is refused here and explained in Python.
     void set(const Array& q_in, const Array& v_in, const nb::object& tau) {
+        const Mechanism& m = p->mechanism;
+        const auto holds = [](const Array& x, int n) { return x.shape(0) == static_cast<size_t>(n); };
+        if (!holds(q_in, m.nq) || !holds(v_in, m.nv) || !has_unit_lengths(m, q_in.data(), unit_tolerance))
+            throw std::invalid_argument("q or v does not fit the model");
         q = map(q_in);
         v = map(v_in);
         w->has_override = !tau.is_none();
-        if (w->has_override) read_into(tau, w->override_torque);
+        if (!w->has_override) return;
+        const Array torque = nb::cast<Array>(tau);
+        if (!holds(torque, m.nv)) throw std::invalid_argument("tau does not fit the model");
+        w->override_torque = map(torque);
     }
 
     // Modes by velocity, and at rest by the complementarity problem; or the ones given.
@@ -181,11 +220,17 @@ struct Runner {  // a workspace and the program it belongs to
         resolve_modes(*p, *w, t, q, v, candidates);
     }
 
-    nb::object acceleration(const Array& q_in, const Array& v_in, double t, nb::object tau) {
-        set(q_in, v_in, tau);
+    // Writes the acceleration into `out`, an array of nv numbers; plain buffers, since this is called in tight loops.
+    void acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle tau, nb::handle out) {
+        read_buffer(q_in, q);
+        read_buffer(v_in, v);
+        w->has_override = !tau.is_none();
+        if (w->has_override) read_buffer(tau, w->override_torque);
         if (p->frictions.empty()) begin_step(*p, *w, t, q, v);
         else choose_modes(t, nb::none());
-        return to_numpy(w->a);
+        const Buffer target(out, PyBUF_WRITABLE);
+        target.check(w->a.size());
+        std::copy(w->a.data(), w->a.data() + w->a.size(), target.data());
     }
 
     nb::dict solve(const Array& q_in, const Array& v_in, double t, nb::object tau, nb::object modes) {
@@ -557,7 +602,7 @@ NB_MODULE(_core, m) {
         .def("runner", [](Builder& b) { return new Runner(b.p); }, nb::rv_policy::take_ownership);
 
     nb::class_<Runner>(m, "Runner")
-        .def("acceleration", &Runner::acceleration, "q"_a, "v"_a, "t"_a = 0.0, "tau"_a.none() = nb::none())
+        .def("acceleration", &Runner::acceleration, "q"_a, "v"_a, "t"_a, "tau"_a.none(), "out"_a)
         .def("solve", &Runner::solve, "q"_a, "v"_a, "t"_a = 0.0, "tau"_a.none() = nb::none(),
              "modes"_a.none() = nb::none())
         .def("rows", &Runner::rows)
@@ -565,6 +610,11 @@ NB_MODULE(_core, m) {
         .def("project", &Runner::project_state)
         .def("time_evaluations", &Runner::time_evaluations)
         .def_prop_ro("rank", &Runner::constraint_rank)
+        // How the rows were factored last: smallest pivot, orthogonal road taken, redundant, refined.
+        .def_prop_ro("factorization", [](Runner& r) {
+            const RowSystem& s = r.w->rows;
+            return nb::make_tuple(s.min_pivot, s.orthogonal, s.redundant, s.refine);
+        })
         .def("simulate", [](Runner& r, const Array& q, const Array& v, const Array& z, const nb::dict& options) {
             const Options o = read_options(options);
             const VecX q0 = map(q), v0 = map(v);
