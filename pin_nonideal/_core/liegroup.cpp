@@ -39,6 +39,18 @@ double cubic(double x) {
     return std::abs(x) < 1e-2 ? 1.0 / 6.0 - x * x / 120.0 + x * x * x * x / 5040.0 : (x - std::sin(x)) / (x * x * x);
 }
 
+// Numbers of a chart that have unit length: a quaternion or (cos, sin), or none.
+struct Stretch { int first, n; };
+Stretch unit_stretch(const Chart& c) {
+    switch (c.kind) {
+        case Chart::Kind::circle: return {c.iq, 2};
+        case Chart::Kind::quaternion: return {c.iq, 4};
+        case Chart::Kind::plane: return {c.iq + 2, 2};
+        case Chart::Kind::pose: return {c.iq + 3, 4};
+        default: return {c.iq, 0};
+    }
+}
+
 void store(const Quat& q, double* out) {
     const Quat n = q.normalized();
     out[0] = n.x(); out[1] = n.y(); out[2] = n.z(); out[3] = n.w();
@@ -75,18 +87,21 @@ void configuration_rate(const Mechanism& m, const double* q, const double* v, do
 
 void normalize(const Mechanism& m, double* q) {
     for (const Chart& c : m.charts) {
-        int offset = 0, n = 0;
-        switch (c.kind) {
-            case Chart::Kind::vector: continue;
-            case Chart::Kind::circle: n = 2; break;
-            case Chart::Kind::quaternion: n = 4; break;
-            case Chart::Kind::plane: offset = 2; n = 2; break;
-            case Chart::Kind::pose: offset = 3; n = 4; break;
-        }
-        Eigen::Map<VecX> part(q + c.iq + offset, n);
+        const Stretch unit = unit_stretch(c);
+        if (unit.n == 0) continue;
+        Eigen::Map<VecX> part(q + unit.first, unit.n);
         const double square = part.squaredNorm();
         if (square != 1.0) part /= std::sqrt(square);
     }
+}
+
+bool has_unit_lengths(const Mechanism& m, const double* q, double tolerance) {
+    for (const Chart& c : m.charts) {
+        const Stretch unit = unit_stretch(c);
+        if (unit.n == 0) continue;
+        if (!(std::abs(Eigen::Map<const VecX>(q + unit.first, unit.n).norm() - 1.0) <= tolerance)) return false;
+    }
+    return true;
 }
 
 void ambient_to_tangent(const Mechanism& m, const double* q, const double* dq, double* tangent) {

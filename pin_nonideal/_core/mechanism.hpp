@@ -78,6 +78,8 @@ Mechanism read_mechanism(const void* model);
 void configuration_rate(const Mechanism& m, const double* q, const double* v, double* dq);
 // Unit length of quaternions and (cos, sin) restored.
 void normalize(const Mechanism& m, double* q);
+// Whether they have unit length, to this tolerance.
+bool has_unit_lengths(const Mechanism& m, const double* q, double tolerance);
 // Tangent coordinates of a small ambient change dq at q.
 void ambient_to_tangent(const Mechanism& m, const double* q, const double* dq, double* tangent);
 // q moved by the tangent vector w for unit time (exponential map).

@@ -1,0 +1,110 @@
+"""Random trees with every kind of joint, and small means to check scenes at random states."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+AXIS = np.array([0.36, 0.48, 0.8])
+
+
+def _composite():
+    joint = pin.JointModelComposite(pin.JointModelRX())
+    joint.addJoint(pin.JointModelPY(), pin.SE3(np.eye(3), np.array([0.1, 0.2, 0.0])))
+    joint.addJoint(pin.JointModelSpherical(), pin.SE3(pin.rpy.rpyToMatrix(0.3, 0.1, 0.2), np.zeros(3)))
+    return joint
+
+
+def _endless_unaligned():
+    """Python's constructor takes no axis; the URDF reader's does."""
+    links = "".join(
+        f'<link name="{n}"><inertial><mass value="1"/>'
+        '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        for n in ("a", "b")
+    )
+    axis = " ".join(str(x) for x in AXIS)
+    joint = f'<joint name="j" type="continuous"><parent link="a"/><child link="b"/><axis xyz="{axis}"/></joint>'
+    return pin.buildModelFromXML(f'<robot name="r">{links}{joint}</robot>').joints[1]
+
+
+# Every kind of joint that Pinocchio has (mimic joints become couplings when loading).
+JOINTS = {
+    "revolute x": pin.JointModelRX,
+    "revolute y": pin.JointModelRY,
+    "revolute z": pin.JointModelRZ,
+    "revolute unaligned": lambda: pin.JointModelRevoluteUnaligned(AXIS),
+    "endless x": pin.JointModelRUBX,
+    "endless y": pin.JointModelRUBY,
+    "endless z": pin.JointModelRUBZ,
+    "endless unaligned": _endless_unaligned,
+    "prismatic x": pin.JointModelPX,
+    "prismatic y": pin.JointModelPY,
+    "prismatic z": pin.JointModelPZ,
+    "prismatic unaligned": lambda: pin.JointModelPrismaticUnaligned(AXIS),
+    "helical x": lambda: pin.JointModelHX(0.1),
+    "helical y": lambda: pin.JointModelHY(-0.2),
+    "helical z": lambda: pin.JointModelHZ(0.3),
+    "helical unaligned": lambda: pin.JointModelHelicalUnaligned(AXIS, 0.15),
+    "spherical": pin.JointModelSpherical,
+    "spherical zyx": pin.JointModelSphericalZYX,
+    "free flyer": pin.JointModelFreeFlyer,
+    "planar": pin.JointModelPlanar,
+    "translation": pin.JointModelTranslation,
+    "universal": lambda: pin.JointModelUniversal(np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])),
+    "composite": _composite,
+    "ellipsoid": lambda: pin.JointModelEllipsoid(0.3, 0.2, 0.1),
+}
+
+
+def placement(rng, size=0.3):
+    """A random place and orientation."""
+    return pin.SE3(_rotation(rng), size * rng.standard_normal(3))
+
+
+def _rotation(rng):
+    q = rng.standard_normal(4)
+    return pin.Quaternion(q / np.linalg.norm(q)).toRotationMatrix()
+
+
+def inertia(rng, mass=1.0):
+    """Inertia of a random solid: positive, with its center anywhere."""
+    points = 0.1 * rng.standard_normal((6, 3))
+    second = sum(np.dot(p, p) * np.eye(3) - np.outer(p, p) for p in points)
+    return pin.Inertia(mass, 0.1 * rng.standard_normal(3), mass * second)
+
+
+def add(model, name, kind, parent, rng, mass=1.0):
+    """One joint with a body and a frame "<name> tip" at a random place of it."""
+    joint = model.addJoint(parent, JOINTS[kind](), placement(rng), name)
+    model.appendBodyToJoint(joint, inertia(rng, mass), pin.SE3.Identity())
+    model.addFrame(pin.Frame(f"{name} tip", joint, 0, placement(rng), pin.FrameType.OP_FRAME))
+    return joint
+
+
+def tree(kinds, rng, *, parents=None, armature=False, gravity=True):
+    """A tree of the given kinds of joints, j0, j1, ...
+
+    Each hangs on the one before it, on an ancestor of that one, or on the world, so that joints are numbered branch
+    by branch as Pinocchio's algorithms need.
+    """
+    model = pin.Model()
+    model.name = "tree"
+    for k, kind in enumerate(kinds):
+        if parents is None:
+            parent = k
+            while parent > 0 and rng.uniform() < 0.3:
+                parent = model.parents[parent]
+        else:
+            parent = parents[k]
+        add(model, f"j{k}", kind, parent, rng, mass=float(rng.uniform(0.2, 3.0)))
+    if gravity:
+        model.gravity = pin.Motion(9.81 * AXIS, np.zeros(3))
+    if armature:
+        model.armature = rng.uniform(0.0, 0.2, model.nv)
+    return model
+
+
+def state(model, rng, speed=1.0, spread=1.0):
+    """Random configuration and velocity."""
+    q = pin.integrate(model, pin.neutral(model), spread * rng.standard_normal(model.nv))
+    return q, speed * rng.standard_normal(model.nv)

@@ -1,0 +1,127 @@
+"""M, bias forces and free acceleration of the core against Pinocchio's own algorithms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import pin_nonideal as pn
+
+from .random_trees import AXIS, JOINTS, state, tree
+
+# Two algorithms in double precision on trees of a few dozen joints: sums in another order.
+ROUNDING = 1e-12
+# The acceleration carries the rounding of M times its condition, which stays below 1e4 in these models.
+SOLVED = 1e-9
+
+
+def assert_terms_match(model, rng, count=3, speed=2.0):
+    data = model.createData()
+    runner = pn.Scene(model).new_runner()
+    for _ in range(count):
+        q, v = state(model, rng, speed)
+        M, bias = runner.terms(q, v)
+        expected = pin.crba(model, data, q, pin.Convention.WORLD)
+        expected = np.triu(expected) + np.triu(expected, 1).T
+        np.testing.assert_allclose(M.reshape(model.nv, -1), expected, atol=ROUNDING * np.abs(expected).max())
+        expected = pin.nonLinearEffects(model, data, q, v)
+        np.testing.assert_allclose(bias, expected, atol=ROUNDING * np.abs(expected).max())
+
+
+def assert_free_acceleration_matches(model, rng, count=3, tolerance=SOLVED):
+    data, scene = model.createData(), pn.Scene(model)
+    for _ in range(count):
+        q, v = state(model, rng)
+        tau = rng.standard_normal(model.nv)
+        expected = pin.aba(model, data, q, v, tau)
+        a = scene.acceleration(q, v, tau)
+        np.testing.assert_allclose(a, expected, atol=tolerance * np.abs(expected).max())
+        np.testing.assert_allclose(scene.solve(q, v, tau=tau).a, a, atol=tolerance * np.abs(a).max())
+
+
+@pytest.mark.parametrize("kind", JOINTS)
+def test_each_kind_of_joint_at_the_root_and_inside_a_tree(kind):
+    rng = np.random.default_rng(1)
+    for kinds in ([kind], [kind, "revolute unaligned"], ["revolute y", kind, "spherical"], ["free flyer", kind, kind]):
+        model = tree(kinds, rng)
+        assert_terms_match(model, rng)
+        assert_free_acceleration_matches(model, rng)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_all_kinds_of_joints_in_one_tree_with_armature(seed):
+    rng = np.random.default_rng(seed)
+    kinds = list(JOINTS)
+    rng.shuffle(kinds)
+    model = tree(kinds, rng, armature=True)
+    assert len(set(model.parents)) > 5
+    assert_terms_match(model, rng)
+    assert_free_acceleration_matches(model, rng)
+
+
+def test_joints_numbered_across_branches():
+    """Pinocchio's crba needs joints numbered branch by branch; the sum of J^T Y J over the bodies does not."""
+    rng = np.random.default_rng(6)
+    model = tree(["free flyer", "revolute x", "spherical", "prismatic y", "planar"], rng, parents=[0, 1, 1, 2, 3])
+    data, runner = model.createData(), pn.Scene(model).new_runner()
+    q, v = state(model, rng)
+    pin.computeJointJacobians(model, data, q)
+    bodies = range(1, model.njoints)
+    J = [pin.getJointJacobian(model, data, i, pin.ReferenceFrame.LOCAL) for i in bodies]
+    expected = sum(j.T @ model.inertias[i].matrix() @ j for i, j in zip(bodies, J, strict=True))
+    M = runner.terms(q, v)[0].reshape(model.nv, -1)
+    np.testing.assert_allclose(M, expected, atol=ROUNDING * np.abs(expected).max())
+
+
+def test_a_chain_of_all_kinds():
+    rng = np.random.default_rng(7)
+    model = tree(list(JOINTS), rng, parents=range(len(JOINTS)))
+    assert_terms_match(model, rng)
+
+
+@pytest.mark.parametrize("direction", [(0, 0, -9.81), (3.0, 0, 0), (0, -1.6, 0), (0, 0, 0), tuple(24.8 * AXIS)])
+def test_gravity_in_any_direction(direction):
+    rng = np.random.default_rng(2)
+    model = tree(["revolute x", "spherical", "prismatic y", "universal"], rng, gravity=False)
+    model.gravity = pin.Motion(np.array(direction, dtype=float), np.zeros(3))
+    assert_terms_match(model, rng)
+    assert_free_acceleration_matches(model, rng)
+
+
+@pytest.mark.parametrize("name", ["panda", "solo12", "talos"])
+def test_example_robots(name):
+    rng = np.random.default_rng(3)
+    robots_loader = pytest.importorskip("example_robot_data.robots_loader")
+    model = robots_loader.load(name).model
+    assert_terms_match(model, rng)
+    assert_free_acceleration_matches(model, rng)
+
+
+def test_a_robot_far_from_the_origin_keeps_its_digits():
+    """A floating base moved by 10 km: M, bias and acceleration are those of the robot at home, digit by digit."""
+    rng = np.random.default_rng(4)
+    kinds = ["free flyer", "revolute x", "spherical", "prismatic unaligned", "universal", "revolute z"]
+    model = tree(kinds, rng, parents=[0, 1, 2, 1, 4, 5])
+    scene = pn.Scene(model)
+    runner = scene.new_runner()
+    q, v = state(model, rng)
+    q[:3] = 0.0
+    far = q.copy()
+    far[:3] = [1e4, -2e4, 3e3]
+    for here, there in zip(runner.terms(q, v), runner.terms(far, v), strict=True):
+        np.testing.assert_allclose(there, here, rtol=0, atol=1e-14 * np.abs(here).max())
+    a = scene.acceleration(q, v)
+    np.testing.assert_allclose(scene.acceleration(far, v), a, rtol=0, atol=1e-12 * np.abs(a).max())
+
+
+def test_quaternions_that_are_not_quite_unit_do_not_change_the_motion():
+    rng = np.random.default_rng(5)
+    model = tree(["free flyer", "spherical", "endless x"], rng)
+    runner = pn.Scene(model).new_runner()
+    q, v = state(model, rng)
+    off = q.copy()
+    off[3:7] *= 1.0 + 3e-7
+    off[7:11] *= 1.0 - 5e-7
+    for exact, scaled in zip(runner.terms(q, v), runner.terms(off, v), strict=True):
+        np.testing.assert_allclose(scaled, exact, atol=ROUNDING * np.abs(exact).max())
