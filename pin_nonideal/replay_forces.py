@@ -160,7 +160,9 @@ def arrows_of(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]
             parts = {"total": motion.of(run.lam[:, rows])}
             if run.lam_ideal is not None:
                 ideal = motion.of(run.lam_ideal[:, rows])
-                parts = {"ideal": ideal, "nonideal": parts["total"] - ideal}
+                rest = parts["total"] - ideal
+                acts = np.abs(rest).max(initial=0.0) > SMALLEST * np.abs(ideal).max(initial=0.0)
+                parts = {"ideal": ideal} | ({"nonideal": rest} if acts else {})
             for kind, lam in parts.items():
                 arrows += _reaction(run.scene, motion, name, kind, item, lam)
     drawn = [("nonideal", run.F_nonideal)]

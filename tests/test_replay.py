@@ -20,6 +20,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import pin_nonideal as pn
 from pin_nonideal.errors import InputError, OutputError
 from pin_nonideal.replay import ReplayPage, replay
 from pin_nonideal.replay_payload import packed_run
@@ -363,6 +364,26 @@ def test_one_sample_is_a_still_picture(browser: Any, folder: Path) -> None:
     watched.context.close()
 
 
+def test_a_simulated_robot_stands_where_its_run_says(browser: Any, folder: Path) -> None:
+    scene = pn.load("four_bar")
+    run = pn.simulate(scene, 0.2, output_dt=1.0 / 60.0, record=("forces", "energy"))
+    watched = Watched(browser, pn.replay(run, folder / "simulated.html"))
+    assert watched.complaints == []
+    data, visual_data = scene.model.createData(), scene.visual_model.createData()
+    for sample in (0, len(run.t) - 1):
+        pin.updateGeometryPlacements(scene.model, data, scene.visual_model, visual_data, run.q[sample])
+        pin.updateFramePlacements(scene.model, data)
+        shown = watched.poses(float(run.t[sample]))
+        for item, placement in zip(scene.visual_model.geometryObjects, visual_data.oMg, strict=True):
+            np.testing.assert_allclose(shown["visuals"][item.name], placement.homogeneous, atol=POSE)
+        (ends,) = shown["marks"].values()
+        anchor = scene.constraints[0]
+        for end, name in zip(ends, (anchor.frame1, anchor.frame2), strict=True):
+            place = data.oMf[scene.model.getFrameId(name)].translation
+            np.testing.assert_allclose(end, place, atol=POSE)
+    watched.context.close()
+
+
 def test_a_notebook_shows_the_page_in_place(browser: Any, loop: Any) -> None:
     page = replay(loop.run)
     assert isinstance(page, ReplayPage)
@@ -390,6 +411,18 @@ def test_the_file_is_the_page_and_overwrites_an_older_one(tmp_path: Path) -> Non
     new = tmp_path / "b.txt"
     new.touch()
     assert path.stat().st_mode == new.stat().st_mode  # a temporary file's own permissions would be narrower
+
+
+@pytest.mark.parametrize("name", [name for name, _ in pn.robots()])
+def test_every_robot_of_the_package_can_be_replayed(name: str) -> None:
+    scene = pn.load(name)
+    run = pn.simulate(scene, 1e-3, record=("forces", "energy"))
+    content = packed_run(run, 1000.0, "title", None, True)
+    header = json.loads(content[4 : 4 + int.from_bytes(content[:4], "little")])
+    assert header["visuals"]
+    assert len(header["joints"]) == scene.model.njoints
+    assert {mark["name"] for mark in header["marks"]} >= {name for name, *_ in scene.anchor_frames}
+    assert 0.05 < header["view"]["size"] < 10.0
 
 
 def test_the_licenses_of_what_is_inside_are_in_plain_text() -> None:
@@ -435,6 +468,15 @@ def test_a_write_that_breaks_off_keeps_the_older_file(
 def test_frames_a_second_must_be_a_positive_number(fps: Any) -> None:
     with pytest.raises(InputError, match="replay: fps must be"):
         replay(four_bar(), fps=fps)
+
+
+def test_a_run_without_its_scene_is_refused() -> None:
+    run = four_bar()
+    run.scene = None
+    message = "a replay needs the scene of the run, which a trajectory read from a file has not: "
+    message += "pass dataclasses.replace(run, scene=scene)"
+    with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+        replay(run)
 
 
 def test_a_title_must_be_text() -> None:

@@ -82,6 +82,12 @@ def test_a_reaction_is_turned_from_the_second_frame_into_the_world_and_split() -
     np.testing.assert_allclose(by_kind["ideal"].origin, tips, atol=ROUNDING)
 
 
+def test_a_nonideal_part_that_is_rounding_has_no_arrow() -> None:
+    run = four_bar()
+    run.lam_ideal = run.lam * (1.0 + 1e-14)
+    assert [arrow.kind for arrow in arrows(run) if arrow.name == "loop"] == ["ideal"]
+
+
 def test_without_a_split_the_arrow_is_the_total() -> None:
     run = four_bar()
     run.lam_ideal = None

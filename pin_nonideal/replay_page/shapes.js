@@ -158,7 +158,7 @@ function groundMesh(THREE, cell, reach) {
         gl_FragColor = vec4(0.32, 0.4, 0.5, fade * max(0.22 * lines(cell), 0.42 * lines(5.0 * cell)));
       }`,
   }));
-  const shadow = new THREE.Mesh(plane, new THREE.ShadowMaterial({ opacity: 0.16 }));
+  const shadow = new THREE.Mesh(plane, new THREE.ShadowMaterial({ opacity: 0.16, depthWrite: false }));
   shadow.receiveShadow = true;
   shadow.renderOrder = -2; grid.renderOrder = -1;
   const group = new THREE.Group();
