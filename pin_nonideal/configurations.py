@@ -1,4 +1,4 @@
-"""Configurations at the door: unit quaternions and (cos, sin) pairs, restored when nearly unit, refused when not."""
+"""Configurations at the door: quaternions and (cos, sin) pairs have unit length, or nearly so, or are refused."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from .checks import array
 from .errors import InputError
 
-# Lengths off by less than this are rounding of a file or a printout and are restored; by more they are an error.
+# Lengths off by less than this are rounding of a file or a printout and are restored; more is an error.
 UNIT_TOLERANCE = 1e-6
 
 _CIRCLES = ("JointModelRUB", "JointModelRevoluteUnbounded", "JointModelPlanar")

@@ -23,7 +23,8 @@ def _endless_unaligned():
         for n in ("a", "b")
     )
     axis = " ".join(str(x) for x in AXIS)
-    joint = f'<joint name="j" type="continuous"><parent link="a"/><child link="b"/><axis xyz="{axis}"/></joint>'
+    ends = f'<parent link="a"/><child link="b"/><axis xyz="{axis}"/>'
+    joint = f'<joint name="j" type="continuous">{ends}</joint>'
     return pin.buildModelFromXML(f'<robot name="r">{links}{joint}</robot>').joints[1]
 
 
@@ -84,8 +85,8 @@ def add(model, name, kind, parent, rng, mass=1.0):
 def tree(kinds, rng, *, parents=None, armature=False, gravity=True):
     """A tree of the given kinds of joints, j0, j1, ...
 
-    Each hangs on the one before it, on an ancestor of that one, or on the world, so that joints are numbered branch
-    by branch as Pinocchio's algorithms need.
+    Each hangs on the one before it, on an ancestor of that one, or on the world, so that joints are numbered
+    branch by branch as Pinocchio's algorithms need.
     """
     model = pin.Model()
     model.name = "tree"

@@ -223,6 +223,8 @@ struct Runner {  // a workspace and the program it belongs to
     // Writes the acceleration into `out`, an array of nv numbers; plain buffers, since this is called in tight loops.
     void acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle tau, nb::handle out) {
         read_buffer(q_in, q);
+        if (!has_unit_lengths(p->mechanism, q.data(), unit_tolerance))
+            throw std::invalid_argument("q holds a part that is not of unit length");
         read_buffer(v_in, v);
         w->has_override = !tau.is_none();
         if (w->has_override) read_buffer(tau, w->override_torque);
