@@ -162,6 +162,19 @@ def test_poses_at_two_times_differ(arm: Any) -> None:
     assert np.linalg.norm(hand[1] - hand[0]) > 0.1
 
 
+def test_between_frames_joints_move_evenly(loop: Any) -> None:
+    before, between, after = (
+        {name: np.array(pose) for name, pose in loop.watched.poses((6 + part) / 60.0)["joints"].items()}
+        for part in (0.0, 0.5, 1.0)
+    )
+    for name, pose in between.items():
+        # Halfway along the straight line, and halfway along the turn: its square is the whole turn.
+        np.testing.assert_allclose(pose[:3, 3], (before[name] + after[name])[:3, 3] / 2.0, atol=POSE)
+        half, whole = before[name][:3, :3].T @ pose[:3, :3], before[name][:3, :3].T @ after[name][:3, :3]
+        np.testing.assert_allclose(half @ half, whole, atol=POSE)
+    assert np.abs(between["coupler"] - before["coupler"]).max() > 100.0 * POSE
+
+
 def test_anchors_stand_on_their_frames(loop: Any) -> None:
     model, data = loop.run.scene.model, loop.run.scene.model.createData()
     for sample in (0, 40):
