@@ -121,6 +121,7 @@ struct Block {
     int total = 0;                 // rows of the description
     std::vector<int> kept;         // rows that act
     std::vector<char> holonomic;   // of every row of the description: has a residual
+    bool comparable_rows = false;  // rows are components of one vector, of one unit
     int user_row = 0;              // first row in the user's numbering
     int row = 0;                   // first row among the kept rows of the scene
     int values = 0;                // place in Workspace::values

@@ -215,6 +215,20 @@ void factor_rows(const RowLayout& layout, const std::vector<Block>& blocks, cons
     row_scales(layout, s.active, s);
     s.min_pivot = 1.0;
     s.orthogonal = false;
+    double shortest = 1.0;
+    for (int index : s.blocks) {
+        const Block& block = blocks[index];
+        if (!block.comparable_rows) continue;
+        double least = HUGE_VAL, most = 0.0;
+        for (size_t k = 0; k < block.kept.size(); ++k) {
+            if (!s.active[block.row + k]) continue;
+            const int i = layout.position[block.row + k];
+            const double square = s.G[layout.start[i] + i];
+            least = std::min(least, square);
+            most = std::max(most, square);
+        }
+        if (least < shortest * most) shortest = least / most;
+    }
     double* L = s.factor.data();
     for (int i = 0; i < layout.rows; ++i) {
         const int row = layout.row_at[i];
@@ -239,6 +253,7 @@ void factor_rows(const RowLayout& layout, const std::vector<Block>& blocks, cons
         }
         Li[i] = 1.0 / std::sqrt(pivot);
     }
+    s.distance = std::min(shortest, s.min_pivot);
     if (s.orthogonal) {
         dense_columns(blocks, B, s.active, s);
         householder(s, static_cast<int>(s.columns.size()), false, 0.0);

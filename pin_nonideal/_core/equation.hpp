@@ -45,6 +45,9 @@ struct RowSystem {
     bool redundant = false;         // some wanted row is not active
     bool refine = false;            // very unequal pivots of M: solutions are refined
     double min_pivot = 1.0;
+    // Square of the sine at which some row stands to the others, or of its length beside the other rows of its block
+    // (a singular position turns a row into zero): small near a singular position.
+    double distance = 1.0;
     int rank = 0;
     // Orthogonal factorization of the scaled active rows, one column a row.
     MatX Q;

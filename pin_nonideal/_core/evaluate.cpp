@@ -77,6 +77,7 @@ void Program::finish() {
     for (size_t i = 0; i < blocks.size(); ++i) {
         Block& block = blocks[i];
         block.values = static_cast<int>(i);
+        block.comparable_rows = std::holds_alternative<PointRows>(block.kind);
         block.row = row;
         row += static_cast<int>(block.kept.size());
         block.support.clear();

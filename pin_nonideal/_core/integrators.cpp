@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "projection.hpp"
 #include "tableaux.hpp"
 
 namespace pn {
@@ -22,14 +23,24 @@ Method method_named(const std::string& name) {
 System::System(const Program& program, Workspace& workspace, bool with_energy)
     : p(program), w(workspace), energy(with_energy), nq(p.mechanism.nq), nv(p.mechanism.nv), nz(p.states),
       nw(with_energy ? 3 + static_cast<int>(p.law_names.size()) : 0), ny(nq + nv + nz + nw),
-      q_buffer(VecX::Zero(nq)), v_buffer(VecX::Zero(nv)) {}
+      q_buffer(VecX::Zero(nq)), v_buffer(VecX::Zero(nv)), projected(VecX::Zero(ny)) {}
 
 void System::derivative(double t, const VecX& y, VecX& dy) {
     q_buffer = y.head(nq);
     v_buffer = y.segment(nq, nv);
     if (nz > 0) w.z = y.segment(nq + nv, nz);
+    if (!on_constraints) {
+        evaluate(p, w, t, q_buffer, v_buffer);
+        if (!w.rows.blocks.empty()) smallest_pivot = std::min(smallest_pivot, w.rows.distance);
+        collect(y, dy);
+        return;
+    }
+    project(p, w, t, q_buffer, v_buffer);
     evaluate(p, w, t, q_buffer, v_buffer);
-    collect(y, dy);
+    projected = y;
+    projected.head(nq) = q_buffer;
+    projected.segment(nq, nv) = v_buffer;
+    collect(projected, dy);
 }
 
 void System::collect(const VecX& y, VecX& dy) {

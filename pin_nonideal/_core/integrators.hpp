@@ -24,6 +24,10 @@ struct System {
     const Program& p;
     Workspace& w;
     bool energy = false;  // integrate the powers of the ledger
+    // Near a singular position the motion off the constraints differs wildly from the motion on them, so stages are
+    // projected first: y' = f(P(y)) has the same solutions and no such cliff.
+    bool on_constraints = false;
+    double smallest_pivot = 1.0;  // of the rows' factor, over the evaluations since it was set
     int nq, nv, nz, nw, ny;
 
     System(const Program& program, Workspace& workspace, bool with_energy);
@@ -33,7 +37,7 @@ struct System {
     auto q(VecX& y) const { return y.head(nq); }
     auto v(VecX& y) const { return y.segment(nq, nv); }
 
-    VecX q_buffer, v_buffer;
+    VecX q_buffer, v_buffer, projected;
 };
 
 // Power of actuation, given forces, constraints, and each law, at the evaluation in the workspace.

@@ -7,6 +7,9 @@ namespace pn {
 
 namespace {
 
+// A pivot of the rows' unit-diagonal factor below this is near a singular position: the square of the sine at which
+// the nearest row stands to the others.
+constexpr double near_singular = 2.5e-3;
 constexpr double safety = 0.9, shrink_limit = 0.2, growth_limit = 10.0;
 
 }  // namespace
@@ -159,7 +162,13 @@ void Simulation::advance_to(double stop) {
     stepper.K[0] = derivative;
     double error = 0.0;
     try {
+        system.on_constraints = w.rows.distance < near_singular && !w.rows.blocks.empty();
+        system.smallest_pivot = 1.0;
         stepper.step(t, size);
+        if (system.smallest_pivot < near_singular && !system.on_constraints) {
+            system.on_constraints = true;
+            stepper.step(t, size);
+        }
         if (!stepper.y1.allFinite()) throw Failure(Failure::Kind::not_finite, t + size);
         if (o.method.kind == Method::Kind::dop853) error = stepper.error_norm(o.rtol, o.atol);
         if (error <= 1.0) {
