@@ -119,12 +119,30 @@ double Stepper::norm(const VecX& dy, const VecX& scale, const VecX& y) {
     const int nq = system.nq, nv = system.nv, n = 2 * nv + system.nz;
     ambient_to_tangent(system.p.mechanism, y.data(), dy.data(), tangent.data());
     tangent.segment(nv, nv + system.nz) = dy.segment(nq, nv + system.nz);
+    if (system.on_constraints) {
+        remove_normal_part(0);
+        remove_normal_part(nv);
+    }
     double sum = 0.0;
     for (int k = 0; k < n; ++k) {
         const double x = tangent[k] / scale[k];
         sum += x * x;
     }
     return std::sqrt(sum / n);
+}
+
+// Takes from the tangent coordinates at `start` what the rows forbid: the projection at the step's end removes it, and
+// near a singular position it is noise.
+void Stepper::remove_normal_part(int start) {
+    Workspace& w = system.w;
+    auto part = tangent.segment(start, system.nv);
+    w.work = part;
+    for (int i : w.rows.blocks) multiply(system.p.blocks[i], w.A, w.work, w.r);
+    solve_rows(system.p.layout, w.rows, w.r, w.lam);
+    w.work.setZero();
+    for (int i : w.rows.blocks) add_transpose(system.p.blocks[i], w.B, w.lam, w.work);
+    solve_Rt(system.p.mechanism, w.terms, w.work);
+    part -= w.work;
 }
 
 double Stepper::error_norm(double rtol, const VecX& atol) {
