@@ -48,13 +48,14 @@ def n_four_bar(
     model.name = "n_four_bar"
     model.gravity = pin.Motion(np.array([0.0, 0.0, -g]), np.zeros(3))
     constraints = []
-    cranks = [
-        _rod(model, visual, 0, f"crank{i}", np.array([i * L, 0.0, 0.0]), "z", m, L) for i in range(N + 1)
-    ]
-    for i in range(N):
-        _rod(model, visual, cranks[i], f"coupler{i}", np.array([0.0, 0.0, L]), "x", m, L)
-        constraints.append(PointAnchor(f"coupler{i}_tip", f"crank{i + 1}_tip", axes="xz", name=f"window{i}"))
-    v0 = np.concatenate([np.full(N + 1, speed / L), np.full(N, -speed / L)])
+    for i in range(N + 1):  # branch by branch, as Pinocchio's algorithms need the joints numbered
+        crank = _rod(model, visual, 0, f"crank{i}", np.array([i * L, 0.0, 0.0]), "z", m, L)
+        if i < N:
+            _rod(model, visual, crank, f"coupler{i}", np.array([0.0, 0.0, L]), "x", m, L)
+            constraints.append(
+                PointAnchor(f"coupler{i}_tip", f"crank{i + 1}_tip", axes="xz", name=f"window{i}")
+            )
+    v0 = np.tile([speed / L, -speed / L], N + 1)[: model.nv]
     return RobotFile(model, visual, constraints=list(constraints), q0=np.zeros(model.nq), v0=v0)
 
 
