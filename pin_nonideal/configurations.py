@@ -1,4 +1,4 @@
-"""Configurations at the door: quaternions and (cos, sin) pairs have unit length, or nearly so, or are refused."""
+"""Configurations at the door: quaternions and (cos, sin) pairs must have unit length, or nearly so."""
 
 from __future__ import annotations
 

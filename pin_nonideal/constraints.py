@@ -107,8 +107,8 @@ class HingeAnchor:
 
     Residual: phi = [R2^T (p1 - p2); t1 . (u x u'); t2 . (u x u')], [m; rad], where u' = R2^T R1 u is the axis
     as frame1 carries it and t1, t2 are `checks.axis_triad(u)`; the last two are scaled by angle/sine, so that
-    they tell the angle between the axes, which must point the same way.  With frame2=None, u is replaced by R1(start) u and all
-    components are in world axes.
+    they tell the angle between the axes, which must point the same way.  With frame2=None, u is replaced by
+    R1(start) u and all components are in world axes.
     Rows: 5, three of place and two of orientation.
     lam: force on frame1's body [N] in the axes of frame2, and the moments about t1 and t2 [N m].
 

@@ -109,3 +109,40 @@ def state(model, rng, speed=1.0, spread=1.0):
     """Random configuration and velocity."""
     q = pin.integrate(model, pin.neutral(model), spread * rng.standard_normal(model.nv))
     return q, speed * rng.standard_normal(model.nv)
+
+
+def attach(model, name, joint, q, place):
+    """A frame of a joint's body that is at `place` in the world when the model is at q."""
+    data = model.createData()
+    pin.forwardKinematics(model, data, q)
+    frame = pin.Frame(name, joint, 0, data.oMi[joint].actInv(place), pin.FrameType.OP_FRAME)
+    model.addFrame(frame)
+    return name
+
+
+def place_of(model, q, name):
+    """Placement of a frame in the world."""
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    return data.oMf[model.getFrameId(name)]
+
+
+def three_trees(rng):
+    """A floating chain, a floating pair and a chain on the ground, with frames on every body.
+
+    Returns:
+        The model and a configuration away from the neutral one.
+    """
+    model = pin.Model()
+    model.name = "three trees"
+    chains = (
+        ("a", ["free flyer", "revolute x", "spherical", "prismatic unaligned"]),
+        ("b", ["free flyer", "universal", "revolute unaligned"]),
+        ("c", ["planar", "endless z", "helical y", "prismatic x"]),
+    )
+    for letter, kinds in chains:
+        parent = 0
+        for k, kind in enumerate(kinds):
+            parent = add(model, f"{letter}{k}", kind, parent, rng, mass=float(rng.uniform(0.5, 2.0)))
+    model.armature = rng.uniform(0.0, 0.1, model.nv)
+    return model, pin.integrate(model, pin.neutral(model), 0.7 * rng.standard_normal(model.nv))
