@@ -269,7 +269,7 @@ void Simulation::switch_modes(double at, VecX& state, int trigger) {
         state.head(system.nq) = q_;
         state.segment(system.nq, system.nv) = v_;
     }
-    resolve_modes(p, w, at, q_, v_, candidates);
+    resolve_modes(p, w, at, q_, v_, candidates, trigger >= 0 && before[trigger] == sticking ? trigger : -1);
     std::fill(indeterminate.begin(), indeterminate.end(), char(0));
     if (p.needs_reactions) gather_reactions(p, w);
     for (int e : candidates)

@@ -10,6 +10,7 @@ namespace pn {
 
 namespace {
 
+constexpr int breaking_passes = 20;       // after these, what reached its limit may stick again
 constexpr int outer_limit = 100;          // of limits that depend on the load
 constexpr double limit_tolerance = 1e-12; // relative change of the limits at which the outer iteration ends
 constexpr double slack = 1e-9;            // part of the limit by which a mode may miss its condition by rounding
@@ -173,20 +174,20 @@ struct Candidates {
     }
 
     // Modes that the forces f of the program mean: what is below its limit sticks.
-    std::vector<signed char> modes_of(const VecX& f, const VecX& alpha, const VecX& limits, double size) {
+    std::vector<signed char> modes_of(const VecX& f, const VecX& alpha, const VecX& limits, double size,
+                                      int breaking) {
         std::vector<signed char> modes(list.size(), sticking);
         for (size_t i = 0, at = 0; i < list.size(); at += dims[i], ++i) {
             const auto fe = f.segment(at, dims[i]);
             const auto ae = alpha.segment(at, dims[i]);
-            if (fe.norm() < limits[i] * (1.0 - 1e-13) || ae.norm() <= 1e-12 * size) continue;
-            if (dims[i] == 1) {
-                modes[i] = ae[0] > 0.0 ? 1 : -1;
-            } else {
-                modes[i] = 1;
-                Vec3 d = Vec3::Zero();
-                d.head(dims[i]) = ae.normalized();
-                w.slip_direction[list[i]] = d;
-            }
+            const bool breaks = list[i] == breaking && fe.norm() >= limits[i] * (1.0 - slack);
+            const bool slides = fe.norm() >= limits[i] * (1.0 - 1e-13) && ae.norm() > 1e-12 * size;
+            if (!breaks && !slides) continue;
+            const VecX direction = slides ? VecX(ae.normalized()) : VecX(-fe.normalized());
+            modes[i] = dims[i] > 1 || direction[0] > 0.0 ? 1 : -1;
+            if (dims[i] == 1) continue;
+            w.slip_direction[list[i]].setZero();
+            w.slip_direction[list[i]].head(dims[i]) = direction;
         }
         return modes;
     }
@@ -224,7 +225,7 @@ bool at_rest(const Program& p, const Workspace& w, int e, const VecX& v) {
 }
 
 void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                   const std::vector<int>& candidates) {
+                   const std::vector<int>& candidates, int breaking) {
     Candidates c(p, w, t, q, v, candidates);
     if (candidates.empty()) {
         want_rows(p, w);
@@ -243,7 +244,7 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
         const VecX f = friction_program(W, alpha0, c.dims, limits);
         const VecX alpha = alpha0 + W * f;
         const double size = alpha0.cwiseAbs().maxCoeff() + 1e-300;
-        const auto next = c.modes_of(f, alpha, limits, size);
+        const auto next = c.modes_of(f, alpha, limits, size, it < breaking_passes ? breaking : -1);
         const bool same = next == modes;
         modes = next;
         c.apply_modes(modes);

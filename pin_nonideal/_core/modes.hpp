@@ -22,9 +22,10 @@ struct ModeChange {
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& limits);
 
 // Finds the modes of the candidate elements together, at rest along their directions; the workspace ends evaluated
-// there with the new modes.
+// there with the new modes. `breaking` is a candidate that stuck until now and has just reached its limit: it slips
+// as soon as its force is at the limit, though its acceleration is still zero.
 void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                   const std::vector<int>& candidates);
+                   const std::vector<int>& candidates, int breaking = -1);
 
 // Friction force of an element in the evaluation at hand: the multiplier of what sticks, the law's force of what slips.
 Vec3 friction_force(const Program& p, const Workspace& w, int element);
