@@ -211,6 +211,7 @@ class Scene:
             keep[row] = False
             self.dropped.append((name, local, "vanishes"))
         self._drop_copies(wide, right, length, keep & ~fixed, keep, owner)
+        self.dropped.sort(key=lambda item: self.constraint_slices[item[0]].start + item[1])
         for name, s in self.constraint_slices.items():
             rows = np.flatnonzero(keep[s]).tolist()
             if len(rows) < s.stop - s.start:

@@ -98,8 +98,7 @@ def tree(kinds, rng, *, parents=None, armature=False, gravity=True):
         else:
             parent = parents[k]
         add(model, f"j{k}", kind, parent, rng, mass=float(rng.uniform(0.2, 3.0)))
-    if gravity:
-        model.gravity = pin.Motion(9.81 * AXIS, np.zeros(3))
+    model.gravity = pin.Motion(9.81 * AXIS if gravity else np.zeros(3), np.zeros(3))
     if armature:
         model.armature = rng.uniform(0.0, 0.2, model.nv)
     return model
