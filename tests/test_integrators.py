@@ -14,8 +14,8 @@ from .random_trees import state, tree
 from .row_cases import TREES, parallel_cranks
 
 TIGHT = {"rtol": 1e-13, "atol": 1e-14}
-# Errors below this are no longer those of the steps: tight runs of some hundred steps round by 1e-13.
-FLOOR = 1e-11
+# Errors below this are no longer those of the steps: tight runs round by 1e-13.
+FLOOR = 5e-13
 # An observed order may be this much below the method's: the next terms of the error at the steps used.
 ORDER = 0.7
 
@@ -79,7 +79,7 @@ def gap(model, one, two):
 
 
 def observed_order(case, method, ladder, **grid):
-    """Order between the two finest grids whose errors are above the floor of the reference."""
+    """Order between the finest grid with an error above the reference's and a grid of half its steps."""
     make, q, v = CASES[case]
     reference = pn.simulate(make(), 1.0, q, v, **TIGHT, **grid)
     errors = []
@@ -88,8 +88,9 @@ def observed_order(case, method, ladder, **grid):
         if len(errors) > 2 and errors[-1] < FLOOR:
             errors.pop()
             break
-    n = ladder[: len(errors)]
-    return np.log(errors[-2] / errors[-1]) / np.log(n[-1] / n[-2])
+    fine = len(errors) - 1
+    coarse = max(k for k in range(fine) if ladder[k] <= ladder[fine] / 2)
+    return np.log(errors[coarse] / errors[fine]) / np.log(ladder[fine] / ladder[coarse])
 
 
 LADDERS = {
