@@ -237,8 +237,8 @@ async function main() {
 window.addEventListener("error", (event) => { window.replayError = window.replayError || String(event.message); });
 main().catch((error) => {
   window.replayError = String(error);
+  document.body.className = "failed";
   element("message").hidden = false;
-  element("message").className = "error";
   element("message").textContent = `This replay cannot be shown.\n${error.message || error}`;
   console.error(error);
 });

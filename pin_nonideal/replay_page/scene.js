@@ -6,7 +6,11 @@ const MARK_COLORS = { anchor: "#f59e0b", rod: "#f59e0b", spring: "#64748b", cont
 class ReplayScene {
   constructor(THREE, run, canvas, labels) {
     Object.assign(this, { THREE, run, canvas, labels, time: run.times[0], forcesShown: true, forceScale: 1, dirty: true });
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    try {
+      this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    } catch (error) {
+      throw new Error("this browser offers no WebGL; turn on hardware acceleration or use another browser");
+    }
     this.renderer.outputEncoding = THREE.sRGBEncoding;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = THREE.PCFSoftShadowMap;
