@@ -40,7 +40,7 @@ from .errors import (
     UserFunctionError,
 )
 from .forces import JointSpring, SpringDamper, UserForce, Wrench
-from .laws import Drag, JointFriction, UserFriction, UserLaw
+from .laws import Drag, JointFriction, LuGre, SigmoidFriction, UserFriction, UserLaw
 from .loading import load, robots
 from .plotting import plot
 from .replay import replay
@@ -67,6 +67,7 @@ __all__ = [
     "KnifeEdge",
     "LoadingError",
     "LoopClosureError",
+    "LuGre",
     "NonFiniteError",
     "OutputError",
     "PinNonidealError",
@@ -78,6 +79,7 @@ __all__ = [
     "RunInterrupted",
     "SampledControl",
     "Scene",
+    "SigmoidFriction",
     "SingularMassError",
     "Solution",
     "SpringDamper",

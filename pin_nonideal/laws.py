@@ -20,22 +20,24 @@ class JointFriction:
     With v_j the joint's velocity, f its reaction force split along (axial) and across (radial) the joint's
     axis and m_b its bending moment, the dry limit is
 
-        load = |f_radial| + 2 |m_b| / span                                              [N]
-        revolute:   limit = coulomb + preload + mu (radius load + axial_radius |f_axial|)  [N m]
-        prismatic:  limit = coulomb + preload + mu load                                    [N]
+        revolute, helical:  limit = coulomb + preload + mu (radius (|f_radial| + |m_b| / span)
+                                                          + axial_radius |f_axial|)          [N m]
+        spherical:          limit = coulomb + preload + mu radius |f|                        [N m]
+        prismatic:          limit = coulomb + preload + mu (|f_radial| + |m| / span)         [N]
 
-    where `span` is the distance of the two bearings that carry m_b as a couple (without it m_b is left out).
+    where m is the reaction moment about the joint's origin and m_b its part across the axis; without `span`
+    moments are left out.
     Sliding gives C_j = -limit s(v_j) sgn(v_j) - viscous v_j, with Stribeck's factor
     s = 1 + (static_ratio - 1) exp(-(v_j / stribeck_velocity)^2), and s = 1 without stribeck_velocity.
     Sticking holds while the force it needs is below static_ratio times the limit.
 
     Args:
-        joint: name of a joint of one degree of freedom, or of a hinge anchor.
+        joint: name of a revolute, prismatic, helical or spherical joint, or of a hinge anchor.
         coulomb: constant dry friction [N m or N].
         mu: coefficient of friction of the bearing surfaces.
         radius: radius at which the radial load rubs [m].
         axial_radius: mean radius at which the axial load rubs [m].
-        span: distance between the two bearings [m].
+        span: lever at which the moment loads the bearing [m]: half the distance of two bearings.
         preload: dry friction of a preloaded bearing, present without load [N m or N].
         static_ratio: static over kinetic friction, at least 1.
         stribeck_velocity: velocity scale of the fall from static to kinetic [rad/s or m/s].
@@ -74,6 +76,85 @@ class JointFriction:
                 f"{who}: one of coulomb, mu, preload, viscous must be positive; all are zero, "
                 "so leave the law out"
             )
+
+
+@dataclass(frozen=True)
+class SigmoidFriction:
+    """Friction of a robot joint as identification gives it: smooth, and independent of the load.
+
+        C_j = -(phi1 / (1 + exp(-phi2 (v_j + phi3))) - phi1 / (1 + exp(-phi2 phi3)))          [N m]
+
+    It vanishes at rest, so it creeps under a load; use `JointFriction` where a joint must hold.
+    Source: Gaz, Cognetti, Oliva, Robuffo Giordano, De Luca, IEEE RA-L 4 (2019), Franka Emika Panda.
+
+    Args:
+        joint: name of a joint of one degree of freedom.
+        phi1: swing of the friction from one direction to the other [N m], not negative.
+        phi2: steepness [s/rad], positive.
+        phi3: velocity offset [rad/s].
+        name: used in messages and results.
+    """
+
+    joint: str
+    phi1: float
+    phi2: float
+    phi3: float = 0.0
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        optional_text("SigmoidFriction: name", self.name)
+        who = label(self)
+        text(f"{who}: joint", self.joint)
+        object.__setattr__(self, "phi1", nonnegative(f"{who}: phi1", self.phi1))
+        object.__setattr__(self, "phi2", positive(f"{who}: phi2", self.phi2))
+        object.__setattr__(self, "phi3", number(f"{who}: phi3", self.phi3))
+
+
+@dataclass(frozen=True)
+class LuGre:
+    """Bristle friction with presliding and hysteresis; its deflection z is integrated with the motion.
+
+        dz/dt = v - stiffness |v| z / g(v),   g(v) = coulomb + (stiction - coulomb) exp(-(v / stribeck_velocity)^2)
+        C_j = -(stiffness z + damping dz/dt + viscous v)                                       [N m or N]
+
+    z is one column of `Trajectory.z`.  Bristles give way a little under any load: this law creeps by design.
+    Source: Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Trans. Automatic Control 40 (1995).
+
+    Args:
+        joint: name of a joint of one degree of freedom.
+        stiffness: of the bristles [N m/rad or N/m], positive.
+        damping: of the bristles [N m s/rad or N s/m], not negative.
+        viscous: coefficient of the velocity, not negative.
+        coulomb: level at high velocity [N m or N], positive.
+        stiction: level near rest, at least `coulomb`; equal to it when None.
+        stribeck_velocity: velocity scale between both [rad/s or m/s], positive.
+        name: used in messages and results.
+    """
+
+    joint: str
+    stiffness: float
+    damping: float
+    coulomb: float
+    viscous: float = 0.0
+    stiction: float | None = None
+    stribeck_velocity: float = 1e-3
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        optional_text("LuGre: name", self.name)
+        who = label(self)
+        text(f"{who}: joint", self.joint)
+        for key in ("stiffness", "coulomb", "stribeck_velocity"):
+            object.__setattr__(self, key, positive(f"{who}: {key}", getattr(self, key)))
+        for key in ("damping", "viscous"):
+            object.__setattr__(self, key, nonnegative(f"{who}: {key}", getattr(self, key)))
+        level = self.coulomb if self.stiction is None else positive(f"{who}: stiction", self.stiction)
+        if level < self.coulomb:
+            raise InputError(
+                f"{who}: stiction must be at least coulomb (static friction is never below kinetic friction); "
+                f"got {level:g} and {self.coulomb:g}"
+            )
+        object.__setattr__(self, "stiction", level)
 
 
 @dataclass(frozen=True)
@@ -172,4 +253,4 @@ def static_ratio(who: str, value: Any) -> float:
     return ratio
 
 
-Law = JointFriction | Drag | UserLaw | UserFriction
+Law = JointFriction | SigmoidFriction | LuGre | Drag | UserLaw | UserFriction

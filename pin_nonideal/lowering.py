@@ -30,7 +30,7 @@ from .constraints import (
 from .contacts import PointContact
 from .errors import InputError, PinNonidealError, UnknownNameError, UserFunctionError, nearest
 from .forces import JointSpring, SpringDamper, UserForce, Wrench
-from .laws import Drag, JointFriction, UserFriction, UserLaw
+from .laws import Drag, JointFriction, LuGre, SigmoidFriction, UserFriction, UserLaw
 from .timefunctions import Constant, Polynomial, Sinusoid, Spline
 
 Array = NDArray[np.float64]
@@ -443,6 +443,14 @@ class Lowering:
                 self._anchor_friction(law, name, constraints[law.joint], who)
             else:
                 self._joint_friction(law, name, constraints, who)
+        elif isinstance(law, SigmoidFriction):
+            dof = self.model.joints[self.joint(law.joint, who)].idx_v
+            add.add_sigmoid(self._law(name), dof, law.phi1, law.phi2, law.phi3)
+        elif isinstance(law, LuGre):
+            dof = self.model.joints[self.joint(law.joint, who)].idx_v
+            numbers = (law.stiffness, law.damping, law.viscous, law.coulomb, law.stiction, law.stribeck_velocity)
+            add.add_bristle(self._law(name), dof, *numbers)
+            self.out.z0 = np.concatenate([self.out.z0, np.zeros(1)])
         elif isinstance(law, Drag):
             add.add_drag(self._law(name), self.frame(law.frame, who), law.coefficient, law.exponent)
         elif isinstance(law, UserLaw):
@@ -468,7 +476,7 @@ class Lowering:
             add.add_friction(name, self._law(name), block, "user", "total", -1, -1, [0.0, 0.0, 1.0], _numbers(), bound)
             self.out.friction_names.append(name)
         else:
-            raise InputError(f"a law must be JointFriction, Drag, UserLaw or UserFriction; got {law!r}")
+            raise InputError(f"a law must be JointFriction, SigmoidFriction, LuGre, Drag, UserLaw or UserFriction; got {law!r}")
 
     def _joint_friction(self, law: JointFriction, name: str, constraints: dict[str, Any], who: str) -> None:
         if not self.model.existJointName(law.joint) and constraints:

@@ -47,7 +47,7 @@ CONSTRAINTS = {
         constraints.Rolling,
     )
 }
-LAWS = {c.__name__: c for c in (laws.JointFriction, laws.Drag)}
+LAWS = {c.__name__: c for c in (laws.JointFriction, laws.SigmoidFriction, laws.LuGre, laws.Drag)}
 CONTACTS = {"PointContact": contacts.PointContact}
 FORCES = {c.__name__: c for c in (forces.SpringDamper, forces.JointSpring, forces.Wrench)}
 ACTUATION = {c.__name__: c for c in (actuation.HoldPosition, actuation.Table)}

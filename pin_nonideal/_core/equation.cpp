@@ -236,7 +236,7 @@ void factor_rows(const RowLayout& layout, const std::vector<Block>& blocks, cons
         double* Li = L + layout.start[i];
         const double* Gi = s.G.data() + layout.start[i];
         const int first = layout.first[i];
-        double pivot = 1.0;
+        double pivot = Gi[i] > 0.0 ? 1.0 : 0.0;  // a row of nothing: its dofs are locked
         for (int j = first; j < i; ++j) {
             const int column = layout.row_at[j];
             if (!s.active[column]) { Li[j] = 0.0; continue; }

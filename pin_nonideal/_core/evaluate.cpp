@@ -107,7 +107,7 @@ void Program::finish() {
 Workspace::Workspace(const Program& p) {
     const int nv = p.mechanism.nv, n = static_cast<int>(p.mechanism.joints.size());
     terms.allocate(p.mechanism);
-    for (VecX* x : {&tau, &external, &F, &C, &C_smooth, &base_C, &a, &scaled, &scaled_free, &trial, &work, &held_torque,
+    for (VecX* x : {&tau, &external, &F, &C, &C_smooth, &base_C, &a, &balance, &scaled, &scaled_free, &trial, &work, &held_torque,
                     &override_torque})
         *x = VecX::Zero(nv);
     values.resize(p.blocks.size());
@@ -144,9 +144,13 @@ void want_rows(const Program& p, Workspace& w) {
     const int constraint_rows = p.constraints < static_cast<int>(p.blocks.size())
                                     ? p.blocks[p.constraints].row : p.layout.rows;
     for (int r = 0; r < p.layout.rows; ++r) w.rows.wanted[r] = r < constraint_rows;
+    std::fill(w.terms.locked.begin(), w.terms.locked.end(), char(0));
     for (size_t e = 0; e < p.frictions.size(); ++e) {
         const Block& block = p.blocks[p.frictions[e].block];
-        if (w.mode[e] == 0)
+        if (w.mode[e] != sticking) continue;
+        if (const auto* d = std::get_if<DofRows>(&block.kind))
+            for (int k = 0; k < d->count; ++k) w.terms.locked[d->dof + k] = 1;
+        else
             for (size_t k = 0; k < block.kept.size(); ++k) w.rows.wanted[block.row + k] = 1;
     }
     w.rows.use_wanted(p.blocks);
@@ -196,7 +200,19 @@ static void constrained_solve(const Program& p, Workspace& w, VecX& x, const Vec
     solve_Rt(p.mechanism, w.terms, x);
 }
 
+const VecX& holding_forces(const Program& p, Workspace& w) {
+    if (w.has_balance) return w.balance;
+    w.has_balance = true;
+    multiply_M(p.mechanism, w.terms, w.a, w.balance);
+    w.balance -= w.F + w.C;
+    w.work.setZero();
+    for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.A, w.lam, w.work);
+    w.balance -= w.work;
+    return w.balance;
+}
+
 void solve_motion(const Program& p, Workspace& w, const VecX& force) {
+    w.has_balance = false;
     w.a = force;
     constrained_solve(p, w, w.a, w.b, w.lam);
     if (w.rows.blocks.empty() || !w.rows.refine) return;
@@ -245,11 +261,6 @@ void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const Vec
             w.trial = w.F + w.C;
             solve_motion(p, w, w.trial);
         }
-        // What sticks has no acceleration at all, not one that rounds to zero.
-        for (size_t e = 0; e < p.frictions.size(); ++e)
-            if (w.mode[e] == 0)
-                if (const auto* d = std::get_if<DofRows>(&p.blocks[p.frictions[e].block].kind))
-                    for (int k = 0; k < d->count; ++k) w.a[d->dof + k] = 0.0;
     }
     if (!w.a.allFinite()) throw Failure(Failure::Kind::not_finite, t);
 }
@@ -359,9 +370,17 @@ void split_forces(const Program& p, Workspace& w, Split& out) {
         sticks |= !constraint;
         add_transpose(p.blocks[i], w.A, w.lam_shared, constraint ? total : out.C);  // C holds what sticks as well
     }
+    const std::vector<char> locked = w.terms.locked;
+    for (int dof = 0; dof < nv; ++dof)
+        if (locked[dof]) {
+            out.C[dof] += holding_forces(p, w)[dof];
+            sticks = true;
+        }
     // Ideal part: the same rows without C and without what sticks.
     const RowSystem saved = w.rows;
     if (sticks) {
+        std::fill(w.terms.locked.begin(), w.terms.locked.end(), char(0));
+        factorize(p.mechanism, w.terms);
         for (int r = 0; r < p.layout.rows; ++r)
             if (r >= p.blocks[p.constraints].row) w.rows.wanted[r] = 0;
         w.rows.use_wanted(p.blocks);
@@ -379,9 +398,14 @@ void split_forces(const Program& p, Workspace& w, Split& out) {
     to_user_rows(p, w.lam_shared, out.lam_ideal);
     out.F_nonideal = total - out.F_ideal + out.C;  // Eq. (39)
     w.rows = saved;
-    if (sticks) scale_rows(p, w);
+    if (sticks) {
+        w.terms.locked = locked;
+        factorize(p.mechanism, w.terms);
+        scale_rows(p, w);
+    }
     w.a = a;
     w.lam = lam;
+    w.has_balance = false;
 }
 
 void violations(const Program& p, const Workspace& w, double& position, double& velocity) {

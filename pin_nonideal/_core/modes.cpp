@@ -201,11 +201,15 @@ VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>&
     return ball_program(W, alpha0, dims, limits);
 }
 
-Vec3 friction_force(const Program& p, const Workspace& w, int e) {
+Vec3 friction_force(const Program& p, Workspace& w, int e) {
     const Friction& f = p.frictions[e];
     if (w.mode[e] != sticking) return w.slip_force[e];
     Vec3 force = Vec3::Zero();
-    for (int k = 0; k < f.dim; ++k) force[k] = w.lam[p.blocks[f.block].row + k];
+    const Block& block = p.blocks[f.block];
+    if (const auto* d = std::get_if<DofRows>(&block.kind))
+        for (int k = 0; k < f.dim; ++k) force[k] = holding_forces(p, w)[d->dof + k];
+    else
+        for (int k = 0; k < f.dim; ++k) force[k] = w.lam[block.row + k];
     return force;
 }
 

@@ -28,7 +28,7 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
                    const std::vector<int>& candidates, int breaking = -1);
 
 // Friction force of an element in the evaluation at hand: the multiplier of what sticks, the law's force of what slips.
-Vec3 friction_force(const Program& p, const Workspace& w, int element);
+Vec3 friction_force(const Program& p, Workspace& w, int element);
 // Largest force with which an element can stick now.
 double static_limit(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
 

@@ -106,6 +106,8 @@ struct Workspace {
     std::vector<double> limit;        // kinetic, at the present load and slip speed
     std::vector<double> load;         // limit at rest before the static ratio
     std::vector<Vec3> slip_direction; // of the step's start, for elements of two or three directions
+    VecX balance;                     // M a - F - C - A^T lam: what holds the locked dofs
+    bool has_balance = false;
     std::vector<Vec3> slip_force;     // of each slipping element, along its directions
     std::vector<VecX> user_C;
     VecX z, dz;
@@ -138,10 +140,14 @@ void solve_motion(const Program& p, Workspace& w, const VecX& force);
 void given_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 void actuation_torque(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& tau);
 
-// Rows that must hold: constraints and sticking elements. All of them count as independent until begin_step.
+// Rows that must hold: constraints, and elements that stick elsewhere than in a joint (a joint that sticks is locked
+// instead, which costs less than letting it move). All of them count as independent until begin_step.
 void want_rows(const Program& p, Workspace& w);
 // Evaluates at a step's start and decides which rows are independent here; contradicting rows are a failure.
 void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
+
+// Forces that hold the locked dofs, for the motion in the workspace.
+const VecX& holding_forces(const Program& p, Workspace& w);
 
 // lam_shared from lam: redundant rows share the load with least norm (in the user's row scale).
 void share_multipliers(const Program& p, Workspace& w);

@@ -52,6 +52,8 @@ double scene_size(const Workspace& w) {
 }
 
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
+    for (int dof = 0; dof < p.mechanism.nv; ++dof)
+        if (w.terms.locked[dof]) v[dof] = 0.0;  // what sticks has exactly no velocity
     if (w.rows.blocks.empty()) return false;
     look(p, w, t, q, v);
     const double floor = projection_floor * scene_size(w);
@@ -80,10 +82,6 @@ bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
         if (it > 1 && now > 0.5 * last) break;
         last = now;
     }
-    for (size_t e = 0; e < p.frictions.size(); ++e)  // what sticks has exactly no velocity
-        if (w.mode[e] == sticking)
-            if (const auto* d = std::get_if<DofRows>(&p.blocks[p.frictions[e].block].kind))
-                for (int k = 0; k < d->count; ++k) v[d->dof + k] = 0.0;
     if (moved) ++w.projections;
     return moved;
 }

@@ -1,5 +1,6 @@
 #include "terms.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace pn {
@@ -161,6 +162,7 @@ void Terms::allocate(const Mechanism& m) {
     M.assign(m.row_entries, 0.0);
     D = VecX::Zero(m.nv);
     inv_sqrt_D = VecX::Zero(m.nv);
+    locked.assign(m.nv, 0);
     q = VecX::Zero(m.nq);
     foreign = m.make_foreign();
 }
@@ -237,6 +239,14 @@ int factorize(const Mechanism& m, Terms& w) {
     w.L = w.M;
     for (int k = m.nv - 1; k >= 0; --k) {
         double* row = w.L.data() + m.row_offset[k];
+        if (w.locked[k]) {
+            std::fill(row + 1, row + m.depth[k] + 1, 0.0);
+            w.D[k] = 1.0;
+            w.inv_sqrt_D[k] = 0.0;
+            continue;
+        }
+        for (int s = 1, i = m.dof_parent[k]; i >= 0; ++s, i = m.dof_parent[i])
+            if (w.locked[i]) row[s] = 0.0;
         const double pivot = row[0];
         if (!(pivot > 0.0)) return k;
         w.D[k] = pivot;

@@ -28,6 +28,7 @@ struct Terms {
     std::vector<double> L;  // rows of M, then of its factor (Mechanism::row_offset)
     std::vector<double> M;  // rows of M, kept for residuals and kinetic energy
     VecX D, inv_sqrt_D;
+    std::vector<char> locked;  // dofs that cannot move: they drop out of the factor, and R^-1 x is zero there
     VecX q;  // configuration with unit quaternions
     std::unique_ptr<ForeignJoints> foreign;
     JointMotion foreign_motion;
