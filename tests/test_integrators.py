@@ -14,7 +14,7 @@ from .random_trees import state, tree
 from .row_cases import TREES, parallel_cranks
 
 TIGHT = {"rtol": 1e-13, "atol": 1e-14}
-# Errors below this are no longer those of the steps: a reference of a hundred steps of order 8 rounds by 1e-13.
+# Errors below this are not those of the steps: the reference, a hundred steps of order 8, rounds by 1e-13.
 FLOOR = 5e-13
 # An observed order may be this much below the method's: the next terms of the error at the steps used.
 ORDER = 0.7
