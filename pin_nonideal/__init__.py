@@ -46,6 +46,7 @@ from .plotting import plot
 from .replay import replay
 from .scene import Scene
 from .simulation import rollout, simulate
+from .sweep import sweep
 from .timefunctions import constant, polynomial, sinusoid, spline
 from .trajectory import Event, Stats, Trajectory
 
@@ -105,4 +106,5 @@ __all__ = [
     "sinusoid",
     "solve",
     "spline",
+    "sweep",
 ]

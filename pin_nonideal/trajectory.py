@@ -85,7 +85,7 @@ class Trajectory:
         modes: mode of each frictional element, +1 or -1 for slip, 0 for stick, (nt, ne).
         events: events in order of time.
         stats: counters.
-        scene: the scene that ran; None after `load`.
+        scene: the scene that ran; None after `load` and in another process.
         element_names: names of the columns of `modes`.
         name: of the scene.
     """
@@ -109,6 +109,9 @@ class Trajectory:
     scene: Any = None
     element_names: list[str] = field(default_factory=list)
     name: str = ""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "scene": None}  # a scene holds compiled state and stays in its process
 
     def __len__(self) -> int:
         return len(self.t)

@@ -1,0 +1,57 @@
+"""Many runs of scenes that differ: joblib carries them in threads, processes, or on a cluster (Dask, Ray)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from .checks import function
+from .errors import InputError
+from .scene import Scene
+from .simulation import simulate
+from .trajectory import Trajectory
+
+
+def sweep(
+    make: Callable[..., Scene],
+    parameters: Sequence[Mapping[str, Any]],
+    duration: float,
+    *,
+    jobs: int | None = None,
+    **options: Any,
+) -> list[Trajectory]:
+    """Simulates `make(**p)` for each p of `parameters`, in parallel.
+
+    The backend is joblib's: processes by default, or what `joblib.parallel_config` chooses around the call
+    ("threading", "dask", "ray").  For many states of one scene use `rollout`, which needs no processes.
+
+    Args:
+        make: builds a scene from one entry of `parameters`; for processes it must be a function of a module.
+        parameters: keyword arguments, one mapping a run.
+        duration: length of time [s].
+        jobs: number of parallel jobs; joblib's choice when None, all processors when -1.
+        options: passed to `simulate`.
+
+    Returns:
+        One Trajectory a run, in order; `scene` is None when it came from another process.
+
+    Raises:
+        InputError: `make` cannot be called, or `parameters` holds no mappings.
+        RunError: a run stopped early.
+    """
+    from joblib import Parallel, delayed
+
+    function("sweep: make", make, "(**parameters) -> Scene")
+    table = list(parameters)
+    for entry in table:
+        if not isinstance(entry, Mapping):
+            raise InputError(f"sweep: parameters must hold mappings of keyword arguments; got {entry!r}")
+    options.setdefault("progress", False)
+    runs: list[Trajectory] = Parallel(n_jobs=jobs)(delayed(_one)(make, dict(p), duration, options) for p in table)
+    return runs
+
+
+def _one(
+    make: Callable[..., Scene], entry: dict[str, Any], duration: float, options: dict[str, Any]
+) -> Trajectory:
+    return simulate(make(**entry), duration, **options)

@@ -1,0 +1,73 @@
+"""Many runs at once: sweeps over parameters and rollouts over states."""
+
+from __future__ import annotations
+
+import re
+
+import joblib
+import numpy as np
+import pytest
+
+import pin_nonideal as pn
+
+
+def ladder(**parameters):
+    return pn.load("n_four_bar", **parameters)
+
+
+@pytest.mark.parametrize("backend", ["threading", "loky"])
+def test_a_sweep_is_its_runs_one_by_one(backend):
+    parameters = [{"N": 1}, {"N": 3}]
+    with joblib.parallel_config(backend=backend):
+        runs = pn.sweep(ladder, parameters, 0.1, jobs=2, output_dt=0.05)
+    for run, p in zip(runs, parameters, strict=True):
+        alone = pn.simulate(ladder(**p), 0.1, output_dt=0.05)
+        np.testing.assert_array_equal(run.q, alone.q)
+
+
+def test_parameters_must_be_mappings():
+    message = "sweep: parameters must hold mappings of keyword arguments; got 3"
+    with pytest.raises(pn.InputError, match=f"^{re.escape(message)}$"):
+        pn.sweep(ladder, [3], 0.1)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+@pytest.mark.parametrize("robot", ["four_bar", "n_four_bar", "panda_friction"])
+def test_rollouts_are_bitwise_their_single_runs(robot, threads):
+    scene = pn.load(robot)
+    q, v = scene.initial_state()
+    generator = np.random.default_rng(4)
+    n = 6
+    starts_v = np.array([v * (1.0 + 0.1 * generator.standard_normal()) for _ in range(n)])
+    starts_q = np.tile(q, (n, 1))
+    runs = pn.rollout(scene, (starts_q, starts_v), 0.3, threads=threads, record=("energy",))
+    assert len(runs) == n
+    for k, run in enumerate(runs):
+        alone = pn.simulate(scene, 0.3, q=starts_q[k], v=starts_v[k], record=("energy",))
+        for key in ("t", "q", "v", "violation"):
+            np.testing.assert_array_equal(getattr(run, key), getattr(alone, key))
+
+
+def test_python_functions_run_in_rollout_threads_as_well():
+    model = pn.load("panda_friction").model
+    scene = pn.Scene(model, actuation=lambda t, q, v: -2.0 * v)
+    v = np.linspace(-1.0, 1.0, 4)[:, None] * np.ones(model.nv)
+    runs = pn.rollout(scene, (np.tile(scene.q0, (4, 1)), v), 0.05, threads=3)
+    for k, run in enumerate(runs):
+        np.testing.assert_array_equal(run.q, pn.simulate(scene, 0.05, v=v[k], q=scene.q0).q)
+
+
+def test_a_failing_state_is_named():
+    model = pn.load("panda_friction").model
+
+    def limited(t, q, v):
+        if v[0] > 0.5:
+            raise ValueError("too fast")
+        return 0.0 * v
+
+    scene = pn.Scene(model, actuation=limited)
+    v = np.zeros((3, model.nv))
+    v[1, 0] = 1.0
+    with pytest.raises(pn.UserFunctionError, match="too fast") as caught:
+        pn.rollout(scene, (np.tile(scene.q0, (3, 1)), v), 0.05)
+    assert caught.value.index == 1
