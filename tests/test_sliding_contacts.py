@@ -1,0 +1,100 @@
+"""Contacts that slide in two directions come to rest or start to roll, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import pin_nonideal as pn
+
+from .mechanisms import GRAVITY, TIGHT, assert_close, at_events, body, empty, point_mass
+
+# Of the references, for times and states of events.
+EVENT = 1e-9
+
+
+def kinds(run):
+    return [event.kind for event in run.events]
+
+
+def times(run):
+    return [event.time for event in run.events]
+
+
+class TestBallThatSlidesThenRolls:
+    """For I = c m r^2 the slip ends at t1 = v0 c/((1 + c) mu g) with v1 = v0/(1 + c), its direction kept."""
+
+    @staticmethod
+    def ball(c, mass, radius, mu, slides):
+        """On three slides and a ball joint, or as one free body, whose velocities are in its own axes."""
+        model = point_mass(mass=0.0) if slides else empty()
+        joint = pin.JointModelSpherical() if slides else pin.JointModelFreeFlyer()
+        inertia = c * mass * radius**2 * np.eye(3)
+        body(model, 3 if slides else 0, joint, "ball", mass, inertia=inertia)
+        rub = pn.PointContact("ball", mu=mu, radius=radius)
+        return pn.Scene(model, contacts=[rub], q0=[0.0, 0.0, radius, 0.0, 0.0, 0.0, 1.0])
+
+    @staticmethod
+    def velocity(run, k):
+        """Velocity of the center and spin, in world axes."""
+        model, data = run.scene.model, run.scene.model.createData()
+        pin.forwardKinematics(model, data, run.q[k], run.v[k])
+        return pin.getFrameVelocity(model, data, model.getFrameId("ball"), pin.LOCAL_WORLD_ALIGNED)
+
+    @pytest.mark.parametrize("slides", [True, False])
+    @pytest.mark.parametrize("c", [0.4, 1.0, 0.5])
+    def test_straight(self, c, slides):
+        mu, radius, speed, end = 0.3, 0.1, 2.0, 0.8
+        t1, v1 = speed * c / ((1.0 + c) * mu * GRAVITY), speed / (1.0 + c)
+        x1 = speed * t1 - 0.5 * mu * GRAVITY * t1**2
+        scene = self.ball(c, 1.0, radius, mu, slides)
+        run = pn.simulate(scene, end, v=[speed, 0.0, 0.0, 0.0, 0.0, 0.0], **TIGHT)
+        assert kinds(run) == ["stick"]
+        assert_close(times(run), t1, EVENT)
+        here = at_events(run)[0]
+        assert_close(run.q[[here, -1], 0], [x1, x1 + v1 * (end - t1)], EVENT)
+        for k in (here, -1):
+            assert_close(self.velocity(run, k).linear, [v1, 0.0, 0.0], 1e-10)
+            assert_close(self.velocity(run, k).angular, [0.0, v1 / radius, 0.0], 1e-9)
+
+    @pytest.mark.parametrize("rtol", [1e-12, 1e-11, 1e-10])
+    @pytest.mark.parametrize("slides", [True, False])
+    def test_billiard_with_side_spin(self, slides, rtol):
+        """u0 = v0 + w0 x (-r z); t_f = 2 |u0|/(7 mu g), v_f = v0 - (2/7) u0, a parabola up to there."""
+        scene = self.ball(0.4, 0.17, 0.0285, 0.2, slides)
+        start = [2.0, 0.0, 0.0, -30.0, 10.0, 0.0]
+        run = pn.simulate(scene, 0.5, v=start, rtol=rtol, atol=0.1 * rtol)
+        assert kinds(run) == ["stick"]
+        assert_close(times(run), 0.27906095257132574, EVENT)
+        here = at_events(run)[0]
+        assert_close(run.q[here, :2], (0.4897519717626767, 0.03408530206406907), EVENT)
+        for k in (here, -1):
+            assert_close(self.velocity(run, k).linear, (1.51, 0.24428571428571427, 0.0), EVENT)
+
+
+@pytest.mark.parametrize("across", [0.0, 0.7, -1.3])
+@pytest.mark.parametrize("options", [{}, TIGHT, {"method": "rk4", "dt": 0.01}, {"method": "rk4", "dt": 0.1}])
+def test_puck_comes_to_rest(across, options):
+    """Constant deceleration mu g against the velocity, whatever its direction: any method is exact."""
+    start = np.array([2.0, across, 0.0])
+    speed = np.linalg.norm(start)
+    scene = pn.Scene(point_mass(), contacts=[pn.PointContact("mass", mu=0.2)])
+    run = pn.simulate(scene, 2.0, v=start, **options)
+    assert kinds(run) == ["stick"]
+    assert_close(times(run), speed / (0.2 * GRAVITY), EVENT)
+    assert_close(run.q[-1], 0.5 * speed / (0.2 * GRAVITY) * start, EVENT)
+
+
+def test_puck_on_a_slope_turns_downhill():
+    """Slides across a plane under a side force below mu m g: comes to rest, wherever step control steps.
+
+    The times of two step controls agree, though the slip turns all the way to the stop.
+    """
+    model = point_mass(gravity=(0.0, 1.0, -GRAVITY))
+    scene = pn.Scene(model, contacts=[pn.PointContact("mass", mu=0.2)], v0=[2.0, 0.0, 0.0])
+    runs = [pn.simulate(scene, 3.0, rtol=rtol, atol=0.1 * rtol) for rtol in (1e-13, 1e-12, 1e-11)]
+    assert [kinds(run) for run in runs] == [["stick"]] * 3
+    for run in runs[1:]:
+        assert_close(times(run), times(runs[0]), EVENT)
+        assert_close(run.q[-1], runs[0].q[-1], EVENT)
