@@ -35,6 +35,7 @@ from .robot_yaml import (
     names_in,
     one_entry,
     optional_string,
+    pitches,
     strings,
 )
 from .urdf import RobotFile
@@ -147,11 +148,11 @@ def dissipation(
 
 def _change_joints(robot: RobotFile, table: Table, where: str, notes: list[str], merge: bool) -> None:
     """Exchanges joint types as the table asks, and merges revolutes that make a ball joint."""
-    types = joint_types(table, where)
+    types, screws = joint_types(table, where), pitches(table, where)
     coupled = {n for c in robot.constraints for n in dataclasses.astuple(c) if isinstance(n, str)}
     keep = names_in(table) | set(robot.motors) | coupled
     chains = ball_chains(robot.model, keep) if merge else []
-    if not chains and not types:
+    if not chains and not types and not screws:
         return
     if chains:
         balls = ", ".join(f'"{chain.name}"' for chain in chains)
@@ -159,7 +160,7 @@ def _change_joints(robot: RobotFile, table: Table, where: str, notes: list[str],
             f"three revolute joints with massless links between are merged into a ball joint each: {balls}"
         )
     geometries = [g for g in (robot.visual, robot.collision) if g is not None]
-    robot.model, edited = edit_joints(robot.model, geometries, chains, types)
+    robot.model, edited = edit_joints(robot.model, geometries, chains, types, screws)
     remaining = iter(edited)
     robot.visual = next(remaining) if robot.visual is not None else None
     robot.collision = next(remaining) if robot.collision is not None else None

@@ -1,6 +1,6 @@
-"""Joints exchanged in a model that is already built: ball, universal and fixed joints.
+"""Joints exchanged in a model that is already built: ball, universal, screw and fixed joints.
 
-URDF has no ball joint.  CAD exporters write one as three revolute joints in a row with massless links
+URDF has no ball joint and no screw.  CAD exporters write one as three revolute joints in a row with massless links
 between; such a chain locks when its first and last axis become parallel (gimbal lock), where M is singular.
 One ball joint does not.
 """
@@ -148,7 +148,11 @@ def _ball_name(model: Any, joints: tuple[int, int, int]) -> str:
 
 
 def edit_joints(
-    model: Any, geometries: Sequence[Any], chains: Sequence[BallChain], types: Mapping[str, str]
+    model: Any,
+    geometries: Sequence[Any],
+    chains: Sequence[BallChain],
+    types: Mapping[str, str],
+    pitches: Mapping[str, float] | None = None,
 ) -> tuple[Any, list[Any]]:
     """Builds the model anew with other joints.
 
@@ -158,13 +162,15 @@ def edit_joints(
         chains: revolutes to merge into ball joints, from `ball_chains`.
         types: joint name to one of `JOINT_TYPES`.  A universal joint named `j` becomes revolutes `j_X` and
             `j` (axes as in the type), so that each has an angle.
+        pitches: revolute joints that become helical about their axis, with their rise per radian [m/rad].
 
     Returns:
         The new model and the new geometry models, in the given order.
 
     Raises:
-        LoadingError: the type of a joint is unknown or a joint in `types` does not exist.
+        LoadingError: the type of a joint is unknown, a joint does not exist, or a screw has no axis.
     """
+    screws = {name: _screw(model, name, pitch) for name, pitch in (pitches or {}).items()}
     for name, kind in types.items():
         if not model.existJointName(name):
             raise LoadingError(f'joint_name: no joint "{name}" in the robot')
@@ -190,6 +196,8 @@ def edit_joints(
             name, joint = merged[j].name, pin.JointModelSpherical()
             ball = pin.SE3(np.eye(3), merged[j].center)
             placement, shift = placement * ball, ball.inverse()
+        elif name in screws:
+            joint = screws[name]
         elif types.get(name) == "SPHERICAL":
             joint = pin.JointModelSpherical()
         elif types.get(name) in UNIVERSAL:
@@ -208,6 +216,17 @@ def edit_joints(
     if fixed:
         new, copies = pin.buildReducedModel(new, copies, fixed, pin.neutral(new))
     return new, list(copies)
+
+
+def _screw(model: Any, name: str, pitch: float) -> Any:
+    """A helical joint about the axis of a revolute joint."""
+    if not model.existJointName(name):
+        raise LoadingError(f'model: helical: no joint "{name}" in the robot')
+    axis = revolute_axis(model, model.getJointId(name))
+    if axis is None:
+        kind = model.joints[model.getJointId(name)].shortname()
+        raise LoadingError(f'model: helical: joint "{name}" must be revolute in the robot\'s file; it is {kind}')
+    return pin.JointModelHelicalUnaligned(axis, pitch)
 
 
 def _revolute(axis: str) -> Any:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from . import actuation, constraints, contacts, forces, laws, timefunctions
+from .checks import number
 from .errors import InputError, LoadingError, nearest
 from .xml_files import read_text
 
@@ -31,7 +32,7 @@ OWN_KEYS = (
     "gravity",
     "notes",
 )
-MODEL_KEYS = ("urdf", "example_robot_data", "generator", "free_flyer", "locked", "parameters")
+MODEL_KEYS = ("urdf", "example_robot_data", "generator", "free_flyer", "locked", "helical", "parameters")
 
 Table = dict[str, Any]
 CONSTRAINTS = {
@@ -280,6 +281,27 @@ def joint_types(table: Table, where: str) -> dict[str, str]:
             f"{where}: joint_name and joint_type must have the same length; got {len(names)} and {len(kinds)}"
         )
     return dict(zip(names, (k.upper() for k in kinds), strict=True))
+
+
+def pitches(table: Table, where: str) -> dict[str, float]:
+    """Joints that are screws, and their rise per radian [m/rad], from `model: {helical: {joint: pitch}}`.
+
+    Raises:
+        LoadingError: no table of numbers other than zero.
+    """
+    given = (table.get("model") or {}).get("helical") or {}
+    if not isinstance(given, dict):
+        raise LoadingError(f"{where}: model: helical must be a table by joint name; got {given!r}")
+    result = {}
+    for joint, value in given.items():
+        what = f'{where}: model: helical: pitch of "{joint}"'
+        try:
+            result[joint] = number(what, value)
+        except InputError as error:
+            raise LoadingError(str(error)) from None
+        if result[joint] == 0.0:
+            raise LoadingError(f"{what} must not be zero; a joint that does not rise is a revolute one")
+    return result
 
 
 def names_in(value: Any) -> set[str]:

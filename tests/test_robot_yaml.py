@@ -40,6 +40,29 @@ def test_fixed_joint_type(tmp_path):
     assert list(scene.model.names)[1:] == ["shoulder"]
 
 
+def test_screw(tmp_path):
+    """A revolute joint becomes a screw about the same axis, in the same place."""
+    urdf = robot(*ARM[:2], joint("shoulder", "base", "upper", axis="0.6 0 0.8", xyz="0.1 0.2 0.3"))
+    turning = pn.load(folder(tmp_path, "{}", urdf)).model
+    rising = pn.load(folder(tmp_path, "model: {helical: {shoulder: -0.02}}", urdf)).model
+    assert rising.joints[1].shortname() == "JointModelHelicalUnaligned"
+    q = np.array([0.7])
+    placements = []
+    for model in (turning, rising):
+        data = model.createData()
+        pin.forwardKinematics(model, data, q)
+        placements.append(data.oMi[1])
+    np.testing.assert_allclose(placements[1].rotation, placements[0].rotation, atol=ROUNDING)
+    rise = placements[1].translation - placements[0].translation
+    np.testing.assert_allclose(rise, -0.02 * 0.7 * np.array([0.6, 0.0, 0.8]), atol=ROUNDING)
+
+
+def test_a_slide_is_no_screw(tmp_path):
+    urdf = robot(*ARM[:2], joint("shoulder", "base", "upper", kind="prismatic"))
+    with refuses('joint "shoulder" must be revolute in the robot\'s file; it is JointModelPZ'):
+        pn.load(folder(tmp_path, "model: {helical: {shoulder: 0.1}}", urdf))
+
+
 FULL = """
 description: an arm
 source: this test
@@ -205,6 +228,19 @@ YAML_REFUSED = {
         "model: {free_flyer: maybe}",
         "model: free_flyer must be true or false; got 'maybe'",
     ),
+    "helical not a table": (
+        "model: {helical: elbow}",
+        "model: helical must be a table by joint name; got 'elbow'",
+    ),
+    "helical without pitch": (
+        "model: {helical: {elbow: 0}}",
+        'pitch of "elbow" must not be zero; a joint that does not rise is a revolute one',
+    ),
+    "pitch no number": (
+        "model: {helical: {elbow: .nan}}",
+        'model: helical: pitch of "elbow" must be finite; got nan',
+    ),
+    "helical joint unknown": ("model: {helical: {elbo: 0.1}}", 'model: helical: no joint "elbo" in the robot'),
     "unknown generator": (
         "model: {generator: n_five_bar}",
         'no generator "n_five_bar"; nearest: "n_four_bar"',
