@@ -1,8 +1,8 @@
 """Joints exchanged in a model that is already built: ball, universal, screw and fixed joints.
 
-URDF has no ball joint and no screw.  CAD exporters write one as three revolute joints in a row with massless links
-between; such a chain locks when its first and last axis become parallel (gimbal lock), where M is singular.
-One ball joint does not.
+URDF has no ball joint and no screw.  CAD exporters write a ball joint as three revolute joints in a row with
+massless links between; such a chain locks when its first and last axis become parallel (gimbal lock), where
+M is singular.  One ball joint does not.
 """
 
 from __future__ import annotations
@@ -225,7 +225,9 @@ def _screw(model: Any, name: str, pitch: float) -> Any:
     axis = revolute_axis(model, model.getJointId(name))
     if axis is None:
         kind = model.joints[model.getJointId(name)].shortname()
-        raise LoadingError(f'model: helical: joint "{name}" must be revolute in the robot\'s file; it is {kind}')
+        raise LoadingError(
+            f'model: helical: joint "{name}" must be revolute in the robot\'s file; it is {kind}'
+        )
     return pin.JointModelHelicalUnaligned(axis, pitch)
 
 

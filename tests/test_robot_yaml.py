@@ -240,7 +240,10 @@ YAML_REFUSED = {
         "model: {helical: {elbow: .nan}}",
         'model: helical: pitch of "elbow" must be finite; got nan',
     ),
-    "helical joint unknown": ("model: {helical: {elbo: 0.1}}", 'model: helical: no joint "elbo" in the robot'),
+    "helical joint unknown": (
+        "model: {helical: {elbo: 0.1}}",
+        'model: helical: no joint "elbo" in the robot',
+    ),
     "unknown generator": (
         "model: {generator: n_five_bar}",
         'no generator "n_five_bar"; nearest: "n_four_bar"',
