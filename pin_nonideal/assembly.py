@@ -60,6 +60,7 @@ def scene_arguments(robot: RobotFile, table: Table, name: str, *, merge: bool = 
     where = f'robot.yaml of "{name}"'
     notes = [*robot.notes, *strings(table, "notes", where)]
     _change_joints(robot, table, where, notes, merge)
+    _place_base(robot, table, where)
     if "gravity" in table:
         robot.model.gravity = pin.Motion(
             np.array(_vector(table["gravity"], 3, f"{where}: gravity")), np.zeros(3)
@@ -165,6 +166,29 @@ def _change_joints(robot: RobotFile, table: Table, where: str, notes: list[str],
     robot.visual = next(remaining) if robot.visual is not None else None
     robot.collision = next(remaining) if robot.collision is not None else None
     robot.q0 = robot.v0 = None
+
+
+def _place_base(robot: RobotFile, table: Table, where: str) -> None:
+    """Mounts the robot where `model: {base: {xyz: ..., rpy: ...}}` says: on a wall, or from the ceiling."""
+    entry = (table.get("model") or {}).get("base")
+    if entry is None:
+        return
+    where = f"{where}: model: base"
+    if not isinstance(entry, dict):
+        raise LoadingError(f"{where} must be a table with the keys xyz, rpy; got {entry!r}")
+    check_keys(entry, ("xyz", "rpy"), where)
+    xyz, rpy = (np.array(_vector(entry.get(k, [0, 0, 0]), 3, f"{where}: {k}")) for k in ("xyz", "rpy"))
+    base, model = pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz), robot.model
+    for j in range(1, model.njoints):
+        if model.parents[j] == 0:
+            model.jointPlacements[j] = base * model.jointPlacements[j]
+    for frame in list(model.frames)[1:]:
+        if frame.parentJoint == 0:
+            frame.placement = base * frame.placement
+    for geometry in (robot.visual, robot.collision):
+        for shape in geometry.geometryObjects if geometry is not None else ():
+            if shape.parentJoint == 0:
+                shape.placement = base * shape.placement
 
 
 def _joint(model: Any, name: Any, where: str) -> int:

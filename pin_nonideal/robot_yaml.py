@@ -32,7 +32,16 @@ OWN_KEYS = (
     "gravity",
     "notes",
 )
-MODEL_KEYS = ("urdf", "example_robot_data", "generator", "free_flyer", "locked", "helical", "parameters")
+MODEL_KEYS = (
+    "urdf",
+    "example_robot_data",
+    "generator",
+    "free_flyer",
+    "locked",
+    "helical",
+    "base",
+    "parameters",
+)
 
 Table = dict[str, Any]
 CONSTRAINTS = {

@@ -63,6 +63,26 @@ def test_a_slide_is_no_screw(tmp_path):
         pn.load(folder(tmp_path, "model: {helical: {shoulder: 0.1}}", urdf))
 
 
+def test_base(tmp_path):
+    """The whole robot is moved: joints, frames of the ground and shapes."""
+    box = '<visual><geometry><box size="1 1 1"/></geometry></visual>'
+    urdf = robot(f'<link name="base">{box}</link>', *ARM[1:])
+    plain = pn.load(folder(tmp_path, "{}", urdf))
+    moved = pn.load(folder(tmp_path, "model: {base: {xyz: [0.1, 0.2, 1.5], rpy: [0.3, 0.4, 3.0]}}", urdf))
+    base = pin.SE3(pin.rpy.rpyToMatrix(0.3, 0.4, 3.0), np.array([0.1, 0.2, 1.5]))
+    q = np.array([0.7, -0.4])
+    data = [scene.model.createData() for scene in (plain, moved)]
+    shapes = [scene.visual_model.createData() for scene in (plain, moved)]
+    for scene, d, shape in zip((plain, moved), data, shapes, strict=True):
+        pin.framesForwardKinematics(scene.model, d, q)
+        pin.updateGeometryPlacements(scene.model, d, scene.visual_model, shape)
+    for name in ("wall", "hand", "elbow", "base"):
+        frame = plain.model.getFrameId(name)
+        expected = (base * data[0].oMf[frame]).homogeneous
+        np.testing.assert_allclose(data[1].oMf[frame].homogeneous, expected, atol=ROUNDING)
+    np.testing.assert_allclose(shapes[1].oMg[0].homogeneous, base.homogeneous, atol=ROUNDING)
+
+
 FULL = """
 description: an arm
 source: this test
@@ -228,6 +248,12 @@ YAML_REFUSED = {
         "model: {free_flyer: maybe}",
         "model: free_flyer must be true or false; got 'maybe'",
     ),
+    "base not a table": (
+        "model: {base: [0, 0, 1]}",
+        "model: base must be a table with the keys xyz, rpy; got [0, 0, 1]",
+    ),
+    "base of two": ("model: {base: {xyz: [0, 1]}}", "model: base: xyz must have shape (3,); got shape (2,)"),
+    "base with another key": ("model: {base: {xy: [0, 1]}}", 'model: base: unknown key "xy"; nearest: "xyz"'),
     "helical not a table": (
         "model: {helical: elbow}",
         "model: helical must be a table by joint name; got 'elbow'",
