@@ -1,0 +1,139 @@
+"""Work and precision: wall time of one run from its start against the error of its end, tool by tool.
+
+First every setting runs once or a few times, which gives its error and a rough time.  Then, for each error
+level, the fastest setting of every tool that reached it runs again, all tools in turn, and the ratios are
+medians over the rounds.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from . import timing
+from .problems import Problem
+from .tools import Outcome, Setting, Tool
+from .tools.package import Package
+
+OURS = Package.name
+
+
+def sweep(problem: Problem, tool: Tool, limit: float) -> list[dict[str, Any]]:
+    """Runs every setting of a tool; those that would take longer than the limit are named and left out.
+
+    Args:
+        problem: what to compute.
+        tool: by what.
+        limit: of one run [s].
+    """
+    rows: list[dict[str, Any]] = []
+    last: tuple[str, int | None, float] = ("", None, 0.0)
+    for setting in tool.settings(problem):
+        row: dict[str, Any] = {"tool": tool.name, "family": setting.family, "setting": setting.label}
+        rows.append(row)
+        family, steps, seconds = last
+        if family == setting.family:
+            growth = setting.steps / steps if setting.steps and steps else 1.5
+            if seconds * growth > limit:
+                row["status"] = "not run: over the time limit"
+                continue
+        run = tool.prepare(problem, setting)
+        begin = time.perf_counter()
+        outcome = run()
+        seconds = time.perf_counter() - begin
+        for _ in range(4 if seconds < 0.05 * limit else 1 if seconds < 0.5 * limit else 0):
+            begin = time.perf_counter()
+            run()
+            seconds = min(seconds, time.perf_counter() - begin)
+        last = (setting.family, setting.steps, seconds)
+        row |= {"seconds": seconds, **judged(problem, outcome)}
+    return rows
+
+
+def judged(problem: Problem, outcome: Outcome) -> dict[str, Any]:
+    """Error, steps and status of a run."""
+    found: dict[str, Any] = {"steps": outcome.steps, "error": None}
+    if outcome.failure:
+        found["status"] = f"failed: {outcome.failure}"
+    elif not outcome.complete or outcome.q is None:
+        found["status"] = f"incomplete: {outcome.steps} of {outcome.asked} steps"
+    else:
+        error = problem.error(outcome.q)
+        found |= {"error": error, "status": "ok"} if error < 1e3 else {"status": "diverged"}
+    return found
+
+
+def fastest(rows: Sequence[dict[str, Any]], tool: str, level: float) -> dict[str, Any] | None:
+    """The fastest setting of a tool that reached a level."""
+    reached = [r for r in rows if r["tool"] == tool and r.get("error") is not None and r["error"] <= level]
+    return min(reached, key=lambda r: r["seconds"], default=None)
+
+
+def race(
+    problem: Problem, tools: Sequence[Tool], rows: list[dict[str, Any]], rounds: int
+) -> list[dict[str, Any]]:
+    """For each level, the winners' times measured in turn."""
+    results = []
+    for level in problem.levels:
+        winners = {tool.name: fastest(rows, tool.name, level) for tool in tools}
+        batches = {}
+        for tool in tools:
+            row = winners[tool.name]
+            if row is not None:
+                setting = found(tool.settings(problem), row)
+                batches[tool.name] = timing.per_call(tool.prepare(problem, setting))
+        slowest = max((row["seconds"] for row in winners.values() if row), default=0.0)
+        times = timing.paired(batches, max(3, min(rounds, int(3.0 / max(slowest, 1e-3)))))
+        entry: dict[str, Any] = {"level": level, "tools": {}}
+        for name, row in winners.items():
+            if row is None:
+                reached = [r["error"] for r in rows if r["tool"] == name and r.get("error") is not None]
+                entry["tools"][name] = {"best_error": min(reached, default=None)}
+                continue
+            entry["tools"][name] = {
+                "setting": f"{row['family']} {row['setting']}",
+                "error": row["error"],
+                "seconds": times[name].best,
+            }
+            if name != OURS and OURS in times:
+                entry["tools"][name]["ratio"] = timing.ratio(times[name], times[OURS])
+        results.append(entry)
+    return results
+
+
+def found(settings: list[Setting], row: dict[str, Any]) -> Setting:
+    return next(s for s in settings if (s.family, s.label) == (row["family"], row["setting"]))
+
+
+def measure(
+    problem: Problem, tools: Sequence[Tool], quick: bool, say: Callable[[str], None] = print
+) -> dict[str, Any]:
+    """All runs of one problem.
+
+    Args:
+        problem: what to compute.
+        tools: ours and its peers.
+        quick: shorter limits.
+        say: told what happens.
+    """
+    reference = problem.solution
+    rows: list[dict[str, Any]] = []
+    for tool in tools:
+        found = sweep(problem, tool, 0.3 if quick else 10.0)
+        rows += found
+        done = [r for r in found if r.get("error") is not None]
+        if done:
+            best = min(r["error"] for r in done)
+            say(f"  {tool.name}: {len(done)} of {len(found)} runs, best error {best:.1e}")
+        elif found:
+            say(f"  {tool.name}: {found[0]['status']}")
+    taking_part = [tool for tool in tools if any(r["tool"] == tool.name for r in rows)]
+    return {
+        "problem": problem.name,
+        "title": problem.title,
+        "notes": problem.notes,
+        "reference": {"how": reference.how, "uncertainty": reference.uncertainty},
+        "runs": rows,
+        "levels": race(problem, taking_part, rows, 5 if quick else 15),
+    }

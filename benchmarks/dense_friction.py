@@ -1,0 +1,94 @@
+"""Constant Coulomb friction on the dense reference: smooth between events, modes found by trying them all."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from .dense import DenseTree
+
+Array = NDArray[np.float64]
+
+AT_REST = 1e-9  # a velocity below this at an event is zero [rad/s]
+MOST_EVENTS = 500
+
+
+class Friction:
+    """A tree of joints with one freedom each, some sliding (+1, -1), some held (0)."""
+
+    def __init__(self, tree: DenseTree, coulomb: Array, viscous: Array) -> None:
+        self.tree, self.coulomb, self.viscous = tree, coulomb, viscous
+        self.mode = np.zeros(tree.nv)
+        tree.forces = lambda t, tree: -coulomb * self.mode - viscous * tree.v
+
+    def held(self) -> list[int]:
+        """Joints at rest."""
+        return [int(j) for j in np.flatnonzero(self.mode == 0.0)]
+
+    def solve(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
+        """Acceleration, and friction force of every joint that is held."""
+        return self.tree.acceleration(t, q, v, self.held())
+
+    def choose(self, t: float, q: Array, v: Array) -> None:
+        """Modes of the joints at rest that contradict neither their limits nor their accelerations."""
+        self.mode = np.where(np.abs(v) < AT_REST, 0.0, np.sign(v))
+        resting = self.held()
+        for guess in itertools.product((0.0, 1.0, -1.0), repeat=len(resting)):
+            self.mode[resting] = guess
+            a, force = self.solve(t, q, v)
+            holds = all(abs(f) <= self.coulomb[j] for f, j in zip(force, self.held(), strict=True))
+            if holds and all(a[j] * s > 0.0 for j, s in zip(resting, guess, strict=True) if s):
+                return
+        raise RuntimeError(f"no modes fit at t = {t}")
+
+
+def friction_motion(tree: DenseTree, problem: Any, max_step: float) -> Array:
+    """Configuration at the end of the problem.
+
+    Args:
+        tree: its mechanics.
+        problem: gives the initial state, the friction and the duration.
+        max_step: of the integrator [s]; the interpolant that locates events is as good as this is short.
+    """
+    friction = Friction(tree, problem.coulomb, problem.viscous)
+    t, q, v = 0.0, problem.q0.copy(), problem.v0.copy()
+    nv = tree.nv
+    friction.choose(t, q, v)
+    for _ in range(MOST_EVENTS):
+        sliding, held = [int(j) for j in np.flatnonzero(friction.mode)], friction.held()
+
+        def rate(time: float, y: Array) -> Array:
+            a, _ = friction.solve(time, y[:nv], y[nv:])
+            return np.concatenate([y[nv:], a])
+
+        def stops(time: float, y: Array, j: int) -> float:
+            return float(y[nv + j] * friction.mode[j])
+
+        def slips(time: float, y: Array, k: int, held: list[int] = held) -> float:
+            return float(friction.coulomb[held[k]] - abs(friction.solve(time, y[:nv], y[nv:])[1][k]))
+
+        events: list[Any] = [lambda time, y, j=j: stops(time, y, j) for j in sliding]
+        events += [lambda time, y, k=k: slips(time, y, k) for k in range(len(held))]
+        for event in events:
+            event.terminal, event.direction = True, -1.0
+        out = solve_ivp(
+            rate, (t, problem.duration), np.concatenate([q, v]), method="DOP853", rtol=1e-13, atol=1e-14,
+            events=events, max_step=max_step,
+        )  # fmt: skip
+        t, q, v = float(out.t[-1]), out.y[:nv, -1], out.y[nv:, -1].copy()
+        v[held] = 0.0
+        if out.status == 0:
+            return q
+        which = next(k for k, times in enumerate(out.t_events) if len(times))
+        if which < len(sliding):
+            v[sliding[which]] = 0.0
+            friction.choose(t, q, v)
+        else:  # at its limit the joint gives way against the force that held it
+            k = which - len(sliding)
+            force = friction.solve(t, q, v)[1][k]
+            friction.mode[held[k]] = -np.sign(force)
+    raise RuntimeError(f"more than {MOST_EVENTS} events")

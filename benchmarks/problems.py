@@ -1,0 +1,264 @@
+"""The table of problems: each is defined once, for every tool, with a reference that none of them made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+import pin_nonideal as pn
+
+from . import reference_store, references
+from .references import Reference
+
+Array = NDArray[np.float64]
+
+LEVELS = (1e-3, 1e-6, 1e-8, 1e-10)  # errors for which the time is reported
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """One motion to compute.
+
+    Attributes:
+        name: used on the command line and in the results.
+        title: shown in tables.
+        model: pinocchio.Model, the one source of every tool's model.
+        q0: configuration at the start, consistent with the anchors.
+        v0: velocity at the start, likewise.
+        duration: [s].
+        reference: computes the configuration at the end.
+        anchors: PointAnchor and FrameAnchor descriptions.
+        springs: SpringDamper descriptions.
+        torque: constant joint torques, (nv,).
+        hold: proportional and derivative gains (nv,), (nv,), around q0.
+        coulomb: constant dry friction of each degree of freedom, (nv,).
+        viscous: viscous friction of each degree of freedom, (nv,).
+        notes: a remark for tables.
+        levels: errors for which the time is reported.
+    """
+
+    name: str
+    title: str
+    model: Any
+    q0: Array
+    v0: Array
+    duration: float
+    reference: Callable[[Problem], Reference] = references.dense_motion
+    anchors: tuple[Any, ...] = ()
+    springs: tuple[Any, ...] = ()
+    torque: Array | None = None
+    hold: tuple[Array, Array] | None = None
+    coulomb: Array | None = None
+    viscous: Array | None = None
+    notes: str = ""
+    levels: tuple[float, ...] = field(default=LEVELS)
+
+    @cached_property
+    def solution(self) -> Reference:
+        """The reference: the stored one, or computed."""
+        return reference_store.read(self) or self.reference(self)
+
+    def error(self, q: Array) -> float:
+        """Largest error of a coordinate at the end [rad or m]; infinite when q is not finite."""
+        if not np.isfinite(q).all():
+            return float("inf")
+        return float(np.abs(pin.difference(self.model, self.solution.q, q)).max())
+
+    def scene(self) -> pn.Scene:
+        """The problem as a scene of the package."""
+        laws = []
+        for i in range(1, self.model.njoints):
+            dof = self.model.joints[i].idx_v
+            coulomb = 0.0 if self.coulomb is None else float(self.coulomb[dof])
+            viscous = 0.0 if self.viscous is None else float(self.viscous[dof])
+            if coulomb or viscous:
+                laws.append(pn.JointFriction(self.model.names[i], coulomb=coulomb, viscous=viscous))
+        actuation: Any = self.torque
+        if self.hold is not None:
+            actuation = pn.HoldPosition(*self.hold, q=self.q0)
+        return pn.Scene(
+            self.model,
+            constraints=self.anchors,
+            laws=laws,
+            forces=self.springs,
+            actuation=actuation,
+            q0=self.q0,
+            v0=self.v0,
+            name=self.name,
+        )
+
+
+def bare(scene: pn.Scene) -> dict[str, Any]:
+    """What the problems take of a robot of the package: its model, anchors and consistent initial state."""
+    q0, v0 = scene.initial_state()
+    return {"model": scene.model, "anchors": scene.constraints, "q0": q0, "v0": v0}
+
+
+def rods(lengths: list[float], masses: list[float], radius: float = 0.0) -> Any:
+    """A chain of uniform rods hinged about y that hangs along -z at zero angles."""
+    model = pin.Model()
+    model.name = "rods"
+    parent, place = 0, pin.SE3.Identity()
+    for k, (length, mass) in enumerate(zip(lengths, masses, strict=True)):
+        parent = model.addJoint(parent, pin.JointModelRY(), place, f"hinge{k + 1}")
+        across = mass * (length**2 / 12.0 + radius**2 / 4.0)
+        inertia = np.diag([across, across, max(0.5 * mass * radius**2, 1e-3 * across)])
+        model.appendBodyToJoint(
+            parent, pin.Inertia(mass, np.array([0.0, 0.0, -0.5 * length]), inertia), pin.SE3.Identity()
+        )
+        place = pin.SE3(np.eye(3), np.array([0.0, 0.0, -length]))
+    return model
+
+
+def double_pendulum() -> Problem:
+    return Problem(
+        name="double_pendulum",
+        title="double pendulum, 2 s",
+        model=rods([0.5, 0.4], [1.0, 0.7]),
+        q0=np.array([1.2, 0.8]),
+        v0=np.zeros(2),
+        duration=2.0,
+        reference=references.dense_motion,
+    )
+
+
+def panda() -> Problem:
+    scene = pn.load("panda_friction")
+    q0, _ = scene.initial_state()
+    return Problem(
+        name="panda",
+        title="Panda arm falling, 1 s",
+        model=scene.model,
+        q0=q0,
+        v0=np.zeros(scene.model.nv),
+        duration=1.0,
+        reference=references.dense_motion,
+        notes="fingers locked, no friction",
+    )
+
+
+def four_bar() -> Problem:
+    return Problem(
+        name="four_bar",
+        title="four-bar, 2 s",
+        **bare(pn.load("four_bar")),
+        duration=2.0,
+        reference=references.four_bar_quadrature,
+        notes="crank-rocker without friction, about four turns",
+    )
+
+
+def n_four_bar() -> Problem:
+    return Problem(
+        name="n_four_bar",
+        title="10 four-bars, 1 s",
+        **bare(pn.load("n_four_bar", N=10)),
+        duration=1.0,
+        reference=references.n_four_bar_quadrature,
+        notes="IFToMM A02, through one singular position",
+    )
+
+
+def andrews() -> Problem:
+    scene = pn.load("andrews_squeezer")
+    torque = np.zeros(scene.model.nv)
+    torque[scene.model.joints[scene.model.getJointId("beta")].idx_v] = 0.033
+    return Problem(
+        name="andrews",
+        title="Andrews' squeezer, 0.03 s",
+        **bare(scene),
+        springs=scene.forces,
+        torque=torque,
+        duration=0.03,
+        reference=references.published_andrews,
+        levels=(1e-3, 1e-6, 1e-8, 1e-9),
+    )
+
+
+def solo12() -> Problem:
+    scene = pn.load("solo12_standing")
+    kp, kd = np.full(scene.model.nv, 8.0), np.full(scene.model.nv, 0.1)
+    kp[:6] = kd[:6] = 0.0
+    return Problem(
+        name="solo12",
+        title="Solo12 on four anchored feet, 1 s",
+        **bare(scene),
+        hold=(kp, kd),
+        duration=1.0,
+        reference=references.dense_motion,
+    )
+
+
+def coulomb_pendulum() -> Problem:
+    return Problem(
+        name="coulomb_pendulum",
+        title="pendulum with Coulomb friction, 2 s",
+        model=rods([1.0], [1.0]),
+        q0=np.array([1.2]),
+        v0=np.zeros(1),
+        duration=2.0,
+        coulomb=np.array([0.5]),
+        reference=references.coulomb_swings,
+        levels=(1e-3, 1e-4, 1e-6, 1e-9),
+    )
+
+
+def coulomb_rest() -> Problem:
+    return Problem(
+        name="coulomb_rest",
+        title="pendulum with Coulomb friction, rest angle at 10 s",
+        model=rods([1.0], [1.0]),
+        q0=np.array([1.2]),
+        v0=np.zeros(1),
+        duration=10.0,
+        coulomb=np.array([0.5]),
+        reference=references.coulomb_swings,
+        levels=(1e-3, 1e-4, 1e-6, 1e-9),
+    )
+
+
+def panda_friction() -> Problem:
+    scene = pn.load("panda_friction")
+    q0, v0 = scene.initial_state()
+    coulomb = np.array([law.coulomb for law in scene.laws])
+    viscous = np.array([law.viscous for law in scene.laws])
+    return Problem(
+        name="panda_friction",
+        title="Panda with joint friction, 1 s",
+        model=scene.model,
+        q0=q0,
+        v0=v0,
+        duration=1.0,
+        coulomb=coulomb,
+        viscous=viscous,
+        reference=references.dense_friction,
+        levels=(1e-3, 1e-4, 1e-6, 1e-8),
+    )
+
+
+MAKERS: dict[str, Callable[[], Problem]] = {
+    maker.__name__: maker
+    for maker in (
+        four_bar,
+        double_pendulum,
+        panda,
+        coulomb_pendulum,
+        coulomb_rest,
+        andrews,
+        n_four_bar,
+        solo12,
+        panda_friction,
+    )
+}
+
+
+@cache
+def problem(name: str) -> Problem:
+    """A problem of the table, made once a process."""
+    return MAKERS[name]()

@@ -1,0 +1,13 @@
+"""What computes the motions: this package and what a user would pick instead, each with its best settings."""
+
+from __future__ import annotations
+
+from .base import Outcome, Setting, Tool
+from .exudyn import Exudyn
+from .mujoco import MuJoCo
+from .package import Package
+from .pinocchio_scipy import PinocchioSciPy
+
+TOOLS: dict[str, Tool] = {tool.name: tool for tool in (Package(), PinocchioSciPy(), MuJoCo(), Exudyn())}
+
+__all__ = ["TOOLS", "Outcome", "Setting", "Tool"]

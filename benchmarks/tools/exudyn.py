@@ -1,0 +1,106 @@
+"""Exudyn: a kinematic tree in minimal coordinates under its compiled adaptive Runge-Kutta methods."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .base import Outcome, Setting, needs, tolerances
+
+METHODS = ("DOPRI5", "RK67")
+SMALLEST_STEP = 1e-10
+
+
+class Exudyn:
+    """Trees of revolute joints and nothing else; loops would need its redundant formulations."""
+
+    name = "exudyn"
+    title = "Exudyn"
+
+    def missing(self) -> str | None:
+        """Why it cannot run here, or None."""
+        return needs("exudyn")
+
+    def settings(self, problem: Any) -> list[Setting]:
+        """Settings worth trying."""
+        revolute = all(
+            j.shortname() in ("JointModelRX", "JointModelRY", "JointModelRZ")
+            for j in problem.model.joints[1:]
+        )
+        extras = (problem.hold, problem.coulomb, problem.viscous, problem.torque)
+        if not revolute or problem.anchors or problem.springs or any(extra is not None for extra in extras):
+            return []
+        adaptive = [Setting("DOPRI5", f"tol {tol:.0e}", values={"rtol": tol}) for tol in tolerances(3, 13)]
+        steps = [round(problem.duration / h) for h in (0.02, 0.01, 5e-3, 2.5e-3, 1e-3, 5e-4, 2e-4)]
+        fixed = [Setting("RK67", f"h {problem.duration / n:.1e}", n) for n in steps]
+        return adaptive + fixed
+
+    def prepare(self, problem: Any, setting: Setting) -> Callable[[], Outcome]:
+        """A function that runs the problem once from its start."""
+        import exudyn
+
+        mbs = tree(exudyn, problem)
+        settings = exudyn.SimulationSettings()
+        integration = settings.timeIntegration
+        integration.endTime = problem.duration
+        integration.verboseMode = 0
+        settings.solutionSettings.writeSolutionToFile = False
+        settings.solutionSettings.sensorsWritePeriod = 2.0 * problem.duration
+        method = getattr(exudyn.DynamicSolverType, setting.family)
+        if setting.steps is None:
+            integration.automaticStepSize = True
+            integration.relativeTolerance = integration.absoluteTolerance = setting.values["rtol"]
+            integration.numberOfSteps = 1  # the largest step it may take is the whole
+            integration.initialStepSize = 1e-3
+            integration.minimumStepSize = SMALLEST_STEP
+        else:
+            integration.automaticStepSize = False
+            integration.numberOfSteps = setting.steps
+        initial = exudyn.ConfigurationType.Initial
+        q0, v0 = np.array(problem.q0), np.array(problem.v0)
+
+        def run() -> Outcome:
+            mbs.systemData.SetODE2Coordinates(q0, configuration=initial)
+            mbs.systemData.SetODE2Coordinates_t(v0, configuration=initial)
+            try:
+                done = mbs.SolveDynamic(settings, solverType=method)
+            except Exception as error:  # its own exceptions have no common root
+                return Outcome(None, 0, failure=str(error).splitlines()[0])
+            steps = int(mbs.sys["dynamicSolver"].it.currentStepIndex) - 1 if "dynamicSolver" in mbs.sys else 0
+            if done is False:
+                return Outcome(None, steps, setting.steps, failure="the solver gave up")
+            return Outcome(np.array(mbs.systemData.GetODE2Coordinates()), steps)
+
+        return run
+
+
+def tree(exudyn: Any, problem: Any) -> Any:
+    """The problem's model as one kinematic tree."""
+    from exudyn.itemInterface import NodeGenericODE2, ObjectKinematicTree
+
+    model = problem.model
+    n = model.nv
+    joints = range(1, model.njoints)
+    mbs = exudyn.SystemContainer().AddSystem()
+    node = mbs.AddNode(NodeGenericODE2(
+        referenceCoordinates=[0.0] * n, initialCoordinates=problem.q0.tolist(),
+        initialCoordinates_t=problem.v0.tolist(), numberOfODE2Coordinates=n,
+    ))  # fmt: skip
+    kinds = {f"JointModelR{axis}": getattr(exudyn.JointType, f"Revolute{axis}") for axis in "XYZ"}
+    places = [model.jointPlacements[i] for i in joints]
+    bodies = [model.inertias[i] for i in joints]
+    mbs.AddObject(ObjectKinematicTree(
+        nodeNumber=node,
+        gravity=np.array(model.gravity.linear).tolist(),
+        jointTypes=[kinds[model.joints[i].shortname()] for i in joints],
+        linkParents=[model.parents[i] - 1 for i in joints],
+        jointTransformations=exudyn.Matrix3DList([place.rotation for place in places]),
+        jointOffsets=exudyn.Vector3DList([place.translation for place in places]),
+        linkInertiasCOM=exudyn.Matrix3DList([body.inertia for body in bodies]),
+        linkCOMs=exudyn.Vector3DList([body.lever for body in bodies]),
+        linkMasses=[body.mass for body in bodies],
+    ))  # fmt: skip
+    mbs.Assemble()
+    return mbs

@@ -1,0 +1,151 @@
+"""MuJoCo: its integrators with the soft constraints of its defaults, and as stiff as its step allows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.mjcf_export import mjcf
+
+from .base import Outcome, Setting, needs
+
+Array = NDArray[np.float64]
+
+# Steps over the length of a problem.
+STEPS = (50, 100, 200, 400, 1000, 2000, 4000, 10_000, 40_000, 200_000)
+INTEGRATORS = {"Euler": "mjINT_EULER", "implicitfast": "mjINT_IMPLICITFAST", "RK4": "mjINT_RK4"}
+STIFF_IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+SOLVER_TOLERANCE = 1e-12
+
+
+def states(problem: Any) -> Any:
+    """MuJoCo's model of a problem, and where Pinocchio's coordinates are in its own."""
+    import mujoco
+
+    text = mjcf(
+        problem.model,
+        problem.q0,
+        problem.anchors,
+        problem.springs,
+        problem.hold,
+        problem.coulomb,
+        problem.viscous,
+    )
+    return mujoco.MjModel.from_xml_string(text)
+
+
+class Coordinates:
+    """Maps configurations and velocities of a pinocchio.Model to MuJoCo's and back, joint by joint."""
+
+    def __init__(self, model: Any, mj: Any) -> None:
+        self.model, self.mj = model, mj
+        self.parts = []
+        for i in range(1, model.njoints):
+            joint, other = model.joints[i], mj.joint(model.names[i])
+            self.parts.append((joint.shortname() == "JointModelFreeFlyer", joint.idx_q, joint.idx_v,
+                               int(other.qposadr[0]), int(other.dofadr[0])))  # fmt: skip
+
+    def there(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """The state in MuJoCo's coordinates."""
+        import pinocchio as pin
+
+        x, u = np.zeros(self.mj.nq), np.zeros(self.mj.nv)
+        for free, iq, iv, jq, jv in self.parts:
+            if not free:
+                x[jq], u[jv] = q[iq], v[iv]
+                continue
+            x[jq : jq + 3], x[jq + 3 : jq + 7] = q[iq : iq + 3], q[[iq + 6, iq + 3, iq + 4, iq + 5]]
+            R = pin.Quaternion(q[iq + 3 : iq + 7]).matrix()
+            u[jv : jv + 3], u[jv + 3 : jv + 6] = R @ v[iv : iv + 3], v[iv + 3 : iv + 6]
+        return x, u
+
+    def back(self, x: Array) -> Array:
+        """The configuration in Pinocchio's coordinates."""
+        q = np.zeros(self.model.nq)
+        for free, iq, _, jq, _ in self.parts:
+            if free:
+                q[iq : iq + 3], q[iq + 3 : iq + 7] = x[jq : jq + 3], x[[jq + 4, jq + 5, jq + 6, jq + 3]]
+            else:
+                q[iq] = x[jq]
+        return q
+
+
+def lighten(mj: Any) -> None:
+    """Leaves out what none of the problems needs: collisions and limits."""
+    import mujoco
+
+    mj.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
+
+
+def stiffen(mj: Any, h: float) -> None:
+    """Constraints as stiff as the step allows: solref 2 h, impedance near one, a solver that converges."""
+    mj.opt.tolerance = SOLVER_TOLERANCE
+    mj.eq_solref[:], mj.eq_solimp[:] = (2.0 * h, 1.0), STIFF_IMPEDANCE
+    mj.dof_solref[:], mj.dof_solimp[:] = (2.0 * h, 1.0), STIFF_IMPEDANCE
+
+
+class MuJoCo:
+    """mj_step in one call."""
+
+    name = "mujoco"
+    title = "MuJoCo"
+
+    def missing(self) -> str | None:
+        """Why it cannot run here, or None."""
+        return needs("mujoco")
+
+    def settings(self, problem: Any) -> list[Setting]:
+        """Settings worth trying."""
+        constrained = bool(problem.anchors) or problem.coulomb is not None
+        families = [("RK4", True), ("Euler", True)]
+        if constrained:
+            families += [("implicitfast", True), ("RK4", False), ("Euler", False)]
+        found = []
+        for integrator, stiff in families:
+            name = integrator + (" stiff" if stiff and constrained else "")
+            for n in STEPS:
+                values = {"integrator": integrator, "stiff": stiff and constrained}
+                found.append(Setting(name, f"h {problem.duration / n:.1e}", n, values))
+        return found
+
+    def prepare(self, problem: Any, setting: Setting) -> Callable[[], Outcome]:
+        """A function that runs the problem once from its start."""
+        import mujoco
+
+        mj = states(problem)
+        lighten(mj)
+        mj.opt.integrator = getattr(mujoco.mjtIntegrator, INTEGRATORS[setting.values["integrator"]])
+        steps = setting.steps or 0
+        mj.opt.timestep = problem.duration / steps
+        if setting.values["stiff"]:
+            stiffen(mj, mj.opt.timestep)
+        data = mujoco.MjData(mj)
+        coordinates = Coordinates(problem.model, mj)
+        x0, u0 = coordinates.there(problem.q0, problem.v0)
+        torque = None
+        if problem.torque is not None:
+            torque = coordinates.there(problem.q0, problem.torque)[1]
+
+        def run() -> Outcome:
+            mujoco.mj_resetData(mj, data)
+            data.qpos[:], data.qvel[:] = x0, u0
+            if torque is not None:
+                data.qfrc_applied[:] = torque
+            mujoco.mj_step(mj, data, nstep=steps)
+            # On divergence it resets itself and counts a warning: the steps really made are those since then.
+            made = round(data.time / mj.opt.timestep)
+            bad = [w.name for w in resets(mujoco) if data.warning[w.value].number]
+            if bad:
+                return Outcome(None, made, steps, failure=f"diverged ({', '.join(bad)})")
+            return Outcome(coordinates.back(data.qpos), made, steps)
+
+        return run
+
+
+def resets(mujoco: Any) -> list[Any]:
+    """Warnings after which MuJoCo starts again from its initial state."""
+    kinds = mujoco.mjtWarning
+    return [kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC]

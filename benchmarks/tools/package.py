@@ -1,0 +1,47 @@
+"""pin_nonideal itself, through its public door."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pin_nonideal as pn
+
+from .base import Outcome, Setting, tolerances
+
+
+class Package:
+    """pn.simulate with its adaptive methods."""
+
+    name = "pin_nonideal"
+    title = "pin_nonideal"
+
+    def missing(self) -> str | None:
+        """Why it cannot run here, or None."""
+        return None
+
+    def settings(self, problem: Any) -> list[Setting]:
+        """Settings worth trying."""
+        del problem
+        return [
+            Setting(method, f"rtol {rtol:.0e}", values={"method": method, "rtol": rtol})
+            for method, last in (("dop853", 13), ("dopri5", 8))
+            for rtol in tolerances(2, last)
+        ]
+
+    def prepare(self, problem: Any, setting: Setting) -> Callable[[], Outcome]:
+        """A function that runs the problem once from its start."""
+        scene = problem.scene()
+        scene.initial_state()
+        method, rtol = setting.values["method"], setting.values["rtol"]
+
+        def run() -> Outcome:
+            try:
+                run = pn.simulate(
+                    scene, problem.duration, method=method, rtol=rtol, atol=rtol, progress=False
+                )
+            except pn.PinNonidealError as error:
+                return Outcome(None, 0, failure=f"{type(error).__name__}: {error}")
+            return Outcome(run.q[-1], run.stats.steps)
+
+        return run

@@ -1,0 +1,178 @@
+"""The loop a user of Pinocchio writes, at its best: SciPy over pin.aba or pin.constraintDynamics.
+
+Data, constraint models and buffers are made once; LSODA runs through `odeint`, whose loop is compiled.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+from scipy.integrate import ODEintWarning, odeint, solve_ivp
+
+from .base import Outcome, Setting, tolerances
+
+Array = NDArray[np.float64]
+
+# Proximal term of constraintDynamics where rows are redundant (a planar loop closed with three rows has one);
+# its manual suggests 1e-12, and the error in the acceleration is 1e-13 relative then.
+REDUNDANT_MU = 1e-12
+MOST_STEPS = 200_000
+
+
+def anchors(problem: Any) -> list[Any]:
+    """The problem's anchors as Pinocchio's rigid constraint models."""
+    model = problem.model
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, problem.q0)
+    found = []
+    for anchor in problem.anchors:
+        kind = (
+            pin.ContactType.CONTACT_6D
+            if type(anchor).__name__ == "FrameAnchor"
+            else pin.ContactType.CONTACT_3D
+        )
+        one = model.getFrameId(anchor.frame1)
+        ends = [model.frames[one].parentJoint, model.frames[one].placement]
+        if anchor.frame2 is None:
+            ends += [0, data.oMf[one]]
+        else:
+            two = model.frames[model.getFrameId(anchor.frame2)]
+            ends += [two.parentJoint, two.placement]
+        found.append(pin.RigidConstraintModel(kind, model, *ends, pin.ReferenceFrame.LOCAL))
+    return found
+
+
+def is_redundant(problem: Any) -> bool:
+    """Whether an anchor holds a plane, which Pinocchio closes with all three rows."""
+    return any(len(getattr(anchor, "axes", "xyz")) < 3 for anchor in problem.anchors)
+
+
+def proximal(problem: Any) -> Any:
+    return pin.ProximalSettings(1e-14, REDUNDANT_MU if is_redundant(problem) else 0.0, 1)
+
+
+class PinocchioSciPy:
+    """LSODA and DOP853 over Pinocchio's forward dynamics."""
+
+    name = "pin+scipy"
+    title = "Pinocchio + SciPy (Python loop)"
+
+    def missing(self) -> str | None:
+        """Why it cannot run here, or None."""
+        return None
+
+    def settings(self, problem: Any) -> list[Setting]:
+        """Settings worth trying."""
+        del problem
+        tried = [Setting("LSODA", f"rtol {r:.0e}", values={"rtol": r}) for r in tolerances(3, 13)]
+        return tried + [Setting("DOP853", f"rtol {r:.0e}", values={"rtol": r}) for r in tolerances(3, 13)]
+
+    def prepare(self, problem: Any, setting: Setting) -> Callable[[], Outcome]:
+        """A function that runs the problem once from its start."""
+        rate = equation(problem)
+        y0 = np.concatenate([problem.q0, problem.v0])
+        span, rtol, nq = (0.0, problem.duration), setting.values["rtol"], problem.model.nq
+
+        def lsoda() -> Outcome:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", ODEintWarning)
+                y, info = odeint(
+                    rate, y0, span, tfirst=True, rtol=rtol, atol=rtol, full_output=True, mxstep=MOST_STEPS
+                )  # fmt: skip
+            steps = int(info["nst"][-1])
+            if info["message"] != "Integration successful." or not np.isfinite(y).all():
+                return Outcome(None, steps, failure=str(info["message"]))
+            return Outcome(y[-1, :nq], steps)
+
+        def dop853() -> Outcome:
+            out = solve_ivp(rate, span, y0, method="DOP853", rtol=max(rtol, 3e-14), atol=rtol)
+            if not out.success or not np.isfinite(out.y[:, -1]).all():
+                return Outcome(None, len(out.t) - 1, failure=str(out.message))
+            return Outcome(out.y[:nq, -1], len(out.t) - 1)
+
+        return lsoda if setting.family == "LSODA" else dop853
+
+
+def equation(problem: Any) -> Callable[[float, Array], Array]:
+    """dy/dt of y = (q, v)."""
+    model = problem.model
+    data, nq, nv = model.createData(), model.nq, model.nv
+    models = anchors(problem)
+    datas = [c.createData() for c in models]
+    settings = proximal(problem)
+    if models:
+        pin.initConstraintDynamics(model, data, models, datas)
+    floating = model.joints[1].shortname() == "JointModelFreeFlyer"
+    still = np.zeros(nv) if problem.torque is None else problem.torque
+    torque = forces(problem, data)
+
+    def rate(t: float, y: Array) -> Array:
+        q, v = y[:nq], y[nq:]
+        if floating:
+            q = q.copy()
+            q[3:7] /= np.sqrt(q[3:7] @ q[3:7])
+        tau = still if torque is None else torque(q, v)
+        if models:
+            a = pin.constraintDynamics(model, data, q, v, tau, models, datas, settings)
+        else:
+            a = pin.aba(model, data, q, v, tau)
+        if floating:
+            return np.concatenate([base_rate(q, v), v[6:], a])
+        return np.concatenate([v, a])
+
+    return rate
+
+
+def base_rate(q: Array, v: Array) -> list[float]:
+    """Rates of place and quaternion of a floating base; plain floats are faster than arrays of three."""
+    _, _, _, x, y, z, w = q[:7].tolist()
+    a, b, c, p, r, s = v[:6].tolist()
+    tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+    return [
+        a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx,
+        0.5 * (w * p + y * s - z * r), 0.5 * (w * r + z * p - x * s), 0.5 * (w * s + x * r - y * p),
+        -0.5 * (x * p + y * r + z * s),
+    ]  # fmt: skip
+
+
+def forces(problem: Any, data: Any) -> Callable[[Array, Array], Array] | None:
+    """Joint torques that depend on the state; None without any."""
+    model, parts = problem.model, []
+    still = np.zeros(model.nv) if problem.torque is None else problem.torque
+    if problem.hold is not None:
+        kp, kd = problem.hold
+        offset = model.nq - model.nv
+        goal = problem.q0[offset:].copy()
+        parts.append(lambda q, v: kp * (goal - q[offset:]) - kd * v)
+    if problem.coulomb is not None:
+        viscous = np.zeros(model.nv) if problem.viscous is None else problem.viscous
+        parts.append(lambda q, v: -problem.coulomb * np.sign(v) - viscous * v)
+    for spring in problem.springs:
+        parts.append(spring_torque(model, data, spring))
+    if not parts:
+        return None
+    return lambda q, v: still + sum(part(q, v) for part in parts)
+
+
+def spring_torque(model: Any, data: Any, spring: Any) -> Callable[[Array, Array], Array]:
+    """Torque of an undamped spring from the Jacobians of its ends."""
+    one, two = model.getFrameId(spring.frame1), model.getFrameId(spring.frame2)
+    world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+    def torque(q: Array, v: Array) -> Array:
+        del v
+        pin.computeJointJacobians(model, data, q)
+        J = (
+            pin.getFrameJacobian(model, data, one, world)[:3]
+            - pin.getFrameJacobian(model, data, two, world)[:3]
+        )
+        gap = data.oMf[one].translation - data.oMf[two].translation
+        length = np.sqrt(gap @ gap)
+        return J.T @ (-spring.stiffness * (length - spring.rest_length) / length * gap)
+
+    return torque
