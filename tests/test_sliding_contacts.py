@@ -89,7 +89,7 @@ def test_puck_comes_to_rest(across, options):
     assert_close(run.q[-1], 0.5 * speed / (0.2 * GRAVITY) * start, EVENT)
 
 
-# Under a side force m c below mu m g the slip turns: mu g |v| + c v_y falls at the rate (mu g)^2 - c^2 to zero.
+# A side force m c below mu m g turns the slip; mu g |v| + c v_y falls at the rate (mu g)^2 - c^2, to zero.
 CURVE_TIME = 0.2 * GRAVITY * 2.0 / ((0.2 * GRAVITY) ** 2 - 1.0)
 
 
