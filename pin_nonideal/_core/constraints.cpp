@@ -270,6 +270,14 @@ bool has_constant_rows(const Kind& kind) {
            std::holds_alternative<DofRows>(kind);
 }
 
+bool moves_in_time(const Kind& kind) {
+    if (const auto* d = std::get_if<DistanceRows>(&kind)) {
+        const auto* polynomial = std::get_if<Polynomial>(&d->length);
+        return !polynomial || polynomial->coefficients.size() > 1;
+    }
+    return std::holds_alternative<MotionRows>(kind) || std::holds_alternative<UserRows>(kind);
+}
+
 int row_count(const Kind& kind, int user_size) {
     struct Count {
         int user;

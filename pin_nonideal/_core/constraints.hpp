@@ -136,6 +136,8 @@ bool is_geometric(const Kind& kind);
 const Frame* frame1(const Kind& kind);
 const Frame* frame2(const Kind& kind);
 bool has_constant_rows(const Kind& kind);
+// Whether its rate may differ from zero at zero velocity: it moves by itself.
+bool moves_in_time(const Kind& kind);
 int row_count(const Kind& kind, int user_size);
 
 // Residuals, rates and drifts of all rows of the kind, and its wrenches or A.

@@ -15,6 +15,8 @@ constexpr double consistency_tolerance = 1e-6;
 // the same factor in accuracy; two passes of refinement give it back.
 constexpr double refined_pivot_ratio = 1e6;
 constexpr int refinement_passes = 2;
+// A configuration that gives a larger inertia [kg m^2] has run away.
+constexpr double runaway_inertia = 1e30;
 
 void zero(std::vector<Force>& f) { std::fill(f.begin(), f.end(), Force{Vec3::Zero(), Vec3::Zero()}); }
 
@@ -98,6 +100,7 @@ void Program::finish() {
     }
     for (const Friction& f : frictions)
         needs_joint_reactions |= f.load == Friction::Load::user;
+    for (int i = 0; i < constraints; ++i) moves_in_time |= pn::moves_in_time(blocks[i].kind);
     for (Drag& d : drags) d.dofs = mechanism.dofs_of(d.frame.joint);
     driven = !forces.empty() || !std::holds_alternative<NoActuation>(actuation);
     for (const GivenForce& f : forces)
@@ -130,6 +133,7 @@ Workspace::Workspace(const Program& p) {
     limit.assign(elements, 0.0);
     load.assign(elements, 0.0);
     slip_direction.assign(elements, Vec3::UnitX());
+    last_direction = slip_direction;
     slip_force.assign(elements, Vec3::Zero());
     user_C.assign(p.user_laws.size(), VecX::Zero(nv));
     z = VecX::Zero(p.states);
@@ -159,7 +163,7 @@ void want_rows(const Program& p, Workspace& w) {
 void factor_mass(const Program& p, Workspace& w, double t) {
     const int dof = factorize(p.mechanism, w.terms);
     if (dof < 0) return;
-    if (!w.terms.q.allFinite() || !std::isfinite(w.terms.M[p.mechanism.row_offset[dof]]))
+    if (!w.terms.q.allFinite() || !(w.terms.M[p.mechanism.row_offset[dof]] < runaway_inertia))
         throw Failure(Failure::Kind::not_finite, t);
     throw Failure(Failure::Kind::singular_mass, t, {dof});
 }
@@ -198,6 +202,19 @@ static void constrained_solve(const Program& p, Workspace& w, VecX& x, const Vec
         for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.B, lam, x);  // Eq. (40), scaled
     }
     solve_Rt(p.mechanism, w.terms, x);
+}
+
+bool is_immobile(const Program& p, const Workspace& w) {
+    if (p.moves_in_time || p.frictions.empty()) return false;
+    int held = 0;
+    for (char locked : w.terms.locked) held += locked;
+    bool sticks = held > 0;
+    for (int i : w.rows.blocks) {
+        const Block& block = p.blocks[i];
+        for (size_t k = 0; k < block.kept.size(); ++k) held += w.rows.active[block.row + k];
+        sticks |= i >= p.constraints;
+    }
+    return sticks && held >= p.mechanism.nv;
 }
 
 const VecX& holding_forces(const Program& p, Workspace& w) {
@@ -253,6 +270,7 @@ void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const Vec
     if (!p.has_laws()) {
         solve_motion(p, w, w.F);
     } else {
+        w.speed = v.cwiseAbs().maxCoeff();
         smooth_laws(p, w, t, w.terms.q, v);
         if (p.needs_reactions) {
             solve_reactions(p, w, t, w.terms.q, v);
@@ -263,13 +281,14 @@ void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const Vec
         }
     }
     if (!w.a.allFinite()) throw Failure(Failure::Kind::not_finite, t);
+    if (is_immobile(p, w) && (v.array() == 0.0).all()) w.a.setZero();
 }
 
 // Residual of the dependent rows; the worst block, or -1 when all are met.
 static int contradicting_block(const Program& p, Workspace& w, double& worst) {
     int found = -1;
     double excess = 1.0;
-    const double reach = w.a.cwiseAbs().maxCoeff() + 1e-9;  // accelerations in play
+    const double reach = w.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm() + 1e-3;  // accelerations in play
     for (int i : w.rows.blocks) {
         const Block& block = p.blocks[i];
         const int n = static_cast<int>(block.kept.size());

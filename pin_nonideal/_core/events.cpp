@@ -37,23 +37,33 @@ std::vector<Simulation::Watch> Simulation::crossed() {
             if (!gathered && p.needs_reactions) gather_reactions(p, w);
             gathered = true;
             if (indeterminate[e]) continue;
-            if (margin(watch, t1, stepper.y1) < 0.0) list.push_back(watch);
+            bool past = margin(watch, t1, stepper.y1) < 0.0;
+            double least = HUGE_VAL, most = 0.0;  // or may have been past it inside, between two stages
+            for (int i = 0; i < stepper.method.stages; ++i) {
+                const double share = stepper.K[i][system.ny - system.ne + e];
+                least = std::min(least, share);
+                most = std::max(most, share);
+            }
+            past |= most + 0.5 * (most - least) > 1.0 + 1e-9 && most - least > 1e-9;
+            if (past) list.push_back(watch);
             continue;
         }
-        if (margin(watch, t1, stepper.y1) < 0.0) {
+        const double speed = stepper.y1.segment(system.nq, system.nv).cwiseAbs().maxCoeff();
+        const double noise = 1e-3 * rest_speed * (1.0 + speed);  // of an element that has just begun to slip
+        if (margin(watch, t1, stepper.y1) < -noise) {
             list.push_back(watch);
             continue;
         }
         // A dip through zero and back: the cubic through both ends and their slopes tells.
         const auto* d = std::get_if<DofRows>(&p.blocks[p.frictions[e].block].kind);
-        if (!d || d->count != 1) continue;
+        if (!d || d->count != 1 || stepper.method.order < 2) continue;
         const int i = system.nq + d->dof;
         const double s = w.mode[e], u0 = s * stepper.y0[i], u1 = s * stepper.y1[i];
         const double a0 = s * stepper.h * stepper.K[0][i], a1 = s * stepper.h * stepper.f1[i];
         for (double x : {0.2, 0.4, 0.6, 0.8}) {
             const double z = 1.0 - x;
             const double u = z * z * (1.0 + 2.0 * x) * u0 + x * x * (1.0 + 2.0 * z) * u1 + x * z * (z * a0 - x * a1);
-            if (u < 0.0) { list.push_back(watch); break; }
+            if (u < -noise) { list.push_back(watch); break; }
         }
     }
     return list;
@@ -74,7 +84,7 @@ bool Simulation::locate_event() {
     // First sign change over the watched elements, on a coarse grid and then by bisection with secants (Illinois).
     double first = 2.0;
     Watch found{-1, false};
-    constexpr int grid = 8;
+    constexpr int grid = 24;
     for (const Watch& watch : watches) {
         double s0 = 0.0, g0 = 1.0;
         bool passed_positive = false;
@@ -203,6 +213,7 @@ bool Simulation::release_indeterminate() {
     stepper.step(begin, high);
     settle(begin + high, stepper.y1, stepper.f1);
     trigger_element = sticks.front();
+    released_together = true;
     return true;
 }
 
@@ -212,7 +223,7 @@ void Simulation::remember_directions() {
         if (f.dim == 1 || !slips(w.mode[e])) continue;
         Vec3 u = Vec3::Zero();
         for (int k = 0; k < f.dim; ++k) u[k] = w.values[f.block].rate[k];
-        if (u.norm() > 1e-12) w.slip_direction[e] = u.normalized();
+        if (u.norm() > 1e-12) w.slip_direction[e] = w.last_direction[e] = u.normalized();
     }
 }
 
@@ -232,10 +243,11 @@ void Simulation::switch_modes(double at, VecX& state, int trigger) {
     if (system.nz > 0) w.z = state.segment(system.nq + system.nv, system.nz);
     if (p.frictions.empty()) {
         begin_step(p, w, at, q_, v_);
-        system.collect(state, derivative);
+        system.collect(at, state, derivative);
         return;
     }
     const std::vector<signed char> before = w.mode;
+    const std::vector<Vec3> directions = w.slip_direction;
     if (trigger < 0) {  // the start: every element by its velocity
         std::fill(w.mode.begin(), w.mode.end(), 1);
         kinematics(p.mechanism, w.terms, q_, v_);
@@ -255,7 +267,7 @@ void Simulation::switch_modes(double at, VecX& state, int trigger) {
             w.mode[e] = 1;
             Vec3 u = Vec3::Zero();
             for (int k = 0; k < f.dim; ++k) u[k] = values.rate[k];
-            w.slip_direction[e] = u.normalized();
+            w.slip_direction[e] = w.last_direction[e] = u.normalized();
         }
     }
     // What is at rest has no slip velocity at all.
@@ -269,16 +281,20 @@ void Simulation::switch_modes(double at, VecX& state, int trigger) {
         state.head(system.nq) = q_;
         state.segment(system.nq, system.nv) = v_;
     }
-    resolve_modes(p, w, at, q_, v_, candidates, trigger >= 0 && before[trigger] == sticking ? trigger : -1);
+    const int breaking = released_together ? any_at_limit : trigger >= 0 && before[trigger] == sticking ? trigger : -1;
+    released_together = false;
+    resolve_modes(p, w, at, q_, v_, candidates, breaking);
     std::fill(indeterminate.begin(), indeterminate.end(), char(0));
     if (p.needs_reactions) gather_reactions(p, w);
     for (int e : candidates)
-        if (w.mode[e] == sticking &&
-            friction_force(p, w, e).norm() > static_limit(p, w, e, at, q_, v_) * (1.0 + 1e-9))
+        if (w.mode[e] == sticking && ((e == trigger && before[e] == sticking) ||
+            friction_force(p, w, e).norm() > static_limit(p, w, e, at, q_, v_) * (1.0 + 1e-9)))
             indeterminate[e] = 1;
-    system.collect(state, derivative);
+    system.collect(at, state, derivative);
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
-        if (trigger < 0 || before[e] == w.mode[e]) continue;
+        const bool turned = e == trigger && before[e] == 1 && w.mode[e] == 1 && p.frictions[e].dim > 1 &&
+                            directions[e].dot(w.slip_direction[e]) < 0.0;
+        if (trigger < 0 || (before[e] == w.mode[e] && !turned)) continue;
         const auto kind = w.mode[e] == sticking ? Event::Kind::stick
                           : before[e] == sticking ? Event::Kind::slip : Event::Kind::reverse;
         out.events.push_back({at, kind, e});

@@ -4,10 +4,14 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "modes.hpp"
 #include "projection.hpp"
 #include "tableaux.hpp"
 
 namespace pn {
+
+// Part of its limit to which the force of a sticking element is resolved over a step.
+constexpr double watch_tolerance = 1e-4;
 
 Method method_named(const std::string& name) {
     using K = Method::Kind;
@@ -22,7 +26,7 @@ Method method_named(const std::string& name) {
 
 System::System(const Program& program, Workspace& workspace, bool with_energy)
     : p(program), w(workspace), energy(with_energy), nq(p.mechanism.nq), nv(p.mechanism.nv), nz(p.states),
-      nw(with_energy ? 3 + static_cast<int>(p.law_names.size()) : 0), ny(nq + nv + nz + nw),
+      nw(with_energy ? 3 + static_cast<int>(p.law_names.size()) : 0), ne(static_cast<int>(program.frictions.size())), ny(nq + nv + nz + nw + ne),
       q_buffer(VecX::Zero(nq)), v_buffer(VecX::Zero(nv)), projected(VecX::Zero(ny)) {}
 
 void System::derivative(double t, const VecX& y, VecX& dy) {
@@ -32,7 +36,7 @@ void System::derivative(double t, const VecX& y, VecX& dy) {
     if (!on_constraints) {
         evaluate(p, w, t, q_buffer, v_buffer);
         if (!w.rows.blocks.empty()) smallest_pivot = std::min(smallest_pivot, w.rows.distance);
-        collect(y, dy);
+        collect(t, y, dy);
         return;
     }
     project(p, w, t, q_buffer, v_buffer);
@@ -40,16 +44,28 @@ void System::derivative(double t, const VecX& y, VecX& dy) {
     projected = y;
     projected.head(nq) = q_buffer;
     projected.segment(nq, nv) = v_buffer;
-    collect(projected, dy);
+    collect(t, projected, dy);
 }
 
-void System::collect(const VecX& y, VecX& dy) {
+void System::collect(double t, const VecX& y, VecX& dy) {
     configuration_rate(p.mechanism, y.data(), y.data() + nq, dy.data());
     dy.segment(nq, nv) = w.a;
     if (nz > 0) dy.segment(nq + nv, nz) = w.dz;
     if (energy) {
         v_buffer = y.segment(nq, nv);
         powers(p, w, v_buffer, dy.data() + nq + nv + nz);
+    }
+    bool gathered = !p.needs_reactions;
+    for (int e = 0; e < ne; ++e) {
+        double& share = dy[ny - ne + e];
+        share = 0.0;
+        if (w.mode[e] != sticking) continue;
+        if (!gathered) gather_reactions(p, w);
+        gathered = true;
+        q_buffer = y.head(nq);
+        v_buffer = y.segment(nq, nv);
+        const double limit = static_limit(p, w, e, t, q_buffer, v_buffer);
+        share = friction_force(p, w, e).norm() / std::max(limit, 1e-300);
     }
 }
 
@@ -116,7 +132,8 @@ void Stepper::magnitude(const VecX& y, VecX& out) const {
 }
 
 double Stepper::norm(const VecX& dy, const VecX& scale, const VecX& y) {
-    const int nq = system.nq, nv = system.nv, n = 2 * nv + system.nz;
+    const int nq = system.nq, nv = system.nv;
+    int n = 2 * nv + system.nz;
     ambient_to_tangent(system.p.mechanism, y.data(), dy.data(), tangent.data());
     tangent.segment(nv, nv + system.nz) = dy.segment(nq, nv + system.nz);
     if (system.on_constraints) {
@@ -124,9 +141,15 @@ double Stepper::norm(const VecX& dy, const VecX& scale, const VecX& y) {
         remove_normal_part(nv);
     }
     double sum = 0.0;
-    for (int k = 0; k < n; ++k) {
+    for (int k = 0; k < 2 * nv + system.nz; ++k) {
         const double x = tangent[k] / scale[k];
         sum += x * x;
+    }
+    for (int e = 0; e < system.ne; ++e) {
+        if (system.w.mode[e] != sticking) continue;
+        const double x = dy[system.ny - system.ne + e] / watch_scale_;
+        sum += x * x;
+        ++n;
     }
     return std::sqrt(sum / n);
 }
@@ -150,6 +173,7 @@ double Stepper::error_norm(double rtol, const VecX& atol) {
     magnitude(y0, scale_);
     magnitude(y1, scale_);
     scale_ = atol + rtol * scale_;
+    watch_scale_ = watch_tolerance * std::abs(h);
     error5.setZero();
     if (method.kind == Method::Kind::dopri5) {
         for (int j = 0; j < 6; ++j) error5 += (h * tableau::dopri5_E[j]) * K[j];
@@ -195,7 +219,12 @@ void Stepper::make_dense() {
         }
         return;
     }
-    dense[0] = delta;  // cubic through both ends and their rates
+    dense[0] = delta;  // a line for the method of order 1, else the cubic through both ends and their rates
+    if (method.order < 2) {
+        dense[1].setZero();
+        dense[2].setZero();
+        return;
+    }
     dense[1] = h * K[0] - delta;
     dense[2] = 2.0 * delta - h * (f1 + K[0]);
 }
@@ -219,6 +248,7 @@ double Stepper::initial_step(double t, const VecX& y, double rtol, const VecX& a
     scale_.setZero();
     magnitude(y, scale_);
     scale_ = atol + rtol * scale_;
+    watch_scale_ = watch_tolerance;
     VecX plain = y;
     for (const Chart& c : system.p.mechanism.charts)
         if (c.kind != Chart::Kind::vector) plain.segment(c.iq, 1).setZero();

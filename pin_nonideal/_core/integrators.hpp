@@ -1,4 +1,6 @@
-// Explicit Runge-Kutta methods as data, and one stepping routine on the flat state y = (q, v, z, work).
+// Explicit Runge-Kutta methods as data, and one stepping routine on the flat state y = (q, v, z, work, watch).
+// watch integrates |force| / limit of each sticking element, so that the step control resolves a load that comes and
+// goes while nothing moves, and the stages tell whether a limit was passed.
 //
 // q is integrated in ambient coordinates (a quaternion as four numbers): the right-hand side extends smoothly off the
 // unit sphere, so the order is kept, and lengths are restored at the step's end.
@@ -28,12 +30,12 @@ struct System {
     // projected first: y' = f(P(y)) has the same solutions and no such cliff.
     bool on_constraints = false;
     double smallest_pivot = 1.0;  // of the rows' factor, over the evaluations since it was set
-    int nq, nv, nz, nw, ny;
+    int nq, nv, nz, nw, ne, ny;  // sizes of q, v, z, work, watched elements, y
 
     System(const Program& program, Workspace& workspace, bool with_energy);
     void derivative(double t, const VecX& y, VecX& dy);
     // dy from the evaluation that the workspace holds.
-    void collect(const VecX& y, VecX& dy);
+    void collect(double t, const VecX& y, VecX& dy);
     auto q(VecX& y) const { return y.head(nq); }
     auto v(VecX& y) const { return y.segment(nq, nv); }
 
@@ -69,6 +71,7 @@ private:
     void remove_normal_part(int start);
     double norm(const VecX& dy, const VecX& scale, const VecX& y);
     VecX scale_, probe_, probe_rate_;
+    double watch_scale_ = 1.0;
 };
 
 }  // namespace pn

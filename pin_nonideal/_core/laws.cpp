@@ -34,15 +34,19 @@ Vec3 slip_velocity(const Workspace& w, const Friction& f) {
     return u;
 }
 
+// Slip slower than this part of the scene's speed has no direction of its own but rounding.
+constexpr double directed_speed = 1e-9;
+
 // Unit direction of the friction force of a slipping element.
-Vec3 force_direction(const Program& p, const Workspace& w, size_t e) {
+Vec3 force_direction(const Program& p, Workspace& w, size_t e, double scene_speed) {
     const Friction& f = p.frictions[e];
     if (f.dim == 1) return Vec3(-w.mode[e], 0.0, 0.0);
     const Vec3 u = slip_velocity(w, f);
     const double speed = u.norm();
-    if (speed < 1e-14) return -w.slip_direction[e];
-    // Past a reversal inside a step the direction goes on as it was, so that the step sees a smooth law.
-    return u.dot(w.slip_direction[e]) >= 0.0 ? Vec3(-u / speed) : Vec3(u / speed);
+    if (speed > directed_speed * (1.0 + scene_speed))
+        // Past a reversal inside a step the direction goes on as it was, so that the step sees a smooth law.
+        w.last_direction[e] = u.dot(w.slip_direction[e]) >= 0.0 ? Vec3(u / speed) : Vec3(-u / speed);
+    return -w.last_direction[e];
 }
 
 bool load_dependent(const Friction& f) { return f.reaction != Reaction::none; }
@@ -173,7 +177,7 @@ void add_slip_forces(const Program& p, Workspace& w, VecX& C, bool dependent) {
     for (size_t e = 0; e < p.frictions.size(); ++e) {
         const Friction& f = p.frictions[e];
         if (load_dependent(f) != dependent || !slips(w.mode[e])) continue;
-        w.slip_force[e] = w.limit[e] * force_direction(p, w, e);
+        w.slip_force[e] = w.limit[e] * force_direction(p, w, e, w.speed);
         if (const auto* d = std::get_if<DofRows>(&p.blocks[f.block].kind)) {
             for (int k = 0; k < d->count; ++k) add(w, C, f.law, d->dof + k, w.slip_force[e][k]);
         } else {
@@ -205,9 +209,9 @@ void gather_reactions(const Program& p, Workspace& w) {
         for (size_t k = 0; k < block.kept.size(); ++k)
             apply(block, w.values[i].wrench[block.kept[k]], w.lam_shared[block.row + k]);
     }
-    for (size_t e = 0; e < p.frictions.size(); ++e) {  // and what slips there
+    for (size_t e = 0; e < p.frictions.size(); ++e) {  // and what slips there, or is tried while modes are sought
         const Friction& f = p.frictions[e];
-        if (!slips(w.mode[e]) || !w.values[f.block].geometric) continue;
+        if (w.mode[e] == sticking || !w.values[f.block].geometric) continue;
         for (int k = 0; k < f.dim; ++k) apply(p.blocks[f.block], w.values[f.block].wrench[k], w.slip_force[e][k]);
     }
     for (int i = 0; i < n; ++i) w.momentum[i] = {Vec3::Zero(), Vec3::Zero()};

@@ -180,7 +180,7 @@ struct Candidates {
         for (size_t i = 0, at = 0; i < list.size(); at += dims[i], ++i) {
             const auto fe = f.segment(at, dims[i]);
             const auto ae = alpha.segment(at, dims[i]);
-            const bool breaks = list[i] == breaking && fe.norm() >= limits[i] * (1.0 - slack);
+            const bool breaks = (list[i] == breaking || breaking == any_at_limit) && fe.norm() >= limits[i] * (1.0 - slack);
             const bool slides = fe.norm() >= limits[i] * (1.0 - 1e-13) && ae.norm() > 1e-12 * size;
             if (!breaks && !slides) continue;
             const VecX direction = slides ? VecX(ae.normalized()) : VecX(-fe.normalized());
@@ -188,6 +188,7 @@ struct Candidates {
             if (dims[i] == 1) continue;
             w.slip_direction[list[i]].setZero();
             w.slip_direction[list[i]].head(dims[i]) = direction;
+            w.last_direction[list[i]] = w.slip_direction[list[i]];
         }
         return modes;
     }
@@ -237,48 +238,51 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
         return;
     }
     // Without any friction of the candidates: alpha0, W, and first limits from the load there.
+    for (int e : candidates) w.slip_force[e].setZero();
     c.apply_modes(std::vector<signed char>(candidates.size(), unloaded));
-    VecX alpha0 = c.accelerations();
-    VecX limits(candidates.size());
+    const VecX C_smooth = w.C_smooth;
+    VecX alpha0 = c.accelerations(), limits(candidates.size()), f, push(p.mechanism.nv);
     for (size_t i = 0; i < candidates.size(); ++i) limits[i] = static_limit(p, w, candidates[i], t, q, v);
     const MatX W = c.responses();
     std::vector<signed char> modes(candidates.size(), unloaded);
     double change = 0.0;
     for (int it = 0; it < outer_limit; ++it) {
-        const VecX f = friction_program(W, alpha0, c.dims, limits);
+        f = friction_program(W, alpha0, c.dims, limits);
         const VecX alpha = alpha0 + W * f;
         const double size = alpha0.cwiseAbs().maxCoeff() + 1e-300;
         const auto next = c.modes_of(f, alpha, limits, size, it < breaking_passes ? breaking : -1);
         const bool same = next == modes;
         modes = next;
-        c.apply_modes(modes);
-        // The motion with these modes: does everything keep its condition?
-        const VecX actual = c.accelerations();
-        VecX forces(c.rows), loads(candidates.size());
-        bool consistent = true;
+        if (same && change <= limit_tolerance) break;
+        if (it + 1 == outer_limit) throw Failure(Failure::Kind::paradox, t, candidates, w.determinant);
+        // The motion under these forces, and the limits that its loads give: the kinetic one for what slips.
+        push.setZero();
+        VecX unit = VecX::Zero(p.layout.rows);
         for (size_t i = 0, at = 0; i < candidates.size(); at += c.dims[i], ++i) {
-            const int e = candidates[i];
-            const Vec3 fe = friction_force(p, w, e);
-            forces.segment(at, c.dims[i]) = fe.head(c.dims[i]);
-            loads[i] = static_limit(p, w, e, t, q, v);
-            if (modes[i] == sticking) {
-                consistent &= fe.norm() <= loads[i] * (1.0 + slack) + 1e-300;
-            } else {
-                const double along = c.dims[i] == 1 ? modes[i] * actual[at]
-                    : actual.segment(at, c.dims[i]).dot(w.slip_direction[e].head(c.dims[i]));
-                consistent &= along >= -1e-9 * size;
-                // What slips feels kinetic friction from now on.
-                loads[i] = w.limit[e];
-            }
+            const Block& from = c.block(candidates[i]);
+            for (int k = 0; k < c.dims[i]; ++k) unit[from.row + k] = w.slip_force[candidates[i]][k] = f[at + k];
+            add_transpose(from, w.A, unit, push);
         }
+        w.C_smooth = C_smooth + push;
+        if (p.needs_reactions) {
+            solve_reactions(p, w, t, w.terms.q, v);
+        } else {
+            w.C = w.C_smooth;
+            w.trial = w.F + w.C;
+            solve_motion(p, w, w.trial);
+        }
+        alpha0 = c.accelerations() - W * f;
         change = 0.0;
-        for (int i = 0; i < loads.size(); ++i)
-            change = std::max(change, std::abs(loads[i] - limits[i]) / std::max(loads[i], 1e-300));
-        if (consistent && (same || change <= limit_tolerance || !p.needs_reactions)) return;
-        alpha0 = actual - W * forces;
-        limits = loads;
+        for (size_t i = 0; i < candidates.size(); ++i) {
+            const Friction& friction = p.frictions[candidates[i]];
+            double limit = static_limit(p, w, candidates[i], t, q, v);
+            if (modes[i] != sticking) limit *= speed_factor(friction, 0.0) / friction.static_ratio;
+            change = std::max(change, std::abs(limit - limits[i]) / std::max(limit, 1e-300));
+            limits[i] = limit;
+        }
     }
-    throw Failure(Failure::Kind::paradox, t, candidates, change);
+    for (int e : candidates) w.slip_force[e].setZero();
+    c.apply_modes(modes);
 }
 
 }  // namespace pn

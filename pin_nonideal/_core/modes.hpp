@@ -12,18 +12,14 @@ namespace pn {
 // Slip slower than this part of the scene's speed is rest: rounding of the located event.
 constexpr double rest_speed = 1e-11;
 
-struct ModeChange {
-    int element;
-    signed char before, after;
-};
-
 // min f^T W f / 2 + alpha0^T f with |f_e| <= s_e: f for elements whose directions lie one after the other (dims[e]
 // rows each). Exact (principal pivoting) for elements of one direction.
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& limits);
 
 // Finds the modes of the candidate elements together, at rest along their directions; the workspace ends evaluated
 // there with the new modes. `breaking` is a candidate that stuck until now and has just reached its limit: it slips
-// as soon as its force is at the limit, though its acceleration is still zero.
+// as soon as its force is at the limit, though its acceleration is still zero; `any_at_limit` lets all do so that are.
+constexpr int any_at_limit = -3;
 void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                    const std::vector<int>& candidates, int breaking = -1);
 

@@ -214,7 +214,7 @@ struct Runner {  // a workspace and the program it belongs to
             else {
                 Vec3 u = Vec3::Zero();
                 for (int k = 0; k < f.dim; ++k) u[k] = w->values[f.block].rate[k];
-                w->slip_direction[e] = u.normalized();
+                w->slip_direction[e] = w->last_direction[e] = u.normalized();
             }
         }
         resolve_modes(*p, *w, t, q, v, candidates);
@@ -226,6 +226,7 @@ struct Runner {  // a workspace and the program it belongs to
         if (!has_unit_lengths(p->mechanism, q.data(), unit_tolerance))
             throw std::invalid_argument("q holds a part that is not of unit length");
         read_buffer(v_in, v);
+        if (!std::isfinite(t)) throw std::invalid_argument("expected a finite time");
         w->has_override = !tau.is_none();
         if (w->has_override) read_buffer(tau, w->override_torque);
         if (p->frictions.empty()) begin_step(*p, *w, t, q, v);

@@ -84,6 +84,7 @@ struct Program {
     bool needs_joint_reactions = false;  // of tree joints
     bool driven = false;                 // forces or actuation
     bool has_body_forces = false;        // given forces that act on bodies
+    bool moves_in_time = false;          // some constraint moves by itself
 
     // Numbers the kept rows, finds supports and lays out the storage; called again when rows are left out.
     void finish();
@@ -105,7 +106,9 @@ struct Workspace {
     std::vector<signed char> mode;    // +1, -1 slip, 0 stick
     std::vector<double> limit;        // kinetic, at the present load and slip speed
     std::vector<double> load;         // limit at rest before the static ratio
-    std::vector<Vec3> slip_direction; // of the step's start, for elements of two or three directions
+    // For elements of two or three directions: of the step's start, and where slip last had a clear direction.
+    std::vector<Vec3> slip_direction, last_direction;
+    double speed = 0.0;               // largest velocity of the evaluation
     VecX balance;                     // M a - F - C - A^T lam: what holds the locked dofs
     bool has_balance = false;
     std::vector<Vec3> slip_force;     // of each slipping element, along its directions
@@ -146,6 +149,8 @@ void want_rows(const Program& p, Workspace& w);
 // Evaluates at a step's start and decides which rows are independent here; contradicting rows are a failure.
 void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 
+// Whether sticking elements and constraints leave no freedom at all: then nothing moves, exactly.
+bool is_immobile(const Program& p, const Workspace& w);
 // Forces that hold the locked dofs, for the motion in the workspace.
 const VecX& holding_forces(const Program& p, Workspace& w);
 

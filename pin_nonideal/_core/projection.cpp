@@ -54,6 +54,7 @@ double scene_size(const Workspace& w) {
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
     for (int dof = 0; dof < p.mechanism.nv; ++dof)
         if (w.terms.locked[dof]) v[dof] = 0.0;  // what sticks has exactly no velocity
+    if (is_immobile(p, w)) v.setZero();
     if (w.rows.blocks.empty()) return false;
     look(p, w, t, q, v);
     const double floor = projection_floor * scene_size(w);

@@ -30,7 +30,7 @@ void Recorder::sample(double t, const VecX& y, bool evaluated) {
     if (options.energy) {
         out.energy.push_back(kinetic_energy(p.mechanism, w.terms, v_));
         out.energy.push_back(potential_energy(p.mechanism, w.terms));
-        append(out.energy, y.tail(system.nw));
+        append(out.energy, y.segment(system.nq + system.nv + system.nz, system.nw));
         out.energy.push_back(moved_energy);
     }
     if (options.forces) {

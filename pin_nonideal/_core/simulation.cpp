@@ -42,7 +42,7 @@ void Simulation::sample_control(double now) {
     next_period = static_cast<long>(std::floor((now - o.t0) / sampled->period * (1.0 + 1e-14) + 1e-9)) + 1;
     // The torque jumps here: the derivative is taken anew.
     begin_step(p, w, now, q_, v_);
-    system.collect(y, derivative);
+    system.collect(now, y, derivative);
 }
 
 double Simulation::next_stop(double now) const {
@@ -100,7 +100,7 @@ void Simulation::settle(double at, VecX& state, VecX& rate) {
     state.head(system.nq) = q_;
     state.segment(system.nq, system.nv) = v_;
     begin_step(p, w, at, q_, v_);
-    system.collect(state, rate);
+    system.collect(at, state, rate);
     if (moved && o.record.energy)
         pending_energy = kinetic_energy(p.mechanism, w.terms, v_) + potential_energy(p.mechanism, w.terms) - before;
     else pending_energy = 0.0;

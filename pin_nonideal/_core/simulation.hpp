@@ -75,6 +75,7 @@ private:
     bool last_rejected = false;
     double pending_energy = 0.0;  // moved by the projection that ends the step
     int trigger_element = -1;
+    bool released_together = false;  // redundant elements that could hold no longer
     long next_period = 0;
 };
 

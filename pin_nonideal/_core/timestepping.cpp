@@ -110,7 +110,8 @@ void Simulation::moreau_step(double step) {
         probe_rate_.setZero();
         w.lam = lam_free + multipliers * f;
         powers(p, w, mean, probe_rate_.data() + nq + nv + system.nz);
-        y.tail(system.nw) += step * probe_rate_.tail(system.nw);
+        const int at = nq + nv + system.nz;
+        y.segment(at, system.nw) += step * probe_rate_.segment(at, system.nw);
     }
     if (system.nz > 0) y.segment(nq + nv, system.nz) += step * w.dz;
     move = 0.5 * step * v1;
