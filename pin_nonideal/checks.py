@@ -116,8 +116,21 @@ def choice(what: str, value: Any, allowed: Sequence[Any]) -> Any:
     if not any(value is a or (isinstance(value, type(a)) and value == a) for a in allowed):
         names = [a for a in allowed if isinstance(a, str)]
         hint = nearest(value, names) if isinstance(value, str) else ""
+        if not hint.startswith("; nearest"):  # the message lists them already
+            hint = ""
         raise InputError(f"{what} must be one of {', '.join(map(repr, allowed))}; got {value!r}{hint}")
     return value
+
+
+def sequence(what: str, value: Any) -> tuple[Any, ...]:
+    """A list or tuple, as a tuple.
+
+    Raises:
+        InputError: it is something else, such as one description that was not put into a list.
+    """
+    if not isinstance(value, (list, tuple)):
+        raise InputError(f"{what} must be a list; got {value!r}")
+    return tuple(value)
 
 
 def array(what: str, value: Any, shape: Sequence[int | None]) -> NDArray[np.float64]:

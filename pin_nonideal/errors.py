@@ -31,10 +31,6 @@ class LoadingError(PinNonidealError, ValueError):
     """A file cannot be turned into a scene."""
 
 
-class SingularMassError(PinNonidealError, ValueError):
-    """The mass matrix M(q) is not positive definite (massless or negative links)."""
-
-
 class OutputError(PinNonidealError, OSError):
     """A file cannot be written or read back."""
 
@@ -45,12 +41,18 @@ class RunError(PinNonidealError, RuntimeError):
     Attributes:
         trajectory: what was computed up to the failure (`pin_nonideal.Trajectory`), or None outside of a run.
         time: time of the failure [s], or None.
+        index: which state of a rollout it was, or None.
     """
 
     def __init__(self, message: str, *, time: float | None = None) -> None:
         super().__init__(message)
         self.time = time
         self.trajectory: Any = None
+        self.index: int | None = None
+
+
+class SingularMassError(RunError, ValueError):
+    """The mass matrix M(q) is not positive definite (massless or negative links)."""
 
 
 class InconsistentConstraintsError(RunError):

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from .actuation import HoldPosition, SampledControl, Table
 from .checks import array, axis_triad, unit_axis
 from .compiled import load_core
+from .configurations import configuration
 from .constraints import (
     Distance,
     FrameAnchor,
@@ -28,7 +29,7 @@ from .constraints import (
     UserConstraint,
 )
 from .contacts import PointContact
-from .errors import InputError, PinNonidealError, UnknownNameError, UserFunctionError, nearest
+from .errors import InputError, RunError, UnknownNameError, UserFunctionError, nearest
 from .forces import JointSpring, SpringDamper, UserForce, Wrench
 from .laws import Drag, JointFriction, LuGre, SigmoidFriction, UserFriction, UserLaw
 from .timefunctions import Constant, Polynomial, Sinusoid, Spline
@@ -53,7 +54,7 @@ class Lowered:
         anchors: (name, frame id 1, frame id 2 or None for the world) of what joins two frames.
         friction_names: names of the frictional elements, in the core's order.
         law_names: names of the laws, in the core's order (columns of the ledger).
-        user_blocks: blocks whose rows come from Python functions.
+        opaque: blocks whose rows a few samples do not show, given by Python functions or functions of time.
         unprojected: names of user constraints without residual and rate.
         z0: initial states of laws.
     """
@@ -64,7 +65,7 @@ class Lowered:
     anchors: list[tuple[str, int, int | None]] = field(default_factory=list)
     friction_names: list[str] = field(default_factory=list)
     law_names: list[str] = field(default_factory=list)
-    user_blocks: set[int] = field(default_factory=set)
+    opaque: set[int] = field(default_factory=set)
     unprojected: list[str] = field(default_factory=list)
     z0: Array = field(default_factory=lambda: np.zeros(0))
 
@@ -148,7 +149,7 @@ def checked(function: Callable[..., Any], who: str, *shapes: tuple[int, ...]) ->
     def call(*arguments: Any) -> Any:
         try:
             value = function(*arguments)
-        except PinNonidealError:
+        except RunError:
             raise
         except Exception as error:
             raise UserFunctionError(f"{who} raised {type(error).__name__}: {error}") from error
@@ -296,7 +297,9 @@ class Lowering:
         elif isinstance(c, PrescribedMotion):
             joint = self.joint(c.joint, who)
             period = 2.0 * math.pi if self.model.joints[joint].nq == 2 else 0.0
-            self._add(name, add.add_motion(name, joint, time_function(c.function, who), period), 1)
+            block = add.add_motion(name, joint, time_function(c.function, who), period)
+            self.out.opaque.add(block)
+            self._add(name, block, 1)
         elif isinstance(c, KnifeEdge):
             self._add(name, add.add_knife(name, self.frame(c.frame, who), list(unit_axis(who, c.axis))), 1)
         elif isinstance(c, Rolling):
@@ -329,6 +332,8 @@ class Lowering:
         elif not callable(length):
             length = Constant(length)
         block = self.out.builder.add_distance(name, f1, f2, time_function(length, who))
+        if not isinstance(length, Constant):
+            self.out.opaque.add(block)
         self._add(name, block, 1, (c.frame1, c.frame2))
 
     def _coupling(self, c: JointCoupling, name: str, who: str) -> None:
@@ -375,7 +380,7 @@ class Lowering:
         if residual is None and rate is None:
             self.out.unprojected.append(name)
         block = self.out.builder.add_user(name, size, rows, residual, rate)
-        self.out.user_blocks.add(block)
+        self.out.opaque.add(block)
         self._add(name, block, size)
 
     def _pinocchio(self, c: Any, name: str) -> None:
@@ -579,7 +584,7 @@ class Lowering:
         if isinstance(u, SampledControl):
             add.set_sampled_torque(checked(u.function, f"{_who(u)}: function", (nv,)), u.period)
         elif isinstance(u, HoldPosition):
-            q = self.q0 if u.q is None else array(f"{_who(u)}: q", u.q, (self.model.nq,))
+            q = self.q0 if u.q is None else configuration(self.model, u.q, f"{_who(u)}: q")
             add.set_hold_position(self.gains(u, "kp"), self.gains(u, "kd"), np.ascontiguousarray(q))
         elif isinstance(u, Table):
             times, values = np.asarray(u.times), np.asarray(u.values)

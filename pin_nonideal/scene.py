@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from .checks import array, number
+from .checks import array, number, sequence
 from .closure import close_loops
 from .configurations import configuration
 from .constraints import KnifeEdge, Rolling, UserConstraint
@@ -21,7 +21,6 @@ from .errors import (
     InputError,
     LoopClosureError,
     NonFiniteError,
-    PinNonidealError,
     RunError,
     SingularMassError,
     StepSizeError,
@@ -98,11 +97,12 @@ class Scene:
             raise InputError(f"Scene: model must be a pinocchio.Model; got {type(model).__name__}")
         self.model = model
         self.name = name or model.name or "scene"
-        self.constraints, self.laws = tuple(constraints), tuple(laws)
-        self.contacts, self.forces, self.actuation = tuple(contacts), tuple(forces), actuation
+        self.constraints, self.laws = sequence("constraints", constraints), sequence("laws", laws)
+        self.contacts, self.forces = sequence("contacts", contacts), sequence("forces", forces)
+        self.actuation = actuation
         self.visual_model, self.collision_model = visual_model, collision_model
         self.notes, self.source, self.licence = list(notes), source, licence
-        self._check_inertias()
+        self._check_model()
         self.q0 = pin.neutral(model) if q0 is None else self._configuration(q0, "q0")
         self.v0 = np.zeros(model.nv) if v0 is None else self._velocity(v0, "v0")
         self.dropped: list[tuple[str, int, str]] = []
@@ -128,15 +128,26 @@ class Scene:
 
     # --- analysis ---------------------------------------------------------------------------------------------
 
-    def _check_inertias(self) -> None:
-        for i in range(1, self.model.njoints):
-            Y = self.model.inertias[i]
-            if not (np.isfinite(Y.mass) and np.isfinite(Y.lever).all() and np.isfinite(Y.inertia).all()):
-                raise InputError(f'Scene: the inertia of joint "{self.model.names[i]}" must be finite; got {Y}')
+    def _check_model(self) -> None:
+        model = self.model
+        for i in range(1, model.njoints):
+            Y, name = model.inertias[i], model.names[i]
+            parts = ("mass", Y.mass), ("center of mass", Y.lever), ("inertia", Y.inertia)
+            for what, value in parts:
+                array(f'Scene: the {what} moved by joint "{name}"', value, np.shape(value))
             if Y.mass < 0.0:
                 raise InputError(
-                    f'Scene: the mass moved by joint "{self.model.names[i]}" must not be negative; got {Y.mass:g} kg'
+                    f'Scene: the mass moved by joint "{name}" must not be negative; got {Y.mass:g} kg'
                 )
+            array(f'Scene: the place of joint "{name}"', model.jointPlacements[i].homogeneous, (4, 4))
+        for frame in model.frames:
+            array(f'Scene: the place of frame "{frame.name}"', frame.placement.homogeneous, (4, 4))
+        array("Scene: the gravity of the model", model.gravity.vector, (6,))
+        armature = array("Scene: the armature of the model", model.armature, (model.nv,))
+        if (armature < 0.0).any():
+            raise InputError(
+                f"Scene: the armature of the model must not be negative; got {armature.min():g} kg m^2"
+            )
 
     def _lower(self) -> Any:
         low = Lowering(self.model, self.q0)
@@ -178,9 +189,9 @@ class Scene:
             return
         runner = self._builder.runner()
         blocks = self._lowered.blocks
-        fixed = np.zeros(m, dtype=bool)  # rows of Python functions may look special at a few states only
+        fixed = np.zeros(m, dtype=bool)  # rows that may look special at a few states and times only
         for name, block in blocks.items():
-            fixed[self.constraint_slices[name]] = block in self._lowered.user_blocks
+            fixed[self.constraint_slices[name]] = block in self._lowered.opaque
         if fixed.all():
             return
         samples = []
@@ -193,8 +204,8 @@ class Scene:
         tiny = STRUCTURAL * max(float(length.max()), 1e-300)
         keep = np.ones(m, dtype=bool)
         owner = {row: name for name, s in self.constraint_slices.items() for row in range(s.start, s.stop)}
-        for row in np.flatnonzero((length <= tiny) & ~fixed):
-            name, local = owner[row], int(row) - self.constraint_slices[owner[row]].start
+        for row in map(int, np.flatnonzero((length <= tiny) & ~fixed)):
+            name, local = owner[row], row - self.constraint_slices[owner[row]].start
             asked = float(np.abs(right[row]).max())
             if asked > 1e-9 * max(1.0, float(np.abs(right).max())):
                 raise InconsistentConstraintsError(
@@ -329,7 +340,7 @@ class Scene:
         if not self.constraint_slices:
             return q, v
         try:
-            A, _, phi, _ = self._rows(runner, q, v, t)
+            phi = self._rows(runner, q, v, t)[2]
             if float(np.abs(phi).max(initial=0.0)) > 1e-3:
                 q, _ = close_loops(self.model, self._holonomic(runner, t), self._mass(runner), q)
             q, v = runner.project(q, v, t)
@@ -408,11 +419,12 @@ class Scene:
             InconsistentConstraintsError, FrictionParadoxError, SingularMassError: there is no solution.
         """
         if modes is not None:
-            modes = [int(m) for m in modes]
-            if len(modes) != len(self.element_names) or any(m not in (-1, 0, 1) for m in modes):
+            asked = np.asarray(modes)
+            if asked.shape != (len(self.element_names),) or not np.isin(asked, (-1, 0, 1)).all():
                 raise InputError(
                     f"modes must hold {len(self.element_names)} numbers out of -1, 0, 1; got {modes}"
                 )
+            modes = [int(m) for m in asked]
         out = self._call(self._runner.solve, q, v, t, tau, modes)
         return Solution(
             out["a"], out["F_ideal"], out["F_nonideal"], out["lam"], out["rank"],
@@ -469,7 +481,7 @@ class Scene:
 
     # --- words ------------------------------------------------------------------------------------------------
 
-    def failure(self, text: str) -> PinNonidealError:
+    def failure(self, text: str) -> RunError:
         """The core's failure as the exception that names what is to blame.
 
         Args:
@@ -483,9 +495,11 @@ class Scene:
         if kind == "1":
             blamed = [names[i] if i < len(names) else self.element_names[i - len(names)] for i in items]
             quoted = " and ".join(f'"{n}"' for n in blamed)
-            verb = "contradict each other" if len(blamed) > 1 else "contradicts itself"
+            blame = f"constraints {quoted} contradict each other" if len(blamed) > 1 else (
+                f"constraint {quoted} contradicts itself"
+            )
             return InconsistentConstraintsError(
-                f"constraints {quoted} {verb}: residual {abs(value):.1e} m/s^2 at t = {t:.2f} s", time=t
+                f"{blame}: residual {abs(value):.1e} m/s^2 at t = {t:.2f} s", time=t
             )
         if kind == "2":
             return NonFiniteError(f"acceleration is not finite at t = {t:.4g} s", time=t)
@@ -498,8 +512,9 @@ class Scene:
             )
         if kind == "5":
             return StepSizeError(
-                f"the step size fell below rounding at t = {t:.6g} s; loosen rtol and atol, or use a stiff method "
-                '("Radau")', time=t,
+                f"the step size fell below rounding at t = {t:.6g} s: the motion is singular there, or stiff; look at "
+                'the last samples, loosen rtol and atol, or use "Radau"',
+                time=t,
             )
         return RunError(f"the run failed at t = {t:.6g} s", time=t)
 
@@ -509,7 +524,8 @@ class Scene:
         links = ", ".join(f'"{b}"' for b in bodies) or "its body"
         return SingularMassError(
             f'the mass matrix must be positive definite; it is singular at joint "{self.model.names[joint]}" '
-            f"(t = {t:.4g} s): give {links} mass and inertia, or the joint an armature"
+            f"(t = {t:.4g} s): give {links} mass and inertia, or the joint an armature",
+            time=t,
         )
 
     def report(self) -> str:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .checks import array, choice, count, nonnegative, number, positive
-from .errors import InputError, PinNonidealError, RunError, RunInterrupted, UserFunctionError, nearest
+from .checks import array, choice, count, nonnegative, number, positive, sequence
+from .errors import InputError, RunError, RunInterrupted, UserFunctionError
 from .lowering import core
 from .scene import Scene
 from .trajectory import Event, Stats, Trajectory
@@ -80,6 +80,7 @@ def simulate(
         from .stiff import simulate_stiff
 
         return simulate_stiff(scene, q0, v0, options)
+    choice("simulate: progress", progress, (True, False, None))
     bar = _progress_bar(progress, options)
     options["tick"] = bar.update if bar else None
     begin = time.perf_counter()
@@ -127,6 +128,8 @@ def rollout(
         InputError: an argument does not fit.
         RunError: a run stopped early; `trajectory` of the first one that did, and `index` tells which.
     """
+    if not isinstance(scene, Scene):
+        raise InputError(f"rollout: scene must be a Scene; got {type(scene).__name__}")
     threads = count("rollout: threads", threads, least=1)
     if not isinstance(states, tuple) or len(states) != 2:
         raise InputError("rollout: states must be a pair (q, v) of shapes (n, nq) and (n, nv)")
@@ -157,12 +160,15 @@ def _options(
     scene: Scene, duration: Any, t0: Any, method: Any, rtol: Any, atol: Any, dt: Any, output_dt: Any, record: Any
 ) -> dict[str, Any]:
     methods = (*ADAPTIVE, *FIXED, *SCIPY)
-    if not isinstance(method, str) or method not in methods:
-        hint = nearest(method, methods) if isinstance(method, str) else ""
-        raise InputError(f"simulate: method must be one of {', '.join(methods)}; got {method!r}{hint}")
+    choice("simulate: method", method, methods)
     if method in FIXED:
         if dt is None:
             raise InputError(f'simulate: method "{method}" needs a step dt')
+        unused = [name for name, value in (("rtol", rtol), ("atol", atol)) if value is not None]
+        if unused:
+            raise InputError(
+                f'simulate: method "{method}" takes steps of the length dt; leave {" and ".join(unused)} out'
+            )
     elif dt is not None:
         raise InputError(f'simulate: method "{method}" chooses its own steps; leave dt out, or set output_dt')
     nv = scene.model.nv
@@ -178,7 +184,7 @@ def _options(
     relative = DEFAULT_RTOL if rtol is None else nonnegative("simulate: rtol", rtol)
     if relative == 0.0 and not (tolerance > 0.0).all():
         raise InputError("simulate: rtol and atol must not both be zero; set one of them")
-    wanted = {record} if isinstance(record, str) else set(record)
+    wanted = {record} if isinstance(record, str) else set(sequence("simulate: record", record))
     groups = set()
     for name in wanted:
         groups.add(FIELDS.get(name, name))
@@ -210,8 +216,6 @@ def _finish(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: fl
             cause: BaseException | None = None
         elif isinstance(error, RunError):
             stopped, cause = error, error.__cause__
-        elif isinstance(error, PinNonidealError):
-            raise error
         else:
             stopped = UserFunctionError(f"a function of the scene failed at t = {last:.4g} s: {error}", time=last)
             cause = error if isinstance(error, BaseException) else None
@@ -220,10 +224,8 @@ def _finish(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: fl
         raise stopped from cause
     if raw["failure"] is not None:
         failure = scene.failure(raw["failure"])
-        if isinstance(failure, RunError):
-            message = f"{failure}; the trajectory up to there is in error.trajectory"
-            failure.args = (message, *failure.args[1:])
-            failure.trajectory = trajectory
+        failure.args = (f"{failure}; the trajectory up to there is in error.trajectory", *failure.args[1:])
+        failure.trajectory = trajectory
         raise failure
     return trajectory
 
