@@ -129,7 +129,7 @@ bool Simulation::locate_event() {
         evaluate(p, w, begin + full, q_, v_);
         return false;
     }
-    trigger_element = found.element;
+    trigger_element = located_element = found.element;
     // Step again up to the event and correct the instant.
     double size = std::clamp(first, 0.0, 1.0) * full, before = 0.0, margin_before = 0.0;
     for (int it = 0; it < 12; ++it) {
@@ -169,13 +169,16 @@ bool Simulation::locate_event() {
         stepper.step(begin, size);
         settle(begin + size, stepper.y1, stepper.f1);
     }
-    // Slip of several directions may turn without coming to rest: then the step just ends here.
+    // Slip of several directions may turn far without coming to rest: then the step just ends here. It has come to
+    // rest when hardly anything is left of the slip that the step began with.
     const Friction& f = p.frictions[found.element];
     if (found.slip && f.dim > 1) {
         double square = 0.0;
         for (int k = 0; k < f.dim; ++k) square += w.values[f.block].rate[k] * w.values[f.block].rate[k];
         const double speed = stepper.y1.segment(system.nq, system.nv).cwiseAbs().maxCoeff();
-        if (std::sqrt(square) > 1e-6 * (1.0 + speed)) trigger_element = no_trigger;
+        const double now = std::sqrt(square);
+        const bool passing = now > rest_part * slip_at_start[found.element] && now > 1e-6 * (1.0 + speed);
+        if (passing) trigger_element = no_trigger;
     }
     return true;
 }
@@ -223,6 +226,7 @@ void Simulation::remember_directions() {
         if (f.dim == 1 || !slips(w.mode[e])) continue;
         Vec3 u = Vec3::Zero();
         for (int k = 0; k < f.dim; ++k) u[k] = w.values[f.block].rate[k];
+        slip_at_start[e] = u.norm();
         if (u.norm() > 1e-12) w.slip_direction[e] = w.last_direction[e] = u.normalized();
     }
 }
@@ -302,17 +306,21 @@ void Simulation::switch_modes(double at, VecX& state, int trigger) {
     }
     if (trigger < 0) return;
     if (before == w.mode) recent_events.push_back(at);
+    bridge_cluster(at, state, trigger);
+}
+
+// Events that come too thick are bridged by time stepping, which needs none.
+void Simulation::bridge_cluster(double at, VecX& state, int element) {
     if (recent_events.size() > chatter_events) recent_events.erase(recent_events.begin());
-    if (recent_events.size() == chatter_events && at - recent_events.front() < chatter_time) {
-        recent_events.clear();
-        out.events.push_back({at, Event::Kind::chatter, trigger});
-        y = state;
-        t = at;
-        step_in_time(std::min(t_end, at + chatter_time), chatter_time / chatter_steps);
-        state = y;
-        switch_modes(t, state, trigger);
-        y = state;
-    }
+    if (recent_events.size() < chatter_events || at - recent_events.front() > chatter_time) return;
+    recent_events.clear();
+    out.events.push_back({at, Event::Kind::chatter, element});
+    y = state;
+    t = at;
+    step_in_time(std::min(t_end, at + chatter_time), chatter_time / chatter_steps);
+    state = y;
+    switch_modes(t, state, -1);
+    y = state;
 }
 
 }  // namespace pn

@@ -23,6 +23,7 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
     v_ = VecX::Zero(system.nv);
     pulls.assign(p.contacts.size(), 0);
     indeterminate.assign(p.frictions.size(), 0);
+    slip_at_start.assign(p.frictions.size(), 0.0);
 }
 
 void Simulation::tick(double now) {
@@ -212,6 +213,10 @@ void Simulation::advance_to(double stop) {
         switch_modes(t, y, trigger_element);
         emit(t, y, true);
         return;
+    }
+    if (event) {
+        recent_events.push_back(t);
+        bridge_cluster(t, y, located_element);
     }
     report_pulls(t);
     const bool on_grid = o.output_dt > 0.0 && std::abs(next_sample - t) <= 1e-12 * std::max(1.0, std::abs(t));

@@ -45,6 +45,7 @@ private:
 
     // Events.
     static constexpr int no_trigger = -2;
+    static constexpr double rest_part = 0.05;
     struct Watch { int element; bool slip; };
     double margin(const Watch& watch, double t, const VecX& y);  // negative past the event; evaluated state
     std::vector<Watch> crossed();
@@ -52,6 +53,7 @@ private:
     bool release_indeterminate();
     void remember_directions();
     void switch_modes(double t, VecX& y, int trigger);
+    void bridge_cluster(double t, VecX& y, int element);
     void report_pulls(double t);
 
     // Time stepping at velocity level.
@@ -70,11 +72,11 @@ private:
     long samples = 0;  // of the output grid, so far
     long ticks = 0;
     double next_sample = 0.0;
-    std::vector<double> recent_events;
+    std::vector<double> recent_events, slip_at_start;
     std::vector<char> pulls, indeterminate;
     bool last_rejected = false;
     double pending_energy = 0.0;  // moved by the projection that ends the step
-    int trigger_element = -1;
+    int trigger_element = -1, located_element = -1;
     bool released_together = false;  // redundant elements that could hold no longer
     long next_period = 0;
 };
