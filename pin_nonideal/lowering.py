@@ -229,8 +229,9 @@ class Lowering:
             )
         index = int(model.getJointId(name))
         if model.joints[index].nv not in freedoms:
+            degrees = "1 degree" if freedoms == (1,) else f"{' or '.join(map(str, freedoms))} degrees"
             raise InputError(
-                f'{who}: joint "{name}" must have {" or ".join(map(str, freedoms))} degree of freedom; '
+                f'{who}: joint "{name}" must have {degrees} of freedom; '
                 f"it has {model.joints[index].nv}"
             )
         return index
@@ -449,10 +450,10 @@ class Lowering:
             else:
                 self._joint_friction(law, name, constraints, who)
         elif isinstance(law, SigmoidFriction):
-            dof = self.model.joints[self.joint(law.joint, who)].idx_v
+            dof = self.model.joints[self.rubbing_joint(law.joint, who, constraints)].idx_v
             add.add_sigmoid(self._law(name), dof, law.phi1, law.phi2, law.phi3)
         elif isinstance(law, LuGre):
-            dof = self.model.joints[self.joint(law.joint, who)].idx_v
+            dof = self.model.joints[self.rubbing_joint(law.joint, who, constraints)].idx_v
             numbers = (law.stiffness, law.damping, law.viscous, law.coulomb, law.stiction, law.stribeck_velocity)
             add.add_bristle(self._law(name), dof, *numbers)
             self.out.z0 = np.concatenate([self.out.z0, np.zeros(1)])
@@ -483,24 +484,32 @@ class Lowering:
         else:
             raise InputError(f"a law must be JointFriction, SigmoidFriction, LuGre, Drag, UserLaw or UserFriction; got {law!r}")
 
+    def rubbing_joint(
+        self, name: str, who: str, constraints: dict[str, Any], *, freedoms: tuple[int, ...] = (1,)
+    ) -> int:
+        """Index of a joint that a friction law may act on: one that moves, and is no mimic joint."""
+        joint = self.joint(name, who, freedoms=freedoms)
+        for c in constraints.values():
+            if isinstance(c, JointCoupling) and c.joint1 == name and (c.name or "").endswith("mimic"):
+                raise InputError(
+                    f'{who}: joint "{name}" is a mimic joint, driven by "{c.joint2}"; '
+                    f'put the friction on "{c.joint2}"'
+                )
+        return joint
+
     def _joint_friction(self, law: JointFriction, name: str, constraints: dict[str, Any], who: str) -> None:
         if not self.model.existJointName(law.joint) and constraints:
             known = [*list(self.model.names)[1:], *constraints]
             if not self.model.existFrame(law.joint, pin.FrameType.FIXED_JOINT):
                 raise UnknownNameError(f'{who}: no joint or anchor "{law.joint}"{nearest(law.joint, known)}')
-        joint = self.joint(law.joint, who, freedoms=(1, 3))
-        for c in constraints.values():
-            if isinstance(c, JointCoupling) and c.joint1 == law.joint and (c.name or "").endswith("mimic"):
-                raise InputError(
-                    f'{who}: joint "{law.joint}" is a mimic joint, driven by "{c.joint2}"; '
-                    f'put the friction on "{c.joint2}"'
-                )
+        joint = self.rubbing_joint(law.joint, who, constraints, freedoms=(1, 3))
         kind, axis = joint_kind(self.model, joint)
         if kind is None:
             raise InputError(
                 f'{who}: joint "{law.joint}" must be revolute, prismatic, helical or spherical; '
                 f"it is {self.model.joints[joint].shortname()}"
             )
+        _check_radius(law, who, kind)
         dof, count = self.model.joints[joint].idx_v, self.model.joints[joint].nv
         index = self._law(name)
         if law.viscous:
@@ -515,6 +524,7 @@ class Lowering:
                 f'{who}: "{law.joint}" is a {type(anchor).__name__}, which has no axis to rub about; '
                 "use a HingeAnchor"
             )
+        _check_radius(law, who, "revolute")
         f1, f2 = self.pair(anchor, who)
         axis = list(self.hinge_axis(anchor, who))
         block = self.out.builder.add_hinge_slip(name, f1, f2, axis)
@@ -615,6 +625,15 @@ class Lowering:
                         "vector; drive it by a function"
                     )
         return full
+
+
+def _check_radius(law: JointFriction, who: str, kind: str) -> None:
+    """A coefficient without a radius would be no friction at all."""
+    radii = {"revolute": ("radius", "axial_radius"), "spherical": ("radius",)}.get(kind, ())
+    if law.mu and radii and not any(getattr(law, key) for key in radii):
+        raise InputError(
+            f"{who}: mu needs a positive {' or '.join(radii)} on a joint that turns, for torque = mu radius force"
+        )
 
 
 def joint_kind(model: Any, joint: int) -> tuple[str | None, Array]:
