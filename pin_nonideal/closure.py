@@ -1,4 +1,4 @@
-"""Closing loops from far away: damped steps and several starts, before the core's Newton method takes over."""
+"""Closing loops from far away: damped steps and many starts, before the core's Newton method takes over."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ Array = NDArray[np.float64]
 
 # A gap below this part of the scene's size is left to Newton's method, which squares it each time.
 CLOSED = 1e-9
+# A gap that stays above this after projection [m or rad] is a loop that does not close.
+CLOSURE_TOLERANCE = 1e-8
 STEPS = 300  # damped steps a start
 STARTS = 24  # first the given configuration, then random ones around it
 SPREADS = (0.1, 0.3, 1.0)  # of the random starts [rad or m], in turn
-# Closures with a worse conditioned mass matrix than this (gimbal lock) are kept only when no better one is found.
+# Closures with a worse conditioned mass matrix than this (gimbal lock) are kept only without a better one.
 WELL_CONDITIONED = 1e-10
 
 
@@ -25,8 +27,8 @@ def close_loops(
 ) -> tuple[Array, float]:
     """Configuration near q that satisfies the holonomic constraints.
 
-    Levenberg-Marquardt steps dq = -A^T (A A^T + d^2 I)^-1 phi in tangent coordinates, each at most one radian or
-    meter.  Among the closures found the first with a well conditioned mass matrix wins.
+    Levenberg-Marquardt steps dq = -A^T (A A^T + d^2 I)^-1 phi in tangent coordinates, each at most one radian
+    or meter.  Among the closures found the first with a well conditioned mass matrix wins.
 
     Args:
         model: pinocchio.Model.

@@ -1,0 +1,120 @@
+"""States on the constraints: the core's Newton method nearby, damped steps and many starts from far away."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .closure import CLOSURE_TOLERANCE, close_loops
+from .constraints import KnifeEdge, Rolling, UserConstraint
+from .errors import InconsistentConstraintsError, LoopClosureError
+from .lowered import Lowered
+from .scene_analysis import rows_at
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.bool_]
+
+# A larger gap than this [m or rad] is closed by damped steps before Newton's method has its turn.
+FAR = 1e-3
+
+
+def nonholonomic_rows(constraints: Sequence[Any], low: Lowered) -> Rows:
+    """Which rows restrict the velocity only, so that no position can be projected on them, (m,).
+
+    Args:
+        constraints: descriptions of all constraints.
+        low: the program.
+    """
+    rows = np.zeros(low.rows, dtype=bool)
+    for s, c in zip(low.slices.values(), constraints, strict=False):
+        if isinstance(c, KnifeEdge) or (isinstance(c, UserConstraint) and c.residual is None):
+            rows[s] = True
+        elif isinstance(c, Rolling):
+            rows[s.start : s.start + 2] = True
+    return rows
+
+
+def nearest_state(
+    model: Any, low: Lowered, nonholonomic: Rows, q: Array, v: Array, t: float
+) -> tuple[Array, Array]:
+    """Nearest state with phi(q, t) = 0 and A v + phi_t = 0.
+
+    Args:
+        model: pinocchio.Model.
+        low: the program.
+        nonholonomic: rows that restrict the velocity only, (m,).
+        q: configuration, (nq,).
+        v: velocity, (nv,).
+        t: time [s].
+
+    Returns:
+        q (nq,), v (nv,).
+
+    Raises:
+        LoopClosureError: no configuration satisfies the constraints.
+        InconsistentConstraintsError: no velocity does.
+    """
+    if not low.slices:
+        return q, v
+    runner = low.builder.runner()
+    rows, mass = _holonomic(model, runner, nonholonomic, t), _mass(model, runner)
+    if _largest(rows_at(runner, q, v, t)[2]) > FAR:
+        q, _ = close_loops(model, rows, mass, q)
+    q, v = runner.project(q, v, t)
+    _, _, phi, rate = rows_at(runner, q, v, t)
+    if _largest(phi) > CLOSURE_TOLERANCE:
+        q, _ = close_loops(model, rows, mass, q)
+        q, v = runner.project(q, v, t)
+        _, _, phi, rate = rows_at(runner, q, v, t)
+    _check_position(phi, low, t)
+    _check_velocity(rate, v, low, t)
+    return q, v
+
+
+def _check_position(phi: Array, low: Lowered, t: float) -> None:
+    if _largest(phi) <= CLOSURE_TOLERANCE:
+        return
+    gaps = {name: _largest(phi[s]) for name, s in low.slices.items()}
+    open_loops = {name: gap for name, gap in gaps.items() if not gap <= CLOSURE_TOLERANCE}
+    text = "; ".join(f'loop "{name}" does not close: gap {gap:.2g}' for name, gap in open_loops.items())
+    raise LoopClosureError(
+        f"{text} after several starts; check the lengths and frames, or start nearer", gaps=gaps, time=t
+    )
+
+
+def _check_velocity(rate: Array, v: Array, low: Lowered, t: float) -> None:
+    if _largest(rate) <= 1e-6 * (1.0 + _largest(v)):
+        return
+    worst = max(low.slices, key=lambda name: float(np.abs(rate[low.slices[name]]).max()))
+    raise InconsistentConstraintsError(
+        f'no velocity satisfies the constraints at t = {t:.2f} s: "{worst}" misses its rate by '
+        f"{_largest(rate):.1e}",
+        time=t,
+    )
+
+
+def _holonomic(
+    model: Any, runner: Any, nonholonomic: Rows, t: float
+) -> Callable[[Array], tuple[Array, Array]]:
+    """The function q -> (A, phi), with the rows that restrict the velocity only set to zero."""
+    zero = np.zeros(model.nv)
+
+    def rows(q: Array) -> tuple[Array, Array]:
+        A, _, phi, _ = rows_at(runner, q, zero, t)
+        A[nonholonomic] = 0.0
+        return A, phi
+
+    return rows
+
+
+def _mass(model: Any, runner: Any) -> Callable[[Array], Array]:
+    """Mass matrix at a configuration, q -> M, (nv, nv)."""
+    n, zero = model.nv, np.zeros(model.nv)
+    return lambda q: np.asarray(runner.terms(q, zero)[0]).reshape(n, n)
+
+
+def _largest(values: Array) -> float:
+    return float(np.abs(values).max(initial=0.0))
