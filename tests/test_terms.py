@@ -119,6 +119,26 @@ def test_a_robot_far_from_the_origin_keeps_its_digits():
     np.testing.assert_allclose(scene.acceleration(far, v), a, rtol=0, atol=1e-12 * np.abs(a).max())
 
 
+@pytest.mark.parametrize("slides", [["prismatic x", "prismatic y", "prismatic z"], ["translation"]])
+def test_a_robot_that_slid_far_keeps_its_digits(slides):
+    """A base carried by sliding joints: the reference point follows the first joint that turns."""
+    rng = np.random.default_rng(9)
+    kinds = [*slides, "revolute z", "spherical", "prismatic x", "universal"]
+    n = len(slides)
+    model = tree(kinds, rng, parents=[*range(n), n, n + 1, n + 2, n + 1])
+    scene = pn.Scene(model)
+    assert_terms_match(model, rng)
+    q, v = state(model, rng)
+    q[:3] = 0.0
+    far = q.copy()
+    far[:3] = [1e4, -2e4, 3e3]
+    runner = scene.new_runner()
+    for here, there in zip(runner.terms(q, v), runner.terms(far, v), strict=True):
+        np.testing.assert_allclose(there, here, rtol=0, atol=1e-14 * np.abs(here).max())
+    a = scene.acceleration(q, v)
+    np.testing.assert_allclose(scene.acceleration(far, v), a, rtol=0, atol=1e-12 * np.abs(a).max())
+
+
 def test_quaternions_that_are_not_quite_unit_do_not_change_the_motion():
     rng = np.random.default_rng(5)
     model = tree(["free flyer", "spherical", "endless x"], rng)

@@ -66,6 +66,8 @@ void classify(const Model::JointModel& joint, const JointData& data, Joint& out)
     out.axis_index = unit_axis(out.axis);
 }
 
+bool slides(const Joint& j) { return j.kind == JointKind::prismatic || j.kind == JointKind::translation; }
+
 void add_charts(const Model::JointModel& joint, std::vector<Chart>& charts);
 
 struct ChartsOfComposite : boost::static_visitor<bool> {
@@ -135,6 +137,9 @@ Mechanism read_mechanism(const void* opaque) {
         j.p0 = model->jointPlacements[i].translation();
         classify(joint, data, j);
         m.has_foreign |= j.kind == JointKind::other;
+        j.recenters = j.root != i && !slides(j);
+        for (int k = j.root; k < i && j.recenters; ++k)
+            j.recenters = m.joints[k].root != j.root || slides(m.joints[k]);
         const auto& Y = model->inertias[i];
         j.mass = Y.mass();
         j.com = Y.lever();

@@ -19,6 +19,7 @@ struct Joint {
     JointKind kind = JointKind::other;
     bool unbounded = false;  // configuration is (cos, sin) of the angle
     int parent = 0, root = 0;
+    bool recenters = false;  // first joint of its tree that turns: the tree's reference point moves here
     int iq = 0, iv = 0, nq = 0, nv = 0;
     Mat3 R0 = Mat3::Identity();  // placement in the parent joint's frame
     Vec3 p0 = Vec3::Zero();

@@ -113,6 +113,17 @@ void place(const Joint& j, const Body& parent, const VecX& q, Body& b, const Joi
     }
 }
 
+// Moves the reference point of joint i's tree to its place. The bodies before it only slide, so that their motions do
+// not depend on the reference point.
+void recenter(const Mechanism& m, int i, Terms& w) {
+    const Vec3 shift = w.body[i].p;
+    for (int k = m.joints[i].root; k <= i; ++k)
+        if (m.joints[k].root == m.joints[i].root) {
+            w.body[k].p -= shift;
+            w.body[k].ref += shift;
+        }
+}
+
 // Columns J of the joint's dofs in world axes.
 void columns(const Joint& j, const Body& b, const JointMotion& foreign, Motion* J) {
     switch (j.kind) {
@@ -177,6 +188,7 @@ void kinematics(const Mechanism& m, Terms& w, const VecX& q, const VecX& v) {
         const Body& parent = w.body[j.parent];
         if (j.kind == JointKind::other) w.foreign->evaluate(i, w.q, v, w.foreign_motion);
         place(j, parent, w.q, b, w.foreign_motion);
+        if (j.recenters) recenter(m, i, w);
         b.v = parent.v;
         b.a = parent.a;
         if (j.nv == 0) continue;

@@ -1,7 +1,8 @@
 // Kinematics, M(q), bias forces and the sparse factor M = L^T D L (so R = L^T D^1/2 in M = R R^T).
 //
-// Everything is expressed in world axes about one reference point per kinematic tree: the place of its first joint,
-// frozen for the instant of the evaluation. This keeps numbers small for a robot that has walked far.
+// Everything is expressed in world axes about one reference point per kinematic tree: the place of its first joint
+// that turns, frozen for the instant of the evaluation. This keeps numbers small for a robot that has walked far, on a
+// floating base or on sliding joints.
 #pragma once
 
 #include <vector>
