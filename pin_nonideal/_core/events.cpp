@@ -25,6 +25,26 @@ double Simulation::margin(const Watch& watch, double at, const VecX& state) {
     return static_limit(p, w, watch.element, at, q_, v_) * (1.0 + 1e-12) - friction_force(p, w, watch.element).norm();
 }
 
+// Fixed steps shrink toward the rest of a slip of several directions, whose direction may turn fast at the end.
+double Simulation::toward_rest(double size) {
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
+        const Friction& f = p.frictions[e];
+        if (f.dim == 1 || !slips(w.mode[e])) continue;
+        const Block& block = p.blocks[f.block];
+        q_ = y.head(system.nq);
+        v_ = derivative.segment(system.nq, system.nv);
+        multiply(block, w.A, v_, w.r);
+        double slip = 0.0, change = 0.0;
+        for (int k = 0; k < f.dim; ++k) {
+            const double rate = w.r[block.row + k] - w.b[block.row + k];
+            slip += w.values[f.block].rate[k] * w.values[f.block].rate[k];
+            change += rate * rate;
+        }
+        if (slip < change * size * size) size = std::min(size, std::max(0.5 * std::sqrt(slip / change), 1e-3 * size));
+    }
+    return size;
+}
+
 // What lies past its event at the step's end (the workspace is evaluated there), or may have crossed inside.
 std::vector<Simulation::Watch> Simulation::crossed() {
     std::vector<Watch> list;
@@ -50,6 +70,15 @@ std::vector<Simulation::Watch> Simulation::crossed() {
         }
         const double speed = stepper.y1.segment(system.nq, system.nv).cwiseAbs().maxCoeff();
         const double noise = 1e-3 * rest_speed * (1.0 + speed);  // of an element that has just begun to slip
+        if (p.frictions[e].dim > 1 && !stepper.method.adaptive) {
+            double square = 0.0;
+            for (int k = 0; k < p.frictions[e].dim; ++k) {
+                const double u = w.values[p.frictions[e].block].rate[k];
+                square += u * u;
+            }
+            const double now = std::sqrt(square);
+            if (now < slip_at_start[e] && now <= arrived_speed * (1.0 + speed)) arrived = e;
+        }
         if (margin(watch, t1, stepper.y1) < -noise) {
             list.push_back(watch);
             continue;
@@ -71,7 +100,12 @@ std::vector<Simulation::Watch> Simulation::crossed() {
 
 // True when the step now ends at an event; the workspace is evaluated at its end either way.
 bool Simulation::locate_event() {
+    arrived = -1;
     const std::vector<Watch> watches = crossed();
+    if (arrived >= 0) {
+        trigger_element = located_element = arrived;
+        return true;
+    }
     if (watches.empty()) return release_indeterminate();
     const double full = stepper.h, begin = stepper.t0;
     const auto at_fraction = [&](const Watch& watch, double s) {
@@ -274,20 +308,14 @@ void Simulation::switch_modes(double at, VecX& state, int trigger) {
             w.slip_direction[e] = w.last_direction[e] = u.normalized();
         }
     }
-    // What is at rest has no slip velocity at all.
-    if (!candidates.empty()) {
-        for (int e : candidates) w.mode[e] = sticking;
-        want_rows(p, w);
-        evaluate(p, w, at, q_, v_);
-        decide_rows(p.layout, p.blocks, w.B, w.rows);
-        factor_rows(p.layout, p.blocks, w.B, w.rows);
-        project(p, w, at, q_, v_);
-        state.head(system.nq) = q_;
-        state.segment(system.nq, system.nv) = v_;
-    }
     const int breaking = released_together ? any_at_limit : trigger >= 0 && before[trigger] == sticking ? trigger : -1;
     released_together = false;
     resolve_modes(p, w, at, q_, v_, candidates, breaking);
+    // What sticks from now on has no slip velocity at all, not one of rounding.
+    project(p, w, at, q_, v_);
+    state.head(system.nq) = q_;
+    state.segment(system.nq, system.nv) = v_;
+    begin_step(p, w, at, q_, v_);
     std::fill(indeterminate.begin(), indeterminate.end(), char(0));
     if (p.needs_reactions) gather_reactions(p, w);
     for (int e : candidates)

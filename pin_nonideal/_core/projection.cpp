@@ -54,7 +54,6 @@ double scene_size(const Workspace& w) {
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
     for (int dof = 0; dof < p.mechanism.nv; ++dof)
         if (w.terms.locked[dof]) v[dof] = 0.0;  // what sticks has exactly no velocity
-    if (is_immobile(p, w)) v.setZero();
     if (w.rows.blocks.empty()) return false;
     look(p, w, t, q, v);
     const double floor = projection_floor * scene_size(w);
@@ -83,6 +82,7 @@ bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
         if (it > 1 && now > 0.5 * last) break;
         last = now;
     }
+    if (is_immobile(p, w) && v.cwiseAbs().maxCoeff() <= immobile_speed) v.setZero();
     if (moved) ++w.projections;
     return moved;
 }

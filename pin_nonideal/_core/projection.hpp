@@ -9,6 +9,8 @@ namespace pn {
 // Residuals below this part of the scene's size are rounding: a few hundred operations of unit roundoff.
 constexpr double projection_floor = 2e-14;
 constexpr int projection_limit = 12;
+// Where nothing can move, a velocity below this [rad/s or m/s] is what the last event left by rounding.
+constexpr double immobile_speed = 1e-8;
 
 // Moves q and v; returns false when nothing had to move. The workspace must hold factors near (t, q); afterwards its
 // rows are those of the new state, its factors are not.

@@ -159,6 +159,11 @@ void Simulation::advance_to(double stop) {
     } else if (size > 0.5 * remaining) {
         size = 0.5 * remaining;  // two even steps instead of a long and a tiny one
     }
+    if (!o.method.adaptive && !p.frictions.empty()) {
+        const double shorter = toward_rest(size);
+        last &= shorter == size;
+        size = shorter;
+    }
     stepper.y0 = y;
     stepper.K[0] = derivative;
     double error = 0.0;

@@ -45,7 +45,8 @@ private:
 
     // Events.
     static constexpr int no_trigger = -2;
-    static constexpr double rest_part = 0.05;
+    static constexpr double rest_part = 0.05, arrived_speed = 1e-7;
+    double toward_rest(double size);
     struct Watch { int element; bool slip; };
     double margin(const Watch& watch, double t, const VecX& y);  // negative past the event; evaluated state
     std::vector<Watch> crossed();
@@ -76,7 +77,7 @@ private:
     std::vector<char> pulls, indeterminate;
     bool last_rejected = false;
     double pending_energy = 0.0;  // moved by the projection that ends the step
-    int trigger_element = -1, located_element = -1;
+    int trigger_element = -1, located_element = -1, arrived = -1;
     bool released_together = false;  // redundant elements that could hold no longer
     long next_period = 0;
 };
