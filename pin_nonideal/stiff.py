@@ -1,8 +1,9 @@
 """SciPy's implicit methods on the core's right-hand side, for stiff scenes.
 
-State y = (q, v) with q in ambient coordinates, dq/dt = T(q) v (pinocchio.tangentMap), dv/dt from Eq. (40).  One-step
-methods and multistep ones alike run without projection inside; every sample is projected onto the constraints.
-Modes of dry friction are chosen anew at every evaluation, without located events: prefer the core's methods there.
+State y = (q, v) with q in ambient coordinates, dq/dt = T(q) v (pinocchio.tangentMap), dv/dt from Eq. (40).
+One-step methods and multistep ones alike run without projection inside; every sample is projected onto the
+constraints.  Modes of dry friction are chosen anew at every evaluation, without located events: prefer the
+core's methods there.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from .trajectory import Stats, Trajectory
 
 Array = NDArray[np.float64]
 
-# Differences of the right-hand side: the step that balances rounding against curvature for order one quantities.
+# Differences of the right-hand side: the step that balances rounding against curvature.
 DIFFERENCE = 6e-6
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import pin_nonideal as pn
 
-# Global error over a second of motion at rtol 1e-8: multistep methods lose more of their tolerance than Radau.
+# Global error over a second of motion at rtol 1e-8: multistep methods lose more of it than Radau.
 REACHED = {"Radau": 1e-7, "BDF": 1e-4, "LSODA": 1e-4}
 
 
