@@ -1,7 +1,8 @@
 """The exceptions of pin_nonideal.
 
 Every error derives from `PinNonidealError` and from the built-in exception that a caller expects
-(`ValueError`, `KeyError`, `RuntimeError`, `OSError`).  A message says what must hold, what came, and what to do.
+(`ValueError`, `KeyError`, `RuntimeError`, `OSError`).  A message says what must hold, what came, and what to
+do.
 """
 
 from __future__ import annotations

@@ -114,7 +114,8 @@ class SigmoidFriction:
 class LuGre:
     """Bristle friction with presliding and hysteresis; its deflection z is integrated with the motion.
 
-        dz/dt = v - stiffness |v| z / g(v),   g(v) = coulomb + (stiction - coulomb) exp(-(v / stribeck_velocity)^2)
+        dz/dt = v - stiffness |v| z / g(v)
+        g(v) = coulomb + (stiction - coulomb) exp(-(v / stribeck_velocity)^2)
         C_j = -(stiffness z + damping dz/dt + viscous v)                                       [N m or N]
 
     z is one column of `Trajectory.z`.  Bristles give way a little under any load: this law creeps by design.
@@ -151,8 +152,8 @@ class LuGre:
         level = self.coulomb if self.stiction is None else positive(f"{who}: stiction", self.stiction)
         if level < self.coulomb:
             raise InputError(
-                f"{who}: stiction must be at least coulomb (static friction is never below kinetic friction); "
-                f"got {level:g} and {self.coulomb:g}"
+                f"{who}: stiction must be at least coulomb (static friction is never below kinetic "
+                f"friction); got {level:g} and {self.coulomb:g}"
             )
         object.__setattr__(self, "stiction", level)
 

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from .checks import array, choice, count, nonnegative, number, positive, sequence
 from .errors import InputError, RunError, RunInterrupted, UserFunctionError
-from .lowering import core
 from .scene import Scene
 from .trajectory import Event, Stats, Trajectory
 
@@ -44,9 +43,9 @@ def simulate(
 ) -> Trajectory:
     """Integrates a scene in time, on its constraints.
 
-    Adaptive methods keep the local error of every coordinate below atol + rtol |y|; the state is put back on the
-    constraints after every step, so that violations stay at rounding.  Dry friction sticks and slips at located
-    events.
+    Adaptive methods keep the local error of every coordinate below atol + rtol |y|; the state is put back on
+    the constraints after every step, so that violations stay at rounding.  Dry friction sticks and slips at
+    located events.
 
     Args:
         scene: what to simulate.
@@ -54,8 +53,8 @@ def simulate(
         q: initial configuration, (nq,); the scene's when None.  It is projected onto the constraints first.
         v: initial velocity, (nv,); the scene's when None.
         t0: initial time [s].
-        method: "dop853" (order 8) or "dopri5" (order 5), adaptive; "rk4", "semi_implicit_euler" or "moreau" (time
-            stepping at velocity level), fixed dt; "Radau", "BDF" or "LSODA" by SciPy, for stiff scenes.
+        method: "dop853" (order 8) or "dopri5" (order 5), adaptive; "rk4", "semi_implicit_euler" or "moreau"
+            (time stepping at velocity level), fixed dt; "Radau", "BDF" or "LSODA" by SciPy, for stiff scenes.
         rtol: relative tolerance of adaptive methods, 1e-8 when None.
         atol: absolute tolerance, a number or an array (2 nv,) for positions and velocities, 1e-10 when None.
         dt: step of the fixed-step methods [s].
@@ -75,7 +74,11 @@ def simulate(
     if not isinstance(scene, Scene):
         raise InputError(f"simulate: scene must be a Scene; got {type(scene).__name__}")
     options = _options(scene, duration, t0, method, rtol, atol, dt, output_dt, record)
-    q0, v0 = scene.project(q, v, options["t0"]) if (q is not None or v is not None or t0) else scene.initial_state()
+    q0, v0 = (
+        scene.project(q, v, options["t0"])
+        if (q is not None or v is not None or t0)
+        else scene.initial_state()
+    )
     if method in SCIPY:
         from .stiff import simulate_stiff
 
@@ -134,7 +137,10 @@ def rollout(
     if not isinstance(states, tuple) or len(states) != 2:
         raise InputError("rollout: states must be a pair (q, v) of shapes (n, nq) and (n, nv)")
     model = scene.model
-    q, v = (array(f"rollout: {k}", x, (None, n)) for k, x, n in zip("qv", states, (model.nq, model.nv), strict=True))
+    q, v = (
+        array(f"rollout: {k}", x, (None, n))
+        for k, x, n in zip("qv", states, (model.nq, model.nv), strict=True)
+    )
     if len(q) != len(v):
         raise InputError(f"rollout: q and v must have as many rows; got {len(q)} and {len(v)}")
     if method in SCIPY:
@@ -157,7 +163,15 @@ def rollout(
 
 
 def _options(
-    scene: Scene, duration: Any, t0: Any, method: Any, rtol: Any, atol: Any, dt: Any, output_dt: Any, record: Any
+    scene: Scene,
+    duration: Any,
+    t0: Any,
+    method: Any,
+    rtol: Any,
+    atol: Any,
+    dt: Any,
+    output_dt: Any,
+    record: Any,
 ) -> dict[str, Any]:
     methods = (*ADAPTIVE, *FIXED, *SCIPY)
     choice("simulate: method", method, methods)
@@ -210,14 +224,17 @@ def _finish(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: fl
         last = float(trajectory.t[-1]) if len(trajectory) else options["t0"]
         if isinstance(error, KeyboardInterrupt):
             stopped: RunError = RunInterrupted(
-                f"the run was interrupted at t = {last:.4g} s; the trajectory up to there is in error.trajectory",
+                f"the run was interrupted at t = {last:.4g} s; the trajectory up to there is in "
+                "error.trajectory",
                 time=last,
             )
             cause: BaseException | None = None
         elif isinstance(error, RunError):
             stopped, cause = error, error.__cause__
         else:
-            stopped = UserFunctionError(f"a function of the scene failed at t = {last:.4g} s: {error}", time=last)
+            stopped = UserFunctionError(
+                f"a function of the scene failed at t = {last:.4g} s: {error}", time=last
+            )
             cause = error if isinstance(error, BaseException) else None
         stopped.time = last if stopped.time is None else stopped.time
         stopped.trajectory = trajectory
@@ -259,7 +276,11 @@ def shaped(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: flo
         fields["power"] = dict(zip(columns, table("power", len(columns)).T, strict=True))
     if options["energy"]:
         numbers = table("energy", len(columns) + 3)
-        ledger = {"kinetic": numbers[:, 0], "potential": numbers[:, 1], "total": numbers[:, 0] + numbers[:, 1]}
+        ledger = {
+            "kinetic": numbers[:, 0],
+            "potential": numbers[:, 1],
+            "total": numbers[:, 0] + numbers[:, 1],
+        }
         ledger |= dict(zip([*columns, "projection"], numbers[:, 2:].T, strict=True))
         done = numbers[:, 2:].sum(axis=1)
         ledger["balance"] = ledger["total"] - ledger["total"][:1] - done
@@ -269,7 +290,8 @@ def shaped(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: flo
     contacts = list(scene.constraint_slices)
     names = {3: contacts}
     events = [
-        Event(t, EVENT_KINDS[kind], names.get(kind, scene.element_names)[element]) for t, kind, element in raw["events"]
+        Event(t, EVENT_KINDS[kind], names.get(kind, scene.element_names)[element])
+        for t, kind, element in raw["events"]
     ]
     counters = ("steps", "rejected", "evaluations", "factorizations", "projections", "iterations")
     return Trajectory(
@@ -299,7 +321,9 @@ class _Bar:
         from tqdm import tqdm
 
         self._t0 = t0
-        self._bar = tqdm(total=total, unit="s", bar_format="{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]")
+        self._bar = tqdm(
+            total=total, unit="s", bar_format="{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]"
+        )
 
     def update(self, t: float) -> None:
         self._bar.n = t - self._t0
@@ -312,4 +336,3 @@ class _Bar:
 def _progress_bar(progress: bool | None, options: dict[str, Any]) -> _Bar | None:
     shown = sys.stderr.isatty() if progress is None else progress
     return _Bar(options["duration"], options["t0"]) if shown else None
-

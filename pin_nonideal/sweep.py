@@ -47,7 +47,9 @@ def sweep(
         if not isinstance(entry, Mapping):
             raise InputError(f"sweep: parameters must hold mappings of keyword arguments; got {entry!r}")
     options.setdefault("progress", False)
-    runs: list[Trajectory] = Parallel(n_jobs=jobs)(delayed(_one)(make, dict(p), duration, options) for p in table)
+    runs: list[Trajectory] = Parallel(n_jobs=jobs)(
+        delayed(_one)(make, dict(p), duration, options) for p in table
+    )
     return runs
 
 

@@ -29,8 +29,8 @@ class Event:
 
     Attributes:
         time: when [s].
-        kind: "stick", "slip" or "reverse" of a frictional element, "pull" of a contact whose normal force turned
-            negative, "chatter" where a cluster of events was bridged by time stepping.
+        kind: "stick", "slip" or "reverse" of a frictional element, "pull" of a contact whose normal force
+            turned negative, "chatter" where a cluster of events was bridged by time stepping.
         element: name of the law or contact.
     """
 
@@ -123,7 +123,8 @@ class Trajectory:
             f"{self.name or 'trajectory'}: {span}, {len(self.t)} samples",
             f"  steps {s.steps} ({s.rejected} rejected), evaluations {s.evaluations}, "
             f"projections {s.projections}, reaction passes {s.iterations}",
-            f"  violation {self.violation.max(initial=0.0):.1e}, rate {self.violation_rate.max(initial=0.0):.1e}",
+            f"  violation {self.violation.max(initial=0.0):.1e}, "
+            f"rate {self.violation_rate.max(initial=0.0):.1e}",
         ]
         if self.energy is not None and len(self.t):
             shown = ", ".join(f"{k} {x[-1]:.6g}" for k, x in self.energy.items() if k != "balance")
@@ -173,7 +174,9 @@ class Trajectory:
                 np.savez_compressed(file, **arrays)
             os.replace(temporary, target)
         except OSError as error:
-            raise OutputError(f'cannot write "{target}": {error.strerror or error}; choose a writable path') from error
+            raise OutputError(
+                f'cannot write "{target}": {error.strerror or error}; choose a writable path'
+            ) from error
         finally:
             if temporary is not None and os.path.exists(temporary):
                 with contextlib.suppress(OSError):
@@ -203,15 +206,13 @@ class Trajectory:
             missing = [key for key in REQUIRED if key not in arrays]
             if missing:
                 raise LoadingError(f'"{source}" is no complete trajectory: {", ".join(missing)} missing')
-            tables = {
-                group: None if header[group] is None
-                else {name: arrays[f"{group}/{i}"] for i, name in enumerate(header[group])}
-                for group in ("energy", "power")
-            }
+            fields: dict[str, Any] = {key: arrays.get(key) for key in (*REQUIRED, *OPTIONAL)}
+            for group in ("energy", "power"):
+                if header[group] is not None:
+                    fields[group] = {name: arrays[f"{group}/{i}"] for i, name in enumerate(header[group])}
             events = [Event(float(t), str(kind), str(element)) for t, kind, element in header["events"]]
             return cls(
-                **{key: arrays.get(key) for key in (*REQUIRED, *OPTIONAL)},
-                **tables,
+                **fields,
                 events=events,
                 stats=Stats(**header["stats"]),
                 element_names=list(header["element_names"]),

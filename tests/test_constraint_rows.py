@@ -130,8 +130,13 @@ def test_a_standing_quadruped_against_pinocchio():
         place = place_of(model, scene.q0, foot.frame1)
         rigid.append(
             pin.RigidConstraintModel(
-                pin.ContactType.CONTACT_3D, model, frame.parentJoint, frame.placement, 0,
-                pin.SE3(np.eye(3), place.translation), pin.ReferenceFrame.LOCAL,
+                pin.ContactType.CONTACT_3D,
+                model,
+                frame.parentJoint,
+                frame.placement,
+                0,
+                pin.SE3(np.eye(3), place.translation),
+                pin.ReferenceFrame.LOCAL,
             )
         )
     q, v = consistent(scene, rng, 0.0)
