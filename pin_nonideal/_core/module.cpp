@@ -161,6 +161,43 @@ std::function<void(double, const VecX&, const VecX&, VecX&)> torque_function(nb:
 
 VecX column(const Array& a) { return map(a); }
 
+RecordOptions read_record(const nb::dict& d) {
+    const auto wanted = [&](const char* key) { return nb::cast<bool>(d[key]); };
+    return {wanted("a"), wanted("forces"), wanted("energy"), wanted("power")};
+}
+
+nb::dict hand_over(const Workspace& w, const Recording& r) {
+    nb::dict out;
+    const std::pair<const char*, const std::vector<double>*> fields[] = {
+        {"t", &r.t}, {"q", &r.q}, {"v", &r.v}, {"violation", &r.violation}, {"violation_rate", &r.violation_rate},
+        {"a", &r.a}, {"F_ideal", &r.F_ideal}, {"F_nonideal", &r.F_nonideal}, {"lam", &r.lam},
+        {"lam_ideal", &r.lam_ideal}, {"energy", &r.energy}, {"power", &r.power}, {"z", &r.z}};
+    for (const auto& [name, values] : fields) out[name] = to_numpy(*values);
+    nb::list modes, events;
+    std::vector<double> mode_numbers(r.modes.begin(), r.modes.end());
+    out["modes"] = to_numpy(mode_numbers);
+    for (const Event& e : r.events) events.append(nb::make_tuple(e.time, static_cast<int>(e.kind), e.element));
+    out["events"] = events;
+    out["steps"] = r.steps;
+    out["rejected"] = r.rejected;
+    out["evaluations"] = w.evaluations;
+    out["factorizations"] = w.factorizations;
+    out["projections"] = w.projections;
+    out["iterations"] = w.iterations;
+    out["failure"] = r.failure ? nb::cast(std::string(r.failure->what())) : nb::none();
+    out["error"] = nb::none();
+    if (r.error) {
+        try {
+            std::rethrow_exception(r.error);
+        } catch (nb::python_error& e) {
+            out["error"] = nb::borrow(e.value());
+        } catch (const std::exception& e) {
+            out["error"] = nb::cast(std::string(e.what()));
+        }
+    }
+    return out;
+}
+
 constexpr double unit_tolerance = 1e-6;  // of quaternions and (cos, sin) pairs, as at Python's door
 
 struct Runner {  // a workspace and the program it belongs to
@@ -311,6 +348,11 @@ struct Runner {  // a workspace and the program it belongs to
 
     nb::tuple project_state(const Array& q_in, const Array& v_in, double t) {
         set(q_in, v_in, nb::none());
+        project_here(t);
+        return nb::make_tuple(to_numpy(q), to_numpy(v));
+    }
+
+    void project_here(double t) {
         std::fill(w->mode.begin(), w->mode.end(), static_cast<signed char>(1));
         want_rows(*p, *w);
         kinematics(p->mechanism, w->terms, q, v);
@@ -323,7 +365,55 @@ struct Runner {  // a workspace and the program it belongs to
             factor_rows(p->layout, p->blocks, w->B, w->rows);
             project(*p, *w, t, q, v);
         }
-        return nb::make_tuple(to_numpy(q), to_numpy(v));
+    }
+
+    // For integrators outside the core: the rate of y = (q, v, states of laws, work of the ledger's columns).
+    nb::object derivative(double t, const Array& y_in, bool energy) {
+        System system(*p, *w, energy);
+        const VecX y = read_state(system, map(y_in));
+        VecX rate(system.ny);
+        choose_modes(t, nb::none());
+        system.collect(t, y, rate);
+        return to_numpy(rate.data(), system.ny - system.ne);
+    }
+
+    // Samples of such a run, projected, as the core records its own.
+    nb::dict record(const Array& times, const Array2& states, const nb::dict& options) {
+        const RecordOptions wanted = read_record(options);
+        System system(*p, *w, wanted.energy);
+        Recording out;
+        Recorder recorder(system, wanted, out);
+        for (size_t k = 0; k < times.shape(0); ++k) {
+            const double* row = states.data() + k * states.shape(1);
+            VecX y = read_state(system, Eigen::Map<const VecX>(row, states.shape(1)));
+            const double t = times.data()[k];
+            const double before = wanted.energy ? energy() : 0.0;
+            project_here(t);
+            if (wanted.energy) recorder.moved_energy = energy() - before;
+            y.head(system.nq) = q;
+            y.segment(system.nq, system.nv) = v;
+            choose_modes(t, nb::none());
+            recorder.sample(t, y, true);
+        }
+        return hand_over(*w, out);
+    }
+
+    // Such a y with the core's watch of sticking elements behind it.
+    VecX read_state(const System& system, const VecX& outside) {
+        VecX y = VecX::Zero(system.ny);
+        if (outside.size() != system.ny - system.ne) throw std::invalid_argument("y does not fit the scene");
+        y.head(outside.size()) = outside;
+        q = y.head(system.nq);
+        v = y.segment(system.nq, system.nv);
+        if (system.nz > 0) w->z = y.segment(system.nq + system.nv, system.nz);
+        w->has_override = false;
+        return y;
+    }
+
+    double energy() {
+        kinematics(p->mechanism, w->terms, q, v);
+        inertia(p->mechanism, w->terms);
+        return kinetic_energy(p->mechanism, w->terms, v) + potential_energy(p->mechanism, w->terms);
     }
 
     double time_evaluations(const Array& q_in, const Array& v_in, double t, int count) {
@@ -344,10 +434,7 @@ Options read_options(const nb::dict& d) {
     o.dt = nb::cast<double>(d["dt"]);
     o.output_dt = nb::cast<double>(d["output_dt"]);
     read_into(nb::cast<nb::object>(d["atol"]), o.atol);
-    o.record.a = nb::cast<bool>(d["a"]);
-    o.record.forces = nb::cast<bool>(d["forces"]);
-    o.record.energy = nb::cast<bool>(d["energy"]);
-    o.record.power = nb::cast<bool>(d["power"]);
+    o.record = read_record(d);
     const nb::object tick = nb::cast<nb::object>(d["tick"]);
     o.tick = [tick, last = std::chrono::steady_clock::now()](double t) mutable {
         const auto now = std::chrono::steady_clock::now();
@@ -358,39 +445,6 @@ Options read_options(const nb::dict& d) {
         if (!tick.is_none()) tick(t);
     };
     return o;
-}
-
-nb::dict hand_over(const Program& p, const Workspace& w, const Recording& r) {
-    nb::dict out;
-    const std::pair<const char*, const std::vector<double>*> fields[] = {
-        {"t", &r.t}, {"q", &r.q}, {"v", &r.v}, {"violation", &r.violation}, {"violation_rate", &r.violation_rate},
-        {"a", &r.a}, {"F_ideal", &r.F_ideal}, {"F_nonideal", &r.F_nonideal}, {"lam", &r.lam},
-        {"lam_ideal", &r.lam_ideal}, {"energy", &r.energy}, {"power", &r.power}, {"z", &r.z}};
-    for (const auto& [name, values] : fields) out[name] = to_numpy(*values);
-    nb::list modes, events;
-    std::vector<double> mode_numbers(r.modes.begin(), r.modes.end());
-    out["modes"] = to_numpy(mode_numbers);
-    for (const Event& e : r.events) events.append(nb::make_tuple(e.time, static_cast<int>(e.kind), e.element));
-    out["events"] = events;
-    out["steps"] = r.steps;
-    out["rejected"] = r.rejected;
-    out["evaluations"] = w.evaluations;
-    out["factorizations"] = w.factorizations;
-    out["projections"] = w.projections;
-    out["iterations"] = w.iterations;
-    out["failure"] = r.failure ? nb::cast(std::string(r.failure->what())) : nb::none();
-    out["error"] = nb::none();
-    if (r.error) {
-        try {
-            std::rethrow_exception(r.error);
-        } catch (nb::python_error& e) {
-            out["error"] = nb::borrow(e.value());
-        } catch (const std::exception& e) {
-            out["error"] = nb::cast(std::string(e.what()));
-        }
-    }
-    (void)p;
-    return out;
 }
 
 }  // namespace
@@ -611,6 +665,8 @@ NB_MODULE(_core, m) {
         .def("rows", &Runner::rows)
         .def("terms", &Runner::terms)
         .def("project", &Runner::project_state)
+        .def("derivative", &Runner::derivative)
+        .def("record", &Runner::record)
         .def("time_evaluations", &Runner::time_evaluations)
         .def_prop_ro("rank", &Runner::constraint_rank)
         // How the rows were factored last: smallest pivot, orthogonal road taken, redundant, refined.
@@ -628,7 +684,7 @@ NB_MODULE(_core, m) {
                 nb::gil_scoped_release release;
                 simulate(*r.p, *r.w, q0, v0, o, recording);
             }
-            return hand_over(*r.p, *r.w, recording);
+            return hand_over(*r.w, recording);
         });
 
     // Many states in native threads, one workspace a thread.
@@ -664,7 +720,7 @@ NB_MODULE(_core, m) {
             for (std::thread& thread : pool) thread.join();
         }
         nb::list out;
-        for (size_t i = 0; i < count; ++i) out.append(hand_over(p, *spaces[i], recordings[i]));
+        for (size_t i = 0; i < count; ++i) out.append(hand_over(*spaces[i], recordings[i]));
         return out;
     });
 
