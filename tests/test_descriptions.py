@@ -27,7 +27,7 @@ from pin_nonideal.constraints import (
 from pin_nonideal.contacts import PointContact
 from pin_nonideal.errors import InputError
 from pin_nonideal.forces import JointSpring, SpringDamper, UserForce, Wrench
-from pin_nonideal.laws import Drag, JointFriction, UserFriction, UserLaw
+from pin_nonideal.laws import Drag, JointFriction, LuGre, SigmoidFriction, UserFriction, UserLaw
 from pin_nonideal.timefunctions import sinusoid
 
 
@@ -46,6 +46,8 @@ ACCEPTED = [
     Rolling("a", 0.5),
     UserConstraint(nothing, 2),
     JointFriction("j", mu=0.1, radius=0.02),
+    SigmoidFriction("j", 0.5, 5),
+    LuGre("j", 1e5, 300, 1),
     Drag("a", 0.3),
     UserLaw(nothing),
     UserFriction(nothing, nothing),
@@ -120,8 +122,15 @@ def test_lengths_may_be_functions_of_time():
     assert Distance("a", "b").length is None
 
 
+def test_stiction_is_coulomb_when_left_out():
+    assert LuGre("j", 1e5, 300, 2).stiction == 2.0
+    assert LuGre("j", 1e5, 300, 2, stiction=3).stiction == 3.0
+
+
 def test_numbers_become_floats_and_arrays_are_copied():
     assert isinstance(JointFriction("j", mu=np.float32(0.5)).mu, float)
+    assert isinstance(LuGre("j", 1, 0, 1, stiction=2).stiction, float)
+    assert isinstance(SigmoidFriction("j", 1, 2).phi2, float)
     assert Wrench("a", np.arange(6)).value == (0.0, 1.0, 2.0, 3.0, 4.0, 5.0)
     values = np.ones((2, 3))
     table = Table([0.0, 1.0], values)
@@ -226,6 +235,51 @@ REFUSED = {
     "array as number": (
         lambda: Drag("a", np.ones(2)),
         "Drag: coefficient must be one number; got an array of shape (2,)",
+    ),
+    "negative swing": (
+        lambda: SigmoidFriction("j", -0.5, 5.0, name="rub"),
+        'SigmoidFriction "rub": phi1 must not be negative; got -0.5',
+    ),
+    "no steepness": (
+        lambda: SigmoidFriction("j", 0.5, 0.0),
+        "SigmoidFriction: phi2 must be positive; got 0",
+    ),
+    "offset of velocity nan": (
+        lambda: SigmoidFriction("j", 0.5, 5.0, NAN),
+        "SigmoidFriction: phi3 must be finite; got nan",
+    ),
+    "sigmoid of a joint by number": (
+        lambda: SigmoidFriction(1, 0.5, 5.0),
+        "SigmoidFriction: joint must be a name (a string); got 1",
+    ),
+    "bristles without stiffness": (
+        lambda: LuGre("j", 0, 300, 1),
+        "LuGre: stiffness must be positive; got 0",
+    ),
+    "bristles that drive": (
+        lambda: LuGre("j", 1e5, -300, 1),
+        "LuGre: damping must not be negative; got -300",
+    ),
+    "bristles without friction": (
+        lambda: LuGre("j", 1e5, 300, 0),
+        "LuGre: coulomb must be positive; got 0",
+    ),
+    "viscous part that drives": (
+        lambda: LuGre("j", 1e5, 300, 1, viscous=-1),
+        "LuGre: viscous must not be negative; got -1",
+    ),
+    "stribeck velocity of zero": (
+        lambda: LuGre("j", 1e5, 300, 1, stribeck_velocity=0),
+        "LuGre: stribeck_velocity must be positive; got 0",
+    ),
+    "stiction below coulomb": (
+        lambda: LuGre("j", 1e5, 300, 2, stiction=1.5, name="rub"),
+        'LuGre "rub": stiction must be at least coulomb (static friction is never below kinetic friction); '
+        "got 1.5 and 2",
+    ),
+    "stiction of zero": (
+        lambda: LuGre("j", 1e5, 300, 2, stiction=0),
+        "LuGre: stiction must be positive; got 0",
     ),
     "unknown reaction": (
         lambda: JointFriction("j", mu=1, reaction="totl"),
