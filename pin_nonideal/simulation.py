@@ -79,16 +79,17 @@ def simulate(
         if (q is not None or v is not None or t0)
         else scene.initial_state()
     )
-    if method in SCIPY:
-        from .stiff import simulate_stiff
-
-        return simulate_stiff(scene, q0, v0, options)
     choice("simulate: progress", progress, (True, False, None))
     bar = _progress_bar(progress, options)
     options["tick"] = bar.update if bar else None
     begin = time.perf_counter()
     try:
-        raw = scene.new_runner().simulate(q0, v0, scene.z0, options)
+        if method in SCIPY:
+            from .stiff import simulate_stiff
+
+            raw = simulate_stiff(scene, q0, v0, options)
+        else:
+            raw = scene.new_runner().simulate(q0, v0, scene.z0, options)
     finally:
         if bar:
             bar.close()

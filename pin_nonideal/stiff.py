@@ -1,63 +1,132 @@
 """SciPy's implicit methods on the core's right-hand side, for stiff scenes.
 
-State y = (q, v) with q in ambient coordinates, dq/dt = T(q) v (pinocchio.tangentMap), dv/dt from Eq. (40).
-One-step methods and multistep ones alike run without projection inside; every sample is projected onto the
-constraints.  Modes of dry friction are chosen anew at every evaluation, without located events: prefer the
-core's methods there.
+The state is y = (q, v, states of laws, work of the ledger's columns), with q in ambient coordinates:
+quaternions and (cos, sin) pairs are plain numbers, and the right-hand side is smooth off unit length as well.
+Radau, a one-step method, goes on from the projected state after every step; BDF and LSODA remember earlier
+steps, so that only their samples are projected.  Modes of dry friction are chosen anew at every evaluation,
+without located events: prefer the core's methods there.
 """
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
-from .errors import InputError, RunError, RunInterrupted, StepSizeError
+from .actuation import SampledControl
+from .errors import InputError, RunError, StepSizeError
+from .lowering import core
 from .scene import Scene
-from .trajectory import Stats, Trajectory
 
 Array = NDArray[np.float64]
 
-# Differences of the right-hand side: the step that balances rounding against curvature.
+# Relative step of central differences of the right-hand side: the cube root of the rounding, where rounding
+# and curvature cost the same.
 DIFFERENCE = 6e-6
+# SciPy refuses, or cannot reach, tolerances below this.
+LEAST_RTOL = 1e-13
+# Work is integrated along and takes no part in the choice of steps.
+FREE = 1e100
 
 
-class _System:
-    """y' = f(t, y) and its Jacobian."""
+class _Run:
+    """One run: right-hand side, Jacobian, and samples so far."""
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene, self.model = scene, scene.model
-        self.nq, self.nv = self.model.nq, self.model.nv
-        self.flat = all(j.nq == j.nv for j in list(self.model.joints)[1:])
-        self.evaluations = 0
-
-    def split(self, y: Array) -> tuple[Array, Array]:
-        q = y[: self.nq] if self.flat else pin.normalize(self.model, y[: self.nq])
-        return np.ascontiguousarray(q), np.ascontiguousarray(y[self.nq :])
+    def __init__(self, scene: Scene, options: dict[str, Any]) -> None:
+        self.scene, self.options = scene, options
+        self.runner = scene.new_runner()
+        self.energy = bool(options["energy"])
+        self.work = 3 + len(scene.law_names) if self.energy else 0
+        self.moved = 0.0  # energy, by projections that the run went on from
+        self.steps = 0
+        self.samples: list[tuple[float, Array, float]] = []
 
     def rate(self, t: float, y: Array) -> Array:
-        self.evaluations += 1
-        q, v = self.split(y)
-        moved = v if self.flat else pin.tangentMap(self.model, q) @ v
-        return np.concatenate([moved, self.scene.acceleration(q, v, None, t)])
+        """dy/dt."""
+        result: Array = self.runner.derivative(t, np.ascontiguousarray(y), self.energy)
+        return result
 
     def jacobian(self, t: float, y: Array) -> Array:
-        """Central differences with steps that stay bounded when an angle has turned many times."""
-        n = y.size
-        result = np.empty((n, n))
-        for k in range(n):
-            h = DIFFERENCE * (1.0 if k < self.nq else max(1.0, abs(float(y[k]))))
+        """d(dy/dt)/dy by central differences.
+
+        Their steps stay bounded when a joint has turned many times; SciPy's own grow with the coordinate.
+        """
+        n, nq = y.size, self.scene.model.nq
+        result = np.zeros((n, n))
+        for k in range(n - self.work):
+            h = DIFFERENCE * (1.0 if k < nq else max(1.0, abs(float(y[k]))))
             ahead, back = y.copy(), y.copy()
             ahead[k] += h
             back[k] -= h
             result[:, k] = (self.rate(t, ahead) - self.rate(t, back)) / (ahead[k] - back[k])
         return result
 
+    def tolerance(self) -> Array:
+        """Absolute tolerance in ambient coordinates: a quaternion takes the smallest of its joint's."""
+        given, model = self.options["atol"], self.scene.model
+        positions = np.empty(model.nq)
+        for joint in list(model.joints)[1:]:
+            own = given[joint.idx_v : joint.idx_v + joint.nv]
+            same = joint.nq == joint.nv
+            positions[joint.idx_q : joint.idx_q + joint.nq] = own if same else own.min(initial=np.inf)
+        return np.concatenate([positions, given[model.nv :], np.full(self.work, FREE)])
 
-def simulate_stiff(scene: Scene, q0: Array, v0: Array, options: dict[str, Any]) -> Trajectory:
+    def sample(self, t: float, y: Array) -> None:
+        """Keeps the projected state, unless that time has a sample already."""
+        if self.samples and t <= self.samples[-1][0]:
+            return
+        settled, moved = self.runner.settle(t, np.ascontiguousarray(y), self.energy)
+        self.samples.append((t, settled, self.moved + moved))
+
+    def step(self, solver: Any, grid: _Grid) -> None:
+        """One step of SciPy's, and the samples inside it."""
+        message = solver.step()
+        if solver.status == "failed":
+            raise StepSizeError(
+                f"{self.options['method']} cannot go on at t = {solver.t:.6g} s ({message}): the motion is "
+                "singular there; look at the last samples, or loosen rtol and atol; the trajectory up to "
+                "there is in error.trajectory",
+                time=float(solver.t),
+            )
+        self.steps += 1
+        now, last = float(solver.t), solver.status == "finished"
+        if grid.dt:
+            dense = solver.dense_output()
+            for t in grid.before(now):
+                self.sample(t, dense(t))
+        if last or not grid.dt:
+            self.sample(now, solver.y)
+        if self.options["method"] == "Radau" and self.scene.constraint_slices:
+            solver.y, moved = self.runner.settle(now, np.ascontiguousarray(solver.y), self.energy)
+            solver.f = self.rate(now, solver.y)
+            self.moved += moved
+        if self.options["tick"] is not None:
+            self.options["tick"](now)
+
+    def recorded(self) -> dict[str, Any]:
+        """The samples as the core hands over its own."""
+        times, states, moved = zip(*self.samples, strict=True) if self.samples else ((), (), ())
+        width = self.scene.model.nq + self.scene.model.nv + self.scene.z0.size + self.work
+        rows = np.array(states).reshape(len(times), width)
+        raw: dict[str, Any] = self.runner.record(np.array(times), rows, np.array(moved), self.options)
+        return raw | {"steps": self.steps}
+
+
+class _Grid:
+    """Times t0 + k dt of the samples, in turn; none when dt is zero."""
+
+    def __init__(self, t0: float, dt: float) -> None:
+        self.t0, self.dt, self.k = t0, dt, 1
+
+    def before(self, t: float) -> Any:
+        """Times of the grid before t, or at it, that were not asked for yet."""
+        while self.t0 + self.k * self.dt <= t:
+            yield self.t0 + self.k * self.dt
+            self.k += 1
+
+
+def simulate_stiff(scene: Scene, q0: Array, v0: Array, options: dict[str, Any]) -> dict[str, Any]:
     """Runs one of SciPy's implicit methods.
 
     Args:
@@ -67,115 +136,29 @@ def simulate_stiff(scene: Scene, q0: Array, v0: Array, options: dict[str, Any]) 
         options: as checked by `simulate`.
 
     Returns:
-        The Trajectory.
+        Arrays by name, and what stopped the run, as the core's own runs return them.
 
     Raises:
-        InputError: the scene or the recording needs one of the core's methods.
-        RunError: the run stopped early; its `trajectory` holds the samples up to there.
+        InputError: the scene's torque is held between samples, which these methods would step over.
     """
     from scipy import integrate
 
-    for key in ("energy", "power"):
-        if options[key]:
-            raise InputError(
-                f'simulate: record "{key}" needs one of the core\'s methods; got {options["method"]}'
-            )
-    if scene.z0.size:
-        raise InputError(
-            f"simulate: laws with states need one of the core's methods; got {options['method']}"
-        )
-    system = _System(scene)
-    samples = _Samples(scene, options)
+    method = options["method"]
+    if isinstance(scene.actuation, SampledControl):
+        raise InputError(f'simulate: SampledControl needs one of the core\'s methods; got "{method}"')
+    run = _Run(scene, options)
     t0, t_end = options["t0"], options["t0"] + options["duration"]
-    nv, nq = scene.model.nv, scene.model.nq
-    absolute = options["atol"][: 2 * nv]
-    tolerance = np.concatenate(
-        [absolute[:nv] if system.flat else np.full(nq, absolute[:nv].min()), absolute[nv:]]
-    )
-    begin = time.perf_counter()
-    steps = 0
-    y0 = np.concatenate([q0, v0])
+    grid = _Grid(t0, options["output_dt"])
+    y0 = np.concatenate([q0, v0, scene.z0, np.zeros(run.work)])
+    stopped: dict[str, Any] = {}
     try:
-        samples.add(t0, y0, system)
-        solver = getattr(integrate, options["method"])(
-            system.rate, t0, y0, t_end, rtol=max(options["rtol"], 1e-13), atol=tolerance, jac=system.jacobian
-        )
-        grid = 1
+        run.sample(t0, y0)
+        tolerance = {"rtol": max(options["rtol"], LEAST_RTOL), "atol": run.tolerance()}
+        solver = getattr(integrate, method)(run.rate, t0, y0, t_end, jac=run.jacobian, **tolerance)
         while solver.status == "running":
-            message = solver.step()
-            if solver.status == "failed":
-                raise StepSizeError(
-                    f"{options['method']} failed at t = {solver.t:.6g} s: {message}; loosen rtol and atol",
-                    time=float(solver.t),
-                )
-            steps += 1
-            if options["output_dt"]:
-                dense = solver.dense_output()
-                while t0 + grid * options["output_dt"] < min(solver.t, t_end - 1e-12):
-                    at = t0 + grid * options["output_dt"]
-                    samples.add(at, dense(at), system)
-                    grid += 1
-            if not options["output_dt"] or solver.status == "finished":
-                samples.add(float(solver.t), solver.y, system)
-    except KeyboardInterrupt:
-        stopped: RunError = RunInterrupted(
-            "the run was interrupted; the trajectory up to there is in error.trajectory"
-        )
-        stopped.trajectory = samples.trajectory(system, steps, time.perf_counter() - begin)
-        raise stopped from None
-    except RunError as error:
-        error.trajectory = samples.trajectory(system, steps, time.perf_counter() - begin)
-        raise
-    return samples.trajectory(system, steps, time.perf_counter() - begin)
-
-
-class _Samples:
-    """Projected states, and what else was asked for."""
-
-    def __init__(self, scene: Scene, options: dict[str, Any]) -> None:
-        self.scene, self.options = scene, options
-        self.rows: dict[str, list[Any]] = {
-            k: [] for k in ("t", "q", "v", "violation", "violation_rate", "modes")
-        }
-        self.rows |= {k: [] for k in ("a", "F_ideal", "F_nonideal", "lam", "lam_ideal")}
-
-    def add(self, t: float, y: Array, system: _System) -> None:
-        q, v = self.scene.project(*system.split(y), t)
-        runner = self.scene.new_runner()
-        _, _, residual, rate = runner.rows(q, v, t)
-        rows = self.rows
-        rows["t"].append(t)
-        rows["q"].append(q)
-        rows["v"].append(v)
-        rows["violation"].append(float(np.abs(residual).max(initial=0.0)))
-        rows["violation_rate"].append(float(np.abs(rate).max(initial=0.0)))
-        if not (self.options["a"] or self.options["forces"] or self.scene.element_names):
-            return
-        out = runner.solve(q, v, t, None, None)
-        rows["modes"].append(out["modes"])
-        for key in ("a", "F_ideal", "F_nonideal", "lam", "lam_ideal"):
-            rows[key].append(out[key])
-
-    def trajectory(self, system: _System, steps: int, wall: float) -> Trajectory:
-        model, nt = self.scene.model, len(self.rows["t"])
-        shape = {
-            "t": (nt,),
-            "q": (nt, model.nq),
-            "v": (nt, model.nv),
-            "violation": (nt,),
-            "violation_rate": (nt,),
-        }
-        fields: dict[str, Any] = {k: np.array(self.rows[k], dtype=float).reshape(s) for k, s in shape.items()}
-        wanted = [*(["a"] if self.options["a"] else [])]
-        wanted += ["F_ideal", "F_nonideal", "lam", "lam_ideal"] if self.options["forces"] else []
-        for key in wanted:
-            fields[key] = np.array(self.rows[key]).reshape(nt, -1)
-        if self.scene.element_names:
-            fields["modes"] = np.array(self.rows["modes"], dtype=np.int8).reshape(nt, -1)
-        return Trajectory(
-            **fields,
-            stats=Stats(steps=steps, evaluations=system.evaluations, wall_s=wall),
-            scene=self.scene,
-            element_names=list(self.scene.element_names),
-            name=self.scene.name,
-        )
+            run.step(solver, grid)
+    except (KeyboardInterrupt, RunError) as error:
+        stopped = {"error": error}
+    except core.CoreFailure as failure:
+        stopped = {"failure": str(failure)}
+    return run.recorded() | stopped

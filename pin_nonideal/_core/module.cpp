@@ -377,23 +377,30 @@ struct Runner {  // a workspace and the program it belongs to
         return to_numpy(rate.data(), system.ny - system.ne);
     }
 
-    // Samples of such a run, projected, as the core records its own.
-    nb::dict record(const Array& times, const Array2& states, const nb::dict& options) {
+    // Such a y put on the constraints, and the energy that this moved.
+    nb::tuple settle(double t, const Array& y_in, bool with_energy) {
+        System system(*p, *w, with_energy);
+        VecX y = read_state(system, map(y_in));
+        const double before = energy();
+        project_here(t);
+        normalize(p->mechanism, q.data());
+        y.head(system.nq) = q;
+        y.segment(system.nq, system.nv) = v;
+        return nb::make_tuple(to_numpy(y.data(), system.ny - system.ne), energy() - before);
+    }
+
+    // Samples of such a run as the core records its own; `moved` is the energy moved by projection up to each.
+    nb::dict record(const Array& times, const Array2& states, const Array& moved, const nb::dict& options) {
         const RecordOptions wanted = read_record(options);
         System system(*p, *w, wanted.energy);
         Recording out;
         Recorder recorder(system, wanted, out);
         for (size_t k = 0; k < times.shape(0); ++k) {
             const double* row = states.data() + k * states.shape(1);
-            VecX y = read_state(system, Eigen::Map<const VecX>(row, states.shape(1)));
-            const double t = times.data()[k];
-            const double before = wanted.energy ? energy() : 0.0;
-            project_here(t);
-            if (wanted.energy) recorder.moved_energy = energy() - before;
-            y.head(system.nq) = q;
-            y.segment(system.nq, system.nv) = v;
-            choose_modes(t, nb::none());
-            recorder.sample(t, y, true);
+            const VecX y = read_state(system, Eigen::Map<const VecX>(row, states.shape(1)));
+            choose_modes(times.data()[k], nb::none());
+            recorder.moved_energy = moved.data()[k];
+            recorder.sample(times.data()[k], y, true);
         }
         return hand_over(*w, out);
     }
@@ -666,6 +673,7 @@ NB_MODULE(_core, m) {
         .def("terms", &Runner::terms)
         .def("project", &Runner::project_state)
         .def("derivative", &Runner::derivative)
+        .def("settle", &Runner::settle)
         .def("record", &Runner::record)
         .def("time_evaluations", &Runner::time_evaluations)
         .def_prop_ro("rank", &Runner::constraint_rank)
