@@ -7,6 +7,7 @@ import json
 import os
 import tempfile
 import zipfile
+import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,9 @@ from .errors import LoadingError, OutputError
 Array = NDArray[np.float64]
 
 FORMAT = 1
+# What NumPy, zip archives and JSON raise on files that are damaged or something else.
+UNREADABLE: tuple[type[Exception], ...] = (OSError, ValueError, LookupError, TypeError, AttributeError)
+UNREADABLE += (EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
 REQUIRED = ("t", "q", "v", "violation", "violation_rate")
 OPTIONAL = ("a", "F_ideal", "F_nonideal", "lam", "lam_ideal", "z", "modes")
 
@@ -206,6 +210,7 @@ class Trajectory:
             missing = [key for key in REQUIRED if key not in arrays]
             if missing:
                 raise LoadingError(f'"{source}" is no complete trajectory: {", ".join(missing)} missing')
+            _check_arrays(arrays, source)
             fields: dict[str, Any] = {key: arrays.get(key) for key in (*REQUIRED, *OPTIONAL)}
             for group in ("energy", "power"):
                 if header[group] is not None:
@@ -220,8 +225,28 @@ class Trajectory:
             )
         except LoadingError:
             raise
-        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        except UNREADABLE as error:
             raise LoadingError(
                 f'cannot read a trajectory from "{source}": {type(error).__name__}: {error}; '
                 "it must be an .npz file written by Trajectory.save"
             ) from error
+
+
+def _check_arrays(arrays: dict[str, Any], source: Path) -> None:
+    """Raises unless every array holds numbers and has a row for each sample.
+
+    Raises:
+        LoadingError: one does not.
+    """
+    rows = arrays["t"].shape[:1]
+    for key, x in arrays.items():
+        if x.dtype.kind not in "fi":
+            raise LoadingError(f'"{source}" is no trajectory: {key} must hold numbers; got {x.dtype.name}')
+        columns = 2 if key in ("q", "v", *OPTIONAL) else 1
+        if x.ndim != columns:
+            shape = "a table" if columns == 2 else "one column"
+            raise LoadingError(f'"{source}" is no trajectory: {key} must be {shape}; got shape {x.shape}')
+        if x.shape[:1] != rows:
+            raise LoadingError(
+                f'"{source}" is no trajectory: {key} must have {rows[0]} rows as t has; got shape {x.shape}'
+            )

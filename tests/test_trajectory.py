@@ -1,0 +1,258 @@
+"""Trajectories: their fields, their words, and files of them, good and bad."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import pickle
+import zipfile
+
+import numpy as np
+import pytest
+
+import pin_nonideal as pn
+from pin_nonideal.errors import LoadingError, OutputError
+
+from .small_robots import refuses
+
+
+@pytest.fixture(scope="module")
+def run():
+    scene = pn.load("four_bar")
+    return pn.simulate(scene, 0.3, output_dt=0.05, record=("a", "forces", "energy", "power"))
+
+
+ARRAYS = (
+    "t",
+    "q",
+    "v",
+    "violation",
+    "violation_rate",
+    "a",
+    "F_ideal",
+    "F_nonideal",
+    "lam",
+    "lam_ideal",
+    "modes",
+)
+
+
+def test_shapes(run):
+    scene, n = run.scene, len(run)
+    m = max(s.stop for s in scene.constraint_slices.values())
+    widths = {"q": scene.model.nq, "v": scene.model.nv, "a": scene.model.nv, "lam": m, "lam_ideal": m}
+    widths |= {"F_ideal": scene.model.nv, "F_nonideal": scene.model.nv, "modes": len(scene.element_names)}
+    for key in ARRAYS:
+        shape = (n, widths[key]) if key in widths else (n,)
+        assert getattr(run, key).shape == shape, key
+    assert run.z is None
+    columns = ["kinetic", "potential", "total", "actuation", "forces", "constraints", *scene.law_names]
+    assert list(run.energy) == [*columns, "projection", "balance"]
+    assert list(run.power) == columns[3:]
+
+
+def test_fields_that_were_not_asked_for_are_none():
+    plain = pn.simulate(pn.load("four_bar"), 0.05)
+    for key in ("a", "F_ideal", "F_nonideal", "lam", "lam_ideal", "energy", "power", "z"):
+        assert getattr(plain, key) is None, key
+
+
+@pytest.mark.parametrize(
+    ("record", "keys"),
+    [
+        ("lam", ("lam", "F_ideal", "F_nonideal", "lam_ideal")),
+        (["F_ideal", "a"], ("F_ideal", "lam", "a")),
+        ({"energy"}, ("energy",)),
+    ],
+)
+def test_a_name_of_a_field_records_its_group(record, keys):
+    recorded = pn.simulate(
+        pn.load("four_bar"), 0.02, record=list(record) if isinstance(record, set) else record
+    )
+    assert all(getattr(recorded, key) is not None for key in keys)
+
+
+def test_recorded_forces_belong_to_the_recorded_motion(run):
+    """Samples between the steps too: M a = F + F_ideal + F_nonideal with the scene's own solution there."""
+    for k in range(len(run)):
+        s = run.scene.solve(run.q[k], run.v[k], run.t[k])
+        scale = np.abs(s.F_ideal).max() + np.abs(s.F_nonideal).max()
+        np.testing.assert_allclose(run.a[k], s.a, rtol=0, atol=1e-9 * np.abs(s.a).max())
+        for key in ("F_ideal", "F_nonideal", "lam"):
+            np.testing.assert_allclose(getattr(run, key)[k], getattr(s, key), rtol=0, atol=1e-9 * scale)
+
+
+def test_recorded_acceleration_of_laws_with_states():
+    """The states of a law at the sample, not those of the stages, enter the recorded acceleration."""
+    model = pn.load("four_bar").model
+    law = pn.UserLaw(lambda t, q, v, r, z: (-5.0 * z * np.ones(3), [np.sin(20.0 * t) + v[0]]), states=1)
+    scene = pn.Scene(model, laws=[law], v0=[1.0, -2.0, 0.5])
+    sampled = pn.simulate(scene, 0.5, output_dt=0.05, record="a", rtol=1e-9)
+    frozen_law = pn.UserLaw(lambda t, q, v, r: -5.0 * now * np.ones(3), reaction=None)
+    frozen = pn.Scene(model, laws=[frozen_law])
+    for k in range(len(sampled)):
+        now = float(sampled.z[k, 0])
+        expected = frozen.acceleration(sampled.q[k], sampled.v[k])
+        np.testing.assert_allclose(sampled.a[k], expected, rtol=1e-9, atol=1e-9)
+
+
+def test_words(run):
+    lines = str(run).splitlines()
+    assert lines[0] == "four_bar: 0 to 0.3 s, 7 samples"
+    assert lines[1].startswith(f"  steps {run.stats.steps} ({run.stats.rejected} rejected), evaluations ")
+    assert lines[2].startswith("  violation ")
+    assert lines[3].startswith("  energy [J]: kinetic ")
+    assert lines[-1].startswith("  wall time ")
+
+
+# --- Files -------------------------------------------------------------------------------------------------
+
+
+def test_a_file_gives_everything_back(run, tmp_path):
+    path = run.save(tmp_path / "four_bar")
+    assert path == tmp_path / "four_bar.npz"
+    back = pn.Trajectory.load(path)
+    for key in ARRAYS:
+        np.testing.assert_array_equal(getattr(back, key), getattr(run, key))
+    for group in ("energy", "power"):
+        assert list(getattr(back, group)) == list(getattr(run, group))
+        for name, column in getattr(run, group).items():
+            np.testing.assert_array_equal(getattr(back, group)[name], column)
+    assert (back.events, back.stats, back.name, back.element_names) == (
+        run.events,
+        run.stats,
+        "four_bar",
+        run.element_names,
+    )
+    assert back.scene is None
+    assert str(back) == str(run)
+
+
+def test_events_and_states_of_laws_come_back(tmp_path):
+    law = pn.UserLaw(lambda t, q, v, r, z: (-z * np.ones(3), [v[0]]), states=1)
+    scene = pn.Scene(pn.load("four_bar").model, laws=[law, pn.JointFriction("rocker_joint", coulomb=0.05)])
+    run = pn.simulate(scene, 1.0, v=[1.0, -2.0, 0.5])
+    assert run.events
+    back = pn.Trajectory.load(run.save(tmp_path / "run.npz"))
+    assert back.events == run.events
+    np.testing.assert_array_equal(back.z, run.z)
+
+
+def test_a_file_is_replaced_whole_or_not_at_all(run, tmp_path, monkeypatch):
+    path = run.save(tmp_path / "run.npz")
+    before = path.read_bytes()
+
+    def full_disk(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "savez_compressed", full_disk)
+    with refuses(f'cannot write "{path}": No space left on device; choose a writable path', OutputError):
+        run.save(path)
+    assert path.read_bytes() == before
+    assert os.listdir(tmp_path) == ["run.npz"]
+
+
+def test_an_unwritable_place(run, tmp_path):
+    path = tmp_path / "nowhere" / "run.npz"
+    with refuses(f'cannot write "{path}": No such file or directory; choose a writable path', OutputError):
+        run.save(path)
+    (tmp_path / "file").write_text("")
+    path = tmp_path / "file" / "run.npz"
+    with refuses(f'cannot write "{path}": Not a directory; choose a writable path', OutputError):
+        run.save(path)
+    folder = tmp_path / "run.npz"
+    folder.mkdir()
+    with refuses(f'cannot write "{folder}": Is a directory; choose a writable path', OutputError):
+        run.save(folder)
+    assert sorted(os.listdir(tmp_path)) == ["file", "run.npz"]
+
+
+def cannot_read(path, reason):
+    return refuses(f'cannot read a trajectory from "{path}": {reason}', LoadingError)
+
+
+def test_a_missing_file(tmp_path):
+    path = tmp_path / "no.npz"
+    with cannot_read(path, f"FileNotFoundError: [Errno 2] No such file or directory: '{path}'; it must be"):
+        pn.Trajectory.load(path)
+
+
+@pytest.mark.parametrize("part", [0.0, 0.2, 0.7, 0.999])
+def test_a_truncated_file(run, tmp_path, part):
+    path = run.save(tmp_path / "run.npz")
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(part * len(whole))])
+    with pytest.raises(LoadingError) as caught:
+        pn.Trajectory.load(path)
+    assert str(caught.value).startswith(f'cannot read a trajectory from "{path}": ')
+    assert str(caught.value).endswith("; it must be an .npz file written by Trajectory.save")
+
+
+def test_a_damaged_file(run, tmp_path):
+    path = run.save(tmp_path / "run.npz")
+    data = bytearray(path.read_bytes())
+    data[len(data) // 3 : len(data) // 3 + 40] = bytes(40)
+    path.write_bytes(bytes(data))
+    with cannot_read(path, ""):
+        pn.Trajectory.load(path)
+
+
+class Command:
+    """Runs when it is unpickled."""
+
+    def __reduce__(self):
+        return (os.mkdir, ("came_true",))
+
+
+def test_a_file_that_tries_to_run_code(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    plain = tmp_path / "plain.npz"
+    plain.write_bytes(pickle.dumps(Command()))
+    hidden = tmp_path / "hidden.npz"
+    np.savez(hidden, header=np.array([Command()], dtype=object), t=np.zeros(1))
+    for path in (plain, hidden):
+        with cannot_read(path, "ValueError: "):
+            pn.Trajectory.load(path)
+    assert not (tmp_path / "came_true").exists()
+
+
+def rewrite(path, **changes):
+    """The file with other members; None leaves one out."""
+    with np.load(path) as file:
+        members = {key: file[key] for key in file.files}
+    header = json.loads(str(members["header"]))
+    header |= changes.pop("header", {})
+    members["header"] = np.array(json.dumps(header))
+    members |= changes
+    np.savez(path, **{key: x for key, x in members.items() if x is not None})
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"header": {"format": 99}}, "must have format 1; it has 99"),
+        ({"q": None}, "is no complete trajectory: q missing"),
+        ({"v": np.zeros((2, 3))}, "v must have 7 rows as t has; got shape (2, 3)"),
+        ({"t": np.zeros((7, 2))}, "t must be one column; got shape (7, 2)"),
+        ({"lam": np.array(["a"] * 7)}, "lam must hold numbers; got str"),
+    ],
+)
+def test_a_file_that_is_no_trajectory_of_this_version(run, tmp_path, changes, message):
+    path = run.save(tmp_path / "run.npz")
+    rewrite(path, **changes)
+    with refuses(message, LoadingError):
+        pn.Trajectory.load(path)
+
+
+def test_other_archives(tmp_path):
+    path = tmp_path / "other.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("readme.txt", "hello")
+    with cannot_read(path, "KeyError: "):
+        pn.Trajectory.load(path)
+    buffer = io.BytesIO()
+    np.save(buffer, np.zeros(3))
+    path.write_bytes(buffer.getvalue())
+    with cannot_read(path, ""):
+        pn.Trajectory.load(path)
