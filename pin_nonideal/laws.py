@@ -118,7 +118,8 @@ class LuGre:
         g(v) = coulomb + (stiction - coulomb) exp(-(v / stribeck_velocity)^2)
         C_j = -(stiffness z + damping dz/dt + viscous v)                                       [N m or N]
 
-    z is one column of `Trajectory.z`.  Bristles give way a little under any load: this law creeps by design.
+    z is one column of `Trajectory.z`.  Bristles give way a little under any load, and the body
+    drifts under a load that varies; use `JointFriction` where a joint must hold.
     Source: Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Trans. Automatic Control 40 (1995).
 
     Args:
