@@ -95,7 +95,8 @@ def drop_rows(model: Any, q0: Array, low: Lowered) -> list[tuple[str, int, str]]
         if not keep[s].all():
             low.builder.keep_rows(low.blocks[name], np.flatnonzero(keep[s]).tolist())
     low.builder.finish()
-    return dropped
+    rows = {owner: row for row, owner in enumerate(owners)}
+    return sorted(dropped, key=lambda entry: rows[entry[:2]])
 
 
 def _check_vanishing(name: str, local: int, asked: float, largest: float, gap: float) -> None:

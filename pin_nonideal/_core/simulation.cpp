@@ -200,15 +200,7 @@ void Simulation::advance_to(double stop) {
         return;
     }
     if (o.method.adaptive) {
-        double factor = growth_limit;
-        if (error > 0.0) {
-            factor = std::min(factor, safety * std::pow(error, -1.0 / o.method.order));
-            if (accepted_error > 0.0)  // the trend of the last two steps, so that growing errors are foreseen (Gustafsson)
-                factor = std::min(factor, safety * (size / accepted_size) *
-                                              std::pow(accepted_error / (error * error), 1.0 / o.method.order));
-        }
-        accepted_error = std::max(error, 1e-2);
-        accepted_size = size;
+        double factor = error == 0.0 ? growth_limit : std::min(growth_limit, safety * std::pow(error, -1.0 / o.method.order));
         if (last_rejected) factor = std::min(1.0, factor);
         last_rejected = false;
         if (!(last && factor * size < h)) h = size * std::max(factor, shrink_limit);

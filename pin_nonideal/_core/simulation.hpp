@@ -76,7 +76,6 @@ private:
     std::vector<double> recent_events, slip_at_start;
     std::vector<char> pulls, indeterminate;
     bool last_rejected = false;
-    double accepted_error = 0.0, accepted_size = 0.0;  // of the last accepted step
     double pending_energy = 0.0;  // moved by the projection that ends the step
     int trigger_element = -1, located_element = -1, arrived = -1;
     bool released_together = false;  // redundant elements that could hold no longer
