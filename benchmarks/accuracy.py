@@ -7,12 +7,12 @@ medians over the rounds.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from . import timing
-from .problems import Problem
+from .problems import SAMPLES, Problem
+from .timing import clock
 from .tools import Outcome, Setting, Tool
 from .tools.package import Package
 
@@ -39,14 +39,16 @@ def sweep(problem: Problem, tool: Tool, limit: float) -> list[dict[str, Any]]:
                 row["status"] = "not run: over the time limit"
                 continue
         run = tool.prepare(problem, setting)
-        begin = time.perf_counter()
+        begin = clock()
         outcome = run()
-        seconds = time.perf_counter() - begin
+        seconds = clock() - begin
         for _ in range(4 if seconds < 0.05 * limit else 1 if seconds < 0.5 * limit else 0):
-            begin = time.perf_counter()
+            begin = clock()
             run()
-            seconds = min(seconds, time.perf_counter() - begin)
+            seconds = min(seconds, clock() - begin)
         last = (setting.family, setting.steps, seconds)
+        if not outcome.failure:
+            outcome = tool.prepare(problem, setting, SAMPLES)()
         row |= {"seconds": seconds, **judged(problem, outcome)}
     return rows
 

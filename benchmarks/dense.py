@@ -167,17 +167,23 @@ class DenseTree:
                 dq[j0] = v[j]
         return np.concatenate([dq, self.acceleration(t, q, v)[0]])
 
-    def motion(self, q: Array, v: Array, duration: float, rtol: float = 1e-13) -> tuple[Array, Array]:
-        """State after a time, by SciPy's DOP853.
+    def motion(self, q: Array, v: Array, times: Array, rtol: float = 1e-13) -> Array:
+        """Configurations at some times, by SciPy's DOP853, started anew at each of them.
 
         Args:
-            q: configuration at the start.
-            v: velocity at the start.
-            duration: [s].
+            q: configuration at time zero.
+            v: velocity at time zero.
+            times: [s], (k,).
             rtol: relative tolerance; the absolute one is a tenth of it.
+
+        Returns:
+            Configurations, (k, nq).
         """
-        y0 = np.concatenate([q, v])
-        out = solve_ivp(self.rate, (0.0, duration), y0, method="DOP853", rtol=rtol, atol=0.1 * rtol)
-        if not out.success:
-            raise RuntimeError(f"the reference did not reach its end: {out.message}")
-        return out.y[: self.nq, -1], out.y[self.nq :, -1]
+        t, y, found = 0.0, np.concatenate([q, v]), []
+        for end in times:
+            out = solve_ivp(self.rate, (t, end), y, method="DOP853", rtol=rtol, atol=0.1 * rtol)
+            if not out.success:
+                raise RuntimeError(f"the reference did not reach its end: {out.message}")
+            t, y = float(end), out.y[:, -1]
+            found.append(y[: self.nq])
+        return np.array(found)

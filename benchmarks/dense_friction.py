@@ -47,17 +47,19 @@ class Friction:
 
 
 def friction_motion(tree: DenseTree, problem: Any, max_step: float) -> Array:
-    """Configuration at the end of the problem.
+    """Configurations at the problem's sample times, (k, nq).
 
     Args:
         tree: its mechanics.
-        problem: gives the initial state, the friction and the duration.
+        problem: gives the initial state, the friction and the times.
         max_step: of the integrator [s]; the interpolant that locates events is as good as this is short.
     """
     friction = Friction(tree, problem.coulomb, problem.viscous)
     t, q, v = 0.0, problem.q0.copy(), problem.v0.copy()
     nv = tree.nv
     friction.choose(t, q, v)
+    found: list[Array] = []
+    times = problem.times
     for _ in range(MOST_EVENTS):
         sliding, held = [int(j) for j in np.flatnonzero(friction.mode)], friction.held()
 
@@ -76,13 +78,16 @@ def friction_motion(tree: DenseTree, problem: Any, max_step: float) -> Array:
         for event in events:
             event.terminal, event.direction = True, -1.0
         out = solve_ivp(
-            rate, (t, problem.duration), np.concatenate([q, v]), method="DOP853", rtol=1e-13, atol=1e-14,
+            rate, (t, times[len(found)]), np.concatenate([q, v]), method="DOP853", rtol=1e-13, atol=1e-14,
             events=events, max_step=max_step,
         )  # fmt: skip
         t, q, v = float(out.t[-1]), out.y[:nv, -1], out.y[nv:, -1].copy()
         v[held] = 0.0
         if out.status == 0:
-            return q
+            found.append(q)
+            if len(found) == len(times):
+                return np.array(found)
+            continue
         which = next(k for k, times in enumerate(out.t_events) if len(times))
         if which < len(sliding):
             v[sliding[which]] = 0.0

@@ -102,10 +102,9 @@ def python_batch(case: Problem) -> timing.Batch:
     """Pinocchio's evaluation called from Python, data and settings made once."""
     model, q, v, tau = case.model, np.array(case.q0), np.array(case.v0), np.zeros(case.model.nv)
     data = model.createData()
-    models = loop.anchors(case)
-    if not models:
+    if not case.anchors:
         return timing.per_call(lambda: pin.aba(model, data, q, v, tau))
-    datas = [c.createData() for c in models]
+    models, datas = loop.containers(loop.anchors(case))
     settings = loop.proximal(case)
     pin.initConstraintDynamics(model, data, models, datas)
     return timing.per_call(lambda: pin.constraintDynamics(model, data, q, v, tau, models, datas, settings))

@@ -18,6 +18,7 @@ from .references import Reference
 
 Array = NDArray[np.float64]
 
+SAMPLES = 10
 LEVELS = (1e-3, 1e-6, 1e-8, 1e-10)  # errors for which the time is reported
 
 
@@ -32,7 +33,7 @@ class Problem:
         q0: configuration at the start, consistent with the anchors.
         v0: velocity at the start, likewise.
         duration: [s].
-        reference: computes the configuration at the end.
+        reference: computes the configurations at `times`.
         anchors: PointAnchor and FrameAnchor descriptions.
         springs: SpringDamper descriptions.
         torque: constant joint torques, (nv,).
@@ -64,11 +65,21 @@ class Problem:
         """The reference: the stored one, or computed."""
         return reference_store.read(self) or self.reference(self)
 
+    @property
+    def times(self) -> Array:
+        """Where errors are measured [s]: ten times, so that one lucky crossing of zero counts for nothing."""
+        return np.linspace(0.0, self.duration, SAMPLES + 1)[1:]
+
     def error(self, q: Array) -> float:
-        """Largest error of a coordinate at the end [rad or m]; infinite when q is not finite."""
+        """Largest error of a coordinate [rad or m]; infinite when q is not finite.
+
+        Args:
+            q: configurations at the last of `times`, (k, nq).
+        """
         if not np.isfinite(q).all():
             return float("inf")
-        return float(np.abs(pin.difference(self.model, self.solution.q, q)).max())
+        pairs = zip(self.solution.q[-len(q) :], q, strict=True)
+        return max(float(np.abs(pin.difference(self.model, exact, found)).max()) for exact, found in pairs)
 
     def scene(self) -> pn.Scene:
         """The problem as a scene of the package."""
@@ -176,8 +187,8 @@ def andrews() -> Problem:
         springs=scene.forces,
         torque=torque,
         duration=0.03,
-        reference=references.published_andrews,
-        levels=(1e-3, 1e-6, 1e-8, 1e-9),
+        reference=references.andrews,
+        levels=(1e-3, 1e-6, 1e-8),
     )
 
 

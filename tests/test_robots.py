@@ -26,15 +26,19 @@ ROUNDING = 1e-13
 def test_the_robots_are_there():
     assert NAMES == [
         "andrews_squeezer",
+        "belt_oscillator",
         "delta",
         "five_bar",
         "four_bar",
         "knife_edge_sleigh",
+        "loaded_joint",
         "n_four_bar",
         "panda_friction",
+        "panda_settling",
         "rolling_disk",
         "slider_crank",
         "solo12_standing",
+        "worm_drive",
     ]
 
 

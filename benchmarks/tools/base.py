@@ -18,7 +18,7 @@ class Outcome:
     """End of one run.
 
     Attributes:
-        q: configuration as Pinocchio orders it; None when the run failed.
+        q: configurations at the sample times as Pinocchio orders them, (k, nq); None when the run failed.
         steps: steps really made.
         asked: steps that a fixed step asks for; None for adaptive methods.
         failure: what went wrong, empty when nothing did.
@@ -67,8 +67,14 @@ class Tool(Protocol):
     def settings(self, problem: Any) -> list[Setting]:
         """Settings worth trying; none when the tool cannot state the problem."""
 
-    def prepare(self, problem: Any, setting: Setting) -> Callable[[], Outcome]:
-        """A function that runs the problem once from its start."""
+    def prepare(self, problem: Any, setting: Setting, samples: int = 1) -> Callable[[], Outcome]:
+        """A function that runs the problem once from its start.
+
+        Args:
+            problem: what to compute.
+            setting: how.
+            samples: configurations wanted, at equal times up to the end; 1 is timed, more tell the error.
+        """
 
 
 def needs(package: str) -> str | None:

@@ -37,14 +37,13 @@ class Exudyn:
         fixed = [Setting("RK67", f"h {problem.duration / n:.1e}", n) for n in steps]
         return adaptive + fixed
 
-    def prepare(self, problem: Any, setting: Setting) -> Callable[[], Outcome]:
+    def prepare(self, problem: Any, setting: Setting, samples: int = 1) -> Callable[[], Outcome]:
         """A function that runs the problem once from its start."""
         import exudyn
 
         mbs = tree(exudyn, problem)
         settings = exudyn.SimulationSettings()
         integration = settings.timeIntegration
-        integration.endTime = problem.duration
         integration.verboseMode = 0
         settings.solutionSettings.writeSolutionToFile = False
         settings.solutionSettings.sensorsWritePeriod = 2.0 * problem.duration
@@ -52,26 +51,37 @@ class Exudyn:
         if setting.steps is None:
             integration.automaticStepSize = True
             integration.relativeTolerance = integration.absoluteTolerance = setting.values["rtol"]
-            integration.numberOfSteps = 1  # the largest step it may take is the whole
             integration.initialStepSize = 1e-3
             integration.minimumStepSize = SMALLEST_STEP
         else:
             integration.automaticStepSize = False
-            integration.numberOfSteps = setting.steps
         initial = exudyn.ConfigurationType.Initial
         q0, v0 = np.array(problem.q0), np.array(problem.v0)
 
-        def run() -> Outcome:
+        def run_to(end: float, steps: int | None) -> Outcome:
+            integration.endTime = end
+            integration.numberOfSteps = steps or 1  # adaptive: the largest step it may take is the whole
             mbs.systemData.SetODE2Coordinates(q0, configuration=initial)
             mbs.systemData.SetODE2Coordinates_t(v0, configuration=initial)
             try:
                 done = mbs.SolveDynamic(settings, solverType=method)
             except Exception as error:  # its own exceptions have no common root
                 return Outcome(None, 0, failure=str(error).splitlines()[0])
-            steps = int(mbs.sys["dynamicSolver"].it.currentStepIndex) - 1 if "dynamicSolver" in mbs.sys else 0
+            made = int(mbs.sys["dynamicSolver"].it.currentStepIndex) - 1
             if done is False:
-                return Outcome(None, steps, setting.steps, failure="the solver gave up")
-            return Outcome(np.array(mbs.systemData.GetODE2Coordinates()), steps)
+                return Outcome(None, made, steps, failure="the solver gave up")
+            return Outcome(np.array(mbs.systemData.GetODE2Coordinates())[None, :], made, steps)
+
+        def run() -> Outcome:
+            """Each sample is the end of a run of its own: an adaptive step does not stop elsewhere."""
+            outcome, found = Outcome(None, 0), []
+            for k in range(1, samples + 1):
+                steps = None if setting.steps is None else setting.steps * k // samples
+                outcome = run_to(problem.duration * k / samples, steps)
+                if outcome.q is None:
+                    return outcome
+                found.append(outcome.q[0])
+            return Outcome(np.array(found), outcome.steps, outcome.asked)
 
         return run
 

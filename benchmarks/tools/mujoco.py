@@ -111,7 +111,7 @@ class MuJoCo:
                 found.append(Setting(name, f"h {problem.duration / n:.1e}", n, values))
         return found
 
-    def prepare(self, problem: Any, setting: Setting) -> Callable[[], Outcome]:
+    def prepare(self, problem: Any, setting: Setting, samples: int = 1) -> Callable[[], Outcome]:
         """A function that runs the problem once from its start."""
         import mujoco
 
@@ -134,13 +134,16 @@ class MuJoCo:
             data.qpos[:], data.qvel[:] = x0, u0
             if torque is not None:
                 data.qfrc_applied[:] = torque
-            mujoco.mj_step(mj, data, nstep=steps)
+            found = []
+            for _ in range(samples):
+                mujoco.mj_step(mj, data, nstep=steps // samples)
+                found.append(coordinates.back(data.qpos))
             # On divergence it resets itself and counts a warning: the steps really made are those since then.
             made = round(data.time / mj.opt.timestep)
             bad = [w.name for w in resets(mujoco) if data.warning[w.value].number]
             if bad:
                 return Outcome(None, made, steps, failure=f"diverged ({', '.join(bad)})")
-            return Outcome(coordinates.back(data.qpos), made, steps)
+            return Outcome(np.array(found), made, steps)
 
         return run
 

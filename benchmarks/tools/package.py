@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 import pin_nonideal as pn
 
 from .base import Outcome, Setting, tolerances
@@ -29,19 +31,23 @@ class Package:
             for rtol in tolerances(2, last)
         ]
 
-    def prepare(self, problem: Any, setting: Setting) -> Callable[[], Outcome]:
+    def prepare(self, problem: Any, setting: Setting, samples: int = 1) -> Callable[[], Outcome]:
         """A function that runs the problem once from its start."""
         scene = problem.scene()
         scene.initial_state()
         method, rtol = setting.values["method"], setting.values["rtol"]
 
+        settings = {"method": method, "rtol": rtol, "atol": rtol, "progress": False}
+        output_dt = problem.duration / samples
+
         def run() -> Outcome:
             try:
-                run = pn.simulate(
-                    scene, problem.duration, method=method, rtol=rtol, atol=rtol, progress=False
-                )
+                run = pn.simulate(scene, problem.duration, output_dt=output_dt, **settings)
             except pn.PinNonidealError as error:
                 return Outcome(None, 0, failure=f"{type(error).__name__}: {error}")
-            return Outcome(run.q[-1], run.stats.steps)
+            if samples == 1:
+                return Outcome(run.q[-1:], run.stats.steps)
+            places = [int(np.argmin(np.abs(run.t - t))) for t in problem.times]  # events are samples too
+            return Outcome(run.q[places], run.stats.steps)
 
         return run

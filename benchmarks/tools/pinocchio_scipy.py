@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 # Proximal term of constraintDynamics where rows are redundant (a planar loop closed with three rows has one);
 # its manual suggests 1e-12, and the error in the acceleration is 1e-13 relative then.
 REDUNDANT_MU = 1e-12
-MOST_STEPS = 200_000
+MOST_EVALUATIONS = 200_000
 
 
 def anchors(problem: Any) -> list[Any]:
@@ -45,6 +45,15 @@ def anchors(problem: Any) -> list[Any]:
             ends += [two.parentJoint, two.placement]
         found.append(pin.RigidConstraintModel(kind, model, *ends, pin.ReferenceFrame.LOCAL))
     return found
+
+
+def containers(models: list[Any]) -> tuple[Any, Any]:
+    """Constraint models and their data in Pinocchio's own vectors: lists would be copied at every call."""
+    kept, data = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+    for model in models:
+        kept.append(model)
+        data.append(model.createData())
+    return kept, data
 
 
 def is_redundant(problem: Any) -> bool:
@@ -72,44 +81,73 @@ class PinocchioSciPy:
         tried = [Setting("LSODA", f"rtol {r:.0e}", values={"rtol": r}) for r in tolerances(3, 13)]
         return tried + [Setting("DOP853", f"rtol {r:.0e}", values={"rtol": r}) for r in tolerances(3, 13)]
 
-    def prepare(self, problem: Any, setting: Setting) -> Callable[[], Outcome]:
+    def prepare(self, problem: Any, setting: Setting, samples: int = 1) -> Callable[[], Outcome]:
         """A function that runs the problem once from its start."""
         rate = equation(problem)
         y0 = np.concatenate([problem.q0, problem.v0])
-        span, rtol, nq = (0.0, problem.duration), setting.values["rtol"], problem.model.nq
+        rtol, nq = setting.values["rtol"], problem.model.nq
+        times = np.linspace(0.0, problem.duration, samples + 1)
+        count = 0
 
         def lsoda() -> Outcome:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ODEintWarning)
                 y, info = odeint(
-                    rate, y0, span, tfirst=True, rtol=rtol, atol=rtol, full_output=True, mxstep=MOST_STEPS
-                )  # fmt: skip
+                    rate,
+                    y0,
+                    times,
+                    tfirst=True,
+                    rtol=rtol,
+                    atol=rtol,
+                    full_output=True,
+                    mxstep=MOST_EVALUATIONS,
+                )
             steps = int(info["nst"][-1])
             if info["message"] != "Integration successful." or not np.isfinite(y).all():
                 return Outcome(None, steps, failure=str(info["message"]))
-            return Outcome(y[-1, :nq], steps)
+            return Outcome(y[1:, :nq], steps)
+
+        def copied(t: float, y: Array) -> Array:
+            """SciPy's own methods keep what they get, and know no limit of steps."""
+            nonlocal count
+            count += 1
+            if count > MOST_EVALUATIONS:
+                raise TimeoutError(f"more than {MOST_EVALUATIONS} evaluations")
+            return rate(t, y).copy()
 
         def dop853() -> Outcome:
-            out = solve_ivp(rate, span, y0, method="DOP853", rtol=max(rtol, 3e-14), atol=rtol)
+            nonlocal count
+            count = 0
+            try:
+                out = solve_ivp(
+                    copied,
+                    (0.0, problem.duration),
+                    y0,
+                    method="DOP853",
+                    rtol=max(rtol, 3e-14),
+                    atol=rtol,
+                    t_eval=times if samples > 1 else None,
+                )
+            except TimeoutError as error:
+                return Outcome(None, 0, failure=str(error))
             if not out.success or not np.isfinite(out.y[:, -1]).all():
                 return Outcome(None, len(out.t) - 1, failure=str(out.message))
-            return Outcome(out.y[:nq, -1], len(out.t) - 1)
+            return Outcome(out.y[:nq, -samples:].T, len(out.t) - 1)
 
         return lsoda if setting.family == "LSODA" else dop853
 
 
 def equation(problem: Any) -> Callable[[float, Array], Array]:
-    """dy/dt of y = (q, v)."""
+    """dy/dt of y = (q, v), in one array that is written again at every call."""
     model = problem.model
     data, nq, nv = model.createData(), model.nq, model.nv
-    models = anchors(problem)
-    datas = [c.createData() for c in models]
+    models, datas = containers(anchors(problem))
     settings = proximal(problem)
     if models:
         pin.initConstraintDynamics(model, data, models, datas)
     floating = model.joints[1].shortname() == "JointModelFreeFlyer"
     still = np.zeros(nv) if problem.torque is None else problem.torque
-    torque = forces(problem, data)
+    torque, dy = forces(problem, data), np.empty(nq + nv)
 
     def rate(t: float, y: Array) -> Array:
         q, v = y[:nq], y[nq:]
@@ -122,8 +160,11 @@ def equation(problem: Any) -> Callable[[float, Array], Array]:
         else:
             a = pin.aba(model, data, q, v, tau)
         if floating:
-            return np.concatenate([base_rate(q, v), v[6:], a])
-        return np.concatenate([v, a])
+            dy[:7], dy[7:nq] = base_rate(q, v), v[6:]
+        else:
+            dy[:nq] = v
+        dy[nq:] = a
+        return dy
 
     return rate
 
