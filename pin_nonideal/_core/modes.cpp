@@ -14,6 +14,7 @@ constexpr int breaking_passes = 20;       // after these, what reached its limit
 constexpr int outer_limit = 100;          // of limits that depend on the load
 constexpr double limit_tolerance = 1e-12; // relative change of the limits at which the outer iteration ends
 constexpr double slack = 1e-9;            // part of the limit by which a mode may miss its condition by rounding
+constexpr double least_response = 1e-11;  // part of an element's free response that the constraints must leave it
 
 // Free elements F solve W_FF f_F = -(alpha0 + W_FB f_B)_F with least norm.
 void solve_free(const MatX& W, const VecX& alpha0, const std::vector<char>& is_free, VecX& f) {
@@ -42,6 +43,11 @@ VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s) {
     const int n = static_cast<int>(s.size());
     VecX f = VecX::Zero(n);
     std::vector<char> is_free(n, 1);
+    for (int i = 0; i < n; ++i)
+        if (W(i, i) == 0.0 && alpha0[i] != 0.0) {  // driven by the constraints, whatever the friction
+            is_free[i] = 0;
+            f[i] = alpha0[i] > 0.0 ? -s[i] : s[i];
+        }
     int fewest = n + 1, patience = 10;
     for (int it = 0; it < 200 + 50 * n; ++it) {
         solve_free(W, alpha0, is_free, f);
@@ -144,10 +150,11 @@ struct Candidates {
         return alpha;
     }
 
-    // W: slip accelerations per unit of each friction force, after the ideal rows.
+    // W: slip accelerations per unit of each friction force, after the ideal rows. Exactly zero for what the
+    // constraints alone decide, such as the friction of a driven joint.
     MatX responses() {
         MatX W(rows, rows);
-        VecX force(p.mechanism.nv), unit = VecX::Zero(p.layout.rows);
+        VecX force(p.mechanism.nv), unit = VecX::Zero(p.layout.rows), free(rows);
         const VecX b = w.b;
         w.b.setZero();
         int column = 0;
@@ -160,10 +167,18 @@ struct Candidates {
                 unit[from.row + k] = 0.0;
                 solve_motion(p, w, force);
                 W.col(column) = accelerations();
+                solve_R(p.mechanism, w.terms, force);
+                free[column] = force.squaredNorm();
             }
         }
         w.b = b;
-        return 0.5 * (W + W.transpose());
+        W = (0.5 * (W + W.transpose())).eval();
+        for (int i = 0; i < rows; ++i) {
+            if (W(i, i) > least_response * free[i]) continue;
+            W.row(i).setZero();
+            W.col(i).setZero();
+        }
+        return W;
     }
 
     void apply_modes(const std::vector<signed char>& modes) {
@@ -244,6 +259,12 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
     VecX alpha0 = c.accelerations(), limits(candidates.size()), f, push(p.mechanism.nv);
     for (size_t i = 0; i < candidates.size(); ++i) limits[i] = static_limit(p, w, candidates[i], t, q, v);
     const MatX W = c.responses();
+    const auto round_driven = [&] {  // what the constraints hold still has no slip acceleration
+        const double noise = 1e-12 * (w.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+        for (int i = 0; i < c.rows; ++i)
+            if (W(i, i) == 0.0 && std::abs(alpha0[i]) <= noise) alpha0[i] = 0.0;
+    };
+    round_driven();
     std::vector<signed char> modes(candidates.size(), unloaded);
     double change = 0.0;
     for (int it = 0; it < outer_limit; ++it) {
@@ -272,6 +293,7 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
             solve_motion(p, w, w.trial);
         }
         alpha0 = c.accelerations() - W * f;
+        round_driven();
         change = 0.0;
         for (size_t i = 0; i < candidates.size(); ++i) {
             const Friction& friction = p.frictions[candidates[i]];
