@@ -259,12 +259,10 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
     VecX alpha0 = c.accelerations(), limits(candidates.size()), f, push(p.mechanism.nv);
     for (size_t i = 0; i < candidates.size(); ++i) limits[i] = static_limit(p, w, candidates[i], t, q, v);
     const MatX W = c.responses();
-    const auto round_driven = [&] {  // what the constraints hold still has no slip acceleration
-        const double noise = 1e-12 * (w.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
-        for (int i = 0; i < c.rows; ++i)
-            if (W(i, i) == 0.0 && std::abs(alpha0[i]) <= noise) alpha0[i] = 0.0;
-    };
-    round_driven();
+    const double noise = 1e-12 * (w.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+    for (int i = 0; i < c.rows; ++i)  // what the constraints hold still has no slip acceleration
+        if (W(i, i) == 0.0 && std::abs(alpha0[i]) <= noise) alpha0[i] = 0.0;
+    const VecX driven = alpha0;
     std::vector<signed char> modes(candidates.size(), unloaded);
     double change = 0.0;
     for (int it = 0; it < outer_limit; ++it) {
@@ -293,7 +291,8 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
             solve_motion(p, w, w.trial);
         }
         alpha0 = c.accelerations() - W * f;
-        round_driven();
+        for (int i = 0; i < c.rows; ++i)
+            if (W(i, i) == 0.0) alpha0[i] = driven[i];
         change = 0.0;
         for (size_t i = 0; i < candidates.size(); ++i) {
             const Friction& friction = p.frictions[candidates[i]];
