@@ -19,38 +19,54 @@ from .tools.package import Package
 OURS = Package.name
 
 
-def sweep(problem: Problem, tool: Tool, limit: float) -> list[dict[str, Any]]:
-    """Runs every setting of a tool; those that would take longer than the limit are named and left out.
+def sweep(problem: Problem, tool: Tool, limit: float, stride: int = 1) -> list[dict[str, Any]]:
+    """Runs the settings of a tool; those that would take longer than the limit are named and left out.
 
     Args:
         problem: what to compute.
         tool: by what.
         limit: of one run [s].
+        stride: every how many of a family's settings are tried.
     """
     rows: list[dict[str, Any]] = []
     last: tuple[str, int | None, float] = ("", None, 0.0)
-    for setting in tool.settings(problem):
+    for setting in every(tool.settings(problem), stride):
         row: dict[str, Any] = {"tool": tool.name, "family": setting.family, "setting": setting.label}
         rows.append(row)
         family, steps, seconds = last
         if family == setting.family:
             growth = setting.steps / steps if setting.steps and steps else 1.5
             if seconds * growth > limit:
-                row["status"] = "not run: over the time limit"
+                row["status"] = f"not run: over {limit:g} s"
                 continue
-        run = tool.prepare(problem, setting)
         begin = clock()
-        outcome = run()
+        row |= judged(problem, tool.prepare(problem, setting, SAMPLES)())  # warms up as well
         seconds = clock() - begin
-        for _ in range(4 if seconds < 0.05 * limit else 1 if seconds < 0.5 * limit else 0):
-            begin = clock()
-            run()
-            seconds = min(seconds, clock() - begin)
+        if row["status"] == "ok":
+            run = tool.prepare(problem, setting)
+            seconds = min(timed(run) for _ in range(4 if seconds < 0.1 * limit else 1))
+            row["seconds"] = seconds
         last = (setting.family, setting.steps, seconds)
-        if not outcome.failure:
-            outcome = tool.prepare(problem, setting, SAMPLES)()
-        row |= {"seconds": seconds, **judged(problem, outcome)}
     return rows
+
+
+def every(settings: Sequence[Setting], stride: int) -> list[Setting]:
+    """Every `stride`-th setting of each family."""
+    kept: list[Setting] = []
+    place: dict[str, int] = {}
+    for setting in settings:
+        k = place.setdefault(setting.family, 0)
+        place[setting.family] += 1
+        if k % stride == 0:
+            kept.append(setting)
+    return kept
+
+
+def timed(run: Callable[[], object]) -> float:
+    """Seconds of one run."""
+    begin = clock()
+    run()
+    return clock() - begin
 
 
 def judged(problem: Problem, outcome: Outcome) -> dict[str, Any]:
@@ -73,9 +89,9 @@ def fastest(rows: Sequence[dict[str, Any]], tool: str, level: float) -> dict[str
 
 
 def race(
-    problem: Problem, tools: Sequence[Tool], rows: list[dict[str, Any]], rounds: int
+    problem: Problem, tools: Sequence[Tool], rows: list[dict[str, Any]], rounds: int, seconds: float
 ) -> list[dict[str, Any]]:
-    """For each level, the winners' times measured in turn."""
+    """For each level, the winners' times measured in turn, fewer than `rounds` times when they take long."""
     results = []
     for level in problem.levels:
         winners = {tool.name: fastest(rows, tool.name, level) for tool in tools}
@@ -86,7 +102,7 @@ def race(
                 setting = found(tool.settings(problem), row)
                 batches[tool.name] = timing.per_call(tool.prepare(problem, setting))
         slowest = max((row["seconds"] for row in winners.values() if row), default=0.0)
-        times = timing.paired(batches, max(3, min(rounds, int(3.0 / max(slowest, 1e-3)))))
+        times = timing.paired(batches, max(3, min(rounds, int(seconds / max(slowest, 1e-3)))))
         entry: dict[str, Any] = {"level": level, "tools": {}}
         for name, row in winners.items():
             if row is None:
@@ -122,7 +138,7 @@ def measure(
     reference = problem.solution
     rows: list[dict[str, Any]] = []
     for tool in tools:
-        found = sweep(problem, tool, 0.3 if quick else 10.0)
+        found = sweep(problem, tool, *((0.05, 2) if quick else (10.0, 1)))
         rows += found
         done = [r for r in found if r.get("error") is not None]
         if done:
@@ -137,5 +153,5 @@ def measure(
         "notes": problem.notes,
         "reference": {"how": reference.how, "uncertainty": reference.uncertainty},
         "runs": rows,
-        "levels": race(problem, taking_part, rows, 5 if quick else 15),
+        "levels": race(problem, taking_part, rows, *((5, 0.1) if quick else (15, 3.0))),
     }

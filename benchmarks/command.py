@@ -56,7 +56,10 @@ def parser() -> argparse.ArgumentParser:
 
 EPILOG = """parts:
   evaluation   seconds of one constrained acceleration, against Pinocchio's C++ and MuJoCo
-  accuracy     wall time against error, problem by problem
+  scaling      the same against the number of loops, N four-bars
+  accuracy     run time against error, problem by problem
+  features     what a loop, a law, sticking, recording add to an evaluation and a step
+  batches      steps a second of many states in one and two threads
 actions:
   build-peers  compile the C++ peers (some minutes, once)
   references   compute the references anew
@@ -117,6 +120,24 @@ def accuracy(options: argparse.Namespace) -> Any:
     return results
 
 
+def scaling(options: argparse.Namespace) -> Any:
+    from . import scaling
+
+    return scaling.measure(options.quick, say)
+
+
+def features(options: argparse.Namespace) -> Any:
+    from . import features
+
+    return features.measure(options.quick, say)
+
+
+def batches(options: argparse.Namespace) -> Any:
+    from . import batches
+
+    return batches.measure(options.quick, options.only, say)
+
+
 def chosen_tools(options: argparse.Namespace) -> list[Any]:
     """Ours and the peers asked for that are installed; the others are told."""
     from .tools import TOOLS
@@ -149,7 +170,9 @@ def references(options: argparse.Namespace) -> int:
     return 0
 
 
-PARTS: dict[str, Callable[[argparse.Namespace], Any]] = {"evaluation": evaluation, "accuracy": accuracy}
+PARTS: dict[str, Callable[[argparse.Namespace], Any]] = {
+    part.__name__: part for part in (evaluation, scaling, accuracy, features, batches)
+}
 ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "build-peers": build_peers,
     "references": references,

@@ -6,6 +6,7 @@ Same model, same state, same flags of the compiler; `acceleration` of the peers 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,78 +14,49 @@ import pinocchio as pin
 
 import pin_nonideal as pn
 
-from . import build_peers, timing
+from . import build_peers, cases, timing
 from .problems import Problem
 from .tools import pinocchio_scipy as loop
 
 SAME_ACCELERATION = 1e-9  # relative; Pinocchio's with a proximal term of 1e-12 agrees to 1e-13
 
 
-def _of(scene: pn.Scene, name: str, title: str, anchors: Any = None) -> Problem:
-    """A scene's model, anchors and initial state; no duration, since nothing moves."""
-    q0, v0 = scene.initial_state()
-    held = scene.constraints if anchors is None else anchors
-    return Problem(name=name, title=title, model=scene.model, q0=q0, v0=v0, duration=0.0, anchors=held)
-
-
-def four_bar() -> Problem:
-    return _of(pn.load("four_bar"), "four_bar", "four-bar, one loop")
-
-
-def solo12() -> Problem:
-    return _of(pn.load("solo12_standing"), "solo12", "Solo12, four anchored feet")
-
-
-def talos() -> Problem:
-    robot = pn.load("talos")
-    soles = (pn.FrameAnchor("left_sole_link"), pn.FrameAnchor("right_sole_link"))
-    return _of(
-        pn.Scene(robot.model, constraints=soles, q0=robot.q0), "talos", "Talos, two feet held in 6D", soles
-    )
-
-
-def panda_free() -> Problem:
-    return _of(pn.load("panda_friction"), "panda_free", "Panda, free", ())
-
-
-def solo12_free() -> Problem:
-    return _of(pn.load("solo12_standing"), "solo12_free", "Solo12, floating", ())
-
-
-def talos_free() -> Problem:
-    return _of(pn.load("talos"), "talos_free", "Talos, floating", ())
-
-
 CASES: dict[str, Callable[[], Problem]] = {
-    maker.__name__: maker for maker in (four_bar, solo12, talos, panda_free, solo12_free, talos_free)
+    maker.__name__: maker
+    for maker in (
+        cases.four_bar,
+        cases.solo12,
+        cases.talos,
+        cases.panda,
+        cases.solo12_free,
+        cases.talos_free,
+    )
 }
 
 
 def our_batch(scene: pn.Scene, q: Any, v: Any) -> timing.Batch:
     """The core's own evaluation."""
     runner = scene.new_runner()
-    return lambda count: runner.time_evaluations(q, v, 0.0, count)
+    return timing.counted(lambda count: runner.time_evaluations(q, v, 0.0, count))
 
 
 def compiled_batches(case: Problem) -> dict[str, timing.Batch]:
     """Pinocchio's evaluation in C++: from the wheel's libraries and from its headers."""
     batches: dict[str, timing.Batch] = {}
+    q, v = np.array(case.q0), np.array(case.v0)
     for name in build_peers.NAMES:
         module = build_peers.load(name)
         if module is None:
             continue
-        settings = loop.proximal(case)
-        peer = module.Peer(case.model, loop.anchors(case), settings.mu, 1)
-        q, v = np.array(case.q0), np.array(case.v0)
+        peer = module.Peer(case.model, loop.anchors(case), loop.proximal(case).mu, 1)
         check_same(case, peer)
         if case.anchors:
-            batches[f"{name} constraintDynamics"] = lambda n, p=peer, q=q, v=v: p.time_constraint_dynamics(
-                q, v, n
-            )
+            run = partial(peer.time_constraint_dynamics, q, v)
+            batches[f"{name} constraintDynamics"] = timing.counted(run)
         else:
             for world in (False, True):
                 label = f"{name} aba {'WORLD' if world else 'LOCAL'}"
-                batches[label] = lambda n, p=peer, q=q, v=v, w=world: p.time_aba(q, v, n, w)
+                batches[label] = timing.counted(partial(peer.time_aba, q, v, world=world))
     return batches
 
 
@@ -127,8 +99,9 @@ def mujoco_batch(case: Problem) -> timing.Batch | None:
 
 
 def measure_case(case: Problem, rounds: int) -> dict[str, Any]:
-    """Times of everybody on one case, with the ratio to the faster of Pinocchio's builds."""
-    batches = {"pin_nonideal": our_batch(case.scene(), case.q0, case.v0), **compiled_batches(case)}
+    """Times of everybody on one case, and ours over the faster of Pinocchio's builds and over MuJoCo."""
+    scene = case.scene()
+    batches = {"pin_nonideal": our_batch(scene, case.q0, case.v0), **compiled_batches(case)}
     batches["pinocchio from Python"] = python_batch(case)
     rival = mujoco_batch(case)
     if rival is not None:
@@ -136,13 +109,15 @@ def measure_case(case: Problem, rounds: int) -> dict[str, Any]:
     times = timing.paired(batches, rounds)
     compiled = [name for name in times if name.startswith("pinocchio_")]
     result: dict[str, Any] = {
-        "case": case.name, "title": case.title, "nv": case.model.nv,
-        "rows": int(case.scene().new_runner().rows(case.q0, case.v0, 0.0)[1].size) if case.anchors else 0,
+        "title": case.title, "nv": case.model.nv,
+        "rows": int(scene.new_runner().rows(case.q0, case.v0, 0.0)[1].size) if case.anchors else 0,
         "seconds": {name: t.best for name, t in times.items()},
     }  # fmt: skip
     if compiled:
         best = min(compiled, key=lambda name: times[name].best)
         result |= {"peer": best, "ratio": timing.ratio(times["pin_nonideal"], times[best])}
+    if rival is not None:
+        result["ratio_mujoco"] = timing.ratio(times["pin_nonideal"], times["mujoco mj_forward"])
     return result
 
 
@@ -152,7 +127,7 @@ def measure(quick: bool, only: str | None, say: Callable[[str], None] = print) -
     for name, maker in CASES.items():
         if only not in (None, name):
             continue
-        result = measure_case(maker(), 20 if quick else 200)
+        result = {"case": name, **measure_case(maker(), 20 if quick else 200)}
         results.append(result)
         ours = result["seconds"]["pin_nonideal"] * 1e6
         versus = (

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+THIN = 1e-6
 HINGES = {"JointModelRX": (1, 0, 0), "JointModelRY": (0, 1, 0), "JointModelRZ": (0, 0, 1)}
 
 
@@ -23,6 +24,12 @@ def quaternion(R: Array) -> str:
     """(w, x, y, z), as MJCF orders it."""
     x, y, z, w = pin.Quaternion(R).coeffs()
     return numbers([w, x, y, z])
+
+
+def thickened(inertia: Array) -> Array:
+    """MuJoCo takes no rod without thickness: its own axis gets a part in a million of the largest moment."""
+    moments, axes = np.linalg.eigh(inertia)
+    return (axes * np.maximum(moments, THIN * moments.max())) @ axes.T
 
 
 def mjcf(
@@ -56,15 +63,17 @@ def mjcf(
             bodies[model.parents[i]], "body", name=model.names[i], pos=numbers(place.translation),
             quat=quaternion(place.rotation),
         )  # fmt: skip
-        I = inertia.inertia  # noqa: E741
+        I = thickened(inertia.inertia)  # noqa: E741
         ET.SubElement(
             body, "inertial", pos=numbers(inertia.lever), mass=numbers(inertia.mass),
             fullinertia=numbers([I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]),
         )  # fmt: skip
         joint(body, model, i, q0, hold, coulomb, viscous)
         bodies.append(body)
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, q0)
+    places: Any = None
+    if any(anchor.frame2 is None for anchor in anchors):  # Data of a large model takes gigabytes
+        places = model.createData()
+        pin.framesForwardKinematics(model, places, q0)
 
     def site(name: str | None, tag: str, at: Any) -> str:
         """A site at a frame, or in the world at a place; its name."""
@@ -81,7 +90,7 @@ def mjcf(
     equality = ET.SubElement(root, "equality")
     for k, anchor in enumerate(anchors):
         kind = "weld" if type(anchor).__name__ == "FrameAnchor" else "connect"
-        at = data.oMf[model.getFrameId(anchor.frame1)]
+        at = None if anchor.frame2 else places.oMf[model.getFrameId(anchor.frame1)]
         one, two = site(anchor.frame1, f"anchor{k}_1", at), site(anchor.frame2, f"anchor{k}_2", at)
         ET.SubElement(equality, kind, site1=one, site2=two)
     tendons = ET.SubElement(root, "tendon")

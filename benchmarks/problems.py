@@ -192,15 +192,20 @@ def andrews() -> Problem:
     )
 
 
+def solo12_gains(model: Any) -> tuple[Any, Any]:
+    """Gains with which Solo12 stands [N m/rad, N m s/rad]."""
+    kp, kd = np.full(model.nv, 8.0), np.full(model.nv, 0.1)
+    kp[:6] = kd[:6] = 0.0
+    return kp, kd
+
+
 def solo12() -> Problem:
     scene = pn.load("solo12_standing")
-    kp, kd = np.full(scene.model.nv, 8.0), np.full(scene.model.nv, 0.1)
-    kp[:6] = kd[:6] = 0.0
     return Problem(
         name="solo12",
         title="Solo12 on four anchored feet, 1 s",
         **bare(scene),
-        hold=(kp, kd),
+        hold=solo12_gains(scene.model),
         duration=1.0,
         reference=references.dense_motion,
     )

@@ -1,19 +1,20 @@
 """Timing on a machine that others use too: short batches, contestants in turn, minima, medians of ratios.
 
-`clock` counts the processor time of the calling thread.  On an idle machine that is wall time, since
-tools run
-on one thread; on a busy one wall time would punish long runs, which lose the processor more often.
+`clock` counts the processor time of the calling thread.  On an idle machine that is wall time, since tools
+run on one thread; on a busy one wall time would punish long runs, which lose the processor more often.
 """
 
 from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
+from typing import TypeVar
 
 # Runs a number of evaluations and returns the seconds of one.
 Batch = Callable[[int], float]
+Name = TypeVar("Name", bound=Hashable)
 
 clock = time.thread_time
 
@@ -45,9 +46,24 @@ def per_call(function: Callable[[], object]) -> Batch:
     return batch
 
 
+def counted(function: Callable[[int], object]) -> Batch:
+    """A batch of compiled code that repeats by itself.
+
+    Args:
+        function: runs the given number of evaluations.
+    """
+
+    def batch(count: int) -> float:
+        begin = clock()
+        function(count)
+        return (clock() - begin) / count
+
+    return batch
+
+
 def paired(
-    contestants: dict[str, Batch], rounds: int, batch_seconds: float = BATCH_SECONDS
-) -> dict[str, Times]:
+    contestants: dict[Name, Batch], rounds: int, batch_seconds: float = BATCH_SECONDS
+) -> dict[Name, Times]:
     """Times all contestants in turn, `rounds` times, so that a slow moment hits them alike.
 
     Args:
@@ -57,9 +73,11 @@ def paired(
     """
     counts = {}
     for name, batch in contestants.items():
-        batch(1)  # warm-up
-        counts[name] = max(1, round(batch_seconds / max(min(batch(1) for _ in range(3)), 1e-7)))
-    seconds: dict[str, list[float]] = {name: [] for name in contestants}
+        seconds_once = batch(1)  # warm-up
+        if seconds_once < 10.0 * batch_seconds:
+            seconds_once = min(batch(1) for _ in range(3))
+        counts[name] = max(1, round(batch_seconds / max(seconds_once, 1e-7)))
+    seconds: dict[Name, list[float]] = {name: [] for name in contestants}
     order = list(contestants)
     for _ in range(rounds):
         for name in order:
