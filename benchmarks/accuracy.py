@@ -17,6 +17,7 @@ from .tools import Outcome, Setting, Tool
 from .tools.package import Package
 
 OURS = Package.name
+NO_GAIN_AFTER = 3  # finer settings of a family in a row that do not halve its error: it has met its floor
 
 
 def sweep(problem: Problem, tool: Tool, limit: float, stride: int = 1) -> list[dict[str, Any]]:
@@ -39,6 +40,9 @@ def sweep(problem: Problem, tool: Tool, limit: float, stride: int = 1) -> list[d
             if seconds * growth > limit:
                 row["status"] = f"not run: over {limit:g} s"
                 continue
+        if has_met_its_floor([r["error"] for r in rows if r["family"] == setting.family and r.get("error")]):
+            row["status"] = "not run: finer settings gain nothing"
+            continue
         begin = clock()
         row |= judged(problem, tool.prepare(problem, setting, SAMPLES)())  # warms up as well
         seconds = clock() - begin
@@ -48,6 +52,12 @@ def sweep(problem: Problem, tool: Tool, limit: float, stride: int = 1) -> list[d
             row["seconds"] = seconds
         last = (setting.family, setting.steps, seconds)
     return rows
+
+
+def has_met_its_floor(errors: Sequence[float]) -> bool:
+    """Whether the last settings of a family, ever finer, brought nothing."""
+    before, last = errors[:-NO_GAIN_AFTER], errors[-NO_GAIN_AFTER:]
+    return bool(before) and min(last) > 0.5 * min(before)
 
 
 def every(settings: Sequence[Setting], stride: int) -> list[Setting]:
@@ -138,7 +148,7 @@ def measure(
     reference = problem.solution
     rows: list[dict[str, Any]] = []
     for tool in tools:
-        found = sweep(problem, tool, *((0.05, 2) if quick else (10.0, 1)))
+        found = sweep(problem, tool, *((0.05, 2) if quick else (4.0, 1)))
         rows += found
         done = [r for r in found if r.get("error") is not None]
         if done:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import platform
 import sys
 import time
@@ -14,8 +15,8 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parent
 DEFAULT_OUTPUT = ROOT.parent / "build" / "benchmarks" / "results"
-RECORDED = ROOT / "results"
 PACKAGES = ("pin", "numpy", "scipy", "mujoco", "exudyn")
+DIGITS = 6  # significant ones of a number in the results; times have fewer
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -60,41 +61,68 @@ EPILOG = """parts:
   accuracy     run time against error, problem by problem
   features     what a loop, a law, sticking, recording add to an evaluation and a step
   batches      steps a second of many states in one and two threads
+  long         ten simulated seconds: cost, closure gap, energy change
+  footprint    time and memory of an import
 actions:
   build-peers  compile the C++ peers (some minutes, once)
   references   compute the references anew
+  report       keep the full results of the output folder; write docs/benchmarks.md and the README's table
 """
 
 
 def run_parts(options: argparse.Namespace) -> int:
-    """Runs the parts and writes one JSON file for each."""
+    """Runs the parts; writes JSON and Markdown for each, and the pictures of those that have one."""
+    from . import plots, report
+
     options.output.mkdir(parents=True, exist_ok=True)
     for name in options.parts or PARTS:
         print(f"{name}:", flush=True)
         begin = time.perf_counter()
         results = PARTS[name](options)
-        record = {"part": name, "quick": options.quick, "machine": machine(), "results": results}
+        record = {"part": name, "quick": options.quick, "machine": machine(), "results": rounded(results)}
         path = options.output / f"{name}.json"
-        path.write_text(json.dumps(record, indent=1) + "\n")
+        path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+        path.with_suffix(".md").write_text(report.section(record), encoding="utf-8")
+        plots.draw({name: record}, options.output / "benchmarks")
         print(f"  {time.perf_counter() - begin:.0f} s, {path}", flush=True)
     return 0
 
 
+def rounded(value: Any) -> Any:
+    """Results with numbers of few digits."""
+    if isinstance(value, float):
+        return float(f"{value:.{DIGITS}g}")
+    if isinstance(value, dict):
+        return {key: rounded(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [rounded(item) for item in value]
+    return value
+
+
 def machine() -> dict[str, Any]:
     """What a reader has to know about where the numbers come from, in general terms."""
-    import os
-
-    versions = {}
+    versions, absent = {}, []
     for package in PACKAGES:
         try:
             versions[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
-            continue
+            absent.append(package)
     return {
-        "machine": f"{os.cpu_count()}-core {platform.machine().replace('_', '-')}",
+        "machine": f"{os.cpu_count()} cores of {processor()}, {platform.system()}",
         "python": platform.python_version(),
         "packages": versions,
+        "absent": absent,
     }
+
+
+def processor() -> str:
+    """The processor's model where the system tells it, else its architecture."""
+    info = Path("/proc/cpuinfo")
+    if info.is_file():
+        for line in info.read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
 
 
 def say(text: str) -> None:
@@ -138,6 +166,18 @@ def batches(options: argparse.Namespace) -> Any:
     return batches.measure(options.quick, options.only, say)
 
 
+def long(options: argparse.Namespace) -> Any:
+    from . import long
+
+    return long.measure(chosen_tools(options), options.quick, options.only, say)
+
+
+def footprint(options: argparse.Namespace) -> Any:
+    from . import footprint
+
+    return footprint.measure(options.quick, say)
+
+
 def chosen_tools(options: argparse.Namespace) -> list[Any]:
     """Ours and the peers asked for that are installed; the others are told."""
     from .tools import TOOLS
@@ -170,12 +210,21 @@ def references(options: argparse.Namespace) -> int:
     return 0
 
 
+def report(options: argparse.Namespace) -> int:
+    from . import report
+
+    report.keep_full_runs(options.output)
+    report.write()
+    return 0
+
+
 PARTS: dict[str, Callable[[argparse.Namespace], Any]] = {
-    part.__name__: part for part in (evaluation, scaling, accuracy, features, batches)
+    part.__name__: part for part in (evaluation, scaling, accuracy, features, batches, long, footprint)
 }
 ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "build-peers": build_peers,
     "references": references,
+    "report": report,
 }
 
 if __name__ == "__main__":

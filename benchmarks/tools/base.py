@@ -22,12 +22,14 @@ class Outcome:
         steps: steps really made.
         asked: steps that a fixed step asks for; None for adaptive methods.
         failure: what went wrong, empty when nothing did.
+        v: velocity at the end as Pinocchio orders it, (nv,).
     """
 
     q: Array | None
     steps: int
     asked: int | None = None
     failure: str = ""
+    v: Array | None = None
 
     @property
     def complete(self) -> bool:

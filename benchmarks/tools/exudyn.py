@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -71,7 +72,8 @@ class Exudyn:
             made = int(mbs.sys["dynamicSolver"].it.currentStepIndex) - 1
             if done is False:
                 return Outcome(None, made, steps, failure="the solver gave up")
-            return Outcome(np.array(mbs.systemData.GetODE2Coordinates())[None, :], made, steps)
+            q, v = mbs.systemData.GetODE2Coordinates(), mbs.systemData.GetODE2Coordinates_t()
+            return Outcome(np.array(q)[None, :], made, steps, v=np.array(v))
 
         def run() -> Outcome:
             """Each sample is the end of a run of its own: an adaptive step does not stop elsewhere."""
@@ -82,7 +84,7 @@ class Exudyn:
                 if outcome.q is None:
                     return outcome
                 found.append(outcome.q[0])
-            return Outcome(np.array(found), outcome.steps, outcome.asked)
+            return replace(outcome, q=np.array(found))
 
         return run
 

@@ -81,15 +81,19 @@ class Coordinates:
             u[jv : jv + 3], u[jv + 3 : jv + 6] = R @ v[iv : iv + 3], v[iv + 3 : iv + 6]
         return x, u
 
-    def back(self, x: Array) -> Array:
-        """The configuration in Pinocchio's coordinates."""
-        q = np.zeros(self.model.nq)
-        for free, iq, _, jq, _ in self.parts:
-            if free:
-                q[iq : iq + 3], q[iq + 3 : iq + 7] = x[jq : jq + 3], x[[jq + 4, jq + 5, jq + 6, jq + 3]]
-            else:
-                q[iq] = x[jq]
-        return q
+    def back(self, x: Array, u: Array) -> tuple[Array, Array]:
+        """The state in Pinocchio's coordinates."""
+        import pinocchio as pin
+
+        q, v = np.zeros(self.model.nq), np.zeros(self.model.nv)
+        for free, iq, iv, jq, jv in self.parts:
+            if not free:
+                q[iq], v[iv] = x[jq], u[jv]
+                continue
+            q[iq : iq + 3], q[iq + 3 : iq + 7] = x[jq : jq + 3], x[[jq + 4, jq + 5, jq + 6, jq + 3]]
+            R = pin.Quaternion(q[iq + 3 : iq + 7]).matrix()
+            v[iv : iv + 3], v[iv + 3 : iv + 6] = R.T @ u[jv : jv + 3], u[jv + 3 : jv + 6]
+        return q, v
 
 
 def lighten(mj: Any) -> None:
@@ -156,13 +160,13 @@ class MuJoCo:
             found = []
             for _ in range(samples):
                 mujoco.mj_step(mj, data, nstep=steps // samples)
-                found.append(coordinates.back(data.qpos))
+                found.append(coordinates.back(data.qpos, data.qvel))
             # On divergence it resets itself and counts a warning: the steps really made are those since then.
             made = round(data.time / mj.opt.timestep)
             bad = [w.name for w in resets(mujoco) if data.warning[w.value].number]
             if bad:
                 return Outcome(None, made, steps, failure=f"diverged ({', '.join(bad)})")
-            return Outcome(np.array(found), made, steps)
+            return Outcome(np.array([q for q, _ in found]), made, steps, v=found[-1][1])
 
         return run
 

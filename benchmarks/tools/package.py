@@ -26,7 +26,7 @@ class Package:
         """Settings worth trying."""
         del problem
         return [
-            Setting(method, f"rtol {rtol:.0e}", values={"method": method, "rtol": rtol})
+            Setting(method, f"rtol {rtol:.0e}", values={"rtol": rtol, "atol": rtol})
             for method, last in (("dop853", 13), ("dopri5", 8))
             for rtol in tolerances(2, last)
         ]
@@ -35,19 +35,16 @@ class Package:
         """A function that runs the problem once from its start."""
         scene = problem.scene()
         scene.initial_state()
-        method, rtol = setting.values["method"], setting.values["rtol"]
-
-        settings = {"method": method, "rtol": rtol, "atol": rtol, "progress": False}
-        output_dt = problem.duration / samples
+        settings = {"method": setting.family, "output_dt": problem.duration / samples, **setting.values}
 
         def run() -> Outcome:
             try:
-                run = pn.simulate(scene, problem.duration, output_dt=output_dt, **settings)
+                run = pn.simulate(scene, problem.duration, progress=False, **settings)
             except pn.PinNonidealError as error:
                 return Outcome(None, 0, failure=f"{type(error).__name__}: {error}")
             if samples == 1:
-                return Outcome(run.q[-1:], run.stats.steps)
+                return Outcome(run.q[-1:], run.stats.steps, setting.steps, v=run.v[-1])
             places = [int(np.argmin(np.abs(run.t - t))) for t in problem.times]  # events are samples too
-            return Outcome(run.q[places], run.stats.steps)
+            return Outcome(run.q[places], run.stats.steps, setting.steps, v=run.v[-1])
 
         return run

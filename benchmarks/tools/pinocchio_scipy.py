@@ -105,7 +105,7 @@ class PinocchioSciPy:
             steps = int(info["nst"][-1])
             if info["message"] != "Integration successful." or not np.isfinite(y).all():
                 return Outcome(None, steps, failure=str(info["message"]))
-            return Outcome(y[1:, :nq], steps)
+            return Outcome(y[1:, :nq], steps, v=y[-1, nq:])
 
         def copied(t: float, y: Array) -> Array:
             """SciPy's own methods keep what they get, and know no limit of steps."""
@@ -132,7 +132,7 @@ class PinocchioSciPy:
                 return Outcome(None, 0, failure=str(error))
             if not out.success or not np.isfinite(out.y[:, -1]).all():
                 return Outcome(None, len(out.t) - 1, failure=str(out.message))
-            return Outcome(out.y[:nq, -samples:].T, len(out.t) - 1)
+            return Outcome(out.y[:nq, -samples:].T, len(out.t) - 1, v=out.y[nq:, -1])
 
         return lsoda if setting.family == "LSODA" else dop853
 

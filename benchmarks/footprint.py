@@ -1,0 +1,65 @@
+"""What it costs to have a tool: time and memory of its import, in a fresh interpreter."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+MODULES = {
+    "numpy": "numpy",
+    "pinocchio": "pinocchio",
+    "pin_nonideal": "pin_nonideal",
+    "Pinocchio + SciPy": "pinocchio, scipy.integrate",
+    "MuJoCo": "mujoco",
+    "Exudyn": "exudyn",
+}
+
+SCRIPT = """
+import json, pathlib, resource, time
+
+def resident():
+    statm = pathlib.Path("/proc/self/statm")  # elsewhere the largest size must do
+    if statm.is_file():
+        return int(statm.read_text().split()[1]) * resource.getpagesize()
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+begin, before = time.process_time(), resident()
+import {modules}
+print(json.dumps([time.process_time() - begin, resident() - before]))
+"""
+
+
+def one(modules: str) -> tuple[float, float]:
+    """Processor seconds and bytes of an import in an interpreter of its own, with compiled Python files."""
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
+    environment["PYTHONPATH"] = os.pathsep.join(p for p in sys.path if p)
+    code = SCRIPT.format(modules=modules)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
+    )
+    seconds, size = json.loads(done.stdout.splitlines()[-1])
+    return seconds, size
+
+
+def measure(quick: bool, say: Callable[[str], None] = print) -> list[dict[str, Any]]:
+    """All modules that are installed, in turn; the best of the rounds, files being in memory then."""
+    here = {
+        name: modules
+        for name, modules in MODULES.items()
+        if all(importlib.util.find_spec(m.strip().partition(".")[0]) for m in modules.split(","))
+    }
+    found: dict[str, list[tuple[float, float]]] = {name: [] for name in here}
+    for _ in range(2 if quick else 6):
+        for name, modules in here.items():
+            found[name].append(one(modules))
+    rows = []
+    for name, runs in found.items():
+        seconds, size = (min(values) for values in zip(*runs, strict=True))
+        rows.append({"tool": name, "import_seconds": seconds, "import_bytes": size})
+        say(f"  {name}: {seconds * 1e3:.0f} ms, {size / 2**20:.0f} MiB")
+    return rows

@@ -1,0 +1,82 @@
+"""Log-log pictures: run time against error, problem by problem, and cost against the number of loops."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from .goals import Records
+
+COLORS = {"pin_nonideal": "C0", "pin+scipy": "C2", "mujoco": "C1", "exudyn": "C4"}
+COLUMNS = 3
+
+
+def lower_front(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Of (seconds, error), what nobody faster beats: the curve that a user would live on."""
+    front: list[tuple[float, float]] = []
+    for seconds, error in sorted(points):
+        if not front or error < front[-1][1]:
+            front.append((seconds, error))
+    return front
+
+
+def accuracy(results: list[dict[str, Any]]) -> Figure:
+    """A panel for each problem: all good runs as dots, the best of each tool joined."""
+    rows = -(-len(results) // COLUMNS)
+    figure = Figure(figsize=(4.0 * COLUMNS, 3.0 * rows), layout="constrained")
+    panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
+    for panel, result in zip(panels, results, strict=False):
+        for tool, color in COLORS.items():
+            points = [
+                (row["seconds"] * 1e3, max(row["error"], result["reference"]["uncertainty"]))
+                for row in result["runs"]
+                if row["tool"] == tool and row["status"] == "ok"
+            ]
+            if points:
+                panel.loglog(*zip(*points, strict=True), ".", color=color, alpha=0.35, markersize=4)
+                panel.loglog(
+                    *zip(*lower_front(points), strict=True), "o-", color=color, markersize=3, label=tool
+                )
+        label(panel, result["title"], "time of the run [ms]", "error [rad or m]")
+    for panel in panels[len(results) :]:
+        panel.remove()
+    panels[0].legend(fontsize="small")
+    return figure
+
+
+def scaling(results: dict[str, Any]) -> Figure:
+    """Microseconds of an evaluation over N."""
+    figure = Figure(figsize=(5.0, 3.6), layout="constrained")
+    panel = figure.subplots()
+    names = dict.fromkeys(name for row in results["sizes"] for name in row.get("seconds", ()))
+    for name in names:
+        points = [
+            (r["N"], r["seconds"][name] * 1e6) for r in results["sizes"] if name in r.get("seconds", ())
+        ]
+        panel.loglog(*zip(*points, strict=True), "o-", markersize=3, label=name)
+    label(panel, "N four-bars", "N", "one evaluation [us]")
+    panel.legend(fontsize="small")
+    return figure
+
+
+def label(panel: Axes, title: str, x: str, y: str) -> None:
+    panel.set_title(title, fontsize="medium")
+    panel.set_xlabel(x)
+    panel.set_ylabel(y)
+    panel.grid(alpha=0.3)
+
+
+FIGURES = {"accuracy": accuracy, "scaling": scaling}
+
+
+def draw(records: Records, folder: Path) -> None:
+    """Writes one SVG file for each part that has a picture; equal results give equal files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with mpl.rc_context({"svg.hashsalt": "benchmarks", "svg.fonttype": "none"}):
+        for name in FIGURES.keys() & records.keys():
+            figure = FIGURES[name](records[name]["results"])
+            figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
