@@ -17,7 +17,9 @@ from .tools import Outcome, Setting, Tool
 from .tools.package import Package
 
 OURS = Package.name
-NO_GAIN_AFTER = 3  # finer settings of a family in a row that do not halve its error: it has met its floor
+# A family has met its floor when its last settings, ever finer, do not halve the errors of as many before
+# them.  Errors of order one tell nothing yet, and one lucky setting among the others must not end the search.
+WINDOW, TELLING = 3, 0.1
 
 
 def sweep(problem: Problem, tool: Tool, limit: float, stride: int = 1) -> list[dict[str, Any]]:
@@ -56,8 +58,8 @@ def sweep(problem: Problem, tool: Tool, limit: float, stride: int = 1) -> list[d
 
 def has_met_its_floor(errors: Sequence[float]) -> bool:
     """Whether the last settings of a family, ever finer, brought nothing."""
-    before, last = errors[:-NO_GAIN_AFTER], errors[-NO_GAIN_AFTER:]
-    return bool(before) and min(last) > 0.5 * min(before)
+    before, last = errors[-2 * WINDOW : -WINDOW], errors[-WINDOW:]
+    return len(before) == WINDOW and max(before) < TELLING and min(last) > 0.5 * max(before)
 
 
 def every(settings: Sequence[Setting], stride: int) -> list[Setting]:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from typing import Any
+
+from .processes import run_python
 
 MODULES = {
     "numpy": "numpy",
@@ -35,13 +34,9 @@ print(json.dumps([time.process_time() - begin, resident() - before]))
 
 
 def one(modules: str) -> tuple[float, float]:
-    """Processor seconds and bytes of an import in an interpreter of its own, with compiled Python files."""
-    environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
-    environment["PYTHONPATH"] = os.pathsep.join(p for p in sys.path if p)
-    code = SCRIPT.format(modules=modules)
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
-    )
+    """Processor seconds and bytes of an import in an interpreter of its own."""
+    done = run_python(SCRIPT.format(modules=modules))
+    done.check_returncode()
     seconds, size = json.loads(done.stdout.splitlines()[-1])
     return seconds, size
 

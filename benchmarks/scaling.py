@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import subprocess
-import sys
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+
+from .processes import run_python
 
 SIZES = (1, 2, 5, 10, 20, 40, 80, 160, 320, 640)
 QUICK = (1, 5, 20, 40, 80)
@@ -57,10 +57,7 @@ def apart(size: int, rounds: int) -> dict[str, Any]:
         f"from benchmarks.scaling import one; print(json.dumps(one({size}, {rounds})))"
     )
     try:
-        done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, timeout=SECONDS, check=False,
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
-        )  # fmt: skip
+        done = run_python(code, SECONDS)
     except subprocess.TimeoutExpired:
         return {"N": size, "status": f"failed: more than {SECONDS} s"}
     if done.returncode:
