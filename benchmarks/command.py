@@ -15,7 +15,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parent
 DEFAULT_OUTPUT = ROOT.parent / "build" / "benchmarks" / "results"
-PACKAGES = ("pin", "numpy", "scipy", "mujoco", "exudyn")
+PACKAGES = ("pin", "numpy", "scipy", "mujoco", "exudyn", "drake")
 DIGITS = 6  # significant ones of a number in the results; times have fewer
 
 

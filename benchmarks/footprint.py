@@ -16,6 +16,7 @@ MODULES = {
     "Pinocchio + SciPy": "pinocchio, scipy.integrate",
     "MuJoCo": "mujoco",
     "Exudyn": "exudyn",
+    "Drake": "pydrake.all",
 }
 
 SCRIPT = """

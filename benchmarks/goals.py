@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -50,6 +51,11 @@ class KeyFigure:
         return f"{'>=' if self.at_least else '<='} {self.goal:g}"
 
 
+def power(error: float) -> str:
+    """A power of ten, briefly."""
+    return f"1e{round(math.log10(error))}"
+
+
 def level(records: Records, problem: str, error: float) -> dict[str, Any]:
     """What each tool needs to reach an error; empty when that was not measured."""
     for result in records.get("accuracy", {}).get("results", ()):
@@ -76,7 +82,7 @@ def times_faster(title: str, tools: dict[str, Any], goal: float, rival: str | No
     found = best_rival({rival: tools[rival]} if rival in tools else {} if rival else tools)
     if found is None:
         return KeyFigure(title, None, goal, remark="no rival got there in the time limit")
-    return KeyFigure(f"{title}, {found[0]} {found[1]['setting']}", found[1]["ratio"], goal)
+    return KeyFigure(f"{title} ({found[0]}, {found[1]['setting']})", found[1]["ratio"], goal)
 
 
 def earlier(title: str, fine: dict[str, Any], coarse: dict[str, Any]) -> KeyFigure:
@@ -86,7 +92,7 @@ def earlier(title: str, fine: dict[str, Any], coarse: dict[str, Any]) -> KeyFigu
     found = best_rival(coarse)
     if found is None:
         return KeyFigure(title, None, 1.0, remark="no rival got there in the time limit")
-    return KeyFigure(f"{title}, {found[0]}", found[1]["seconds"] / fine[OURS]["seconds"], 1.0)
+    return KeyFigure(f"{title} ({found[0]})", found[1]["seconds"] / fine[OURS]["seconds"], 1.0)
 
 
 def key_figures(records: Records) -> list[KeyFigure]:
@@ -111,7 +117,7 @@ def at_equal_errors(records: Records) -> Iterator[KeyFigure]:
     for problem, title in (("double_pendulum", "double pendulum"), ("panda", "Panda")):
         for error in (1e-6, 1e-8):
             tools = level(records, problem, error)
-            yield times_faster(f"{title} to {error:.0e}: best rival's time over ours", tools, 2.0)
+            yield times_faster(f"{title} to {power(error)}: best rival's time over ours", tools, 2.0)
     for problem, title in (("coulomb_pendulum", "angle at 2 s"), ("coulomb_rest", "rest angle")):
         fine, coarse = (level(records, problem, error) for error in (1e-9, 1e-4))
         yield earlier(f"Coulomb pendulum, {title}: best rival's time to 1e-4 over ours to 1e-9", fine, coarse)
@@ -129,9 +135,9 @@ def with_many_loops(records: Records) -> Iterator[KeyFigure]:
 def in_batches(records: Records) -> Iterator[KeyFigure]:
     cases = {r["case"]: r for r in records.get("batches", {}).get("results", ())}
     for name in HELD_BATCHES:
-        result = cases.get(name, {"title": name, "ratios": [], "rows": []})
+        result = cases.get(name, {"title": name, "ratios": ()})
         ratio = next((r["ratio"] for r in result["ratios"] if r["threads"] == 1), None)
-        yield KeyFigure(f"batch, {result['title']}: our steps per second over mujoco.rollout's", ratio, 1.0)
+        yield KeyFigure(f"batch of {result['title']}: our steps per second over mujoco.rollout's", ratio, 1.0)
     gains = [
         (row["over_one_thread"], result["two_threads_at_most"])
         for result in cases.values()
@@ -139,5 +145,5 @@ def in_batches(records: Records) -> Iterator[KeyFigure]:
         if row["tool"] == OURS and "over_one_thread" in row
     ]
     gain, most = max(gains, key=lambda pair: pair[1], default=(None, 0.0))
-    title = f"batch: two threads over one (machine could give {most:.2f})"
+    title = f"batch: two threads over one (the machine could give {most:.2f})"
     yield KeyFigure(title, gain, 1.8)

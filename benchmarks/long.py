@@ -45,6 +45,7 @@ def settings(problem: Problem) -> dict[str, list[Setting]]:
             Setting(careful, "h 1e-03", fixed(1e-3), {"integrator": "RK4", "stiff": True}),
         ],
         "exudyn": [Setting("DOPRI5", "tol 1e-08", values={"rtol": 1e-8})],
+        "drake": [Setting("RungeKutta3", "accuracy 1e-04", values={"accuracy": 1e-4})],
     }
 
 

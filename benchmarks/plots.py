@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from .goals import Records
 
-COLORS = {"pin_nonideal": "C0", "pin+scipy": "C2", "mujoco": "C1", "exudyn": "C4"}
+COLORS = {"pin_nonideal": "C0", "pin+scipy": "C2", "mujoco": "C1", "exudyn": "C4", "drake": "C3"}
 COLUMNS = 3
 
 
@@ -37,14 +37,20 @@ def accuracy(results: list[dict[str, Any]]) -> Figure:
                 if row["tool"] == tool and row["status"] == "ok"
             ]
             if points:
-                panel.loglog(*zip(*points, strict=True), ".", color=color, alpha=0.35, markersize=4)
+                panel.loglog(
+                    *zip(*points, strict=True), ".", color=color, alpha=0.35, markersize=4, rasterized=True
+                )
                 panel.loglog(
                     *zip(*lower_front(points), strict=True), "o-", color=color, markersize=3, label=tool
                 )
         label(panel, result["title"], "time of the run [ms]", "error [rad or m]")
     for panel in panels[len(results) :]:
         panel.remove()
-    panels[0].legend(fontsize="small")
+    shown: dict[str, Any] = {}
+    for panel in figure.axes:
+        lines, texts = panel.get_legend_handles_labels()
+        shown |= dict(zip(texts, lines, strict=True))
+    figure.legend(shown.values(), shown.keys(), loc="outside upper center", ncols=len(shown))
     return figure
 
 
@@ -64,10 +70,12 @@ def scaling(results: dict[str, Any]) -> Figure:
 
 
 def label(panel: Axes, title: str, x: str, y: str) -> None:
+    """Title, axes and grid; ticks at powers of ten only, which keeps the file small."""
     panel.set_title(title, fontsize="medium")
     panel.set_xlabel(x)
     panel.set_ylabel(y)
     panel.grid(alpha=0.3)
+    panel.minorticks_off()
 
 
 FIGURES = {"accuracy": accuracy, "scaling": scaling}
@@ -79,4 +87,4 @@ def draw(records: Records, folder: Path) -> None:
     with mpl.rc_context({"svg.hashsalt": "benchmarks", "svg.fonttype": "none"}):
         for name in FIGURES.keys() & records.keys():
             figure = FIGURES[name](records[name]["results"])
-            figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
+            figure.savefig(folder / f"{name}.svg", metadata={"Date": None}, dpi=150)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from .goals import OURS, Records, key_figures
+from .goals import OURS, Records, key_figures, power
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORDED = ROOT / "benchmarks" / "results"
@@ -124,7 +124,7 @@ def accuracy(results: list[dict[str, Any]]) -> str:
     parts = [ACCURACY]
     for result in results:
         names = list(dict.fromkeys(name for entry in result["levels"] for name in entry["tools"]))
-        rows = [(f"{e['level']:.0e}", *(reached(e["tools"].get(n)) for n in names)) for e in result["levels"]]
+        rows = [(power(e["level"]), *(reached(e["tools"].get(n)) for n in names)) for e in result["levels"]]
         reference = result["reference"]
         notes = [f"Reference: {reference['how']}, good to {reference['uncertainty']:.0e}."]
         notes += [f"{capital(result['notes'])}."] if result["notes"] else []
