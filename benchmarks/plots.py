@@ -25,7 +25,7 @@ def lower_front(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def accuracy(results: list[dict[str, Any]]) -> Figure:
-    """A panel for each problem: all good runs as dots, the best of each tool joined."""
+    """A panel for each problem: of each tool the settings that none of its faster ones beats."""
     rows = -(-len(results) // COLUMNS)
     figure = Figure(figsize=(4.0 * COLUMNS, 3.0 * rows), layout="constrained")
     panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
@@ -37,12 +37,8 @@ def accuracy(results: list[dict[str, Any]]) -> Figure:
                 if row["tool"] == tool and row["status"] == "ok"
             ]
             if points:
-                panel.loglog(
-                    *zip(*points, strict=True), ".", color=color, alpha=0.35, markersize=4, rasterized=True
-                )
-                panel.loglog(
-                    *zip(*lower_front(points), strict=True), "o-", color=color, markersize=3, label=tool
-                )
+                curve = zip(*lower_front(points), strict=True)
+                panel.loglog(*curve, "o-", color=color, markersize=3, label=tool)
         label(panel, result["title"], "time of the run [ms]", "error [rad or m]")
     for panel in panels[len(results) :]:
         panel.remove()
@@ -87,4 +83,4 @@ def draw(records: Records, folder: Path) -> None:
     with mpl.rc_context({"svg.hashsalt": "benchmarks", "svg.fonttype": "none"}):
         for name in FIGURES.keys() & records.keys():
             figure = FIGURES[name](records[name]["results"])
-            figure.savefig(folder / f"{name}.svg", metadata={"Date": None}, dpi=150)
+            figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
