@@ -18,6 +18,7 @@ import pin_nonideal as pn
 
 from .errors import InputError, OutputError, PinNonidealError, RunError, RunInterrupted
 from .loading import robots
+from .plotting import picture_format
 
 EXIT_ERROR = 2
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
@@ -146,12 +147,14 @@ def _simulation_settings(options: argparse.Namespace) -> dict[str, Any]:
     return settings
 
 
-def _writers(options: argparse.Namespace) -> list[tuple[Path, Callable[[Any, Path], Any]]]:
-    """Files to write and what writes them; folders are checked now, because a run may take long."""
-    asked: list[tuple[Path | None, Callable[[Any, Path], Any]]] = [
+def _writers(options: argparse.Namespace) -> list[tuple[Path, Callable[[Any, Path], Path]]]:
+    """Files to write and what writes them; they are checked now, because a run may take long."""
+    if options.plot is not None:
+        picture_format(options.plot)
+    asked: list[tuple[Path | None, Callable[[Any, Path], Path]]] = [
         (options.save, lambda run, path: run.save(path)),
-        (options.html, lambda run, path: pn.replay(run, path)),
-        (options.plot, lambda run, path: pn.plot(run, path)),
+        (options.html, _write_replay),
+        (options.plot, _write_figure),
     ]
     writers = [(path, writer) for path, writer in asked if path is not None]
     for path, _ in writers:
@@ -165,10 +168,19 @@ def _writers(options: argparse.Namespace) -> list[tuple[Path, Callable[[Any, Pat
     return writers
 
 
-def _write(run: Any, writers: list[tuple[Path, Callable[[Any, Path], Any]]]) -> None:
+def _write(run: Any, writers: list[tuple[Path, Callable[[Any, Path], Path]]]) -> None:
     for path, writer in writers:
-        writer(run, path)
-        print(f"wrote {path}")
+        print(f"wrote {writer(run, path)}")
+
+
+def _write_replay(run: Any, path: Path) -> Path:
+    pn.replay(run, path)
+    return path
+
+
+def _write_figure(run: Any, path: Path) -> Path:
+    pn.plot(run, path)
+    return path
 
 
 def _parameters(settings: Sequence[str]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError, OutputError
-from .replay import write_whole
+from .files import file_path, whole_file
 from .replay_signals import MODES, Plot, check_scene, mode_bands, plots_of
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ CROWD = 40
 def plot(
     run: Trajectory,
     path: str | os.PathLike[str] | None = None,
-    what: Sequence[str | tuple[str, Mapping[str, NDArray[np.float64]]]] | None = None,
+    what: str | Sequence[str | tuple[str, Mapping[str, NDArray[np.float64]]]] | None = None,
 ) -> Figure:
     """Draws a run over time, one plot below the other, with the events marked.
 
@@ -60,6 +60,8 @@ def plot(
             *(["violation"] if run.scene.constraint_slices else []),
             *(["modes"] if run.modes is not None else []),
         ]
+    if isinstance(what, str):
+        what = [what]
     if not what:
         raise InputError("plot: what must name at least one plot; got none")
     if "modes" in what and run.modes is None:
@@ -82,7 +84,7 @@ def plot(
     figure.align_ylabels()
     figure.suptitle(run.name, fontsize=12, fontweight="bold", x=0.01, ha="left")
     if path is not None:
-        _save(figure, Path(path))
+        _save(figure, file_path("plot: path", path))
     return figure
 
 
@@ -145,14 +147,28 @@ def _draw_modes(axes: Axes, run: Trajectory) -> None:
     )
 
 
-def _save(figure: Figure, path: Path) -> None:
-    """The figure as a file, whole or not at all."""
-    known = sorted(figure.canvas.get_supported_filetypes())
-    ending = path.suffix.lower().lstrip(".")
+def picture_format(path: Path) -> str:
+    """The format that the ending of a file names.
+
+    Args:
+        path: the file.
+
+    Raises:
+        OutputError: matplotlib writes no such format.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    known, ending = sorted(FigureCanvasAgg.get_supported_filetypes()), path.suffix.lower().lstrip(".")
     if ending not in known:
         raise OutputError(
             f'cannot write a figure to "{path}": its ending must be one of {", ".join(known)}; got "{ending}"'
         )
+    return ending
+
+
+def _save(figure: Figure, path: Path) -> None:
+    """The figure as a file, whole or not at all."""
     picture = io.BytesIO()
-    figure.savefig(picture, format=ending, dpi=160)
-    write_whole(path, picture.getvalue(), "the figure")
+    figure.savefig(picture, format=picture_format(path), dpi=160)
+    with whole_file(path, "the figure") as stream:
+        stream.write(picture.getvalue())

@@ -14,7 +14,6 @@ import importlib.util
 import json
 import os
 import re
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,6 +22,7 @@ import pinocchio as pin
 
 from .checks import positive
 from .errors import InputError, OutputError
+from .files import file_path, whole_file
 from .replay_payload import packed_run
 from .replay_signals import Chosen, check_scene
 
@@ -49,10 +49,20 @@ class ReplayPage:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Writes the page to a file, whole or not at all.
 
+        Args:
+            path: the file.
+
+        Returns:
+            The path written.
+
         Raises:
+            InputError: `path` is no name of a file.
             OutputError: the file cannot be written.
         """
-        return write_whole(Path(path), self.text.encode(), "the replay")
+        target = file_path("replay: path", path)
+        with whole_file(target, "the replay") as stream:
+            stream.write(self.text.encode())
+        return target
 
     def _repr_html_(self) -> str:
         page = html.escape(self.text, quote=True)
@@ -99,46 +109,6 @@ def replay(
     check_scene(run, "a replay")
     page = ReplayPage(_page(run, fps, title or run.name, plots, compress, forces))
     return page if path is None else page.save(path)
-
-
-def write_whole(path: Path, content: bytes, what: str) -> Path:
-    """Writes a file under a temporary name beside it and renames it, so that no half of it is ever seen.
-
-    Args:
-        path: the file.
-        content: all of it.
-        what: words for the message.
-
-    Raises:
-        OutputError: the folder does not exist or cannot be written, or `path` is a folder.
-    """
-    try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:40]}.", suffix=".part")
-    except OSError as error:
-        raise OutputError(_cannot_write(path, what, error)) from error
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
-    except BaseException as error:
-        Path(temporary).unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise OutputError(_cannot_write(path, what, error)) from error
-        raise
-    return path
-
-
-def _cannot_write(path: Path, what: str, error: OSError) -> str:
-    reason = error.strerror or type(error).__name__
-    return f'cannot write {what} to "{path}": {reason}; name a file in a folder that can be written'
-
-
-def _umask() -> int:
-    """Permissions that new files of this process do not get."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _page(

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 # Plots by name, or by a title "what [unit]" and curves by label, (nt,) each.
-Chosen = Sequence[str | tuple[str, Mapping[str, Array]]]
+Chosen = str | Sequence[str | tuple[str, Mapping[str, Array]]]
 
 # Curves of one plot when joints are not chosen: as many as can be told apart.
 MAX_CURVES = 8
@@ -151,7 +151,7 @@ def plots_of(run: Trajectory, chosen: Chosen | None) -> list[Plot]:
     if chosen is None:
         chosen = [name for name in ("energy", "violation", "reactions", "q") if _recorded(run, name)]
     plots: list[Plot] = []
-    for item in chosen:
+    for item in [chosen] if isinstance(chosen, str) else chosen:
         plots += _plot(run, item) if isinstance(item, str) else [_given(run, *item)]
     return plots
 
@@ -230,15 +230,17 @@ def _largest(curves: dict[str, Array]) -> dict[str, Array]:
 
 
 def check_scene(run: Trajectory, what: str) -> None:
-    """Refuses a run without its scene.
+    """Refuses what is no run, and a run without its scene.
 
     Args:
         run: the run.
         what: what needs the scene, for the message.
 
     Raises:
-        InputError: the run has no scene.
+        InputError: it is no run, or it has no scene.
     """
+    if not all(hasattr(run, name) for name in ("t", "q", "v", "scene")):
+        raise InputError(f"{what} shows a Trajectory, what `simulate` returns; got {type(run).__name__}")
     if run.scene is None:
         raise InputError(
             f"{what} needs the scene of the run, which a trajectory read from a file has not: "

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
-import tempfile
 import zipfile
 import zlib
 from dataclasses import dataclass, field
@@ -15,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import LoadingError, OutputError
+from .errors import LoadingError
+from .files import file_path, whole_file
 
 Array = NDArray[np.float64]
 
@@ -66,7 +65,7 @@ class Stats:
     wall_s: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
     """Samples of a run; what was not recorded is None.
 
@@ -120,6 +119,10 @@ class Trajectory:
     def __len__(self) -> int:
         return len(self.t)
 
+    def __repr__(self) -> str:
+        samples = f"{len(self.t)} samples" + (f" to {self.t[-1]:g} s" if len(self.t) else "")
+        return f'<Trajectory "{self.name}": {samples}, {len(self.events)} events>'
+
     def __str__(self) -> str:
         s = self.stats
         span = f"{self.t[0]:g} to {self.t[-1]:g} s" if len(self.t) else "empty"
@@ -150,9 +153,10 @@ class Trajectory:
             The path written.
 
         Raises:
+            InputError: `path` is no name of a file.
             OutputError: the file cannot be written.
         """
-        target = Path(os.fspath(path))
+        target = file_path("Trajectory.save: path", path)
         if target.suffix != ".npz":
             target = target.with_name(target.name + ".npz")
         arrays: dict[str, Any] = {key: getattr(self, key) for key in REQUIRED}
@@ -171,20 +175,8 @@ class Trajectory:
             "power": None if self.power is None else list(self.power),
         }
         arrays["header"] = np.array(json.dumps(header))
-        temporary = None
-        try:
-            handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-            with os.fdopen(handle, "wb") as file:
-                np.savez_compressed(file, **arrays)
-            os.replace(temporary, target)
-        except OSError as error:
-            raise OutputError(
-                f'cannot write "{target}": {error.strerror or error}; choose a writable path'
-            ) from error
-        finally:
-            if temporary is not None and os.path.exists(temporary):
-                with contextlib.suppress(OSError):
-                    os.unlink(temporary)
+        with whole_file(target, "the trajectory") as stream:
+            np.savez_compressed(stream, **arrays)
         return target
 
     @classmethod
@@ -198,9 +190,10 @@ class Trajectory:
             The trajectory, without its scene.
 
         Raises:
+            InputError: `path` is no name of a file.
             LoadingError: the file is missing, truncated, or no trajectory.
         """
-        source = Path(os.fspath(path))
+        source = file_path("Trajectory.load: path", path)
         try:
             with np.load(source, allow_pickle=False) as file:
                 arrays = {key: file[key] for key in file.files}

@@ -135,6 +135,24 @@ class TestErrors:
             f'pin-nonideal: error: cannot write "{path}": no permission; choose another place'
         )
 
+    def test_an_unknown_picture_is_found_before_the_run(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        monkeypatch.setattr(pn, "simulate", lambda *args, **settings: pytest.fail("the run was started"))
+        path = tmp_path / "run.xyz"
+        assert main(["run", "four_bar", "--plot", str(path)]) == EXIT_ERROR
+        line = error_line(capsys)
+        assert line.startswith(
+            f'pin-nonideal: error: cannot write a figure to "{path}": its ending must be one'
+        )
+        assert line.endswith('got "xyz"')
+
+    def test_the_file_that_was_written_is_named(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        assert main(["run", "four_bar", *SHORT, "--save", str(tmp_path / "run")]) == 0
+        assert f"wrote {tmp_path / 'run.npz'}\n" in capsys.readouterr().out
+
     def test_unknown_option(self, capsys: pytest.CaptureFixture[str]) -> None:
         with pytest.raises(SystemExit) as caught:
             main(["run", "four_bar", "--durations", "1"])

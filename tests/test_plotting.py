@@ -142,6 +142,20 @@ def test_what_cannot_be_drawn_is_refused() -> None:
         plot(run)
 
 
+@pytest.mark.parametrize("run", [None, pn.load("four_bar")])
+def test_what_is_no_run_is_refused(run: Any) -> None:
+    for draw, what in ((plot, "a figure"), (pn.replay, "a replay")):
+        message = f"{what} shows a Trajectory, what `simulate` returns; got {type(run).__name__}"
+        with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+            draw(run)
+
+
+def test_one_name_stands_for_a_list_of_it() -> None:
+    run = pn.simulate(pn.load("four_bar"), 0.05, record="energy")
+    assert len(plot(run, what="energy").axes) == 1
+    assert pn.replay(run, plots="energy").text == pn.replay(run, plots=["energy"]).text
+
+
 def test_a_simulated_run_is_drawn() -> None:
     run = pn.simulate(pn.load("four_bar"), 0.05, record=("forces", "energy", "a"))
     figure = plot(run, what=["q", "v", "a", "energy", "work", "violation", "reactions", "modes"])

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.errors import LoadingError, OutputError
+from pin_nonideal.errors import InputError, LoadingError, OutputError
 
 from .small_robots import refuses
 
@@ -139,6 +139,32 @@ def test_events_and_states_of_laws_come_back(tmp_path):
     np.testing.assert_array_equal(back.z, run.z)
 
 
+def cannot_write(path, reason):
+    message = (
+        f'cannot write the trajectory to "{path}": {reason}; name a file in a folder that can be written'
+    )
+    return refuses(message, OutputError)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+def test_a_file_gets_the_permissions_of_any_new_file(run, tmp_path):
+    plain = tmp_path / "plain"
+    plain.write_text("")
+    assert run.save(tmp_path / "run.npz").stat().st_mode == plain.stat().st_mode
+
+
+@pytest.mark.parametrize("path", [None, 3, b"run.npz", ""])
+def test_names_of_files_that_are_none(run, path):
+    with refuses(f"Trajectory.save: path must be the name of a file; got {path!r}", InputError):
+        run.save(path)
+    with refuses(f"Trajectory.load: path must be the name of a file; got {path!r}", InputError):
+        pn.Trajectory.load(path)
+
+
+def test_a_run_shows_itself_in_one_line(run):
+    assert repr(run) == f'<Trajectory "{run.name}": {len(run)} samples to {run.t[-1]:g} s, 0 events>'
+
+
 def test_a_file_is_replaced_whole_or_not_at_all(run, tmp_path, monkeypatch):
     path = run.save(tmp_path / "run.npz")
     before = path.read_bytes()
@@ -147,7 +173,7 @@ def test_a_file_is_replaced_whole_or_not_at_all(run, tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(np, "savez_compressed", full_disk)
-    with refuses(f'cannot write "{path}": No space left on device; choose a writable path', OutputError):
+    with cannot_write(path, "No space left on device"):
         run.save(path)
     assert path.read_bytes() == before
     assert os.listdir(tmp_path) == ["run.npz"]
@@ -155,15 +181,15 @@ def test_a_file_is_replaced_whole_or_not_at_all(run, tmp_path, monkeypatch):
 
 def test_an_unwritable_place(run, tmp_path):
     path = tmp_path / "nowhere" / "run.npz"
-    with refuses(f'cannot write "{path}": No such file or directory; choose a writable path', OutputError):
+    with cannot_write(path, "No such file or directory"):
         run.save(path)
     (tmp_path / "file").write_text("")
     path = tmp_path / "file" / "run.npz"
-    with refuses(f'cannot write "{path}": Not a directory; choose a writable path', OutputError):
+    with cannot_write(path, "Not a directory"):
         run.save(path)
     folder = tmp_path / "run.npz"
     folder.mkdir()
-    with refuses(f'cannot write "{folder}": Is a directory; choose a writable path', OutputError):
+    with cannot_write(folder, "Is a directory"):
         run.save(folder)
     assert sorted(os.listdir(tmp_path)) == ["file", "run.npz"]
 
