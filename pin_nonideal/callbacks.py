@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,10 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import RunError, UnknownNameError, UserFunctionError, nearest
+from .errors import InputError, RunError, UnknownNameError, UserFunctionError, nearest
 from .timefunctions import Constant, Polynomial, Sinusoid, Spline
 
 Array = NDArray[np.float64]
+
+# Where a user's function of time is compared with its differences [s]: at no round time, since it may have
+# corners there, and at several, since one may fall on a corner all the same.
+PROBES = (0.01371, 0.21317, 0.71753)
+PROBE_STEP = 1e-6
+COARSE = 0.1  # what is interpolated in tables of its own for each derivative stays below
+ROUNDING = 1e-7  # of a difference over two steps, and more
 
 
 def checked(function: Callable[..., Any], who: str, *shapes: tuple[int, ...]) -> Callable[..., Any]:
@@ -43,6 +51,8 @@ def checked(function: Callable[..., Any], who: str, *shapes: tuple[int, ...]) ->
 
 def _numbers(part: Any, shape: tuple[int, ...], who: str) -> Array:
     try:
+        if np.iscomplexobj(part):
+            raise TypeError
         result = np.array(part, dtype=float, order="C")
     except (TypeError, ValueError):
         raise UserFunctionError(f"{who} must return numbers of shape {shape}; got {part!r}") from None
@@ -61,6 +71,9 @@ def time_function(function: Any, who: str) -> Any:
     Args:
         function: of `pin_nonideal.timefunctions`, or the user's t -> (value, rate, acceleration).
         who: words for messages.
+
+    Raises:
+        InputError: a derivative is wrong.
     """
     if isinstance(function, Constant):
         return ("polynomial", [function.value])
@@ -71,7 +84,41 @@ def time_function(function: Any, who: str) -> Any:
     if isinstance(function, Spline):
         return ("spline", function.breaks.tolist(), function.coefficients.ravel().tolist())
     jet = checked(function, f"{who}: function of time", (), (), ())
+    _check_derivatives(jet, who)
     return lambda t: tuple(float(x) for x in jet(t))
+
+
+def _check_derivatives(jet: Callable[..., Any], who: str) -> None:
+    """Compares the rate and the acceleration of a user's function of time with central differences.
+
+    Args:
+        jet: t -> (value, rate, acceleration), checked.
+        who: words for messages.
+
+    Raises:
+        InputError: one of them is wrong at every probe.
+    """
+    ends = []
+    for t in PROBES:
+        with contextlib.suppress(UserFunctionError):  # it may be defined for a part of the time only
+            ends.append((t, jet(t - PROBE_STEP), jet(t), jet(t + PROBE_STEP)))
+    for k, (quantity, derivative) in enumerate((("value", "rate"), ("rate", "acceleration"))):
+        rows = [
+            (t, (after[k] - before[k]) / (2.0 * PROBE_STEP), at[k + 1], abs(at[k]))
+            for t, before, at, after in ends
+        ]
+        wrong = [
+            (t, difference, given)
+            for t, difference, given, size in rows
+            if abs(difference - given) > COARSE * max(abs(difference), abs(given)) + ROUNDING * (1.0 + size)
+        ]
+        if wrong and len(wrong) == len(rows):
+            t, difference, given = wrong[0]
+            raise InputError(
+                f"{who}: function of time: {derivative} must be the derivative of {quantity}; at t = {t:g} s "
+                f"it returns {given:.6g}, and differences give {difference:.6g}; mend it, or use sinusoid, "
+                "polynomial or spline"
+            )
 
 
 @dataclass

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from .checks import array, number, sequence
+from .checks import array, number, optional_text, sequence
 from .configurations import configuration
 from .consistency import Rows, nearest_state, nonholonomic_rows
 from .equation import Solution
@@ -78,13 +78,22 @@ class Scene:
     ) -> None:
         if not isinstance(model, pin.Model):
             raise InputError(f"Scene: model must be a pinocchio.Model; got {type(model).__name__}")
+        for what, geometry in (("visual_model", visual_model), ("collision_model", collision_model)):
+            if geometry is not None and not isinstance(geometry, pin.GeometryModel):
+                raise InputError(
+                    f"Scene: {what} must be a pinocchio.GeometryModel; got {type(geometry).__name__}"
+                )
         self.model = model
-        self.name = name or model.name or "scene"
+        self.name = optional_text("Scene: name", name) or model.name or "scene"
         self.constraints, self.laws = sequence("constraints", constraints), sequence("laws", laws)
         self.contacts, self.forces = sequence("contacts", contacts), sequence("forces", forces)
         self.actuation = actuation
         self.visual_model, self.collision_model = visual_model, collision_model
-        self.notes, self.source, self.licence = list(notes), source, licence
+        self.notes = list(sequence("notes", notes))
+        self.source, self.licence = (
+            optional_text(f"Scene: {what}", value)
+            for what, value in (("source", source), ("licence", licence))
+        )
         check_model(model)
         self.q0 = pin.neutral(model) if q0 is None else self._configuration(q0, "q0")
         self.v0 = np.zeros(model.nv) if v0 is None else self._velocity(v0, "v0")

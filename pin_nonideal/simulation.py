@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .checks import array, choice, count, nonnegative, number, positive, sequence
+from .actuation import SampledControl
+from .checks import array, choice, count, label, nonnegative, number, positive, sequence
 from .errors import InputError, RunError, RunInterrupted, UserFunctionError
 from .scene import Scene
 from .trajectory import Event, Stats, Trajectory
@@ -24,6 +25,10 @@ RECORDS = ("a", "forces", "energy", "power")
 FIELDS = {"F_ideal": "forces", "F_nonideal": "forces", "lam": "forces", "lam_ideal": "forces"}
 EVENT_KINDS = ("stick", "slip", "reverse", "pull", "chatter")
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-8, 1e-10
+# Times are floating-point numbers: a step of fewer of their spacings is off by more than a percent, and one
+# shorter than a spacing leads nowhere.
+LEAST_SPACINGS = 100.0
+MOST_SAMPLES = 1e8  # some gigabytes for a small robot
 
 
 def simulate(
@@ -98,8 +103,9 @@ def simulate(
 
 def rollout(
     scene: Scene,
-    states: tuple[ArrayLike, ArrayLike],
-    duration: float,
+    q: ArrayLike | tuple[ArrayLike, ArrayLike],
+    v: ArrayLike | None = None,
+    duration: float | None = None,
     *,
     t0: float = 0.0,
     method: str = "dop853",
@@ -112,9 +118,12 @@ def rollout(
 ) -> list[Trajectory]:
     """Runs many initial states in native threads; each result is bitwise that of its own `simulate`.
 
+    Called as rollout(scene, q, v, duration), or with a pair of states as rollout(scene, (q, v), duration).
+
     Args:
         scene: what to simulate.
-        states: (q, v), shapes (n, nq) and (n, nv).
+        q: initial configurations, (n, nq).
+        v: initial velocities, (n, nv).
         duration: length of time [s].
         t0: initial time [s].
         method: one of the core's methods (not SciPy's).
@@ -135,19 +144,18 @@ def rollout(
     if not isinstance(scene, Scene):
         raise InputError(f"rollout: scene must be a Scene; got {type(scene).__name__}")
     threads = count("rollout: threads", threads, least=1)
-    if not isinstance(states, tuple) or len(states) != 2:
-        raise InputError("rollout: states must be a pair (q, v) of shapes (n, nq) and (n, nv)")
-    model = scene.model
-    q, v = (
-        array(f"rollout: {k}", x, (None, n))
-        for k, x, n in zip("qv", states, (model.nq, model.nv), strict=True)
-    )
-    if len(q) != len(v):
-        raise InputError(f"rollout: q and v must have as many rows; got {len(q)} and {len(v)}")
+    if isinstance(q, tuple) and len(q) == 2 and (v is None or duration is None):
+        (q, v), duration = q, v if duration is None else duration  # type: ignore[assignment]
+    if v is None or duration is None:
+        raise InputError("rollout needs q, v and a duration: rollout(scene, q, v, duration)")
+    starts_q = array("rollout: q", q, (None, scene.model.nq))
+    starts_v = array("rollout: v", v, (None, scene.model.nv))
+    if len(starts_q) != len(starts_v):
+        raise InputError(f"rollout: q and v must have as many rows; got {len(starts_q)} and {len(starts_v)}")
     if method in SCIPY:
         raise InputError(f'rollout: method must be one of the core\'s; "{method}" runs in SciPy')
     options = _options(scene, duration, t0, method, rtol, atol, dt, output_dt, record)
-    starts = [scene.project(a, b, options["t0"]) for a, b in zip(q, v, strict=True)]
+    starts = [scene.project(a, b, options["t0"]) for a, b in zip(starts_q, starts_v, strict=True)]
     options["tick"] = None
     begin = time.perf_counter()
     q0, v0 = (np.ascontiguousarray([s[i] for s in starts]).reshape(len(starts), -1) for i in (0, 1))
@@ -199,6 +207,10 @@ def _options(
     relative = DEFAULT_RTOL if rtol is None else nonnegative("simulate: rtol", rtol)
     if relative == 0.0 and not (tolerance > 0.0).all():
         raise InputError("simulate: rtol and atol must not both be zero; set one of them")
+    begin, length = number("simulate: t0", t0), positive("simulate: duration", duration)
+    steps = {"dt": dt, "output_dt": output_dt}
+    lengths = {key: positive(f"simulate: {key}", value) for key, value in steps.items() if value is not None}
+    _check_clock(scene, begin, length, lengths)
     wanted = {record} if isinstance(record, str) else set(sequence("simulate: record", record))
     groups = set()
     for name in wanted:
@@ -206,15 +218,45 @@ def _options(
         choice("simulate: record", FIELDS.get(name, name), RECORDS)
     return {
         "method": method,
-        "duration": positive("simulate: duration", duration),
-        "t0": number("simulate: t0", t0),
+        "duration": length,
+        "t0": begin,
         # Below a few units of rounding no step can meet its tolerance.
         "rtol": max(relative, 1e-14) if relative else 0.0,
         "atol": np.ascontiguousarray(np.maximum(tolerance, 1e-300)),
-        "dt": 0.0 if dt is None else positive("simulate: dt", dt),
-        "output_dt": 0.0 if output_dt is None else positive("simulate: output_dt", output_dt),
+        **{key: lengths.get(key, 0.0) for key in steps},
         **{key: key in groups for key in RECORDS},
     }
+
+
+def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, float]) -> None:
+    """Refuses lengths of time that floating-point times near the end of the run cannot tell apart.
+
+    Args:
+        scene: what to simulate.
+        t0: initial time [s].
+        duration: length of time [s].
+        lengths: dt and output_dt, as far as given [s].
+
+    Raises:
+        InputError: a length is too short, or leaves more samples than a run can hold.
+    """
+    end = max(abs(t0), abs(t0 + duration))
+    spacing = float(np.spacing(end))
+    named = {f"simulate: {key}": value for key, value in {"duration": duration, **lengths}.items()}
+    if isinstance(scene.actuation, SampledControl):
+        named[f"{label(scene.actuation)}: period"] = scene.actuation.period
+    for what, value in named.items():
+        if value < LEAST_SPACINGS * spacing:
+            raise InputError(
+                f"{what} must be at least {LEAST_SPACINGS:g} times the spacing of floating-point times, "
+                f"which is {spacing:.2g} s at t = {end:g} s; got {value:g} s"
+            )
+    key = next((key for key in ("output_dt", "dt") if key in lengths), None)
+    if key is not None and duration / lengths[key] > MOST_SAMPLES:
+        raise InputError(
+            f"simulate: {key} must leave at most {MOST_SAMPLES:g} samples; {lengths[key]:g} s leaves "
+            f"{duration / lengths[key]:.2g}; set a longer {'output_dt' if key == 'dt' else key}"
+        )
 
 
 def _finish(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: float) -> Trajectory:

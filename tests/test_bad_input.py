@@ -181,6 +181,13 @@ MISFITS = {
     "q0 nan": ({"q0": with_entry(Q, 0, NAN)}, "q0 must be finite; entry [0] is nan"),
     "v0 shape": ({"v0": [1.0]}, "v0 must have shape (12,); got shape (1,)"),
     "v0 inf": ({"v0": with_entry(V, 11, INF)}, "v0 must be finite; entry [11] is inf"),
+    "picture": (
+        {"visual_model": pin.Model()},
+        "Scene: visual_model must be a pinocchio.GeometryModel; got Model",
+    ),
+    "name": ({"name": 3}, "Scene: name must be a name (a string); got 3"),
+    "notes": ({"notes": 3}, "notes must be a list; got 3"),
+    "licence": ({"licence": 3}, "Scene: licence must be a name (a string); got 3"),
 }
 
 
@@ -368,6 +375,28 @@ RUNS = {
         'simulate: method "rk4" takes steps of the length dt; leave rtol and atol out',
     ),
     "output_dt": ({"output_dt": 0.0}, "simulate: output_dt must be positive; got 0"),
+    "duration without steps": (
+        {"duration": 1.0, "t0": 1e15},
+        "simulate: duration must be at least 100 times the spacing of floating-point times, which is 0.12 s "
+        "at t = 1e+15 s; got 1 s",
+    ),
+    "dt without end": (
+        {"method": "rk4", "dt": 1e-300},
+        "simulate: dt must be at least 100 times the spacing of floating-point times, which is 2.2e-16 s at "
+        "t = 1 s; got 1e-300 s",
+    ),
+    "output_dt without end": (
+        {"output_dt": 1e-300},
+        "simulate: output_dt must be at least 100 times the spacing of floating-point times",
+    ),
+    "too many samples": (
+        {"output_dt": 1e-9},
+        "simulate: output_dt must leave at most 1e+08 samples; 1e-09 s leaves 1e+09; set a longer output_dt",
+    ),
+    "too many steps kept": (
+        {"method": "rk4", "dt": 1e-9},
+        "simulate: dt must leave at most 1e+08 samples; 1e-09 s leaves 1e+09; set a longer output_dt",
+    ),
     "record": (
         {"record": "energi"},
         "simulate: record must be one of 'a', 'forces', 'energy', 'power'; got 'energi'; nearest: \"energy\"",
@@ -386,6 +415,12 @@ def test_runs_that_cannot_start(case):
         pn.simulate(pn.Scene(MODEL), **{"duration": 1.0, **given})
 
 
+def test_a_period_without_end():
+    control = pn.SampledControl(lambda t, q, v: np.zeros(MODEL.nv), 1e-300)
+    with refuses("SampledControl: period must be at least 100 times the spacing", InputError):
+        pn.simulate(pn.Scene(MODEL, actuation=control), 1.0)
+
+
 def test_a_run_needs_a_scene():
     with refuses("simulate: scene must be a Scene; got Model", InputError):
         pn.simulate(MODEL, 1.0)
@@ -394,17 +429,18 @@ def test_a_run_needs_a_scene():
 
 
 ROLLOUTS = {
-    "states": ({"states": Q}, "rollout: states must be a pair (q, v) of shapes (n, nq) and (n, nv)"),
-    "one state": ({"states": (Q, V)}, "rollout: q must have shape (n, 15); got shape (15,)"),
+    "no velocities": ({"v": None}, "rollout needs q, v and a duration: rollout(scene, q, v, duration)"),
+    "no duration": ({"duration": None}, "rollout needs q, v and a duration: rollout(scene, q, v, duration)"),
+    "one state": ({"q": Q, "v": V}, "rollout: q must have shape (n, 15); got shape (15,)"),
     "rows": (
-        {"states": (np.tile(Q, (2, 1)), V[None])},
+        {"q": np.tile(Q, (2, 1))},
         "rollout: q and v must have as many rows; got 2 and 1",
     ),
     "threads": ({"threads": 0}, "rollout: threads must be at least 1; got 0"),
     "threads float": ({"threads": 1.5}, "rollout: threads must be an integer; got 1.5"),
     "method": ({"method": "Radau"}, 'rollout: method must be one of the core\'s; "Radau" runs in SciPy'),
     "length": (
-        {"states": (0.5 * Q[None], V[None])},
+        {"q": 0.5 * Q[None]},
         'q: the quaternion of joint "j2" must have length 1; got 0.5; normalize it',
     ),
 }
@@ -414,4 +450,4 @@ ROLLOUTS = {
 def test_rollouts_that_cannot_start(case):
     given, message = ROLLOUTS[case]
     with refuses(message, InputError):
-        pn.rollout(pn.Scene(MODEL), **{"states": (Q[None], V[None]), "duration": 0.1, **given})
+        pn.rollout(pn.Scene(MODEL), **{"q": Q[None], "v": V[None], "duration": 0.1, **given})

@@ -40,8 +40,10 @@ def test_rollouts_are_bitwise_their_single_runs(robot, threads):
     n = 6
     starts_v = np.array([v * (1.0 + 0.1 * generator.standard_normal()) for _ in range(n)])
     starts_q = np.tile(q, (n, 1))
-    runs = pn.rollout(scene, (starts_q, starts_v), 0.3, threads=threads, record=("energy",))
+    runs = pn.rollout(scene, starts_q, starts_v, 0.3, threads=threads, record=("energy",))
     assert len(runs) == n
+    for run, paired in zip(runs, pn.rollout(scene, (starts_q, starts_v), 0.3), strict=True):
+        np.testing.assert_array_equal(run.q, paired.q)
     for k, run in enumerate(runs):
         alone = pn.simulate(scene, 0.3, q=starts_q[k], v=starts_v[k], record=("energy",))
         for key in ("t", "q", "v", "violation"):

@@ -62,6 +62,10 @@ CASES = {
         {"actuation": later(np.zeros(3), "off")},
         "actuation must return numbers of shape (3,); got 'off'",
     ),
+    "torque complex": (
+        {"actuation": later(np.zeros(3), np.full(3, 1.0j))},
+        "actuation must return numbers of shape (3,); got array([0.+1.j, 0.+1.j, 0.+1.j])",
+    ),
     "torque nan": (
         {"actuation": later(np.zeros(3), NAN3)},
         "actuation must return finite numbers; got [ 0. nan  0.]",
@@ -268,3 +272,36 @@ def test_ctrl_c_keeps_what_was_computed(kind):
     assert int(samples) > 10
     assert (at_end, finite, cause) == ("True", "True", "None")
     assert issubclass(RunInterrupted, KeyboardInterrupt)
+
+
+# --- functions of time -------------------------------------------------------------------------------------
+
+WRONG_DERIVATIVES = {
+    "no rate": (
+        lambda t: (2.0 * t, 0.0, 0.0),
+        "rate must be the derivative of value; at t = 0.01371 s it returns 0",
+    ),
+    "sign": (
+        lambda t: (np.cos(t), -np.sin(t), np.cos(t)),
+        "acceleration must be the derivative of rate; at t = 0.01371 s it returns 0.999906",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_DERIVATIVES)
+def test_wrong_derivatives_of_a_function_of_time(case):
+    function, message = WRONG_DERIVATIVES[case]
+    with refuses(f'PrescribedMotion "drive": function of time: {message}', pn.InputError):
+        pn.Scene(MODEL, constraints=[pn.PrescribedMotion(MODEL.names[1], function, name="drive")])
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda t: (max(0.0, t - 0.21317), float(t > 0.21317), 0.0),  # a corner on a probe
+        lambda t: (np.interp(t, [0, 1], [0, 1]), 1.0, 0.0) if t < 0.1 else (None, None, None),
+        lambda t: (1e6 + 1e-3 * t, 1e-3, 0.0),  # differences drown in rounding
+    ],
+)
+def test_functions_of_time_that_pass(function):
+    pn.Scene(MODEL, constraints=[pn.PrescribedMotion(MODEL.names[1], function, name="drive")])
