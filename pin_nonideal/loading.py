@@ -37,8 +37,8 @@ def load(name: str | os.PathLike[str], **parameters: Any) -> Scene:
     Args:
         name: see above.
         **parameters: of a generated robot, such as N for "n_four_bar"; of URDF files and folders:
-        `free_flyer` (bool, a
-            floating base), `package_dirs` (folders for package:// paths), `merge_ball_joints` (bool, True).
+            `free_flyer` (bool, a floating base), `package_dirs` (folders for package:// paths),
+            `merge_ball_joints` (bool, True).
 
     Returns:
         The scene; `simulate` takes it.
@@ -49,7 +49,7 @@ def load(name: str | os.PathLike[str], **parameters: Any) -> Scene:
         SingularMassError: the mass matrix at the initial configuration is not positive definite.
         InputError: an unknown parameter, or a bad value of one.
     """
-    text = os.fspath(name)
+    text = os.fspath(name) if isinstance(name, (str, os.PathLike)) else None
     if not isinstance(text, str) or not text:
         raise InputError(f"name must be the name of a robot or a path; got {name!r}")
     path = Path(text).expanduser()
@@ -82,7 +82,7 @@ def robot_folders() -> dict[str, Path]:
     here = Path(__file__).resolve().parent
     for base in (here / "robots", here.parent / "robots"):
         if base.is_dir():
-            return {p.name: p for p in base.iterdir() if (p / "robot.yaml").is_file()}
+            return {p.name: p for p in sorted(base.iterdir()) if (p / "robot.yaml").is_file()}
     return {}
 
 

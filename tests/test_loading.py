@@ -39,9 +39,10 @@ def test_other_files_are_refused(tmp_path):
         pn.load(tmp_path / "robot.sdf")
 
 
-def test_name_must_be_a_name():
-    with refuses("name must be the name of a robot or a path; got ''", InputError):
-        pn.load("")
+@pytest.mark.parametrize("name", ["", None, 3, b"four_bar"])
+def test_name_must_be_a_name(name):
+    with refuses(f"name must be the name of a robot or a path; got {name!r}", InputError):
+        pn.load(name)
 
 
 def test_folder_without_urdf_points_at_the_one_it_has(tmp_path):
