@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from .compiled import load_core
 from .errors import SingularMassError
 
-# Rounding in crba is a few units in the last place of the largest term of each entry; once rows and columns
+# Rounding in M is a few units in the last place of the largest term of each entry; once rows and columns
 # are scaled to a unit diagonal, an eigenvalue below this many units cannot be told from zero.
 SINGULAR = 16.0 * float(np.finfo(float).eps)
 
@@ -31,8 +32,9 @@ def mass_diagnosis(model: Any, q: Any = None) -> str | None:
     if model.nv == 0:
         return None
     q = pin.neutral(model) if q is None else np.asarray(q, dtype=float)
-    M = np.array(pin.crba(model, model.createData(), q))
-    M = np.triu(M) + np.triu(M, 1).T
+    builder = load_core().Builder(model)
+    builder.finish()
+    M = np.asarray(builder.runner().terms(q, np.zeros(model.nv))[0]).reshape(model.nv, model.nv)
     diagonal = M.diagonal()
     largest = float(diagonal.max())
     bare = [i for i in range(model.nv) if not diagonal[i] > SINGULAR**2 * max(largest, 0.0)]
@@ -44,9 +46,12 @@ def mass_diagnosis(model: Any, q: Any = None) -> str | None:
             "inertia in the robot's file, or make the joint fixed"
         )
     scale = 1.0 / np.sqrt(diagonal)
-    values, vectors = np.linalg.eigh(scale[:, None] * M * scale)
-    if values[0] > SINGULAR * model.nv:
+    scaled = scale[:, None] * M * scale
+    try:  # much cheaper than eigenvalues, and enough for nearly every robot
+        np.linalg.cholesky(scaled - SINGULAR * model.nv * np.eye(model.nv))
         return None
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(scaled)
     direction = np.abs(vectors[:, 0])
     joints = _joints_of(model, [int(i) for i in np.flatnonzero(direction > 0.1 * direction.max())])
     suspects = _light_links(model, joints) or _links_beyond(model, joints)

@@ -11,6 +11,7 @@ import pinocchio as pin
 from .constraints import Constraint, Distance, FrameAnchor, JointCoupling, PointAnchor, PrescribedMotion
 from .errors import LoadingError, nearest
 from .mjcf_text import Defaults
+from .placements import joint_placements
 from .timefunctions import Constant
 from .xml_files import numbers
 
@@ -25,8 +26,7 @@ class _Reader:
         self.defaults = defaults
         self.model = model
         self.q0 = q0
-        self.data = model.createData()
-        pin.framesForwardKinematics(model, self.data, q0)
+        self.placements = joint_placements(model, q0)
 
     def body(self, name: str | None, where: str) -> tuple[int, Any, Any]:
         """(parent joint, placement on that joint, placement in the world) of a body; the world for None."""
@@ -37,7 +37,8 @@ class _Reader:
             raise LoadingError(f'{where}: no body "{name}"{nearest(name, bodies)}')
         index = self.model.getFrameId(name, pin.FrameType.BODY)
         frame = self.model.frames[index]
-        return int(frame.parentJoint), frame.placement, self.data.oMf[index]
+        joint = int(frame.parentJoint)
+        return joint, frame.placement, self.placements[joint] * frame.placement
 
     def site(self, name: str, where: str) -> str:
         """The name of a site, checked."""

@@ -13,6 +13,7 @@ from .checks import Vector3, axis_triad, unit_axis
 from .constraints import HingeAnchor
 from .contacts import PointContact
 from .errors import InputError, UnknownNameError, nearest
+from .placements import joint_placements
 
 Array = NDArray[np.float64]
 # A frame as the core takes it: joint, orientation by rows, place.
@@ -41,8 +42,7 @@ class Resolution:
 
     def __init__(self, model: Any, q0: Array) -> None:
         self.model, self.q0 = model, q0
-        self._data = model.createData()
-        pin.forwardKinematics(model, self._data, q0)
+        self._placements = joint_placements(model, q0)
 
     def frame_id(self, name: str, who: str) -> int:
         """Index of a frame, or of the frame of a joint."""
@@ -65,7 +65,7 @@ class Resolution:
     def in_world(self, frame: Frame) -> Any:
         """Where a frame is in the world at q0, pinocchio.SE3."""
         joint, R, p = frame
-        return self._data.oMi[joint] * pin.SE3(np.reshape(R, (3, 3)), np.array(p))
+        return self._placements[joint] * pin.SE3(np.reshape(R, (3, 3)), np.array(p))
 
     def joint(self, name: str, who: str, *, freedoms: tuple[int, ...] = (1,)) -> int:
         """Index of a joint with an allowed number of degrees of freedom."""

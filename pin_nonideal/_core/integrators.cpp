@@ -41,6 +41,7 @@ void System::derivative(double t, const VecX& y, VecX& dy) {
     }
     project(p, w, t, q_buffer, v_buffer);
     evaluate(p, w, t, q_buffer, v_buffer);
+    smallest_pivot = std::min(smallest_pivot, w.rows.distance);
     projected = y;
     projected.head(nq) = q_buffer;
     projected.segment(nq, nv) = v_buffer;

@@ -56,7 +56,9 @@ bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
         if (w.terms.locked[dof]) v[dof] = 0.0;  // what sticks has exactly no velocity
     if (w.rows.blocks.empty()) return false;
     look(p, w, t, q, v);
-    const double floor = projection_floor * scene_size(w);
+    // Near a singular position what is left would come back magnified: there every bit counts.
+    const double part = w.rows.distance < near_singular ? 0.0 : projection_floor;
+    const double floor = part * scene_size(w);
     bool moved = false;
     double last = gather(p, w, true);
     for (int it = 0; it < projection_limit && last > floor; ++it) {
@@ -72,7 +74,7 @@ bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
     }
     const double speed = std::max(1.0, v.cwiseAbs().maxCoeff());
     last = gather(p, w, false);
-    for (int it = 0; it < projection_limit && last > projection_floor * speed; ++it) {
+    for (int it = 0; it < projection_limit && last > part * speed; ++it) {
         least_move(p, w, w.scaled);
         v += w.scaled;
         moved = true;

@@ -9,6 +9,9 @@ namespace pn {
 // Residuals below this part of the scene's size are rounding: a few hundred operations of unit roundoff.
 constexpr double projection_floor = 2e-14;
 constexpr int projection_limit = 12;
+// A pivot of the rows' unit-diagonal factor below this is near a singular position: the square of the sine at which
+// the nearest row stands to the others.
+constexpr double near_singular = 2.5e-3;
 // Where nothing can move, a velocity below this [rad/s or m/s] is what the last event left by rounding.
 constexpr double immobile_speed = 1e-8;
 

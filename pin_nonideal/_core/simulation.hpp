@@ -76,6 +76,7 @@ private:
     std::vector<double> recent_events, slip_at_start;
     std::vector<char> pulls, indeterminate;
     bool last_rejected = false;
+    int detours = 0;  // in a row, around a singular position
     double pending_energy = 0.0;  // moved by the projection that ends the step
     int trigger_element = -1, located_element = -1, arrived = -1;
     bool released_together = false;  // redundant elements that could hold no longer

@@ -1,0 +1,30 @@
+"""Where the joints of a tree are, without Pinocchio's Data.
+
+Data holds tensors of nv^3 numbers, gigabytes from some five hundred degrees of freedom on.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pinocchio as pin
+from numpy.typing import NDArray
+
+
+def joint_placements(model: Any, q: NDArray[Any]) -> list[Any]:
+    """Frames of all joints in the world: oM_i = oM_parent  M_i  J_i(q), the universe's first.
+
+    Args:
+        model: pinocchio.Model.
+        q: configuration, shape (nq,).
+
+    Returns:
+        A pinocchio.SE3 for every joint, as `Data.oMi` after `pinocchio.forwardKinematics`.
+    """
+    found = [pin.SE3.Identity()]
+    for index in range(1, model.njoints):
+        joint = model.joints[index]
+        data = joint.createData()
+        joint.calc(data, q)
+        found.append(found[model.parents[index]] * model.jointPlacements[index] * pin.SE3(data.M))
+    return found
