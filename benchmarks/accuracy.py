@@ -150,7 +150,7 @@ def measure(
     reference = problem.solution
     rows: list[dict[str, Any]] = []
     for tool in tools:
-        found = sweep(problem, tool, *((0.05, 2) if quick else (4.0, 1)))
+        found = sweep(problem, tool, *((0.05, 2) if quick else (2.0, 1)))
         rows += found
         done = [r for r in found if r.get("error") is not None]
         if done:
@@ -165,5 +165,5 @@ def measure(
         "notes": problem.notes,
         "reference": {"how": reference.how, "uncertainty": reference.uncertainty},
         "runs": rows,
-        "levels": race(problem, taking_part, rows, *((5, 0.1) if quick else (15, 3.0))),
+        "levels": race(problem, taking_part, rows, *((5, 0.1) if quick else (15, 2.0))),
     }
