@@ -1,92 +1,72 @@
 """Cost of one evaluation against the number of loops: N four-bars side by side, each crank its own branch.
 
-Every size runs in a process of its own with a limit of memory: what a size cannot do is recorded and
-spoils no other.
+All sizes of all tools have their turns in the same rounds, so that the exponent is one of paired times.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import subprocess
+import statistics
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
+import pin_nonideal as pn
 
-from .processes import run_python
+from . import cases, timing
+from .evaluation import compiled_batches, mujoco_batch, our_batch
 
 SIZES = (1, 2, 5, 10, 20, 40, 80, 160, 320, 640)
-QUICK = (1, 5, 20, 40, 80)
+QUICK = (1, 5, 20, 40, 160)
 # Pinocchio's constraintDynamics factors all rows densely, and its Data holds tensors of nv^3 numbers.
 LARGEST_DENSE = 80
 FIT_FROM = 40
-MEMORY_GIB = 12
-SECONDS = 300
+BATCH_SECONDS = 0.02  # so that the largest size is evaluated many times in a row, as it is in a run
+OURS, RIVAL = "pin_nonideal", "mujoco mj_forward"
 
 
-def one(size: int, rounds: int) -> dict[str, Any]:
-    """Times of one size, in this process."""
-    from . import cases, timing
-    from .evaluation import compiled_batches, mujoco_batch, our_batch
-
+def batches_of(size: int) -> dict[str, timing.Batch]:
+    """Everybody's evaluation of one size."""
     case = cases.n_four_bar(size)
-    batches = {"pin_nonideal": our_batch(case.scene(), case.q0, case.v0)}
+    batches = {OURS: our_batch(case.scene(), case.q0, case.v0)}
     rival = mujoco_batch(case)
     if rival is not None:
-        batches["mujoco mj_forward"] = rival
-    if size <= LARGEST_DENSE:
-        batches |= compiled_batches(case)
-    times = timing.paired(batches, rounds)
-    result: dict[str, Any] = {
-        "N": size,
-        "nv": case.model.nv,
-        "seconds": {k: t.best for k, t in times.items()},
-    }
-    for name in times:
-        if name != "pin_nonideal":
-            result.setdefault("ratio", {})[name] = timing.ratio(times["pin_nonideal"], times[name])
-    return result
+        batches[RIVAL] = rival
+    return batches | (compiled_batches(case) if size <= LARGEST_DENSE else {})
 
 
-def apart(size: int, rounds: int) -> dict[str, Any]:
-    """Times of one size, in a process of its own."""
-    code = (
-        "import json, resource, sys; "
-        f"resource.setrlimit(resource.RLIMIT_AS, ({MEMORY_GIB} << 30, {MEMORY_GIB} << 30)); "
-        f"from benchmarks.scaling import one; print(json.dumps(one({size}, {rounds})))"
-    )
-    try:
-        done = run_python(code, SECONDS)
-    except subprocess.TimeoutExpired:
-        return {"N": size, "status": f"failed: more than {SECONDS} s"}
-    if done.returncode:
-        lines = done.stderr.strip().splitlines()
-        return {"N": size, "status": f"failed: {lines[-1] if lines else f'exit code {done.returncode}'}"}
-    return {**json.loads(done.stdout.splitlines()[-1]), "status": "ok"}
-
-
-def exponent(rows: list[dict[str, Any]], tool: str, first: int) -> float | None:
-    """Slope of log(seconds) over log(N) from `first` on."""
-    points = [(r["N"], r["seconds"][tool]) for r in rows if r["N"] >= first and tool in r.get("seconds", {})]
-    if len(points) < 2:
-        return None
-    slope = np.polyfit(*np.log(np.array(points)).T, 1)[0]
-    return float(slope) if math.isfinite(slope) else None
+def exponent(small: timing.Times, large: timing.Times, growth: float) -> float:
+    """Of the cost: log(cost) over log(N), median over the rounds."""
+    pairs = zip(small.seconds, large.seconds, strict=True)
+    return statistics.median(math.log(b / a) for a, b in pairs) / math.log(growth)
 
 
 def measure(quick: bool, say: Callable[[str], None] = print) -> dict[str, Any]:
     """All sizes."""
+    batches: dict[tuple[str, int], timing.Batch] = {}
+    failures: dict[int, str] = {}
+    for size in QUICK if quick else SIZES:
+        try:
+            batches |= {(name, size): batch for name, batch in batches_of(size).items()}
+        except (pn.PinNonidealError, MemoryError) as error:
+            failures[size] = f"failed: {type(error).__name__}: {error}"
+    times = timing.paired(batches, 5 if quick else 25, BATCH_SECONDS)
     rows = []
     for size in QUICK if quick else SIZES:
-        row = apart(size, 15 if quick else 60)
+        found = {name: t for (name, n), t in times.items() if n == size}
+        row: dict[str, Any] = {"N": size, "status": failures.get(size, "ok")}
         rows.append(row)
-        if row["status"] == "ok":
-            shown = ", ".join(f"{name} {t * 1e6:.2f}" for name, t in row["seconds"].items())
-            say(f"  N = {size}: {shown} us")
-        else:
-            say(f"  N = {size}: {row['status']}")
-    tools = ("pin_nonideal", "mujoco mj_forward")
-    slopes = {tool: exponent(rows, tool, FIT_FROM) for tool in tools}
-    say("  exponents from N = 40: " + ", ".join(f"{k} {v:.2f}" for k, v in slopes.items() if v is not None))
+        if size in failures:
+            say(f"  N = {size}: {failures[size]}")
+            continue
+        row["seconds"] = {name: t.best for name, t in found.items()}
+        row["ratio"] = {name: timing.ratio(found[OURS], t) for name, t in found.items() if name != OURS}
+        shown = ", ".join(f"{name} {t.best * 1e6:.2f}" for name, t in found.items())
+        say(f"  N = {size}: {shown} us")
+    largest = max((row["N"] for row in rows if row["status"] == "ok"), default=0)
+    slopes = {
+        name: exponent(times[name, FIT_FROM], times[name, largest], largest / FIT_FROM)
+        for name in (OURS, RIVAL)
+        if (name, FIT_FROM) in times and largest > FIT_FROM
+    }
+    say(f"  exponents from N = {FIT_FROM}: " + ", ".join(f"{k} {v:.2f}" for k, v in slopes.items()))
     return {"sizes": rows, "exponents": slopes, "fit_from": FIT_FROM}
