@@ -5,20 +5,55 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import pinocchio as pin
 
 from .errors import (
     FrictionParadoxError,
     InconsistentConstraintsError,
+    LoopClosureError,
     NonFiniteError,
     RunError,
     SingularMassError,
     StepSizeError,
 )
 from .lowered import Lowered
+from .scene_analysis import rows_at
 
 # Kinds of failure, as the core numbers them.
 SINGULAR, INCONSISTENT, NOT_FINITE, PARADOX, STEP_SIZE = 0, 1, 2, 3, 5
+
+# A sample with a larger gap than this [m or rad] has left the constraints: after every step projection comes
+# down to rounding, and in singular positions to the square root of it.
+LEFT = 1e-6
+
+
+def check_closed(scene: Any, trajectory: Any) -> None:
+    """Raises when a run has left its constraints, as it must when a drive pulls a loop apart.
+
+    Args:
+        scene: the scene that ran.
+        trajectory: its samples.
+
+    Raises:
+        LoopClosureError: with the samples before.
+    """
+    left = np.flatnonzero(trajectory.violation > LEFT)
+    if not left.size:
+        return
+    k = int(left[0])
+    t = float(trajectory.t[k])
+    residual = np.abs(rows_at(scene.new_runner(), trajectory.q[k], trajectory.v[k], t)[2])
+    gaps = {key: float(residual[rows].max()) for key, rows in scene.constraint_slices.items()}
+    name = max(gaps, key=lambda key: gaps[key])
+    stopped = LoopClosureError(
+        f'loop "{name}" has opened by t = {t:.4g} s: gap {gaps[name]:.2g}; no position near there satisfies '
+        "all constraints: check lengths and drives; the trajectory up to there is in error.trajectory",
+        gaps=gaps,
+        time=t,
+    )
+    stopped.trajectory = trajectory.first(k)
+    raise stopped
 
 
 def named_failure(text: str, model: Any, low: Lowered) -> RunError:

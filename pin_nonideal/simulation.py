@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from .actuation import SampledControl
 from .checks import array, choice, count, label, nonnegative, number, positive, sequence
 from .errors import InputError, RunError, RunInterrupted, UserFunctionError
+from .failures import check_closed
 from .scene import Scene
 from .trajectory import Event, Stats, Trajectory
 
@@ -72,7 +73,7 @@ def simulate(
 
     Raises:
         InputError: an argument does not fit.
-        LoopClosureError: the initial state cannot be put on the constraints.
+        LoopClosureError: the initial state cannot be put on the constraints, or the run was pulled off them.
         RunError: the run stopped early; its `trajectory` holds the samples up to there.
         RunInterrupted: Ctrl-C; the same.
     """
@@ -195,6 +196,8 @@ def _options(
     elif dt is not None:
         raise InputError(f'simulate: method "{method}" chooses its own steps; leave dt out, or set output_dt')
     nv = scene.model.nv
+    if nv == 0:
+        raise InputError(f'simulate: "{scene.name}" has no joint that moves; there is nothing to simulate')
     tolerance = np.full(2 * nv + scene.z0.size, DEFAULT_ATOL)
     if atol is not None:
         given = np.asarray(atol)
@@ -263,7 +266,9 @@ def _finish(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: fl
     """Shapes the core's flat arrays; raises what stopped the run, with the trajectory attached."""
     trajectory = shaped(scene, raw, options, wall)
     error = raw["error"]
-    if error is not None:
+    if error is None:
+        check_closed(scene, trajectory)
+    else:
         last = float(trajectory.t[-1]) if len(trajectory) else options["t0"]
         if isinstance(error, KeyboardInterrupt):
             stopped: RunError = RunInterrupted(

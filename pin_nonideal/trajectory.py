@@ -143,6 +143,23 @@ class Trajectory:
         lines.append(f"  wall time {s.wall_s:.3g} s")
         return "\n".join(lines)
 
+    def first(self, count: int) -> Trajectory:
+        """The first samples of a run.
+
+        Args:
+            count: how many.
+        """
+        length = len(self)
+
+        def cut(value: Any) -> Any:
+            if isinstance(value, dict):
+                return {key: x[:count] for key, x in value.items()}
+            return value[:count] if isinstance(value, np.ndarray) and len(value) == length else value
+
+        fields = {key: cut(value) for key, value in self.__dict__.items()}
+        last = float(self.t[count - 1]) if count else -np.inf
+        return Trajectory(**{**fields, "events": [e for e in self.events if e.time <= last]})
+
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Writes all arrays to one .npz file; an existing file is replaced whole or not at all.
 

@@ -9,6 +9,7 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.errors import (
     InconsistentConstraintsError,
+    InputError,
     LoopClosureError,
     NonFiniteError,
     StepSizeError,
@@ -39,6 +40,45 @@ def test_drives_that_ask_for_two_places():
         pn.simulate(drives(pn.constant(0.0), pn.constant(1.0)), 1.0)
     assert caught.value.gaps["two"] == pytest.approx(1.0)
     assert caught.value.gaps["one"] == pytest.approx(0.0, abs=1e-12)
+
+
+ROD = [("dop853", {}), ("rk4", {"dt": 0.01}), ("moreau", {"dt": 0.01}), ("Radau", {})]
+
+
+@pytest.mark.parametrize(("method", "options"), ROD)
+def test_a_rod_that_shrinks_to_less_than_nothing(method, options):
+    model = pin.Model()
+    bob = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "bob")
+    model.appendBodyToJoint(bob, pin.Inertia(1.0, np.zeros(3), np.eye(3)), pin.SE3.Identity())
+    model.addFrame(pin.Frame("bob", bob, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    rod = pn.Distance("bob", "universe", pn.polynomial([1.0, -1.0]), name="rod")
+    scene = pn.Scene(model, constraints=[rod], q0=[0.0, 0.0, -1.0])
+    with refuses('loop "rod" has opened by t = ', LoopClosureError) as caught:
+        pn.simulate(scene, 2.0, method=method, record="energy", **options)
+    error = caught.value
+    assert error.gaps["rod"] > 1e-6
+    assert error.time > error.trajectory.t[-1] > 0.0
+    assert error.trajectory.violation.max() < 1e-12
+    assert len(error.trajectory.energy["total"]) == len(error.trajectory.q) == len(error.trajectory)
+    assert "all constraints: check lengths and drives; the trajectory up to there" in str(error)
+
+
+def test_a_drive_that_pulls_a_loop_apart():
+    start = pn.load("four_bar")
+    turn = pn.polynomial([start.q0[2], start.v0[2]])  # the rocker of a crank-rocker cannot go around
+    scene = pn.Scene(
+        start.model,
+        constraints=[*start.constraints, pn.PrescribedMotion("rocker_joint", turn, name="drive")],
+        q0=start.q0,
+        v0=start.v0,
+    )
+    with refuses('loop "loop" has opened by t = ', LoopClosureError):
+        pn.simulate(scene, 1.0)
+
+
+def test_a_model_that_cannot_move():
+    with refuses('simulate: "post" has no joint that moves; there is nothing to simulate', InputError):
+        pn.simulate(pn.Scene(pin.Model(), name="post"), 1.0)
 
 
 def test_drives_that_ask_for_two_velocities():
