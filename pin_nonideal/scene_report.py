@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .laws import JointFriction
 
 if TYPE_CHECKING:
     from .scene import Scene
+
+UNLIMITED = 1e3  # positions that no joint reaches [rad or m]
 
 
 def report(scene: Scene, rank: int) -> str:
@@ -54,4 +56,13 @@ def _skipped(scene: Scene) -> list[str]:
         skipped.append("reactions (no law reads them)")
     if not scene.forces and scene.actuation is None:
         skipped.append("given forces (none)")
+    if any(_limited(scene.model, joint) for joint in range(1, scene.model.njoints)):
+        skipped.append("limits of joints (the motion may pass them)")
     return skipped
+
+
+def _limited(model: Any, joint: int) -> bool:
+    """Whether a joint of one degree of freedom has a limit of position that it could reach."""
+    i = model.idx_qs[joint]
+    bounds = (model.lowerPositionLimit[i], model.upperPositionLimit[i])
+    return model.nqs[joint] == 1 and any(abs(bound) < UNLIMITED for bound in bounds)

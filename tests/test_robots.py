@@ -268,3 +268,8 @@ def test_n_four_bar_refuses_bad_parameters(key, value, message):
 def test_unknown_parameter_of_a_generated_robot():
     with refuses('robot "n_four_bar" takes no parameter "M"; known: "N", "m", "L", "g", "speed"', InputError):
         pn.load("n_four_bar", M=3)
+
+
+@pytest.mark.parametrize(("name", "told"), [("panda", True), ("four_bar", False), ("n_four_bar", False)])
+def test_the_report_says_that_limits_of_joints_play_no_part(name, told):
+    assert ("limits of joints (the motion may pass them)" in pn.load(name).report()) is told
