@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .assembly import scene_arguments
+from .checks import sequence
 from .errors import InputError, LoadingError, UnknownNameError, nearest
 from .generators import GENERATORS
 from .mjcf import read_mjcf
@@ -105,6 +106,9 @@ def _file_options(parameters: dict[str, Any], name: str) -> tuple[dict[str, Any]
     options = {k: v for k, v in parameters.items() if k != "merge_ball_joints"}
     if isinstance(options.get("package_dirs"), (str, Path)):
         options["package_dirs"] = [options["package_dirs"]]
+    folders = sequence("package_dirs", options.get("package_dirs", []))
+    if not all(isinstance(folder, (str, Path)) for folder in folders):
+        raise InputError(f"package_dirs must be folders; got {options['package_dirs']!r}")
     return options, parameters.get("merge_ball_joints", True)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from .checks import function
+from .checks import function, sequence
 from .errors import InputError
 from .scene import Scene
 from .simulation import simulate
@@ -42,7 +42,7 @@ def sweep(
     from joblib import Parallel, delayed
 
     function("sweep: make", make, "(**parameters) -> Scene")
-    table = list(parameters)
+    table = sequence("sweep: parameters", parameters)
     for entry in table:
         if not isinstance(entry, Mapping):
             raise InputError(f"sweep: parameters must hold mappings of keyword arguments; got {entry!r}")

@@ -191,7 +191,7 @@ def polynomial(coefficients: Sequence[float]) -> Polynomial:
     Raises:
         InputError: there is none, or one is no finite number.
     """
-    return Polynomial(coefficients if isinstance(coefficients, tuple) else tuple(coefficients))
+    return Polynomial(coefficients)  # type: ignore[arg-type]
 
 
 def spline(times: ArrayLike, values: ArrayLike, ends: str = "clamped") -> Spline:

@@ -56,6 +56,8 @@ def test_unknown_parameter_names_the_nearest(tmp_path):
         pn.load(folder(tmp_path), free_flier=True)
     with refuses("free_flyer must be True or False; got 1", InputError):
         pn.load(folder(tmp_path), free_flyer=1)
+    with refuses("package_dirs must be folders; got [3]", InputError):
+        pn.load(folder(tmp_path), package_dirs=[3])
 
 
 def test_urdf_path_and_folder_agree(tmp_path):

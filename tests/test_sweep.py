@@ -29,6 +29,8 @@ def test_parameters_must_be_mappings():
     message = "sweep: parameters must hold mappings of keyword arguments; got 3"
     with pytest.raises(pn.InputError, match=f"^{re.escape(message)}$"):
         pn.sweep(ladder, [3], 0.1)
+    with pytest.raises(pn.InputError, match="sweep: parameters must be a list; got None"):
+        pn.sweep(ladder, None, 0.1)
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

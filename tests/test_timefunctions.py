@@ -91,6 +91,10 @@ REFUSED = {
         lambda: sinusoid(1.0, math.inf),
         "Sinusoid: frequency must be finite; got inf",
     ),
+    "polynomial of a number": (
+        lambda: polynomial(3),
+        "Polynomial: coefficients must have shape (n,); got shape ()",
+    ),
     "empty polynomial": (
         lambda: polynomial([]),
         "Polynomial: coefficients must hold at least one number; got none",
