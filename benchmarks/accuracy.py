@@ -150,7 +150,7 @@ def measure(
     reference = problem.solution
     rows: list[dict[str, Any]] = []
     for tool in tools:
-        found = sweep(problem, tool, *((0.05, 2) if quick else (2.0, 1)))
+        found = sweep(problem, tool, *((0.05, 4) if quick else (2.0, 1)))
         rows += found
         done = [r for r in found if r.get("error") is not None]
         if done:

@@ -45,7 +45,7 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     made.add_argument("parts", nargs="*", metavar="PART", help="parts to run (default: all), or one action")
     made.add_argument("--quick", action="store_true", help="short runs, under two minutes in all")
-    made.add_argument("--only", metavar="PROBLEM", help="one problem or case")
+    made.add_argument("--only", metavar="PROBLEM", help="one problem or case; results of others are kept")
     made.add_argument(
         "--peers", metavar="NAMES", help="peers to run, separated by commas; none: just us (default: all)"
     )
@@ -81,11 +81,26 @@ def run_parts(options: argparse.Namespace) -> int:
         results = PARTS[name](options)
         record = {"part": name, "quick": options.quick, "machine": machine(), "results": rounded(results)}
         path = options.output / f"{name}.json"
+        if options.only is not None:
+            record = beside_the_others(record, path)
         path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
         path.with_suffix(".md").write_text(report.section(record), encoding="utf-8")
         plots.draw({name: record}, options.output / "benchmarks")
         print(f"  {time.perf_counter() - begin:.0f} s, {path}", flush=True)
     return 0
+
+
+def beside_the_others(record: dict[str, Any], path: Path) -> dict[str, Any]:
+    """The results of some problems or cases among those of the others measured before in the same way."""
+    if not path.is_file():
+        return record
+    before = json.loads(path.read_text(encoding="utf-8"))
+    if any(before[key] != record[key] for key in ("quick", "machine")):
+        return record
+    key = "problem" if record["part"] in ("accuracy", "long") else "case"
+    renewed = {result[key]: result for result in record["results"]}
+    others = [renewed.pop(result[key], result) for result in before["results"]]
+    return record | {"results": [*others, *renewed.values()]}
 
 
 def rounded(value: Any) -> Any:

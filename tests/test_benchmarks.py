@@ -51,6 +51,12 @@ def test_evaluation(command: ModuleType, tmp_path: Path) -> None:
     assert row["seconds"]["pin_nonideal"] > 0.0
 
 
+def test_results_of_other_cases_are_kept(command: ModuleType, tmp_path: Path) -> None:
+    for name in ("four_bar", "panda", "four_bar"):
+        found = results(command, tmp_path, "evaluation", "--only", name)
+    assert [row["case"] for row in found] == ["four_bar", "panda"]
+
+
 def test_scaling(command: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from benchmarks import scaling
 

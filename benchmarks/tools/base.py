@@ -85,4 +85,5 @@ def needs(package: str) -> str | None:
 
 
 def tolerances(first: int, last: int) -> list[float]:
-    return [10.0**-k for k in range(first, last + 1)]
+    """From 10^-first to 10^-last by factors of about three, so that none wins by where its grid lies."""
+    return [float(f"{10.0 ** (-0.5 * k):.0e}") for k in range(2 * first, 2 * last + 1)]
