@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -39,19 +39,25 @@ def _parts(joint: Any) -> Iterator[slice]:
         yield slice(end - (2 if kind.startswith(_CIRCLES) else 4), end)
 
 
-def configuration(model: Any, q: ArrayLike, what: str) -> NDArray[np.float64]:
+def configuration(
+    model: Any, q: ArrayLike, what: str, parts: Sequence[tuple[str, slice]] | None = None
+) -> NDArray[np.float64]:
     """A configuration with unit quaternions and (cos, sin) pairs, (nq,).
 
     Args:
         model: pinocchio.Model.
         q: configuration, (nq,).
         what: words for messages.
+        parts: those of `unit_parts`, when known.
 
     Raises:
         InputError: wrong shape, not finite, or a part far from unit length.
     """
     result = np.array(array(what, q, (model.nq,)))
-    for joint, part in unit_parts(model):
+    parts = tuple(unit_parts(model)) if parts is None else parts
+    if not parts:
+        return result
+    for joint, part in parts:
         length = float(np.linalg.norm(result[part]))
         if abs(length - 1.0) > UNIT_TOLERANCE:
             kind = "quaternion" if part.stop - part.start == 4 else "(cos, sin) pair"

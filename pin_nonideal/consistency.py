@@ -19,6 +19,8 @@ Rows = NDArray[np.bool_]
 
 # A larger gap than this [m or rad] is closed by damped steps before Newton's method has its turn.
 FAR = 1e-3
+# Rows that no velocity meets better than this part of 1 + |v| contradict each other.
+RATE_TOLERANCE = 1e-6
 
 
 def nonholonomic_rows(constraints: Sequence[Any], low: Lowered) -> Rows:
@@ -60,36 +62,30 @@ def nearest_state(
     if not low.slices:
         return q, v
     runner = low.builder.runner()
-    rows, mass = _holonomic(model, runner, nonholonomic, t), _mass(model, runner)
-    if _largest(rows_at(runner, q, v, t)[2]) > FAR:
+    on, v_on, before, after, rate = runner.project(q, v, t, FAR)
+    if not after <= CLOSURE_TOLERANCE:
+        rows, mass = _holonomic(model, runner, nonholonomic, t), _mass(model, runner)
         q, _ = close_loops(model, rows, mass, q)
-    q, v = runner.project(q, v, t)
-    _, _, phi, rate = rows_at(runner, q, v, t)
-    if _largest(phi) > CLOSURE_TOLERANCE:
-        q, _ = close_loops(model, rows, mass, q)
-        q, v = runner.project(q, v, t)
-        _, _, phi, rate = rows_at(runner, q, v, t)
-    _check_position(phi, low, t)
-    _check_velocity(rate, v, low, t)
-    return q, v
+        on, v_on, before, after, rate = runner.project(q, v, t, np.inf)
+    if not after <= CLOSURE_TOLERANCE:
+        raise _open_loops(rows_at(runner, on if after < before else q, v_on, t)[2], low, t)
+    if not rate <= RATE_TOLERANCE * (1.0 + _largest(v_on)):
+        raise _lost_velocity(rows_at(runner, on, v_on, t)[3], low, t)
+    return on, v_on
 
 
-def _check_position(phi: Array, low: Lowered, t: float) -> None:
-    if _largest(phi) <= CLOSURE_TOLERANCE:
-        return
+def _open_loops(phi: Array, low: Lowered, t: float) -> LoopClosureError:
     gaps = {name: _largest(phi[s]) for name, s in low.slices.items()}
     open_loops = {name: gap for name, gap in gaps.items() if not gap <= CLOSURE_TOLERANCE}
     text = "; ".join(f'loop "{name}" does not close: gap {gap:.2g}' for name, gap in open_loops.items())
-    raise LoopClosureError(
+    return LoopClosureError(
         f"{text} after several starts; check the lengths and frames, or start nearer", gaps=gaps, time=t
     )
 
 
-def _check_velocity(rate: Array, v: Array, low: Lowered, t: float) -> None:
-    if _largest(rate) <= 1e-6 * (1.0 + _largest(v)):
-        return
+def _lost_velocity(rate: Array, low: Lowered, t: float) -> InconsistentConstraintsError:
     worst = max(low.slices, key=lambda name: float(np.abs(rate[low.slices[name]]).max()))
-    raise InconsistentConstraintsError(
+    return InconsistentConstraintsError(
         f'no velocity satisfies the constraints at t = {t:.2f} s: "{worst}" misses its rate by '
         f"{_largest(rate):.1e}",
         time=t,

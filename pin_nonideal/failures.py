@@ -21,7 +21,7 @@ from .lowered import Lowered
 from .scene_analysis import rows_at
 
 # Kinds of failure, as the core numbers them.
-SINGULAR, INCONSISTENT, NOT_FINITE, PARADOX, STEP_SIZE = 0, 1, 2, 3, 5
+SINGULAR, INCONSISTENT, NOT_FINITE, PARADOX, CLOSURE, STEP_SIZE = 0, 1, 2, 3, 4, 5
 
 # A sample with a larger gap than this [m or rad] has left the constraints: after every step projection comes
 # down to rounding, and in singular positions to the square root of it.
@@ -46,14 +46,18 @@ def check_closed(scene: Any, trajectory: Any) -> None:
     residual = np.abs(rows_at(scene.new_runner(), trajectory.q[k], trajectory.v[k], t)[2])
     gaps = {key: float(residual[rows].max()) for key, rows in scene.constraint_slices.items()}
     name = max(gaps, key=lambda key: gaps[key])
-    stopped = LoopClosureError(
-        f'loop "{name}" has opened by t = {t:.4g} s: gap {gaps[name]:.2g}; no position near there satisfies '
-        "all constraints: check lengths and drives; the trajectory up to there is in error.trajectory",
+    stopped = _opened(name, gaps, t, "; the trajectory up to there is in error.trajectory")
+    stopped.trajectory = trajectory.first(k)
+    raise stopped
+
+
+def _opened(name: str, gaps: dict[str, float], t: float, after: str = "") -> LoopClosureError:
+    return LoopClosureError(
+        f'loop "{name}" has opened by t = {t:.4g} s: gap {gaps[name]:.2g} (m or rad); no position near there '
+        f"satisfies all constraints: check lengths and drives{after}",
         gaps=gaps,
         time=t,
     )
-    stopped.trajectory = trajectory.first(k)
-    raise stopped
 
 
 def named_failure(text: str, model: Any, low: Lowered) -> RunError:
@@ -81,6 +85,9 @@ def named_failure(text: str, model: Any, low: Lowered) -> RunError:
             determinant=value,
             time=t,
         )
+    if kind == CLOSURE:
+        name = list(low.blocks)[items[0]]
+        return _opened(name, {name: value}, t)
     if kind == STEP_SIZE:
         return StepSizeError(
             f"the step size fell below rounding at t = {t:.6g} s: the motion is singular there, or stiff; "

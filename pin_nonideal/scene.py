@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from .checks import array, number, optional_text, sequence
-from .configurations import configuration
+from .configurations import configuration, unit_parts
 from .consistency import Rows, nearest_state, nonholonomic_rows
 from .equation import Solution
 from .errors import InputError, RunError
@@ -95,6 +95,7 @@ class Scene:
             for what, value in (("source", source), ("licence", licence))
         )
         check_model(model)
+        self._unit_parts = tuple(unit_parts(model))
         self.q0 = pin.neutral(model) if q0 is None else self._configuration(q0, "q0")
         self.v0 = np.zeros(model.nv) if v0 is None else self._velocity(v0, "v0")
         self._lowered = low = lower(
@@ -130,7 +131,7 @@ class Scene:
     # --- states ---------------------------------------------------------------------------------------------
 
     def _configuration(self, q: ArrayLike, what: str) -> Array:
-        return configuration(self.model, q, what)
+        return configuration(self.model, q, what, self._unit_parts)
 
     def _velocity(self, v: ArrayLike, what: str) -> Array:
         return np.array(array(what, v, (self.model.nv,)))

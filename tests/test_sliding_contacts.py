@@ -127,3 +127,26 @@ def test_fixed_steps_find_the_rest_of_a_curving_slide(dt):
     assert kind == "stick"
     # The direction of slip turns fast at the end, which costs rk4 its order.
     assert abs(float(time) - CURVE_TIME) < 0.1 * dt
+
+
+LIFTS = [
+    ("dop853", {}, EVENT),
+    ("dopri5", {}, EVENT),
+    ("rk4", {"dt": 0.01}, EVENT),
+    ("moreau", {"dt": 0.01}, 0.01),
+]
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.1])
+@pytest.mark.parametrize(("method", "options", "late"), LIFTS)
+def test_a_pull_is_reported_when_it_begins(method, options, late, mu):
+    """A lift that grows as 30 N/s takes the weight of 1 kg at g / 30."""
+    scene = pn.Scene(
+        point_mass(),
+        contacts=[pn.PointContact("mass", mu=mu)],
+        actuation=lambda t, q, v: [0.0, 0.0, 30.0 * t],
+    )
+    run = pn.simulate(scene, 1.0, method=method, **options)
+    assert "pull" in kinds(run)
+    began = next(event.time for event in run.events if event.kind == "pull")
+    assert -EVENT < began - GRAVITY / 30.0 < late

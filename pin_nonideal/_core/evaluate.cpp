@@ -100,7 +100,10 @@ void Program::finish() {
     }
     for (const Friction& f : frictions)
         needs_joint_reactions |= f.load == Friction::Load::user;
-    for (int i = 0; i < constraints; ++i) moves_in_time |= pn::moves_in_time(blocks[i].kind);
+    for (int i = 0; i < constraints; ++i) {
+        moves_in_time |= pn::moves_in_time(blocks[i].kind);
+        affine_rates &= !std::holds_alternative<UserRows>(blocks[i].kind);
+    }
     for (Drag& d : drags) d.dofs = mechanism.dofs_of(d.frame.joint);
     driven = !forces.empty() || !std::holds_alternative<NoActuation>(actuation);
     for (const GivenForce& f : forces)
@@ -179,6 +182,11 @@ void evaluate_rows(const Program& p, Workspace& w, double t, const VecX& v) {
         fill_A(block, w.terms, values, w.A.data() + block.offset);
         values.has_A = values.constant_A;
     }
+}
+
+void look_at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    kinematics(p.mechanism, w.terms, q, v);
+    evaluate_rows(p, w, t, v);
 }
 
 void scale_rows(const Program& p, Workspace& w) {

@@ -1,6 +1,7 @@
 // Stick and slip along the motion: where an event lies inside a step, and what happens there.
 //
-// A slipping element watches its slip velocity, a sticking one its multiplier against the static limit. The
+// A slipping element watches its slip velocity, a sticking one its multiplier against the static limit, a contact its
+// normal force. The
 // interpolant gives the first guess of the instant; the step is then taken again up to there and the guess corrected
 // by Newton's or the secant method, so that an event is as accurate as a step.
 #include <algorithm>
@@ -12,6 +13,7 @@ namespace pn {
 
 // Positive before the event, zero at it. The workspace must be evaluated at the state.
 double Simulation::margin(const Watch& watch, double at, const VecX& state) {
+    if (watch.contact >= 0) return w.lam[p.blocks[p.contacts[watch.contact]].row];
     const Friction& f = p.frictions[watch.element];
     if (watch.slip) {
         const RowValues& values = w.values[f.block];
@@ -48,6 +50,9 @@ double Simulation::toward_rest(double size) {
 // What lies past its event at the step's end (the workspace is evaluated there), or may have crossed inside.
 std::vector<Simulation::Watch> Simulation::crossed() {
     std::vector<Watch> list;
+    if (stepper.method.order > 1)
+        for (int i = 0; i < static_cast<int>(p.contacts.size()); ++i)
+            if (!pulls[i] && w.lam[p.blocks[p.contacts[i]].row] < 0.0) list.push_back({-1, false, i});
     if (p.frictions.empty()) return list;
     const double t1 = stepper.t0 + stepper.h;
     bool gathered = false;
@@ -100,7 +105,7 @@ std::vector<Simulation::Watch> Simulation::crossed() {
 
 // True when the step now ends at an event; the workspace is evaluated at its end either way.
 bool Simulation::locate_event() {
-    arrived = -1;
+    arrived = parting = -1;
     const std::vector<Watch> watches = crossed();
     if (arrived >= 0) {
         trigger_element = located_element = arrived;
@@ -156,14 +161,16 @@ bool Simulation::locate_event() {
             break;
         }
     }
-    if (found.element < 0) {  // the cubic was wrong: nothing crossed
+    if (found.element < 0 && found.contact < 0) {  // the cubic was wrong: nothing crossed
         q_ = stepper.y1.head(system.nq);
         v_ = stepper.y1.segment(system.nq, system.nv);
         if (system.nz > 0) w.z = stepper.y1.segment(system.nq + system.nv, system.nz);
         evaluate(p, w, begin + full, q_, v_);
         return false;
     }
-    trigger_element = located_element = found.element;
+    trigger_element = found.contact < 0 ? found.element : no_trigger;
+    located_element = found.element;
+    parting = found.contact;
     // Step again up to the event and correct the instant.
     double size = std::clamp(first, 0.0, 1.0) * full, before = 0.0, margin_before = 0.0;
     for (int it = 0; it < 12; ++it) {
@@ -203,6 +210,7 @@ bool Simulation::locate_event() {
         stepper.step(begin, size);
         settle(begin + size, stepper.y1, stepper.f1);
     }
+    if (found.contact >= 0) return true;
     // Slip of several directions may turn far without coming to rest: then the step just ends here. It has come to
     // rest when hardly anything is left of the slip that the step began with.
     const Friction& f = p.frictions[found.element];
@@ -268,10 +276,11 @@ void Simulation::remember_directions() {
 // A maintained contact that would have to pull, told once each time it begins.
 void Simulation::report_pulls(double at) {
     for (size_t i = 0; i < p.contacts.size(); ++i) {
-        const bool pull = w.lam[p.blocks[p.contacts[i]].row] < 0.0;
+        const bool pull = static_cast<int>(i) == parting || w.lam[p.blocks[p.contacts[i]].row] < 0.0;
         if (pull && !pulls[i]) out.events.push_back({at, Event::Kind::pull, p.contacts[i]});
         pulls[i] = pull;
     }
+    parting = -1;
 }
 
 // New modes for all elements at rest, found together; `trigger` has just come to rest or reached its limit.

@@ -346,10 +346,19 @@ struct Runner {  // a workspace and the program it belongs to
         return nb::make_tuple(to_numpy(M), to_numpy(w->terms.nle));
     }
 
-    nb::tuple project_state(const Array& q_in, const Array& v_in, double t) {
+    // q and v on the constraints, and the largest residual before (beyond `far` nothing moves), residual and rate after.
+    nb::tuple project_state(const Array& q_in, const Array& v_in, double t, double far) {
         set(q_in, v_in, nb::none());
-        project_here(t);
-        return nb::make_tuple(to_numpy(q), to_numpy(v));
+        double before, after, rate;
+        look_at(*p, *w, t, q, v);
+        violations(*p, *w, before, rate);
+        after = before;
+        if (before <= far) {
+            project_here(t);
+            look_at(*p, *w, t, q, v);
+            violations(*p, *w, after, rate);
+        }
+        return nb::make_tuple(to_numpy(q), to_numpy(v), before, after, rate);
     }
 
     void project_here(double t) {
@@ -671,7 +680,7 @@ NB_MODULE(_core, m) {
              "modes"_a.none() = nb::none())
         .def("rows", &Runner::rows)
         .def("terms", &Runner::terms)
-        .def("project", &Runner::project_state)
+        .def("project", &Runner::project_state, "q"_a, "v"_a, "t"_a, "far"_a)
         .def("derivative", &Runner::derivative)
         .def("settle", &Runner::settle)
         .def("record", &Runner::record)

@@ -85,6 +85,7 @@ struct Program {
     bool driven = false;                 // forces or actuation
     bool has_body_forces = false;        // given forces that act on bodies
     bool moves_in_time = false;          // some constraint moves by itself
+    bool affine_rates = true;            // A does not depend on v; a user's own rows may
 
     // Numbers the kept rows, finds supports and lays out the storage; called again when rows are left out.
     void finish();
@@ -133,7 +134,8 @@ struct Workspace {
 
 // The heart: acceleration a and multipliers lam at (t, q, v) for the modes and active rows in the workspace.
 void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// The parts of it that projection uses alone.
+// The parts of it that projection uses alone: motion and rows at a state, rows, M's factor, rows in its metric.
+void look_at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 void evaluate_rows(const Program& p, Workspace& w, double t, const VecX& v);
 void factor_mass(const Program& p, Workspace& w, double t);
 void scale_rows(const Program& p, Workspace& w);

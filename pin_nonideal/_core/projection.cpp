@@ -38,9 +38,19 @@ double gather(const Program& p, Workspace& w, bool position) {
     return largest;
 }
 
-void look(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    kinematics(p.mechanism, w.terms, q, v);
-    evaluate_rows(p, w, t, v);
+// The same for rates A v + phi_t after a change of v, which needs no new look at the motion.
+double change_rates(const Program& p, Workspace& w, const VecX& change) {
+    double largest = 0.0;
+    for (int i : w.rows.blocks) {
+        const Block& block = p.blocks[i];
+        multiply(block, w.A, change, w.miss);
+        for (size_t k = 0; k < block.kept.size(); ++k) {
+            const int row = block.row + k;
+            w.r[row] -= w.miss[row];
+            if (w.rows.active[row]) largest = std::max(largest, std::abs(w.r[row]));
+        }
+    }
+    return largest;
 }
 
 }  // namespace
@@ -51,11 +61,23 @@ double scene_size(const Workspace& w) {
     return std::sqrt(square);
 }
 
+void require_closed(const Program& p, const Workspace& w, double t) {
+    double largest = open_gap * scene_size(w);
+    int worst = -1;
+    for (int i = 0; i < p.constraints; ++i)
+        for (int k = 0; k < w.values[i].rows; ++k)
+            if (!(std::abs(w.values[i].residual[k]) <= largest)) {
+                largest = std::abs(w.values[i].residual[k]);
+                worst = i;
+            }
+    if (worst >= 0) throw Failure(Failure::Kind::closure, t, {worst}, largest);
+}
+
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
     for (int dof = 0; dof < p.mechanism.nv; ++dof)
         if (w.terms.locked[dof]) v[dof] = 0.0;  // what sticks has exactly no velocity
     if (w.rows.blocks.empty()) return false;
-    look(p, w, t, q, v);
+    look_at(p, w, t, q, v);
     // Near a singular position what is left would come back magnified: there every bit counts.
     const double part = w.rows.distance < near_singular ? 0.0 : projection_floor;
     const double floor = part * scene_size(w);
@@ -66,7 +88,7 @@ bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
         w.trial = w.scaled;
         retract(p.mechanism, q.data(), w.trial.data(), q.data());
         moved = true;
-        look(p, w, t, q, v);
+        look_at(p, w, t, q, v);
         const double now = gather(p, w, true);
         if (!(now < 0.1 * last) && now > floor) refactor(p, w, t);
         if (it > 3 && now > 0.5 * last) break;  // as good as rounding allows
@@ -78,8 +100,7 @@ bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
         least_move(p, w, w.scaled);
         v += w.scaled;
         moved = true;
-        look(p, w, t, q, v);
-        const double now = gather(p, w, false);
+        const double now = p.affine_rates ? change_rates(p, w, w.scaled) : (look_at(p, w, t, q, v), gather(p, w, false));
         if (!(now < 0.1 * last)) refactor(p, w, t);
         if (it > 1 && now > 0.5 * last) break;
         last = now;

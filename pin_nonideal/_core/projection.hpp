@@ -15,9 +15,16 @@ constexpr double near_singular = 2.5e-3;
 // Where nothing can move, a velocity below this [rad/s or m/s] is what the last event left by rounding.
 constexpr double immobile_speed = 1e-8;
 
-// Moves q and v; returns false when nothing had to move. The workspace must hold factors near (t, q); afterwards its
-// rows are those of the new state, its factors are not.
+// A larger gap than this part of the scene's size that projection leaves has opened for good: after every step it comes
+// down to rounding, in singular positions too.
+constexpr double open_gap = 1e-9;
+
+// Moves q and v; returns false when nothing had to move. The workspace must hold factors near (t, q); afterwards it
+// wants a new evaluation.
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
+
+// Throws where a row's residual at the last look is open.
+void require_closed(const Program& p, const Workspace& w, double t);
 
 // Size of the scene: the largest distance of a body from the world's origin, at least 1 m.
 double scene_size(const Workspace& w);

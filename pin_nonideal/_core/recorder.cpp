@@ -10,6 +10,8 @@ void Recorder::sample(double t, const VecX& y, bool evaluated) {
     if (!evaluated && options.evaluates()) {
         if (system.nz > 0) w.z = y.segment(system.nq + system.nv, system.nz);
         evaluate(p, w, t, q_, v_);
+    } else if (!evaluated && p.constraints > 0) {
+        look_at(p, w, t, q_, v_);
     }
     double position, velocity;
     violations(p, w, position, velocity);

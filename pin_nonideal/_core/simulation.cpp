@@ -105,6 +105,7 @@ void Simulation::settle(double at, VecX& state, VecX& rate) {
     v_ = state.segment(system.nq, system.nv);
     if (system.nz > 0) w.z = state.segment(system.nq + system.nv, system.nz);
     const bool moved = project(p, w, at, q_, v_);
+    require_closed(p, w, at);
     state.head(system.nq) = q_;
     state.segment(system.nq, system.nv) = v_;
     begin_step(p, w, at, q_, v_);
@@ -202,6 +203,7 @@ void Simulation::advance_to(double stop) {
         const double tiny = 1e-10 * std::max(1.0, std::abs(t));
         const bool runs_away = tiny * derivative.segment(system.nq, system.nv).norm() > system.v(y).norm();
         if (!o.method.adaptive || (size < tiny && !runs_away) || failure.kind == Failure::Kind::interrupted) throw;
+        if (failure.kind == Failure::Kind::closure) opened = failure;
         error = 1e4;
     }
     if (!(error <= 1.0)) {
@@ -209,7 +211,10 @@ void Simulation::advance_to(double stop) {
         const double factor = std::isfinite(error) ? retry_safety * std::pow(error, -1.0 / o.method.order) : 0.0;
         h = size * std::max(shrink_limit, factor);
         last_rejected = true;
-        if (h < 4.0 * std::abs(std::nextafter(t, t_end) - t)) throw Failure(Failure::Kind::step_size, t);
+        if (h < 4.0 * std::abs(std::nextafter(t, t_end) - t)) {
+            if (opened) throw *opened;
+            throw Failure(Failure::Kind::step_size, t);
+        }
         q_ = y.head(system.nq);
         v_ = y.segment(system.nq, system.nv);
         tick(t);
@@ -222,6 +227,7 @@ void Simulation::advance_to(double stop) {
         if (!(last && factor * size < h)) h = size * std::max(factor, shrink_limit);
     }
     detours = 0;
+    opened.reset();
     const bool event = locate_event();
     ++out.steps;
     t = event || !last ? stepper.t0 + stepper.h : stop;
@@ -236,7 +242,7 @@ void Simulation::advance_to(double stop) {
         emit(t, y, true);
         return;
     }
-    if (event) {
+    if (event && parting < 0) {
         recent_events.push_back(t);
         bridge_cluster(t, y, located_element);
     }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "modes.hpp"
 #include "projection.hpp"
@@ -47,7 +48,7 @@ private:
     static constexpr int no_trigger = -2;
     static constexpr double rest_part = 0.05, arrived_speed = 1e-7;
     double toward_rest(double size);
-    struct Watch { int element; bool slip; };
+    struct Watch { int element; bool slip; int contact = -1; };  // a friction element, or a contact's pressure
     double margin(const Watch& watch, double t, const VecX& y);  // negative past the event; evaluated state
     std::vector<Watch> crossed();
     bool locate_event();
@@ -77,8 +78,9 @@ private:
     std::vector<char> pulls, indeterminate;
     bool last_rejected = false;
     int detours = 0;  // in a row, around a singular position
+    std::optional<Failure> opened;  // a loop that a trial of this step could not close
     double pending_energy = 0.0;  // moved by the projection that ends the step
-    int trigger_element = -1, located_element = -1, arrived = -1;
+    int trigger_element = -1, located_element = -1, arrived = -1, parting = -1;
     bool released_together = false;  // redundant elements that could hold no longer
     long next_period = 0;
 };

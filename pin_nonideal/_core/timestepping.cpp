@@ -136,6 +136,7 @@ void Simulation::step_in_time(double stop, double dt) {
             if (before[e] != w.mode[e])
                 out.events.push_back({t, w.mode[e] == sticking ? Event::Kind::stick
                                           : before[e] == sticking ? Event::Kind::slip : Event::Kind::reverse, e});
+        report_pulls(t);
         tick(t);
         const bool on_grid = o.output_dt > 0.0 && next_sample <= t + 1e-12 * std::max(1.0, std::abs(t));
         if (on_grid) next_sample = o.t0 + ++samples * o.output_dt;
