@@ -125,6 +125,8 @@ Workspace::Workspace(const Program& p) {
     B.assign(p.entries, 0.0);
     for (VecX* x : {&b, &r, &miss, &lam, &lam_step, &lam_shared}) *x = VecX::Zero(p.layout.rows);
     rows.allocate(p.layout, static_cast<int>(p.blocks.size()), nv);
+    ideal_rows = rows;
+    ideal_locked.assign(nv, 0);
     body_force.resize(n);
     reaction_body.resize(n);
     zero(body_force);
@@ -148,9 +150,7 @@ Workspace::Workspace(const Program& p) {
 }
 
 void want_rows(const Program& p, Workspace& w) {
-    const int constraint_rows = p.constraints < static_cast<int>(p.blocks.size())
-                                    ? p.blocks[p.constraints].row : p.layout.rows;
-    for (int r = 0; r < p.layout.rows; ++r) w.rows.wanted[r] = r < constraint_rows;
+    for (int r = 0; r < p.layout.rows; ++r) w.rows.wanted[r] = r < p.constraint_rows();
     std::fill(w.terms.locked.begin(), w.terms.locked.end(), char(0));
     for (size_t e = 0; e < p.frictions.size(); ++e) {
         const Block& block = p.blocks[p.frictions[e].block];
@@ -161,6 +161,7 @@ void want_rows(const Program& p, Workspace& w) {
             for (size_t k = 0; k < block.kept.size(); ++k) w.rows.wanted[block.row + k] = 1;
     }
     w.rows.use_wanted(p.blocks);
+    w.ideal_decided = false;
 }
 
 void factor_mass(const Program& p, Workspace& w, double t) {
@@ -322,6 +323,7 @@ static int contradicting_block(const Program& p, Workspace& w, double& worst) {
 }
 
 void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    w.ideal_decided = false;
     evaluate(p, w, t, q, v);
     if (w.rows.blocks.empty()) return;
     double residual = 0.0;
@@ -347,92 +349,6 @@ void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const V
     }
     if (other >= 0) blame.push_back(other);
     throw Failure(Failure::Kind::inconsistent, t, blame, residual);
-}
-
-void share_multipliers(const Program& p, Workspace& w) {
-    w.lam_shared = w.lam;
-    if (!w.rows.redundant) return;
-    // A_dependent = W A_active; x + W^T y = lam with least |x|^2 + |y|^2 is y = (I + W W^T)^-1 W lam, x = lam - W^T y.
-    std::vector<int> dependent;
-    for (int r = 0; r < p.layout.rows; ++r)
-        if (w.rows.wanted[r] && !w.rows.active[r]) dependent.push_back(r);
-    const int d = static_cast<int>(dependent.size());
-    MatX W(d, p.layout.rows);
-    VecX column(p.mechanism.nv), unit = VecX::Zero(p.layout.rows), products(p.layout.rows), weights(p.layout.rows);
-    for (int k = 0; k < d; ++k) {
-        column.setZero();
-        products.setZero();
-        unit[dependent[k]] = 1.0;
-        for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.B, unit, column);
-        unit[dependent[k]] = 0.0;
-        for (int i : w.rows.blocks) multiply(p.blocks[i], w.B, column, products);
-        solve_rows(p.layout, w.rows, products, weights);
-        W.row(k) = weights.transpose();
-    }
-    const MatX S = MatX::Identity(d, d) + W * W.transpose();
-    const VecX y = S.ldlt().solve(W * w.lam);
-    w.lam_shared -= W.transpose() * y;
-    for (int k = 0; k < d; ++k) w.lam_shared[dependent[k]] = y[k];
-}
-
-static void to_user_rows(const Program& p, const VecX& kept, VecX& out) {
-    out = VecX::Zero(p.user_rows);
-    for (int i = 0; i < p.constraints; ++i) {
-        const Block& block = p.blocks[i];
-        for (size_t k = 0; k < block.kept.size(); ++k) out[block.user_row + block.kept[k]] = kept[block.row + k];
-    }
-}
-
-void split_forces(const Program& p, Workspace& w, Split& out) {
-    const int nv = p.mechanism.nv;
-    const VecX a = w.a, lam = w.lam;
-    share_multipliers(p, w);
-    to_user_rows(p, w.lam_shared, out.lam);
-    out.C = p.has_laws() ? w.C : VecX(VecX::Zero(nv));
-    VecX total = VecX::Zero(nv);
-    bool sticks = false;
-    for (size_t i = 0; i < p.blocks.size(); ++i) {
-        if (!w.rows.block_used[i]) continue;
-        const bool constraint = static_cast<int>(i) < p.constraints;
-        sticks |= !constraint;
-        add_transpose(p.blocks[i], w.A, w.lam_shared, constraint ? total : out.C);  // C holds what sticks as well
-    }
-    const std::vector<char> locked = w.terms.locked;
-    for (int dof = 0; dof < nv; ++dof)
-        if (locked[dof]) {
-            out.C[dof] += holding_forces(p, w)[dof];
-            sticks = true;
-        }
-    // Ideal part: the same rows without C and without what sticks.
-    const RowSystem saved = w.rows;
-    if (sticks) {
-        std::fill(w.terms.locked.begin(), w.terms.locked.end(), char(0));
-        factorize(p.mechanism, w.terms);
-        for (int r = 0; r < p.layout.rows; ++r)
-            if (r >= p.blocks[p.constraints].row) w.rows.wanted[r] = 0;
-        w.rows.use_wanted(p.blocks);
-        if (!w.rows.blocks.empty()) {
-            scale_rows(p, w);
-            decide_rows(p.layout, p.blocks, w.B, w.rows);
-            factor_rows(p.layout, p.blocks, w.B, w.rows);
-        }
-    }
-    if (p.has_laws()) solve_motion(p, w, w.F);
-    share_multipliers(p, w);
-    out.F_ideal = VecX::Zero(nv);
-    for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.A, w.lam_shared, out.F_ideal);
-    if (w.rows.blocks.empty()) w.lam_shared.setZero();
-    to_user_rows(p, w.lam_shared, out.lam_ideal);
-    out.F_nonideal = total - out.F_ideal + out.C;  // Eq. (39)
-    w.rows = saved;
-    if (sticks) {
-        w.terms.locked = locked;
-        factorize(p.mechanism, w.terms);
-        scale_rows(p, w);
-    }
-    w.a = a;
-    w.lam = lam;
-    w.has_balance = false;
 }
 
 void violations(const Program& p, const Workspace& w, double& position, double& velocity) {

@@ -186,7 +186,7 @@ void add_slip_forces(const Program& p, Workspace& w, VecX& C, bool dependent) {
     }
 }
 
-void gather_reactions(const Program& p, Workspace& w) {
+void gather_reactions(const Program& p, Workspace& w, bool friction) {
     share_multipliers(p, w);
     if (!p.needs_joint_reactions) return;
     const Mechanism& m = p.mechanism;
@@ -211,7 +211,7 @@ void gather_reactions(const Program& p, Workspace& w) {
     }
     for (size_t e = 0; e < p.frictions.size(); ++e) {  // and what slips there, or is tried while modes are sought
         const Friction& f = p.frictions[e];
-        if (w.mode[e] == sticking || !w.values[f.block].geometric) continue;
+        if (!friction || w.mode[e] == sticking || !w.values[f.block].geometric) continue;
         for (int k = 0; k < f.dim; ++k) apply(p.blocks[f.block], w.values[f.block].wrench[k], w.slip_force[e][k]);
     }
     for (int i = 0; i < n; ++i) w.momentum[i] = {Vec3::Zero(), Vec3::Zero()};

@@ -12,6 +12,8 @@ namespace {
 
 constexpr int breaking_passes = 20;       // after these, what reached its limit may stick again
 constexpr int outer_limit = 100;          // of limits that depend on the load
+constexpr int outer_patience = 6;         // after these, modes that stay the same are tried as they are
+constexpr int most_enumerated = 8;        // elements whose combinations of modes are all tried at last
 constexpr double limit_tolerance = 1e-12; // relative change of the limits at which the outer iteration ends
 constexpr double slack = 1e-9;            // part of the limit by which a mode may miss its condition by rounding
 constexpr double least_response = 1e-11;  // part of an element's free response that the constraints must leave it
@@ -188,6 +190,47 @@ struct Candidates {
         begin_step(p, w, t, q, v);
     }
 
+    // Whether the motion under these modes, loads and all, keeps the conditions that they stand for; the workspace
+    // ends evaluated there.
+    bool hold(const std::vector<signed char>& modes, int breaking) {
+        try {
+            for (int e : list) w.slip_force[e].setZero();
+            apply_modes(modes);
+        } catch (const Failure& failure) {
+            if (failure.kind != Failure::Kind::paradox) throw;
+            return false;
+        }
+        if (p.needs_reactions) gather_reactions(p, w);
+        const VecX alpha = accelerations();
+        const double size = w.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
+        for (size_t i = 0, at = 0; i < list.size(); at += dims[i], ++i) {
+            if (modes[i] == sticking) {
+                const double limit = static_limit(p, w, list[i], t, q, v);
+                const double force = friction_force(p, w, list[i]).norm();
+                if (force > limit * (1.0 + slack)) return false;
+                const bool breaks = list[i] == breaking || breaking == any_at_limit;
+                if (breaks && force >= limit * (1.0 - slack)) return false;
+            } else if (dims[i] > 1 || modes[i] * alpha[at] < -slack * size) {
+                return false;
+            }
+        }
+        return true;
+    }
+
+    // All combinations of modes in turn, those that stick first; true at the first that holds.
+    bool enumerate(int breaking) {
+        if (rows > most_enumerated || rows != static_cast<int>(list.size())) return false;
+        int combinations = 1;
+        for (size_t i = 0; i < list.size(); ++i) combinations *= 3;
+        std::vector<signed char> modes(list.size());
+        for (int combination = 0; combination < combinations; ++combination) {
+            for (int i = 0, rest = combination; i < rows; ++i, rest /= 3)
+                modes[i] = rest % 3 == 2 ? -1 : static_cast<signed char>(rest % 3);
+            if (hold(modes, breaking)) return true;
+        }
+        return false;
+    }
+
     // Modes that the forces f of the program mean: what is below its limit sticks.
     std::vector<signed char> modes_of(const VecX& f, const VecX& alpha, const VecX& limits, double size,
                                       int breaking) {
@@ -254,7 +297,8 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
     }
     // Without any friction of the candidates: alpha0, W, and first limits from the load there.
     for (int e : candidates) w.slip_force[e].setZero();
-    c.apply_modes(std::vector<signed char>(candidates.size(), unloaded));
+    const std::vector<signed char> unloaded_modes(candidates.size(), unloaded);
+    c.apply_modes(unloaded_modes);
     const VecX C_smooth = w.C_smooth;
     VecX alpha0 = c.accelerations(), limits(candidates.size()), f, push(p.mechanism.nv);
     for (size_t i = 0; i < candidates.size(); ++i) limits[i] = static_limit(p, w, candidates[i], t, q, v);
@@ -263,17 +307,25 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
     for (int i = 0; i < c.rows; ++i)  // what the constraints hold still has no slip acceleration
         if (W(i, i) == 0.0 && std::abs(alpha0[i]) <= noise) alpha0[i] = 0.0;
     const VecX driven = alpha0;
-    std::vector<signed char> modes(candidates.size(), unloaded);
+    std::vector<signed char> modes = unloaded_modes;
     double change = 0.0;
     for (int it = 0; it < outer_limit; ++it) {
         f = friction_program(W, alpha0, c.dims, limits);
         const VecX alpha = alpha0 + W * f;
         const double size = alpha0.cwiseAbs().maxCoeff() + 1e-300;
-        const auto next = c.modes_of(f, alpha, limits, size, it < breaking_passes ? breaking : -1);
+        const int released = it < breaking_passes ? breaking : -1;
+        const auto next = c.modes_of(f, alpha, limits, size, released);
         const bool same = next == modes;
         modes = next;
         if (same && change <= limit_tolerance) break;
-        if (it + 1 == outer_limit) throw Failure(Failure::Kind::paradox, t, candidates, w.determinant);
+        if (same && it >= outer_patience && it % outer_patience == 0) {  // limits that converge slowly
+            if (c.hold(modes, released)) return;
+            c.apply_modes(unloaded_modes);
+        }
+        if (it + 1 == outer_limit) {
+            if (c.enumerate(released)) return;
+            throw Failure(Failure::Kind::paradox, t, candidates, w.determinant);
+        }
         // The motion under these forces, and the limits that its loads give: the kinetic one for what slips.
         push.setZero();
         VecX unit = VecX::Zero(p.layout.rows);

@@ -87,6 +87,11 @@ struct Program {
     bool moves_in_time = false;          // some constraint moves by itself
     bool affine_rates = true;            // A does not depend on v; a user's own rows may
 
+    // Rows of constraints come first, rows of friction's directions after them.
+    int constraint_rows() const {
+        return constraints < static_cast<int>(blocks.size()) ? blocks[constraints].row : layout.rows;
+    }
+
     // Numbers the kept rows, finds supports and lays out the storage; called again when rows are left out.
     void finish();
 };
@@ -99,6 +104,9 @@ struct Workspace {
     std::vector<double> A, B;
     VecX b, r, miss, lam, lam_step, lam_shared;  // by kept row; shared: least norm among redundant rows
     RowSystem rows;
+    RowSystem ideal_rows;  // of the constraints without what sticks; IdealMotion swaps them in
+    std::vector<char> ideal_locked;
+    bool ideal_decided = false;  // which of them are independent, over this step
     std::vector<Force> body_force, reaction_body;  // given forces; all external forces, then their subtree sums
     std::vector<Motion> motion;
     std::vector<Force> momentum;
@@ -158,6 +166,20 @@ const VecX& holding_forces(const Program& p, Workspace& w);
 
 // lam_shared from lam: redundant rows share the load with least norm (in the user's row scale).
 void share_multipliers(const Program& p, Workspace& w);
+// The motion of the ideal constraints: without C, and without what sticks. The workspace holds it, with its factors,
+// while this object lives; then the factors are again those of the modes, and a and lam are left to the caller.
+class IdealMotion {
+public:
+    IdealMotion(const Program& p, Workspace& w);
+    ~IdealMotion();
+    IdealMotion(const IdealMotion&) = delete;
+    IdealMotion& operator=(const IdealMotion&) = delete;
+
+private:
+    const Program& p;
+    Workspace& w;
+    bool sticks = false;
+};
 struct Split {
     VecX F_ideal, F_nonideal, C, lam, lam_ideal;  // multipliers by row of the descriptions
 };

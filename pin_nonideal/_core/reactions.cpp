@@ -68,6 +68,8 @@ struct Implicit {
     void image(const VecX& y, VecX& g) {
         set(y);
         motion();
+        // A stage that has run away is no case for the laws, a user's above all.
+        if (!std::isfinite(w.a.squaredNorm())) throw Failure(Failure::Kind::not_finite, t);
         gather_reactions(p, w);
         int k = 0;
         for (size_t e = 0; e < p.frictions.size(); ++e)
@@ -130,7 +132,7 @@ struct Implicit {
             const VecX miss = g - y;
             size = std::max({size, y.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});
             const double error = miss.cwiseAbs().maxCoeff();
-            if (!std::isfinite(error)) break;
+            if (!g.allFinite()) throw Failure(Failure::Kind::not_finite, t);
             if (error <= 8.0 * reaction_tolerance * size || (it > 3 && error <= 1e-12 * size && error >= last)) {
                 differentiate(y, g, size);
                 check_uniqueness();
@@ -148,6 +150,7 @@ struct Implicit {
     void solve() {
         VecX &y = w.unknown, &g = w.image;
         if (!w.warm) y.head(n).setZero();
+        w.warm = false;  // what a failure leaves in y is no start for the next evaluation
         auto yn = y.head(n);
         double last = 0.0;
         for (int it = 0; it < fixed_point_limit; ++it) {
@@ -159,7 +162,7 @@ struct Implicit {
                 size = std::max(size, std::abs(g[k]));
                 change = std::max(change, std::abs(g[k] - y[k]));
             }
-            if (!std::isfinite(change)) break;
+            if (!g.head(n).allFinite()) throw Failure(Failure::Kind::not_finite, t);
             yn = g.head(n);
             if (change <= reaction_tolerance * size) return;
             if (it > 1 && change > good_contraction * last && change > 1e-13 * size) break;
@@ -172,7 +175,6 @@ struct Implicit {
             }
             last = change;
         }
-        if (!yn.allFinite()) yn.setZero();
         VecX start = yn, value(n);
         newton(start, value, 0.0);
         yn = start;
@@ -190,11 +192,9 @@ void solve_reactions(const Program& p, Workspace& w, double t, const VecX& q, co
     for (size_t e = 0; e < p.frictions.size(); ++e) ideal |= p.frictions[e].reaction == Reaction::ideal;
     for (const UserLaw& law : p.user_laws) ideal |= law.reaction == Reaction::ideal;
     w.base_C = w.C_smooth;  // C that does not change while the reactions are sought
-    if (ideal) {                // laws on the ideal reaction: the motion without any C
-        w.C.setZero();
-        for (size_t e = 0; e < p.frictions.size(); ++e) w.slip_force[e].setZero();
-        solve_motion(p, w, w.F);
-        gather_reactions(p, w);
+    if (ideal) {
+        const IdealMotion motion(p, w);
+        gather_reactions(p, w, false);
         for (size_t e = 0; e < p.frictions.size(); ++e) {
             if (p.frictions[e].reaction != Reaction::ideal) continue;
             w.load[e] = load_limit(p, w, p.frictions[e], t, q, v);
