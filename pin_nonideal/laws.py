@@ -221,16 +221,18 @@ class UserFriction:
     """Dry friction along a generalized direction given by the user; the package owns its modes.
 
     With d = direction(t, q) and slip velocity s = d . v, sliding gives C = -limit sgn(s) d, and sticking is
-    an ideal row that holds s at zero.
+    an ideal row that holds s at zero while the force it needs is below static_ratio times the limit.
 
     Args:
         direction: (t, q) -> row, shape (nv,).
-        limit: (t, q, v, reactions) -> largest friction force, not negative.
+        limit: (t, q, v, reactions) -> friction force while it slides, not negative.
+        static_ratio: static over kinetic friction, at least 1.
         name: used in messages and results.
     """
 
     direction: Callable[..., Any]
     limit: Callable[..., Any]
+    static_ratio: float = 1.0
     name: str | None = None
 
     def __post_init__(self) -> None:
@@ -238,6 +240,7 @@ class UserFriction:
         who = label(self)
         function(f"{who}: direction", self.direction, "(t, q) -> row")
         function(f"{who}: limit", self.limit, "(t, q, v, reactions) -> force")
+        object.__setattr__(self, "static_ratio", static_ratio(who, self.static_ratio))
 
 
 def static_ratio(who: str, value: Any) -> float:

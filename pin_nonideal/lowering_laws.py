@@ -120,7 +120,8 @@ def _(law: UserFriction, name: str, out: Lowered, around: Surroundings) -> None:
         return value
 
     block = out.builder.add_user_slip(name, direction)
-    out.add_friction(name, out.add_law(name), block, "user", "total", limit=bound)
+    ratio = law.static_ratio
+    out.add_friction(name, out.add_law(name), block, "user", "total", limit=bound, static_ratio=ratio)
 
 
 def _joint_friction(law: JointFriction, name: str, out: Lowered, around: Surroundings) -> None:

@@ -62,7 +62,8 @@ def simulate(
         method: "dop853" (order 8) or "dopri5" (order 5), adaptive; "rk4", "semi_implicit_euler" or "moreau"
             (time stepping at velocity level), fixed dt; "Radau", "BDF" or "LSODA" by SciPy, for stiff scenes.
         rtol: relative tolerance of adaptive methods, 1e-8 when None.
-        atol: absolute tolerance, a number or an array (2 nv,) for positions and velocities, 1e-10 when None.
+        atol: absolute tolerance, a number or an array (2 nv,) for positions and velocities, 1e-10 when None;
+            states of laws take the number, or the smallest of the array.
         dt: step of the fixed-step methods [s].
         output_dt: time between samples [s]; every accepted step when None.  Events are samples as well.
         record: any of "a", "forces", "energy", "power", or names of fields that they fill.
@@ -205,6 +206,7 @@ def _options(
             tolerance[:] = nonnegative("simulate: atol", atol)
         else:
             tolerance[: 2 * nv] = array("simulate: atol", atol, (2 * nv,))
+            tolerance[2 * nv :] = tolerance[: 2 * nv].min()
             if (tolerance < 0.0).any():
                 raise InputError(f"simulate: atol must not be negative; got {tolerance.min():g}")
     relative = DEFAULT_RTOL if rtol is None else nonnegative("simulate: rtol", rtol)

@@ -1,7 +1,7 @@
-"""Conditions of friction at one instant of a run, from Pinocchio's inverse dynamics and the closed forms of the laws.
+"""Conditions of friction at one instant of a run, from Pinocchio's inverse dynamics and the laws' closed forms.
 
-Nothing here comes from the core but the motion and the multipliers that it recorded, and the matrix A, which is
-compared with differences elsewhere.
+Nothing here comes from the core but the motion and the multipliers that it recorded, and the matrix A, which
+is compared with differences elsewhere.
 """
 
 from __future__ import annotations
@@ -12,6 +12,11 @@ import numpy as np
 import pinocchio as pin
 
 import pin_nonideal as pn
+
+# Part of the speeds in play that leaves a slip its direction.
+UNDIRECTED = 1e-8
+# Part of the forces in play to which the equation of motion is balanced by what was recorded.
+BALANCED = 1e-9
 
 
 @dataclass
@@ -67,41 +72,51 @@ class Conditions:
         z = None if run.z is None else run.z[i]
         friction = held - pull - self._smooth(total, z)
         size = np.abs(held).max() + (np.abs(rows.T) @ np.abs(total.lam)).max(initial=0.0) + 1.0
-        return slips, self._share(friction, directions, slips, limits, run.modes[i], total.a, size), limits, size
+        return (
+            slips,
+            self._share(friction, directions, slips, limits, run.modes[i], rows, np.abs(total.v).max(), size),
+            limits,
+            size,
+        )
 
-    def _share(self, friction, directions, slips, limits, modes, a, size):
+    def _share(self, friction, directions, slips, limits, modes, rows, speed, size):
         """Forces of the elements that make up the generalized friction force.
 
-        Those that slip follow their law.  What is left is shared among those that stick; where they are
-        redundant any share within their limits will do.
+        Those that slip in a clear direction follow their law.  What is left is shared among those that stick;
+        where they are redundant, with each other or with the constraints, any share within their limits will
+        do.
         """
         from scipy.optimize import linprog
 
-        forces, left = {}, friction.copy()
+        forces, left, names = {}, friction.copy(), list(slips)
         for name, S, mode in zip(slips, directions, modes, strict=True):
             u = slips[name]
-            if mode != 0:
-                along = np.array([float(mode)])
-                if len(u) > 1:  # one that has just begun to slip does so along its acceleration
-                    along = u if np.linalg.norm(u) > 1e-9 else S @ a
-                    along = along / np.linalg.norm(along)
+            if mode != 0 and not self.undirected(u, speed):
+                along = u / np.linalg.norm(u) if len(u) > 1 else np.array([float(mode)])
                 forces[name] = -limits[name] * self._stribeck(name, u) * along
                 left -= S.T @ forces[name]
-        stuck = [k for k, mode in enumerate(modes) if mode == 0]
-        names = list(slips)
+        stuck = [k for k, name in enumerate(names) if name not in forces]
         S = np.vstack([directions[k] for k in stuck]) if stuck else np.zeros((0, len(left)))
         x = np.linalg.lstsq(S.T, left, rcond=1e-10)[0] if stuck else np.zeros(0)
         np.testing.assert_allclose(S.T @ x, left, rtol=0.0, atol=BALANCED * size)
-        if np.linalg.matrix_rank(S, tol=1e-10) < len(S):
-            most = [self.static_limit(names[k], limits) + BALANCED * size for k in stuck for _ in directions[k]]
-            basis = np.linalg.svd(S.T, full_matrices=False)[0][:, : np.linalg.matrix_rank(S, tol=1e-10)]
-            bounds = [(-x, x) for x in most]
-            found = linprog(np.zeros(len(x)), A_eq=basis.T @ S.T, b_eq=basis.T @ left, bounds=bounds)
+        both = np.vstack([S, rows])
+        if np.linalg.matrix_rank(both, tol=1e-8) < np.linalg.matrix_rank(rows, tol=1e-8) + len(S):
+            most = [
+                self.static_limit(names[k], limits) + BALANCED * size for k in stuck for _ in directions[k]
+            ]
+            basis = np.linalg.svd(both.T, full_matrices=False)[0][:, : np.linalg.matrix_rank(both, tol=1e-8)]
+            bounds = [(-x, x) for x in most] + [(None, None)] * len(rows)
+            found = linprog(np.zeros(len(both)), A_eq=basis.T @ both.T, b_eq=basis.T @ left, bounds=bounds)
             assert found.success, f"no friction within the limits holds {[names[k] for k in stuck]}"
             x = found.x
         for k in stuck:
             forces[names[k]], x = x[: len(directions[k])], x[len(directions[k]) :]
         return forces
+
+    @staticmethod
+    def undirected(slip, speed):
+        """A slip of several directions that has just begun: rounding in v hides where it goes."""
+        return len(slip) > 1 and np.linalg.norm(slip) <= UNDIRECTED * (1.0 + speed)
 
     def _stribeck(self, name, slip):
         """Factor of the limit while it slips."""
@@ -109,6 +124,10 @@ class Conditions:
         if isinstance(law, pn.UserFriction) or law.stribeck_velocity is None:
             return 1.0
         return 1.0 + (law.static_ratio - 1.0) * np.exp(-((np.linalg.norm(slip) / law.stribeck_velocity) ** 2))
+
+    def kinetic_limit(self, name, slip, limits):
+        """Friction force while it slips."""
+        return limits[name] * self._stribeck(name, slip)
 
     def static_limit(self, name, limits):
         """Largest force with which an element can stick."""
@@ -195,9 +214,7 @@ class Conditions:
         for law in self.scene.laws:
             if isinstance(law, pn.Drag):
                 frame = self.model.getFrameId(law.frame)
-                J = pin.computeFrameJacobian(
-                    self.model, self.data, instant.q, frame, pin.LOCAL_WORLD_ALIGNED
-                )
+                J = pin.computeFrameJacobian(self.model, self.data, instant.q, frame, pin.LOCAL_WORLD_ALIGNED)
                 C += J[:3].T @ self._drag(law, frame)
                 continue
             if isinstance(law, pn.JointFriction) and law.viscous:
@@ -216,10 +233,6 @@ class Conditions:
         return C
 
 
-# Part of the forces in play to which the equation of motion is balanced by what was recorded.
-BALANCED = 1e-9
-
-
 class _Wrenches:
     """Reactions as a user's law sees them."""
 
@@ -233,6 +246,6 @@ class _Wrenches:
 def _axis(joint):
     """Axis of a joint of one degree of freedom in its frame."""
     motion = joint.createData()
-    joint.calc(motion, pin.neutral(pin.Model()) if joint.nq == 0 else np.zeros(joint.nq))
+    joint.calc(motion, np.zeros(joint.nq))
     S = np.asarray(motion.S).ravel()
     return S[3:] / np.linalg.norm(S[3:]) if np.any(S[3:]) else S[:3] / np.linalg.norm(S[:3])

@@ -1,4 +1,4 @@
-"""Random mechanisms with friction, by seed: trees, planar linkages, hung bodies and chains closed in space."""
+"""Random mechanisms with friction, by seed: trees, planar linkages, hung bodies, chains closed in space."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def _closed_chain(rng):
 
 
 def _laws(model, constraints, rng):
-    """Laws on most joints and hinges; slip velocities by element.  Bristles may give back what they stored."""
+    """Laws on most joints and hinges; slip velocities by element.  Bristles may give back what they store."""
     laws, slips = [], {}
     users = int(rng.random() < 0.25)  # a Python function in the loop is slow
     for k in range(1, model.njoints):

@@ -66,6 +66,10 @@ class TestNumbers:
             ),
             (lambda: pn.PointContact("foot", mu=0.1, static_ratio=0.9), f"PointContact: {STATIC} 0.9"),
             (
+                lambda: pn.UserFriction(lambda t, q: [1.0], lambda *_: 1.0, static_ratio=0.5),
+                f"UserFriction: {STATIC} 0.5",
+            ),
+            (
                 lambda: pn.LuGre("pin", 1e4, 10.0, 1.0, stiction=0.5),
                 "LuGre: stiction must be at least coulomb (static friction is never below kinetic friction); "
                 "got 0.5 and 1",

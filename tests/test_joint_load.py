@@ -146,6 +146,41 @@ LAWS = [
 ]
 
 
+class TestLawsThatLoad:
+    """A law that acts on bodies loads the joints between them and the ground."""
+
+    def test_drag(self):
+        """A wheel on a pin along y is dragged at its hub, off the axis, by the air that it moves through."""
+        coefficient, radius, rate = 3.0, 0.4, 6.0
+        model = empty(gravity=(0.0, 0.0, 0.0))
+        index = body(model, 0, pin.JointModelRY(), "pin", MASS, inertia=INERTIA * np.eye(3))
+        frame(model, "vane", index, pin.SE3(np.eye(3), np.array([radius, 0.0, 0.0])))
+        law = pn.JointFriction("pin", mu=0.2, radius=0.05, name="rub")
+        scene = pn.Scene(model, laws=[pn.Drag("vane", coefficient, 1.0), law])
+        drag = coefficient * radius * rate  # across the lever; the balanced wheel hangs on the pin alone
+        a = scene.solve([0.3], [rate]).a[0]
+        assert a == pytest.approx(-(radius * drag + 0.2 * 0.05 * drag) / INERTIA, rel=FORCE)
+
+    def test_viscous_hinge(self):
+        """An arm on a guide is turned in a hinge anchor, whose viscous torque the guide must carry."""
+        viscous, rate, span, mu = 0.7, 4.0, 0.5, 0.1
+        model = empty(gravity=(0.0, 0.0, 0.0))
+        slide = body(model, 0, pin.JointModelPX(), "guide", 1.0, inertia=0.1 * np.eye(3))
+        wheel = body(model, 0, pin.JointModelFreeFlyer(), "wheel", MASS, inertia=INERTIA * np.eye(3))
+        frame(model, "axle", slide)
+        frame(model, "hub", wheel)
+        anchor = pn.HingeAnchor("hub", "axle", axis="y", name="hinge")
+        laws = [
+            pn.JointFriction("hinge", viscous=viscous, name="oil"),
+            pn.JointFriction("guide", mu=mu, span=span, name="rub"),
+        ]
+        scene = pn.Scene(model, constraints=[anchor], laws=laws)
+        v = np.array([1.0, 1.0, 0.0, 0.0, 0.0, rate, 0.0])
+        a = scene.solve(scene.q0, v).a
+        assert a[0] == pytest.approx(-mu * viscous * rate / span / (1.0 + MASS), rel=FORCE)
+        assert a[5] == pytest.approx(-viscous * rate / INERTIA, rel=FORCE)
+
+
 class OnePin:
     """An arm on a skew pin, at 1.9 rad from where it hangs, as different models of the same mechanics.
 

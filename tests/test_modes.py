@@ -88,6 +88,26 @@ class TestProgram:
             np.testing.assert_allclose(alpha0 + W @ f, alpha, rtol=0.0, atol=10.0 * SLACK * size)
         assert found
 
+    @pytest.mark.parametrize("seed", range(60))
+    def test_accelerations_that_no_force_causes(self, seed):
+        """alpha0 has a part outside the range of W, as at a dead point: then some of the redundant slip.
+
+        The conditions are those of the minimum of a convex program: none other keeps them.
+        """
+        print("seed", seed)
+        rng = np.random.default_rng(3000 + seed)
+        n = 2 + seed % (LARGEST - 1)
+        W, alpha0, limits = random_program(rng, n, int(rng.integers(1, n)))
+        alpha0 += rng.standard_normal(n) * np.abs(alpha0).max()
+        f = friction_program(W, alpha0, [1] * n, limits)
+        alpha = alpha0 + W @ f
+        size = np.abs(alpha0).max() + (np.abs(W) @ limits).max()
+        inside = np.abs(f) < limits * (1.0 - SLACK)
+        assert (np.abs(f) <= limits * (1.0 + SLACK)).all()
+        np.testing.assert_allclose(alpha[inside], 0.0, rtol=0.0, atol=SLACK * size)
+        assert (f * alpha <= SLACK * size * limits).all()
+        assert not inside.all()
+
     @pytest.mark.parametrize("n", range(1, LARGEST + 1))
     def test_copies_share(self, n):
         """n equal brakes on one wheel hold what one brake of the sum of their limits holds."""

@@ -1,6 +1,8 @@
 """Five hundred random mechanisms with friction: at every recorded instant the laws of friction hold.
 
-The seed makes the mechanism; each test prints its own.  PIN_NONIDEAL_MECHANISMS sets how many the deep run takes.
+The seed makes the mechanism; each test prints its own.  `pytest -m stress` runs all of them, and
+PIN_NONIDEAL_MECHANISMS=10000 that many.  Their bearings are far smaller than their bodies, so a paradox among
+them fails like any other error.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from .random_mechanisms import mechanism
 DURATION = 0.5  # s: several events each
 DEEP = int(os.environ.get("PIN_NONIDEAL_MECHANISMS", "500"))
 QUICK = 48
-# Part of the forces in play by which a condition may be missed: rounding through the solution of the constraints.
+# Part of the forces in play by which a condition may be missed: rounding, through the constraints' solution.
 SLACK = 1e-8
 # Part of the speeds in play that is rounding, for what sticks elsewhere than in a joint.
 STILL = 1e-11
@@ -57,19 +59,21 @@ def assert_ledger_closes(m, run):
 
 
 def assert_conditions(m, run, i, conditions):
+    """Elements that slip by their laws leave to the others what keeps these conditions."""
     slips, forces, limits, size = conditions.at(run, i)
     speed = 1.0 + np.abs(run.v[i]).max()
     for name, mode in zip(m.scene.element_names, run.modes[i], strict=True):
-        u, f, limit = slips[name], forces[name], limits[name]
+        u, f = slips[name], forces[name]
         if mode == 0:
-            in_joint = conditions.laws[name].name not in {f"law {c.name}" for c in m.scene.constraints}
+            in_joint = name not in {f"law {c.name}" for c in m.scene.constraints}
+            in_joint &= not isinstance(conditions.laws[name], pn.UserFriction)
             assert np.linalg.norm(u) <= (0.0 if in_joint else STILL * speed), (i, name)
             assert np.linalg.norm(f) <= conditions.static_limit(name, limits) + SLACK * size, (i, name)
-        else:
-            moves = np.linalg.norm(u) > STILL * speed
-            assert not moves or u @ f <= 0.0, (i, name)
-            assert len(u) > 1 or mode * u[0] >= -STILL * speed, (i, name)
-    # The generalized friction force is what elements that slip at their limits and stick within theirs exert.
+            continue
+        assert len(u) > 1 or mode * u[0] >= -STILL * speed, (i, name)
+        if conditions.undirected(u, speed):
+            kinetic = conditions.kinetic_limit(name, u, limits)
+            assert abs(np.linalg.norm(f) - kinetic) <= SLACK * size, (i, name)
 
 
 @pytest.mark.parametrize("seed", range(QUICK))
@@ -77,7 +81,7 @@ def test_conditions(seed):
     check(seed)
 
 
-@pytest.mark.slow
+@pytest.mark.stress
 @pytest.mark.parametrize("seed", range(QUICK, DEEP))
 def test_conditions_of_many(seed):
     check(seed)

@@ -36,6 +36,7 @@ def test_the_robots_are_there():
         "panda_friction",
         "panda_settling",
         "rolling_disk",
+        "rough_four_bar",
         "slider_crank",
         "solo12_standing",
         "worm_drive",
@@ -273,3 +274,17 @@ def test_unknown_parameter_of_a_generated_robot():
 @pytest.mark.parametrize(("name", "told"), [("panda", True), ("four_bar", False), ("n_four_bar", False)])
 def test_the_report_says_that_limits_of_joints_play_no_part(name, told):
     assert ("limits of joints (the motion may pass them)" in pn.load(name).report()) is told
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
+def test_rough_four_bar_coasts_to_rest(rtol):
+    """Through many dead points of its rocker and its coupler, at each of which a rough pin reverses."""
+    run = pn.simulate(pn.load("rough_four_bar"), 5.0, rtol=rtol)
+    finest = pn.simulate(pn.load("rough_four_bar"), 5.0, rtol=1e-13)
+    assert {event.kind for event in run.events[:-4]} == {"reverse"}
+    assert [event.kind for event in run.events[-4:]] == ["stick"] * 4
+    assert [(e.kind, e.element) for e in run.events] == [(e.kind, e.element) for e in finest.events]
+    assert run.events[-1].time == pytest.approx(finest.events[-1].time, abs=10.0 * rtol + 1e-9)
+    after = run.t > run.events[-1].time
+    np.testing.assert_array_equal(run.v[after], 0.0)
+    np.testing.assert_array_equal(run.q[after], np.broadcast_to(run.q[-1], run.q[after].shape))

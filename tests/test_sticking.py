@@ -8,7 +8,7 @@ import pytest
 
 import pin_nonideal as pn
 
-from .mechanisms import GRAVITY, TIGHT, assert_close, at_events, body, empty, frame, hinge, point_mass
+from .mechanisms import GRAVITY, TIGHT, assert_close, at_events, body, dof, empty, frame, hinge, point_mass
 
 
 def arm(laws, angles=(0.5,), actuation=None, forces=()):
@@ -156,6 +156,7 @@ BREAK_AWAY = [
     (pn.JointFriction("pin", mu=0.3, radius=0.05, static_ratio=1.4), 1.4 * LIMIT),
     (pn.JointFriction("pin", mu=0.3, radius=0.05, reaction="ideal"), LIMIT),
     (pn.UserFriction(lambda t, q: [2.0], lambda t, q, v, reactions: 0.65), 1.3),
+    (pn.UserFriction(lambda t, q: [1.0], lambda t, q, v, reactions: 1.0, static_ratio=1.3), 1.3),
 ]
 METHODS = [
     {},
@@ -263,3 +264,71 @@ class TestOrder:
             errors.append(np.abs(run.q[-1] - reference.q[-1]).max())
         order = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
         assert order > 6.0, f"order {order:.2f} from steps {steps}, errors {errors}"
+
+
+class TestModesAndLoads:
+    """A load may change with the mode: what is decided must hold for the loads that follow from it."""
+
+    def test_a_limit_on_ideal_reactions_is_the_same_in_every_mode(self):
+        """The ideal motion knows no friction, so sticking does not change its reactions."""
+        laws = [pn.JointFriction(f"pin{i}", mu=0.3, radius=0.05, reaction="ideal") for i in range(2)]
+        scene = arm(laws, (0.4, 0.3))
+        runner, rest = scene.new_runner(), np.zeros(2)
+        limits = [
+            runner.solve(scene.q0, rest, 0.0, None, modes)["limits"]
+            for modes in ([1, 1], [0, 1], [1, 0], [0, 0])
+        ]
+        for other in limits[1:]:
+            np.testing.assert_allclose(other, limits[0], rtol=1e-12)
+
+    @pytest.mark.parametrize("share", [0.5, 0.9, 0.99])
+    def test_slowly_converging_limits(self, share):
+        """A block held on a slope by a push that its own friction relieves: mu k is close to 1.
+
+        Friction T along (1, -k) with N = m g - push + k T: it holds while |T| = m a_x <= mu N.
+        """
+        k, mu = 2.0, share / 2.0
+        model = empty()
+        x = body(model, 0, pin.JointModelPX(), "x", 0.0)
+        z = body(model, x, pin.JointModelPZ(), "z", 1.0)
+        frame(model, "block", z)
+        frame(model, "ground", 0)
+        ground = pn.PointAnchor("block", "ground", axes="z", name="ground")
+        rub = pn.UserFriction(
+            lambda t, q: [1.0, k], lambda t, q, v, reactions: mu * abs(reactions["ground"][0]), name="rub"
+        )
+        scene = pn.Scene(model, constraints=[ground], laws=[rub])
+        for part, mode in ((1.0 - 1e-6, 0), (1.0 + 1e-6, 1)):
+            push = part * mu * GRAVITY / (1.0 - mu * k)  # N = m g + k T and T = -mu N at the limit
+            s = scene.solve([0.0, 0.0], [0.0, 0.0], tau=[push, 0.0])
+            assert list(s.modes) == [mode]
+
+    @pytest.mark.parametrize("dt", [2e-3, 1e-3, 5e-4])
+    def test_time_stepping_beside_a_loop(self, dt):
+        """One motor of a five-bar comes to rest and holds, an elbow rubs on: as the located events have it.
+
+        The error of time stepping falls with its step.
+        """
+        robot = pn.load("five_bar")
+        laws = [pn.JointFriction("motor1", coulomb=50.0), pn.JointFriction("elbow2", mu=0.1, radius=0.01)]
+        scene = pn.Scene(robot.model, constraints=robot.constraints[:1], laws=laws, q0=robot.q0)
+        v = scene.project(scene.q0, [0.0, 0.0, 5.0, 0.0])[1]
+        exact = pn.simulate(scene, 0.1, v=v)
+        run = pn.simulate(scene, 0.1, v=v, method="moreau", dt=dt)
+        np.testing.assert_array_equal(run.modes[1:, 0], 0)
+        np.testing.assert_array_equal(run.v[1:, dof(scene, "motor1")], 0.0)
+        np.testing.assert_array_equal(run.modes[-1], exact.modes[-1])
+        assert_close(run.v[-1], exact.v[-1], 6.0 * dt)
+
+
+def test_a_step_that_runs_away_leaves_nothing_behind():
+    """Bristles far too stiff for the first step throw its stages out of range; shorter steps start afresh."""
+    laws = [
+        pn.LuGre("pin1", 300.0, 1.0, 0.1, stribeck_velocity=0.1, name="bristles"),
+        pn.JointFriction("pin0", mu=0.2, radius=0.05),
+    ]
+    scene = arm(laws, (0.4, 0.3))
+    run = pn.simulate(scene, 0.01, v=[5.0, 40.0], record="energy")
+    assert run.stats.rejected > 5
+    assert run.t[-1] == 0.01
+    assert np.abs(run.energy["balance"]).max() <= 1e-8 * run.energy["kinetic"].max()

@@ -111,6 +111,16 @@ double load_limit(const Program& p, Workspace& w, const Friction& f, double t, c
     return f.constant + f.mu * (f.radius * (radial + bending) + f.axial_radius * std::abs(axial));
 }
 
+// Force of a drag on its body, about the body's reference point.
+static Force drag_force(const Workspace& w, const Drag& d) {
+    const Body& body = w.terms.body[d.frame.joint];
+    const Vec3 x = body.ref + body.p + body.R * d.frame.p, u = velocity_at(body, x);
+    const double speed = u.norm();
+    if (speed == 0.0 || d.frame.joint == 0) return {Vec3::Zero(), Vec3::Zero()};
+    const Vec3 force = -d.coefficient * std::pow(speed, d.exponent - 1.0) * u;
+    return {force, (x - body.ref).cross(force)};
+}
+
 // Laws of the state alone.
 static void state_laws(const Program& p, Workspace& w, const VecX& v, VecX& C) {
     for (const Viscous& x : p.viscous) {
@@ -134,12 +144,7 @@ static void state_laws(const Program& p, Workspace& w, const VecX& v, VecX& C) {
         add(w, C, b.law, b.dof, -(b.sigma0 * w.z[b.state] + b.sigma1 * rate + b.sigma2 * speed));
     }
     for (const Drag& d : p.drags) {
-        const Body& body = w.terms.body[d.frame.joint];
-        const Vec3 x = body.ref + body.p + body.R * d.frame.p, u = velocity_at(body, x);
-        const double speed = u.norm();
-        if (speed == 0.0 || d.frame.joint == 0) continue;
-        const Vec3 force = -d.coefficient * std::pow(speed, d.exponent - 1.0) * u;
-        const Force f{force, (x - body.ref).cross(force)};
+        const Force f = drag_force(w, d);
         for (int dof : d.dofs) add(w, C, d.law, dof, dot(w.terms.J[dof], f));
     }
 }
@@ -186,7 +191,7 @@ void add_slip_forces(const Program& p, Workspace& w, VecX& C, bool dependent) {
     }
 }
 
-void gather_reactions(const Program& p, Workspace& w, bool friction) {
+void gather_reactions(const Program& p, Workspace& w, bool nonideal) {
     share_multipliers(p, w);
     if (!p.needs_joint_reactions) return;
     const Mechanism& m = p.mechanism;
@@ -209,10 +214,16 @@ void gather_reactions(const Program& p, Workspace& w, bool friction) {
         for (size_t k = 0; k < block.kept.size(); ++k)
             apply(block, w.values[i].wrench[block.kept[k]], w.lam_shared[block.row + k]);
     }
-    for (size_t e = 0; e < p.frictions.size(); ++e) {  // and what slips there, or is tried while modes are sought
-        const Friction& f = p.frictions[e];
-        if (!friction || w.mode[e] == sticking || !w.values[f.block].geometric) continue;
-        for (int k = 0; k < f.dim; ++k) apply(p.blocks[f.block], w.values[f.block].wrench[k], w.slip_force[e][k]);
+    if (nonideal) {
+        for (size_t e = 0; e < p.frictions.size(); ++e) {  // what slips there, or is tried while modes are sought
+            const Friction& f = p.frictions[e];
+            if (w.mode[e] == sticking || !w.values[f.block].geometric) continue;
+            for (int k = 0; k < f.dim; ++k) apply(p.blocks[f.block], w.values[f.block].wrench[k], w.slip_force[e][k]);
+        }
+        for (const Viscous& x : p.viscous)  // and the other laws that act on bodies
+            if (x.block >= 0)
+                apply(p.blocks[x.block], w.values[x.block].wrench[0], -x.coefficient * w.values[x.block].rate[0]);
+        for (const Drag& d : p.drags) w.reaction_body[d.frame.joint] += drag_force(w, d);
     }
     for (int i = 0; i < n; ++i) w.momentum[i] = {Vec3::Zero(), Vec3::Zero()};
     w.motion[0] = {Vec3::Zero(), Vec3::Zero()};

@@ -85,9 +85,9 @@ void smooth_laws(const Program& p, Workspace& w, double t, const VecX& q, const 
 void law_forces(const Program& p, Workspace& w, const VecX& v);
 // Adds the friction forces of slipping elements to a generalized force, for the limits held in the workspace.
 void add_slip_forces(const Program& p, Workspace& w, VecX& C, bool load_dependent);
-// Makes reactions of the acceleration and multipliers in the workspace, and of the friction forces unless they are
-// left out.
-void gather_reactions(const Program& p, Workspace& w, bool friction = true);
+// Makes reactions of the acceleration and multipliers in the workspace, and of the forces of the laws on bodies unless
+// the motion is the ideal one.
+void gather_reactions(const Program& p, Workspace& w, bool nonideal = true);
 // C of load-dependent laws together with the reactions of the motion that they cause.
 void solve_reactions(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 

@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
-
 namespace pn {
 
 namespace {
@@ -18,108 +15,6 @@ constexpr double limit_tolerance = 1e-12; // relative change of the limits at wh
 constexpr double slack = 1e-9;            // part of the limit by which a mode may miss its condition by rounding
 constexpr double least_response = 1e-11;  // part of an element's free response that the constraints must leave it
 
-// Free elements F solve W_FF f_F = -(alpha0 + W_FB f_B)_F with least norm.
-void solve_free(const MatX& W, const VecX& alpha0, const std::vector<char>& is_free, VecX& f) {
-    std::vector<int> list;
-    for (int i = 0; i < f.size(); ++i)
-        if (is_free[i]) list.push_back(i);
-    const int n = static_cast<int>(list.size());
-    if (n == 0) return;
-    MatX WF(n, n);
-    VecX r(n);
-    for (int i = 0; i < n; ++i) {
-        r[i] = -alpha0[list[i]];
-        for (int j = 0; j < f.size(); ++j)
-            if (!is_free[j]) r[i] -= W(list[i], j) * f[j];
-        for (int j = 0; j < n; ++j) WF(i, j) = W(list[i], list[j]);
-    }
-    Eigen::CompleteOrthogonalDecomposition<MatX> cod(n, n);
-    cod.setThreshold(1e-11);
-    cod.compute(WF);
-    const VecX x = cod.solve(r);
-    for (int i = 0; i < n; ++i) f[list[i]] = x[i];
-}
-
-// One direction each: block principal pivoting, single (least index) once it fails to make progress.
-VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s) {
-    const int n = static_cast<int>(s.size());
-    VecX f = VecX::Zero(n);
-    std::vector<char> is_free(n, 1);
-    for (int i = 0; i < n; ++i)
-        if (W(i, i) == 0.0 && alpha0[i] != 0.0) {  // driven by the constraints, whatever the friction
-            is_free[i] = 0;
-            f[i] = alpha0[i] > 0.0 ? -s[i] : s[i];
-        }
-    int fewest = n + 1, patience = 10;
-    for (int it = 0; it < 200 + 50 * n; ++it) {
-        solve_free(W, alpha0, is_free, f);
-        const VecX alpha = alpha0 + W * f;
-        const double size = alpha0.cwiseAbs().maxCoeff() + (W * f.cwiseAbs()).cwiseAbs().maxCoeff();
-        std::vector<int> wrong;
-        for (int i = 0; i < n; ++i) {
-            const bool outside = is_free[i] && std::abs(f[i]) > s[i] * (1.0 + 1e-13);
-            const bool drives = !is_free[i] && alpha[i] * f[i] > 1e-13 * size * std::abs(f[i]);
-            if (outside || drives) wrong.push_back(i);
-        }
-        if (wrong.empty()) return f;
-        if (static_cast<int>(wrong.size()) < fewest) {
-            fewest = static_cast<int>(wrong.size());
-            patience = 10;
-        } else if (--patience < 0) {
-            wrong.assign(1, wrong.back());
-        }
-        for (int i : wrong) {
-            if (is_free[i]) f[i] = f[i] > 0.0 ? s[i] : -s[i];
-            is_free[i] = !is_free[i];
-        }
-    }
-    return f;
-}
-
-// Disks and balls: block Gauss-Seidel, each block by its own radius; converges linearly.
-VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s) {
-    const int n = static_cast<int>(alpha0.size());
-    VecX f = VecX::Zero(n);
-    for (int sweep = 0; sweep < 20000; ++sweep) {
-        double change = 0.0, size = 0.0;
-        for (int e = 0, at = 0; e < static_cast<int>(dims.size()); at += dims[e], ++e) {
-            const int d = dims[e];
-            const MatX D = W.block(at, at, d, d);
-            const VecX old = f.segment(at, d);
-            const VecX r = alpha0.segment(at, d) + W.middleRows(at, d) * f - D * old;
-            // min x^T D x / 2 + r^T x in |x| <= s: x = -(D + m I)^-1 r with the least m >= 0.
-            Eigen::SelfAdjointEigenSolver<MatX> eigen(D);
-            const VecX c = eigen.eigenvectors().transpose() * r, l = eigen.eigenvalues();
-            const double tiny = 1e-14 * std::max(l.cwiseAbs().maxCoeff(), 1e-300);
-            const auto length = [&](double m) {
-                double sum = 0.0;
-                for (int k = 0; k < d; ++k) {
-                    const double x = c[k] / std::max(l[k] + m, tiny);
-                    sum += x * x;
-                }
-                return std::sqrt(sum);
-            };
-            double m = 0.0;
-            if (length(0.0) > s[e]) {
-                double low = 0.0, high = s[e] > 0.0 ? c.norm() / s[e] + l.cwiseAbs().maxCoeff() : 0.0;
-                for (int k = 0; k < 200 && high - low > 1e-16 * high; ++k) {
-                    m = 0.5 * (low + high);
-                    (length(m) > s[e] ? low : high) = m;
-                }
-            }
-            VecX x = VecX::Zero(d);
-            if (s[e] > 0.0) {
-                for (int k = 0; k < d; ++k) x -= (c[k] / std::max(l[k] + m, tiny)) * eigen.eigenvectors().col(k);
-            }
-            change = std::max(change, (x - old).cwiseAbs().maxCoeff());
-            size = std::max(size, x.cwiseAbs().maxCoeff());
-            f.segment(at, d) = x;
-        }
-        if (change <= 1e-14 * size) break;
-    }
-    return f;
-}
-
 struct Candidates {
     const Program& p;
     Workspace& w;
@@ -128,6 +23,7 @@ struct Candidates {
     const std::vector<int>& list;
     std::vector<int> dims;
     int rows = 0;
+    double determinant = HUGE_VAL;  // least of the modes in which the reactions have no solution or several
 
     Candidates(const Program& program, Workspace& ws, double time, const VecX& qq, const VecX& vv,
                const std::vector<int>& elements)
@@ -198,6 +94,7 @@ struct Candidates {
             apply_modes(modes);
         } catch (const Failure& failure) {
             if (failure.kind != Failure::Kind::paradox) throw;
+            determinant = std::min(determinant, failure.value);
             return false;
         }
         if (p.needs_reactions) gather_reactions(p, w);
@@ -253,12 +150,6 @@ struct Candidates {
 };
 
 }  // namespace
-
-VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& limits) {
-    if (alpha0.size() == 0) return VecX::Zero(0);
-    if (std::all_of(dims.begin(), dims.end(), [](int d) { return d == 1; })) return box_program(W, alpha0, limits);
-    return ball_program(W, alpha0, dims, limits);
-}
 
 Vec3 friction_force(const Program& p, Workspace& w, int e) {
     const Friction& f = p.frictions[e];
@@ -324,7 +215,7 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
         }
         if (it + 1 == outer_limit) {
             if (c.enumerate(released)) return;
-            throw Failure(Failure::Kind::paradox, t, candidates, w.determinant);
+            throw Failure(Failure::Kind::paradox, t, candidates, std::min(c.determinant, w.determinant));
         }
         // The motion under these forces, and the limits that its loads give: the kinetic one for what slips.
         push.setZero();

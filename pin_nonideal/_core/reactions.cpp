@@ -16,6 +16,8 @@ namespace {
 constexpr double reaction_tolerance = 4e-15;  // relative change of y that counts as rounding
 constexpr double good_contraction = 0.25;     // slower fixed points go to Newton's method
 constexpr int fixed_point_limit = 30, newton_limit = 30;
+constexpr int most_mixed = 6;                 // laws whose mixtures of branches are all looked at; else one by one
+constexpr double same_solution = 1e-9;        // relative distance below which two solutions are the same
 
 struct Implicit {
     const Program& p;
@@ -111,18 +113,95 @@ struct Implicit {
         }
     }
 
-    // More than one solution is possible as soon as some mixture of the branches of |load| makes I - dg/dy singular.
-    void check_uniqueness() {
+    // Unknowns of one law, [first, last): a friction's limit or a user law's force.
+    std::vector<std::pair<int, int>> groups() const {
+        std::vector<std::pair<int, int>> list;
+        int k = 0;
+        for (size_t e = 0; e < p.frictions.size(); ++e)
+            if (is_unknown(e)) { list.emplace_back(k, k + 1); ++k; }
+        for (const UserLaw& law : p.user_laws)
+            if (law.reaction == Reaction::total) { list.emplace_back(k, k + nv()); k += nv(); }
+        return list;
+    }
+
+    // What a friction's limit is without any load.
+    VecX constants() const {
+        VecX c = VecX::Zero(n);
+        int k = 0;
+        for (size_t e = 0; e < p.frictions.size(); ++e)
+            if (is_unknown(e)) c[k++] = p.frictions[e].constant * slip_factor(e);
+        return c;
+    }
+
+    // Laws grow with |load|, which has two branches: beyond the kink a law's rows of dg/dy change their sign. Calls
+    // `look` with dg/dy of each mixture of branches, and the rows that it mirrors, until it returns true.
+    template <class Look>
+    void each_mixture(const MatX& J, const Look& look) const {
+        const auto laws = groups();
+        const int m = static_cast<int>(laws.size());
+        const bool all = m <= most_mixed;
+        for (int mixture = 1; mixture < (all ? 1 << m : m + 1); ++mixture) {
+            MatX other = J;
+            VecX mirrored = VecX::Zero(n);
+            for (int i = 0; i < m; ++i) {
+                if (all ? !(mixture >> i & 1) : i + 1 != mixture) continue;
+                const int first = laws[i].first, count = laws[i].second - first;
+                other.middleRows(first, count) *= -1.0;
+                mirrored.segment(first, count).setOnes();
+            }
+            if (look(other, mirrored)) return;
+        }
+    }
+
+    // Least det(I - dg/dy) over the mixtures of branches.
+    double least_determinant(const MatX& J) const {
         const MatX I = MatX::Identity(n, n);
-        const double here = (I - w.jacobian).determinant();
+        double least = (I - J).determinant();
+        each_mixture(J, [&](const MatX& other, const VecX&) {
+            least = std::min(least, (I - other).determinant());
+            return false;
+        });
+        return least;
+    }
+
+    // y is the only solution when every mixture of branches contracts, which |dg/dy| tells; else another one is looked
+    // for in each mixture that turns the equation over.
+    void check_uniqueness(const VecX& y, double size) {
+        const MatX I = MatX::Identity(n, n), J = w.jacobian;
+        const double here = (I - J).determinant();
         w.determinant = here;
         if (!(here > 0.0)) paradox(here);
-        for (int k = 0; k < n; ++k) {
-            MatX other = w.jacobian;
-            other.row(k) *= -1.0;
+        const VecX bound = (I - J.cwiseAbs()).partialPivLu().solve(VecX::Ones(n));
+        if ((bound.array() > 0.0).all()) return;
+        const VecX c = constants();
+        each_mixture(J, [&](const MatX& other, const VecX& mirrored) {
             const double there = (I - other).determinant();
-            if (!(there > 0.0)) paradox(there);
+            if (there > 0.0) return false;
+            const VecX beyond = 2.0 * mirrored.cwiseProduct(c - y);
+            if (there == 0.0 || leads_elsewhere(y, y + (I - other).partialPivLu().solve(beyond), size)) paradox(there);
+            return false;
+        });
+        w.jacobian = J;
+        w.determinant = here;
+    }
+
+    // Whether Newton's method from `start` finds a solution that is not y.
+    bool leads_elsewhere(const VecX& y, VecX start, double size) {
+        VecX g(n);
+        try {
+            for (int it = 0; it < newton_limit; ++it) {
+                image(start, g);
+                const VecX miss = g - start;
+                const double scale = std::max({size, start.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});
+                if (miss.cwiseAbs().maxCoeff() <= same_solution * scale)
+                    return (start - y).cwiseAbs().maxCoeff() > 1e3 * same_solution * scale;
+                differentiate(start, g, scale);
+                start += (MatX::Identity(n, n) - w.jacobian).partialPivLu().solve(miss);
+            }
+        } catch (const Failure& failure) {
+            if (failure.kind != Failure::Kind::not_finite) throw;
         }
+        return false;
     }
 
     void newton(VecX& y, VecX& g, double size) {
@@ -135,7 +214,7 @@ struct Implicit {
             if (!g.allFinite()) throw Failure(Failure::Kind::not_finite, t);
             if (error <= 8.0 * reaction_tolerance * size || (it > 3 && error <= 1e-12 * size && error >= last)) {
                 differentiate(y, g, size);
-                check_uniqueness();
+                check_uniqueness(y, size);
                 image(y, g);
                 return;
             }
@@ -143,7 +222,7 @@ struct Implicit {
             differentiate(y, g, size);
             y += (MatX::Identity(n, n) - w.jacobian).partialPivLu().solve(miss);
         }
-        w.determinant = (MatX::Identity(n, n) - w.jacobian).determinant();
+        w.determinant = least_determinant(w.jacobian);
         paradox(w.determinant);
     }
 

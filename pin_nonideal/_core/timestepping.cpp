@@ -39,7 +39,7 @@ void Simulation::moreau_step(double step) {
     const VecX force = w.F + (p.has_laws() ? w.C : VecX(VecX::Zero(nv)));
     solve_motion(p, w, force);
     const VecX a_free = w.a;
-    VecX alpha0(rows), f = VecX::Zero(rows), limits(n);
+    VecX alpha0(rows), f = VecX::Zero(rows), limits(n), met(n);  // met: limits that f was found for
     MatX W(rows, rows), response(nv, rows), multipliers(p.layout.rows, rows);
     const VecX lam_free = w.lam;
     const auto slip = [&](const VecX& a, VecX& out_alpha) {
@@ -94,13 +94,14 @@ void Simulation::moreau_step(double step) {
         }
         if (pass > 0 && (change <= load_tolerance * size || !p.needs_reactions)) break;
         f = friction_program(W, alpha0, dims, limits);
+        met = limits;
         if (pass + 1 == load_passes) throw Failure(Failure::Kind::paradox, t, {0}, change);
     }
     const VecX end = alpha0 + W * f;
     VecX v1 = v0 + step * (a_free + response * f);
     for (int e = 0, at = 0; e < n; at += dims[e], ++e) {
-        const bool held = f.segment(at, dims[e]).norm() < limits[e] * (1.0 - 1e-12) || limits[e] == 0.0;
-        w.mode[e] = held && limits[e] > 0.0 ? sticking : dims[e] > 1 || end[at] > 0.0 ? 1 : -1;
+        const bool held = f.segment(at, dims[e]).norm() < met[e] * (1.0 - 1e-12);
+        w.mode[e] = held ? sticking : dims[e] > 1 || end[at] > 0.0 ? 1 : -1;
         if (w.mode[e] == sticking)
             if (const auto* d = std::get_if<DofRows>(&p.blocks[p.frictions[e].block].kind))
                 for (int k = 0; k < d->count; ++k) v1[d->dof + k] = 0.0;
