@@ -1,4 +1,4 @@
-"""Conditions of friction at one instant of a run, from Pinocchio's inverse dynamics and the laws' closed forms.
+"""Conditions of friction at one instant of a run, by Pinocchio's inverse dynamics and the laws' closed forms.
 
 Nothing here comes from the core but the motion and the multipliers that it recorded, and the matrix A, which
 is compared with differences elsewhere.

@@ -160,6 +160,16 @@ class TestLuGre:
         assert_close(second.v, first.v, 1e-12)
         assert_close(second.z, first.z, 1e-14)
 
+    def test_tolerance_of_the_bristles(self):
+        """States of laws take the one absolute tolerance, or the smallest of many."""
+        law = pn.LuGre("mass", 1e3, 30.0, coulomb=1.0, stribeck_velocity=1e-2)
+        runs = [
+            pn.simulate(slider([law]), 0.5, v=[0.3], rtol=1e-6, atol=atol)
+            for atol in (1e-5, [1e-5, 1e-5], [1e-3, 1e-5], [1e-5, 1e-9])
+        ]
+        np.testing.assert_array_equal(runs[1].z, runs[0].z)
+        assert runs[2].stats.steps <= runs[1].stats.steps < runs[3].stats.steps
+
 
 class TestDrag:
     """f = -coefficient |u|^(exponent - 1) u at a frame's origin, C = J^T f."""
