@@ -1,0 +1,106 @@
+"""Five mechanisms that rub: one holds, two settle, one sticks and slips in turn, one locks itself.
+
+Each prints what friction did beside what can be said in closed form.  With --html FOLDER it writes replays,
+whose time lines show what sticks and what slips.
+
+Run: python examples/friction.py [NAME ...] [--html FOLDER]
+with NAME among loaded_joint, rough_four_bar, panda_settling, belt_oscillator, worm_drive; all when left out.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+import pin_nonideal as pn
+
+G = 9.81
+TIGHT = {"rtol": 1e-10, "atol": 1e-11}
+
+
+def show(what, computed, expected):
+    print(f"  {what:46s} {computed:18.12f} {expected:18.12f} {abs(computed - expected):9.1e}")
+
+
+def first(run, kind):
+    """Time of the first event of a kind [s]."""
+    return next(event.time for event in run.events if event.kind == kind)
+
+
+def loaded_joint():
+    """A pin of radius 20 mm carries 8.56 kg; it holds until the torque on it reaches 1.3 mu r m g."""
+    run = pn.simulate(pn.load("loaded_joint"), 6.0, **TIGHT)
+    limit = 1.3 * 0.2 * 0.02 * 8.56 * G
+    weight = (1.0 * 0.14 + 1.56 * 0.42 - 6.0 * 0.13) * G  # torque of the lever about the pin
+    show("lets go when the torque grows past the limit [s]", first(run, "slip"), 1.0 + (limit - weight) / 0.2)
+    show("largest speed before [rad/s]", np.abs(run.v[run.t < first(run, "slip")]).max(), 0.0)
+    print(f"  holds again from {first(run, 'stick'):.6f} s on")
+    show("speed at the end [rad/s]", np.abs(run.v[-1]).max(), 0.0)
+    return run
+
+
+def rough_four_bar():
+    """Four pins, the one that closes the loop among them, take all that the four-bar had."""
+    run = pn.simulate(pn.load("rough_four_bar"), 5.0, record="energy", **TIGHT)
+    taken = sum(values[-1] for name, values in run.energy.items() if name.endswith("friction"))
+    show("work of the pins [J]", taken, run.energy["total"][-1] - run.energy["total"][0])
+    show("speed at the end [rad/s]", np.abs(run.v[-1]).max(), 0.0)
+    return run
+
+
+def panda_settling():
+    """Seven joints whose friction follows what they carry bring the hanging arm to rest."""
+    run = pn.simulate(pn.load("panda_settling"), 10.0, record="energy", **TIGHT)
+    rest = run.t[np.flatnonzero(np.abs(run.v).max(axis=1))[-1]]
+    print(f"  at rest from {rest:.6f} s on, after {len(run.events)} events")
+    scale = np.ptp(run.energy["potential"])
+    show("balance of the energy, part of what fell", np.abs(run.energy["balance"]).max() / scale, 0.0)
+    show("speed at the end [rad/s]", np.abs(run.v[-1]).max(), 0.0)
+    return run
+
+
+def belt_oscillator():
+    """1 kg on 100 N/m, belt 0.1 m/s, 8 N before it slips, then 5 N: a circle's arc in the phase plane."""
+    run = pn.simulate(pn.load("belt_oscillator"), 5.0, **TIGHT)
+    slips = [event.time for event in run.events if event.kind == "slip"]
+    sticks = [event.time for event in run.events if event.kind == "stick" and event.time > slips[0]]
+    show("begins to slip [s]", slips[0], 0.08 / 0.1)
+    show("slips for [s]", sticks[0] - slips[0], (np.pi + 2.0 * np.arctan2(0.01, 0.03)) / 10.0)
+    show("sticks for [s]", slips[1] - sticks[0], 2.0 * 0.03 / 0.1)
+    return run
+
+
+def worm_drive():
+    """The thread, mu r = 2 mm, holds the rack, which falls 1.6 mm a radian, with the motor off."""
+    run = pn.simulate(pn.load("worm_drive"), 7.0, output_dt=0.01, **TIGHT)
+    off = (run.t > first(run, "stick")) & (run.t < first(run, "slip"))
+    show("speed with the motor off [rad/s]", np.abs(run.v[off]).max(), 0.0)
+    show("way of the rack meanwhile [rad of thread]", np.ptp(run.q[off, 1]), 0.0)
+    return run
+
+
+EXAMPLES = {
+    f.__name__: f for f in (loaded_joint, rough_four_bar, panda_settling, belt_oscillator, worm_drive)
+}
+
+
+def main(arguments=None):
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", help=f"any of {', '.join(EXAMPLES)}; all when left out")
+    parser.add_argument("--html", metavar="FOLDER", type=Path, help="folder for the replays")
+    options = parser.parse_args(arguments)
+    unknown = sorted(set(options.names) - set(EXAMPLES))
+    if unknown:
+        parser.error(f"no example {', '.join(unknown)}; known: {', '.join(EXAMPLES)}")
+    for name in options.names or EXAMPLES:
+        print(f"{name:48s} {'computed':>18s} {'expected':>18s}")
+        run = EXAMPLES[name]()
+        if options.html is not None:
+            options.html.mkdir(parents=True, exist_ok=True)
+            print(f"  wrote {pn.replay(run, options.html / f'{name}.html')}")
+
+
+if __name__ == "__main__":
+    main()
