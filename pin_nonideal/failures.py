@@ -88,6 +88,12 @@ def named_failure(text: str, model: Any, low: Lowered) -> RunError:
     if kind == CLOSURE:
         name = list(low.blocks)[items[0]]
         return _opened(name, {name: value}, t)
+    if kind == STEP_SIZE and value:
+        return StepSizeError(
+            f"the run would never end: after {value:.0f} steps it has come to t = {t:.4g} s; "
+            'simulate a shorter duration, loosen rtol and atol, or use "Radau"',
+            time=t,
+        )
     if kind == STEP_SIZE:
         return StepSizeError(
             f"the step size fell below rounding at t = {t:.6g} s: the motion is singular there, or stiff; "

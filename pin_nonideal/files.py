@@ -24,7 +24,7 @@ def file_path(what: str, value: Any) -> Path:
     """
     if not isinstance(value, (str, os.PathLike)) or not isinstance(os.fspath(value), str):
         raise InputError(f"{what} must be the name of a file; got {value!r}")
-    if not Path(value).name:
+    if not Path(value).name or "\0" in os.fspath(value):
         raise InputError(f"{what} must be the name of a file; got {os.fspath(value)!r}")
     return Path(value)
 
@@ -47,6 +47,8 @@ def whole_file(path: Path, what: str) -> Iterator[IO[bytes]]:
     try:
         with os.fdopen(handle, "wb") as stream:
             yield stream
+            stream.flush()
+            os.fsync(stream.fileno())  # on the disk before it bears its name
         os.chmod(temporary, 0o666 & ~_umask())
         os.replace(temporary, path)
     except BaseException as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -51,8 +52,30 @@ def load(name: str | os.PathLike[str], **parameters: Any) -> Scene:
         InputError: an unknown parameter, or a bad value of one.
     """
     text = os.fspath(name) if isinstance(name, (str, os.PathLike)) else None
-    if not isinstance(text, str) or not text:
+    if not isinstance(text, str) or not text or "\0" in text:
         raise InputError(f"name must be the name of a robot or a path; got {name!r}")
+    scene = _load(name, text, parameters)
+    scene.origin = _origin(text, parameters)
+    return scene
+
+
+def _origin(text: str, parameters: dict[str, Any]) -> dict[str, Any] | None:
+    """Name and parameters that load the same scene from any folder; None when a file cannot hold them."""
+    kept, path = dict(parameters), Path(text).expanduser()
+    folders = kept.get("package_dirs")
+    if folders is not None:
+        listed = [folders] if isinstance(folders, (str, Path)) else folders
+        kept["package_dirs"] = [str(Path(folder).resolve()) for folder in listed]
+    own = text in robot_folders() or not path.exists()
+    try:
+        return dict(
+            json.loads(json.dumps({"name": text if own else str(path.resolve()), "parameters": kept}))
+        )
+    except (TypeError, ValueError):
+        return None
+
+
+def _load(name: str | os.PathLike[str], text: str, parameters: dict[str, Any]) -> Scene:
     path = Path(text).expanduser()
     folders = robot_folders()
     if text in folders:

@@ -29,6 +29,7 @@ def lower(
     laws: Sequence[Any],
     forces: Sequence[Any],
     actuation: Any,
+    builder: Any = None,
 ) -> Lowered:
     """Writes one scene into the core's builder: rows first, then the laws that read them, then given forces.
 
@@ -40,6 +41,7 @@ def lower(
         laws: descriptions.
         forces: descriptions.
         actuation: None, an array (nv,), a function, or a description.
+        builder: what the scene is written into; a new program of the core when None.
 
     Returns:
         The program under construction with its names.
@@ -49,7 +51,7 @@ def lower(
     """
     where = Resolution(model, q0)
     try:
-        out = Lowered(core.Builder(model))
+        out = Lowered(core.Builder(model) if builder is None else builder)
     except ValueError as error:
         raise InputError(str(error)) from None
     taken: set[str] = set()

@@ -56,6 +56,7 @@ class Scene:
         element_names: names of the frictional elements, in the order of `modes`.
         law_names: names of the laws, in the order of the ledger's columns.
         dropped: (name, row, reason) of rows that can never act.
+        origin: name and parameters that `load` made the scene from; None of another one.
     """
 
     def __init__(
@@ -121,6 +122,7 @@ class Scene:
         self._runner = self._builder.runner()
         self._nv = int(model.nv)
         self._closed: tuple[Array, Array] | None = None
+        self.origin: dict[str, Any] | None = None
 
     def __repr__(self) -> str:
         return (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Sequence
@@ -11,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .actuation import SampledControl
+from .checkpoint import Saver
 from .checks import array, choice, count, label, nonnegative, number, positive, sequence
-from .errors import InputError, RunError, RunInterrupted, UserFunctionError
+from .errors import InputError, OutputError, RunError, RunInterrupted, UserFunctionError
 from .failures import check_closed
 from .scene import Scene
 from .trajectory import Event, Stats, Trajectory
@@ -30,6 +32,8 @@ DEFAULT_RTOL, DEFAULT_ATOL = 1e-8, 1e-10
 # shorter than a spacing leads nowhere.
 LEAST_SPACINGS = 100.0
 MOST_SAMPLES = 1e8  # some gigabytes for a small robot
+# No step meets a tolerance below rounding; the square of what misses it must not overflow.
+LEAST_RTOL, LEAST_ATOL = 1e-14, 1e-100
 
 
 def simulate(
@@ -46,6 +50,8 @@ def simulate(
     output_dt: float | None = None,
     record: str | Sequence[str] = (),
     progress: bool | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    checkpoint_interval: float = 60.0,
 ) -> Trajectory:
     """Integrates a scene in time, on its constraints.
 
@@ -68,12 +74,17 @@ def simulate(
         output_dt: time between samples [s]; every accepted step when None.  Events are samples as well.
         record: any of "a", "forces", "energy", "power", or names of fields that they fill.
         progress: progress bar on standard error; None shows it on a terminal only.
+        checkpoint: file that the run is kept in, so that `resume` goes on with it should it be killed; None
+            for none.  It is replaced whole, at the start, at the end, on Ctrl-C between two steps, and every
+            `checkpoint_interval`.  Of the core's methods only.
+        checkpoint_interval: wall time between checkpoints [s]; 0 for one after every step.
 
     Returns:
         The Trajectory.
 
     Raises:
         InputError: an argument does not fit.
+        OutputError: the checkpoint cannot be written.
         LoopClosureError: the initial state cannot be put on the constraints, or the run was pulled off them.
         RunError: the run stopped early; its `trajectory` holds the samples up to there.
         RunInterrupted: Ctrl-C; the same.
@@ -87,7 +98,14 @@ def simulate(
         else scene.initial_state()
     )
     choice("simulate: progress", progress, (True, False, None))
-    bar = _progress_bar(progress, options)
+    if checkpoint is not None:
+        if method in SCIPY:
+            raise InputError(
+                f'simulate: checkpoint needs one of the core\'s methods; "{method}" runs in SciPy, which '
+                "does not give its state away"
+            )
+        Saver(checkpoint, scene, options, checkpoint_interval)
+    bar = progress_bar(progress, options)
     options["tick"] = bar.update if bar else None
     begin = time.perf_counter()
     try:
@@ -100,7 +118,7 @@ def simulate(
     finally:
         if bar:
             bar.close()
-    return _finish(scene, raw, options, time.perf_counter() - begin)
+    return finish(scene, raw, options, time.perf_counter() - begin)
 
 
 def rollout(
@@ -158,7 +176,6 @@ def rollout(
         raise InputError(f'rollout: method must be one of the core\'s; "{method}" runs in SciPy')
     options = _options(scene, duration, t0, method, rtol, atol, dt, output_dt, record)
     starts = [scene.project(a, b, options["t0"]) for a, b in zip(starts_q, starts_v, strict=True)]
-    options["tick"] = None
     begin = time.perf_counter()
     q0, v0 = (np.ascontiguousarray([s[i] for s in starts]).reshape(len(starts), -1) for i in (0, 1))
     raws = scene.roll_out(q0, v0, options, threads)
@@ -166,7 +183,7 @@ def rollout(
     results = []
     for i, raw in enumerate(raws):
         try:
-            results.append(_finish(scene, raw, options, wall))
+            results.append(finish(scene, raw, options, wall))
         except RunError as error:
             error.index = i
             raise
@@ -225,11 +242,12 @@ def _options(
         "method": method,
         "duration": length,
         "t0": begin,
-        # Below a few units of rounding no step can meet its tolerance.
-        "rtol": max(relative, 1e-14) if relative else 0.0,
-        "atol": np.ascontiguousarray(np.maximum(tolerance, 1e-300)),
+        "rtol": max(relative, LEAST_RTOL) if relative else 0.0,
+        "atol": np.ascontiguousarray(np.maximum(tolerance, LEAST_ATOL)),
         **{key: lengths.get(key, 0.0) for key in steps},
         **{key: key in groups for key in RECORDS},
+        "tick": None,
+        "save": None,
     }
 
 
@@ -251,7 +269,7 @@ def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, fl
     if isinstance(scene.actuation, SampledControl):
         named[f"{label(scene.actuation)}: period"] = scene.actuation.period
     for what, value in named.items():
-        if value < LEAST_SPACINGS * spacing:
+        if not value >= LEAST_SPACINGS * spacing:  # also when the end is beyond all numbers
             raise InputError(
                 f"{what} must be at least {LEAST_SPACINGS:g} times the spacing of floating-point times, "
                 f"which is {spacing:.2g} s at t = {end:g} s; got {value:g} s"
@@ -264,8 +282,19 @@ def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, fl
         )
 
 
-def _finish(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: float) -> Trajectory:
-    """Shapes the core's flat arrays; raises what stopped the run, with the trajectory attached."""
+def finish(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: float) -> Trajectory:
+    """Shapes the core's flat arrays; raises what stopped the run, with the trajectory attached.
+
+    Args:
+        scene: the scene that ran.
+        raw: arrays by name.
+        options: what was asked for.
+        wall: wall time [s].
+
+    Raises:
+        RunError: the run stopped early.
+        OutputError: its first checkpoint could not be written.
+    """
     trajectory = shaped(scene, raw, options, wall)
     error = raw["error"]
     if error is None:
@@ -279,6 +308,8 @@ def _finish(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: fl
                 time=last,
             )
             cause: BaseException | None = None
+        elif isinstance(error, OutputError):
+            raise error
         elif isinstance(error, RunError):
             stopped, cause = error, error.__cause__
         else:
@@ -383,6 +414,12 @@ class _Bar:
         self._bar.close()
 
 
-def _progress_bar(progress: bool | None, options: dict[str, Any]) -> _Bar | None:
+def progress_bar(progress: bool | None, options: dict[str, Any]) -> _Bar | None:
+    """The bar that shows how far a run has come, or None where it is not wanted.
+
+    Args:
+        progress: True, False, or None for a terminal only.
+        options: of the run.
+    """
     shown = sys.stderr.isatty() if progress is None else progress
     return _Bar(options["duration"], options["t0"]) if shown else None

@@ -46,6 +46,8 @@ def sweep(
     for entry in table:
         if not isinstance(entry, Mapping):
             raise InputError(f"sweep: parameters must hold mappings of keyword arguments; got {entry!r}")
+    if options.get("checkpoint") is not None:
+        raise InputError("sweep: checkpoint is the file of one run; its runs would overwrite one another's")
     options.setdefault("progress", False)
     runs: list[Trajectory] = Parallel(n_jobs=jobs)(
         delayed(_one)(make, dict(p), duration, options) for p in table

@@ -354,7 +354,8 @@ void Simulation::bridge_cluster(double at, VecX& state, int element) {
     out.events.push_back({at, Event::Kind::chatter, element});
     y = state;
     t = at;
-    step_in_time(std::min(t_end, at + chatter_time), chatter_time / chatter_steps);
+    const double stop = std::min(t_end, at + chatter_time);
+    while (t < stop) step_in_time(stop, chatter_time / chatter_steps);
     state = y;
     switch_modes(t, state, -1);
     y = state;

@@ -460,6 +460,14 @@ Options read_options(const nb::dict& d) {
         if (PyErr_CheckSignals() != 0) throw nb::python_error();
         if (!tick.is_none()) tick(t);
     };
+    const nb::object save = nb::cast<nb::object>(d["save"]);
+    if (save.is_none()) return o;
+    o.save = [save](const std::string& state) {
+        nb::gil_scoped_acquire gil;
+        save(nb::bytes(state.data(), state.size()));
+    };
+    o.save_interval = std::chrono::duration_cast<Clock::duration>(
+        std::chrono::duration<double>(nb::cast<double>(d["save_interval"])));
     return o;
 }
 
@@ -468,6 +476,9 @@ Options read_options(const nb::dict& d) {
 NB_MODULE(_core, m) {
     nb::set_leak_warnings(false);  // a user's function may hold the scene that holds it: a cycle, not a fault
     m.attr("pinocchio_version") = PIN_NONIDEAL_PINOCCHIO_VERSION;
+    // Changes with the members of what a checkpoint holds.
+    m.attr("state_layout") = std::to_string(sizeof(Workspace)) + "." + std::to_string(sizeof(Simulation)) + "." +
+                             std::to_string(sizeof(long)) + " for Pinocchio " PIN_NONIDEAL_PINOCCHIO_VERSION;
 
     static PyObject* core_failure = nb::exception<Failure>(m, "CoreFailure").ptr();
     (void)core_failure;
@@ -702,6 +713,16 @@ NB_MODULE(_core, m) {
                 simulate(*r.p, *r.w, q0, v0, o, recording);
             }
             return hand_over(*r.w, recording);
+        })
+        .def("resume", [](Runner& r, nb::bytes state, const nb::dict& options) {
+            const Options o = read_options(options);
+            const std::string bytes(static_cast<const char*>(state.data()), state.size());
+            Recording recording;
+            {
+                nb::gil_scoped_release release;
+                resume(*r.p, *r.w, bytes, o, recording);
+            }
+            return hand_over(*r.w, recording);
         });
 
     // Many states in native threads, one workspace a thread.
@@ -711,7 +732,10 @@ NB_MODULE(_core, m) {
         std::vector<Recording> recordings(count);
         std::vector<std::unique_ptr<Workspace>> spaces;
         for (size_t i = 0; i < count; ++i) spaces.emplace_back();
-        Options o = read_options(options);
+        // Copied here and not in the threads: options hold Python's objects, whose counts need the lock.
+        const Options o = read_options(options);
+        Options silent = o;
+        silent.tick = nullptr;
         const VecX z0 = map(z);
         std::vector<VecX> q0, v0;
         for (size_t i = 0; i < count; ++i) {
@@ -722,9 +746,7 @@ NB_MODULE(_core, m) {
         {
             nb::gil_scoped_release release;
             std::atomic<size_t> next{0};
-            const auto work = [&](bool first) {
-                Options mine = o;
-                if (!first) mine.tick = nullptr;
+            const auto work = [&](const Options& mine) {
                 for (size_t i = next++; i < count; i = next++) {
                     spaces[i] = std::make_unique<Workspace>(p);
                     spaces[i]->z = z0;
@@ -732,8 +754,8 @@ NB_MODULE(_core, m) {
                 }
             };
             std::vector<std::thread> pool;
-            for (int k = 1; k < threads; ++k) pool.emplace_back(work, false);
-            work(true);
+            for (int k = 1; k < threads; ++k) pool.emplace_back(work, std::cref(silent));
+            work(o);
             for (std::thread& thread : pool) thread.join();
         }
         nb::list out;

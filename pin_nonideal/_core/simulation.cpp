@@ -19,6 +19,10 @@ double rounding_at(double pivot) { return 2.2e-16 / (pivot * std::sqrt(pivot)); 
 constexpr double clearance = 0.04, detour = 0.85;
 constexpr int detour_limit = 3;
 
+// A run that has come less than this part of its way after so many steps never ends.
+constexpr long early_steps = 20000;
+constexpr double least_progress = 1e-10;
+
 }  // namespace
 
 Simulation::Simulation(const Program& program, Workspace& workspace, const Options& options, Recording& recording)
@@ -33,8 +37,17 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
     slip_at_start.assign(p.frictions.size(), 0.0);
 }
 
-void Simulation::tick(double now) {
-    if (o.tick && (++ticks & 15) == 0) o.tick(now);
+// The only place where a run is interrupted or saved: what is left here is all that the next step needs.
+void Simulation::between_steps() {
+    try {
+        if (o.tick && (++ticks & 15) == 0) o.tick(t);
+    } catch (...) {
+        if (o.save) save();
+        throw;
+    }
+    if (o.save && Clock::now() >= next_save) save();
+    if (out.steps == early_steps && t - o.t0 < least_progress * o.duration)
+        throw Failure(Failure::Kind::step_size, t, {}, static_cast<double>(out.steps));
 }
 
 // --- Actuation and stops ------------------------------------------------------------------------------------------
@@ -131,21 +144,21 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
     out.events.clear();
     emit(t, y, true);
     report_pulls(t);
-}
-
-void Simulation::run(const VecX& q0, const VecX& v0) {
-    start(q0, v0);
-    if (o.method.kind == Method::Kind::moreau) {
-        step_in_time(t_end, o.dt);
-        return;
-    }
     h = o.dt;
     if (o.method.adaptive) {
         stepper.K[0] = derivative;
         h = stepper.initial_step(t, y, o.rtol, o.atol, t_end - t);
         begin_step(p, w, t, q_ = y.head(system.nq), v_ = y.segment(system.nq, system.nv));
     }
+}
+
+void Simulation::run() {
     while (t < t_end) {
+        between_steps();
+        if (o.method.kind == Method::Kind::moreau) {
+            step_in_time(t_end, o.dt);
+            continue;
+        }
         sample_control(t);
         double stop = next_stop(t);
         if (!o.method.adaptive) {  // the fixed grid, whatever events cut out of it
@@ -154,6 +167,7 @@ void Simulation::run(const VecX& q0, const VecX& v0) {
         }
         advance_to(stop);
     }
+    if (o.save) save();
 }
 
 // One accepted step, or one that ends at an event, not beyond `stop`.
@@ -217,7 +231,6 @@ void Simulation::advance_to(double stop) {
         }
         q_ = y.head(system.nq);
         v_ = y.segment(system.nq, system.nv);
-        tick(t);
         return;
     }
     if (o.method.adaptive) {
@@ -236,7 +249,6 @@ void Simulation::advance_to(double stop) {
     emit_between(t);
     y = stepper.y1;
     derivative = stepper.f1;
-    tick(t);
     if (event && trigger_element != no_trigger) {
         switch_modes(t, y, trigger_element);
         emit(t, y, true);
@@ -257,14 +269,29 @@ void Simulation::advance_to(double stop) {
     }
 }
 
-void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, const Options& options, Recording& out) {
+template <class Steps>
+static void keep_what_stops(Recording& out, Steps steps) {
     try {
-        Simulation(p, w, options, out).run(q0, v0);
+        steps();
     } catch (const Failure& failure) {
         out.failure = failure;
     } catch (...) {
         out.error = std::current_exception();
     }
+}
+
+void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, const Options& options, Recording& out) {
+    Simulation simulation(p, w, options, out);
+    keep_what_stops(out, [&] {
+        simulation.start(q0, v0);
+        simulation.run();
+    });
+}
+
+void resume(const Program& p, Workspace& w, const std::string& state, const Options& options, Recording& out) {
+    Simulation simulation(p, w, options, out);
+    simulation.restore(state);
+    keep_what_stops(out, [&] { simulation.run(); });
 }
 
 }  // namespace pn

@@ -1,6 +1,7 @@
 // The time loop: steps, projection, events, samples.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <optional>
 
@@ -10,22 +11,34 @@
 
 namespace pn {
 
+using Clock = std::chrono::steady_clock;
+
+class Archive;
+
 struct Options {
     Method method;
     double t0 = 0.0, duration = 0.0;
     double rtol = 1e-8, dt = 0.0, output_dt = 0.0;  // output_dt 0: every accepted step
     VecX atol;                                      // 2 nv + states
     RecordOptions record;
-    std::function<void(double t)> tick;  // progress and interruption, called now and then
+    std::function<void(double t)> tick;  // progress and interruption, called now and then between steps
+    std::function<void(const std::string& state)> save;  // writes a checkpoint; empty: none
+    Clock::duration save_interval{};                     // of wall time
 };
 
 // Runs into `out`; failures end the run there and keep the samples.
 void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, const Options& options, Recording& out);
+// Goes on from the state that `save` was given, with the same options; throws std::invalid_argument when the state does
+// not fit.
+void resume(const Program& p, Workspace& w, const std::string& state, const Options& options, Recording& out);
 
 class Simulation {
 public:
     Simulation(const Program& p, Workspace& w, const Options& options, Recording& out);
-    void run(const VecX& q0, const VecX& v0);
+    void start(const VecX& q0, const VecX& v0);
+    void restore(const std::string& state);
+    // To the end, from the start or from a restored state.
+    void run();
 
 private:
     // Chatter: this many events within this time make the run go on by time stepping for a while.
@@ -33,7 +46,9 @@ private:
     static constexpr double chatter_time = 1e-4;
     static constexpr int chatter_steps = 50;
 
-    void start(const VecX& q0, const VecX& v0);
+    void between_steps();
+    void save();
+    void archive(Archive& a);
     void sample_control(double t);
     double next_stop(double t) const;
     void advance_to(double stop);
@@ -42,7 +57,6 @@ private:
     double energy_at(const VecX& y);
     void emit_between(double t_end);
     void emit(double t, const VecX& y, bool evaluated);
-    void tick(double t);
 
     // Events.
     static constexpr int no_trigger = -2;
@@ -60,7 +74,7 @@ private:
 
     // Time stepping at velocity level.
     void moreau_step(double h);
-    void step_in_time(double stop, double dt);
+    void step_in_time(double stop, double dt);  // one step, not beyond `stop`
 
     const Program& p;
     Workspace& w;
@@ -73,6 +87,7 @@ private:
     VecX y, derivative, q_, v_, probe_, probe_rate_;
     long samples = 0;  // of the output grid, so far
     long ticks = 0;
+    Clock::time_point next_save;
     double next_sample = 0.0;
     std::vector<double> recent_events, slip_at_start;
     std::vector<char> pulls, indeterminate;

@@ -122,30 +122,27 @@ void Simulation::moreau_step(double step) {
 }
 
 void Simulation::step_in_time(double stop, double dt) {
-    while (t < stop) {
-        sample_control(t);
-        double end = std::min({t + dt, stop, next_stop(t)});
-        if (o.output_dt > 0.0) end = std::min(end, std::max(next_sample, std::nextafter(t, stop)));
-        if (stop - end < 1e-9 * dt) end = stop;
-        const std::vector<signed char> before = w.mode;
-        moreau_step(end - t);
-        t = end;
-        want_rows(p, w);
-        q_ = y.head(system.nq);
-        v_ = y.segment(system.nq, system.nv);
-        begin_step(p, w, t, q_, v_);  // factors of the new modes: what sticks must not move as the rest is projected
-        settle(t, y, derivative);
-        recorder.moved_energy += pending_energy;
-        for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
-            if (before[e] != w.mode[e])
-                out.events.push_back({t, w.mode[e] == sticking ? Event::Kind::stick
-                                          : before[e] == sticking ? Event::Kind::slip : Event::Kind::reverse, e});
-        report_pulls(t);
-        tick(t);
-        const bool on_grid = o.output_dt > 0.0 && next_sample <= t + 1e-12 * std::max(1.0, std::abs(t));
-        if (on_grid) next_sample = o.t0 + ++samples * o.output_dt;
-        if (o.output_dt == 0.0 || on_grid || t >= t_end) emit(t, y, true);
-    }
+    sample_control(t);
+    double end = std::min({t + dt, stop, next_stop(t)});
+    if (o.output_dt > 0.0) end = std::min(end, std::max(next_sample, std::nextafter(t, stop)));
+    if (stop - end < 1e-9 * dt) end = stop;
+    const std::vector<signed char> before = w.mode;
+    moreau_step(end - t);
+    t = end;
+    want_rows(p, w);
+    q_ = y.head(system.nq);
+    v_ = y.segment(system.nq, system.nv);
+    begin_step(p, w, t, q_, v_);  // factors of the new modes: what sticks must not move as the rest is projected
+    settle(t, y, derivative);
+    recorder.moved_energy += pending_energy;
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
+        if (before[e] != w.mode[e])
+            out.events.push_back({t, w.mode[e] == sticking ? Event::Kind::stick
+                                      : before[e] == sticking ? Event::Kind::slip : Event::Kind::reverse, e});
+    report_pulls(t);
+    const bool on_grid = o.output_dt > 0.0 && next_sample <= t + 1e-12 * std::max(1.0, std::abs(t));
+    if (on_grid) next_sample = o.t0 + ++samples * o.output_dt;
+    if (o.output_dt == 0.0 || on_grid || t >= t_end) emit(t, y, true);
 }
 
 }  // namespace pn

@@ -1,0 +1,392 @@
+"""A run that was stopped goes on bit by bit as if it had never been."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import pin_nonideal as pn
+from pin_nonideal import checkpoint, simulation
+from pin_nonideal.errors import InputError, LoadingError, OutputError, RunInterrupted
+
+from .random_trees import add
+from .small_robots import refuses
+
+ALL = ("a", "forces", "energy", "power")
+
+
+def cart():
+    """A mass on a rail, pulled so that it slips, sticks and reverses, with a user law that has a state."""
+    model = pin.Model()
+    model.name = "cart"
+    model.gravity = pin.Motion(np.array([0.0, 0.0, -9.81]), np.zeros(3))
+    add(model, "rail", "prismatic x", 0, np.random.default_rng(0))
+    add(model, "swing", "revolute y", 1, np.random.default_rng(1))
+    pull = pn.Wrench("rail tip", lambda t: [30.0 * np.sin(4.0 * t), 0.0, 0.0, 0.0, 0.0, 0.0])
+    rub = [
+        pn.JointFriction("rail", mu=0.2, coulomb=2.0, static_ratio=1.3, viscous=0.1),
+        pn.UserLaw(
+            lambda t, q, v, r, z: (np.array([0.0, -0.1 * z[0]]), [v[1] - z[0]]), states=1, name="wear"
+        ),
+    ]
+    return pn.Scene(model, laws=rub, forces=[pull], q0=[0.0, 0.7], name="cart")
+
+
+def driven_arm():
+    """The package's arm under a torque that is sampled and held."""
+    scene = pn.load("panda_friction")
+    control = pn.SampledControl(lambda t, q, v: -20.0 * (q - scene.q0) - 2.0 * v + np.sin(7.0 * t), 0.013)
+    return pn.Scene(scene.model, laws=scene.laws, q0=scene.q0, actuation=control, name="arm")
+
+
+# Every method of the core; friction that sticks and slips; loops, redundant ones too; held torques.
+RUNS = {
+    "events": (cart, 1.5, {"record": ALL, "rtol": 1e-6}),
+    "events on a grid": (cart, 1.5, {"record": ALL, "output_dt": 0.02, "method": "dopri5"}),
+    "fixed steps with events": (cart, 1.5, {"record": "energy", "method": "rk4", "dt": 0.01}),
+    "time stepping": (cart, 1.5, {"record": ALL, "method": "moreau", "dt": 0.01, "output_dt": 0.03}),
+    "loop": (lambda: pn.load("four_bar"), 1.0, {"record": ALL}),
+    "loop, order 1": (lambda: pn.load("four_bar"), 0.2, {"method": "semi_implicit_euler", "dt": 1e-3}),
+    "redundant loops": (lambda: pn.load("n_four_bar", N=4), 0.5, {"record": "forces", "output_dt": 0.05}),
+    "sliding feet": (lambda: pn.load("solo12_standing"), 0.2, {"record": "energy", "rtol": 1e-5}),
+    "sampled torque": (driven_arm, 0.2, {"record": "energy"}),
+    "rolling": (lambda: pn.load("rolling_disk"), 0.5, {"output_dt": 0.1}),
+}
+
+
+def same(one, other):
+    """Every array bit by bit, events and counters."""
+    for key in (
+        "t",
+        "q",
+        "v",
+        "violation",
+        "violation_rate",
+        "a",
+        "F_ideal",
+        "F_nonideal",
+        "lam",
+        "lam_ideal",
+    ):
+        np.testing.assert_array_equal(getattr(one, key), getattr(other, key), err_msg=key, strict=True)
+    for key in ("z", "modes"):
+        np.testing.assert_array_equal(getattr(one, key), getattr(other, key), err_msg=key, strict=True)
+    for key in ("energy", "power"):
+        tables = getattr(one, key), getattr(other, key)
+        assert (tables[0] is None) == (tables[1] is None)
+        for name in tables[0] or {}:
+            np.testing.assert_array_equal(tables[0][name], tables[1][name], err_msg=name, strict=True)
+    assert one.events == other.events
+    counters = [{k: v for k, v in vars(run.stats).items() if k != "wall_s"} for run in (one, other)]
+    assert counters[0] == counters[1]
+
+
+@pytest.fixture
+def kept(monkeypatch):
+    """Every file that a run writes, in order."""
+    written = []
+
+    @contextlib.contextmanager
+    def keep(path, what):
+        content = io.BytesIO()
+        yield content
+        written.append(content.getvalue())
+        path.write_bytes(written[-1])
+
+    monkeypatch.setattr(checkpoint, "whole_file", keep)
+    return written
+
+
+@pytest.mark.parametrize("case", RUNS)
+def test_every_part_of_a_run_goes_on_bit_by_bit(case, kept, tmp_path):
+    make, duration, options = RUNS[case]
+    alone = pn.simulate(make(), duration, **options)
+    path = tmp_path / "run"
+    scene = make()
+    same(alone, pn.simulate(scene, duration, **options, checkpoint=path, checkpoint_interval=0.0))
+    states, chosen = list(kept), np.random.default_rng(0)
+    assert len(states) > alone.stats.steps  # one before each step, and the last
+    for k in sorted({0, len(states) - 1, *chosen.integers(len(states), size=6).tolist()}):
+        path.write_bytes(states[k])
+        same(alone, pn.resume(path, scene, checkpoint_interval=1e9))
+
+
+def test_a_run_that_is_stopped_again_and_again(kept, tmp_path):
+    path = tmp_path / "run"
+    alone = pn.simulate(cart(), 1.0, record=ALL, rtol=1e-5)
+    pn.simulate(cart(), 1.0, record=ALL, rtol=1e-5, checkpoint=path, checkpoint_interval=0.0)
+    steps = len(kept)
+    path.write_bytes(kept[0])
+    for _ in range(steps):
+        kept.clear()
+        run = pn.resume(path, cart(), checkpoint_interval=0.0)  # from each file by one step
+        same(alone, run)
+        if len(kept) < 3:
+            break
+        path.write_bytes(kept[1])
+    assert len(kept) < 3
+
+
+SCRIPT = """
+    import sys
+    import pin_nonideal as pn
+    scene = pn.load("n_four_bar", N=3)
+    pn.simulate(scene, 6.0, record="energy", checkpoint=sys.argv[1], checkpoint_interval=0.0)
+"""
+
+
+def test_a_killed_process_leaves_a_file_to_go_on_from(tmp_path):
+    alone = pn.simulate(pn.load("n_four_bar", N=3), 6.0, record="energy")
+    generator = np.random.default_rng()
+    part = 0
+    for attempt in range(3):
+        path = tmp_path / f"run {attempt}"
+        process = subprocess.Popen([sys.executable, "-c", textwrap.dedent(SCRIPT), str(path)])
+        while not path.exists() and process.poll() is None:
+            time.sleep(0.01)
+        time.sleep(generator.uniform(0.0, 0.3))
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        part += process.returncode == -signal.SIGKILL
+        same(alone, pn.resume(path, checkpoint_interval=1e9))  # made by load: no scene needed
+        same(alone, pn.resume(path))  # the end of the run was written as well
+    assert part > 0  # a killed run, not one that had ended
+
+
+def test_an_interrupted_run_loses_nothing(tmp_path):
+    path, scene = tmp_path / "run", pn.load("four_bar")
+    alone = pn.simulate(scene, 100.0)
+
+    class Interrupt:
+        def __init__(self, total, t0): ...
+        def update(self, t):
+            raise KeyboardInterrupt
+
+        def close(self): ...
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("pin_nonideal.simulation._Bar", Interrupt)
+        with pytest.raises(RunInterrupted) as caught:
+            pn.simulate(scene, 100.0, progress=True, checkpoint=path)
+    stopped = caught.value.trajectory
+    assert 0.0 < stopped.t[-1] < 100.0
+    run = pn.resume(path)
+    same(alone, run)
+    assert run.stats.wall_s > stopped.stats.wall_s
+
+
+def test_files_and_parameters_are_found_from_any_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(Path(pn.loading.robot_folders()["four_bar"]).parent)
+    scene = pn.load("./four_bar/robot.urdf", free_flyer=True, package_dirs=".")
+    path = tmp_path / "run"
+    alone = pn.simulate(scene, 0.1, checkpoint=path)
+    monkeypatch.chdir(tmp_path)
+    same(alone, pn.resume(path))
+
+
+# --- What is refused ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def written(tmp_path):
+    path = tmp_path / "run"
+    pn.simulate(cart(), 0.2, checkpoint=path)
+    return path
+
+
+def test_a_scene_that_no_name_makes_must_be_passed(written):
+    message = (
+        f'resume: the scene "cart" of "{written}" was not made by load(name); make it again and pass it: '
+        "resume(path, scene=scene)"
+    )
+    with refuses(message, InputError):
+        pn.resume(written)
+
+
+def other_mass():
+    scene = cart()
+    model = scene.model.copy()
+    model.inertias[1] = pin.Inertia(1.1, np.zeros(3), np.eye(3))
+    return pn.Scene(model, laws=scene.laws, forces=scene.forces, q0=scene.q0, name="cart")
+
+
+def other_law():
+    scene = cart()
+    laws = [pn.JointFriction("rail", mu=0.2000001, coulomb=2.0, static_ratio=1.3, viscous=0.1), scene.laws[1]]
+    return pn.Scene(scene.model, laws=laws, forces=scene.forces, q0=scene.q0, name="cart")
+
+
+def other_force():
+    scene = cart()
+    return pn.Scene(scene.model, laws=scene.laws, q0=scene.q0, name="cart")
+
+
+@pytest.mark.parametrize("other", [other_mass, other_law, other_force])
+def test_another_scene(other, written):
+    message = (
+        f'resume: the scene must be the one that "{written}" was written with ("cart"); "cart" differs from '
+        "it in its model, constraints, laws, contacts, forces or actuation"
+    )
+    with refuses(message, InputError):
+        pn.resume(written, other())
+
+
+def test_a_scene_that_is_none(written):
+    with refuses("resume: scene must be a Scene; got str", InputError):
+        pn.resume(written, "cart")
+
+
+def rewritten(path, **changes):
+    """The file with another header."""
+    with np.load(path) as file:
+        header, state = json.loads(str(file["header"])), file["state"]
+    header |= changes
+    with open(path, "wb") as file:
+        np.savez(file, header=np.array(json.dumps(header)), state=state)
+
+
+@pytest.mark.parametrize("changes", [{"format": 99}, {"version": ["0.0.1", "other"]}])
+def test_another_version(changes, written):
+    rewritten(written, **changes)
+    message = (
+        f'"{written}" was written by another version of pin_nonideal; finish the run with that version, or '
+        "start it again"
+    )
+    with refuses(message, LoadingError):
+        pn.resume(written, cart())
+
+
+def test_a_state_that_was_not_written(written):
+    rewritten(written, digest="0" * 64)
+    with refuses(f'"{written}" is damaged: its state is not the one that was written', LoadingError):
+        pn.resume(written, cart())
+
+
+def test_damaged_files(written):
+    """Cut anywhere, or with any byte changed: refused, or as good as the whole file (a byte nobody reads)."""
+    whole, generator = written.read_bytes(), np.random.default_rng(0)
+    alone = pn.simulate(cart(), 0.2)
+    for end in generator.integers(len(whole), size=20):
+        written.write_bytes(whole[:end])
+        with pytest.raises(LoadingError, match="cannot read a checkpoint from"):
+            pn.resume(written, cart())
+    for place in generator.integers(len(whole), size=60):
+        spoiled = bytearray(whole)
+        spoiled[place] ^= int(generator.integers(1, 256))
+        written.write_bytes(bytes(spoiled))
+        with contextlib.suppress(LoadingError):
+            same(alone, pn.resume(written, cart()))
+
+
+def states_of(scene, duration):
+    """What the core hands over to be written, and the options to read it with."""
+    states = []
+    options = simulation._options(scene, duration, 0.0, "dop853", 1e-6, None, None, None, ())
+    start = *scene.initial_state(), scene.z0
+    scene.new_runner().simulate(*start, options | {"save": states.append, "save_interval": 0.0})
+    return states, options
+
+
+def test_states_that_do_not_fit():
+    """Bytes that were made up: they are refused, or read as numbers, and nothing is overrun."""
+    scene, generator, refused = cart(), np.random.default_rng(0), 0
+    states, options = states_of(scene, 0.2)
+    others = states_of(pn.load("four_bar"), 1e-3)[0]
+    for state in (b"", states[0][:-1], states[0] + b"\0", others[0], bytes(1000)):
+        with pytest.raises(ValueError, match="the state does not fit the scene"):
+            scene.new_runner().resume(state, options)
+    for place in generator.integers(len(states[0]) // 8, size=200) * 8:
+        spoiled = states[0][:place] + b"\xff" * 8 + states[0][place + 8 :]
+        try:
+            scene.new_runner().resume(spoiled, options)
+        except ValueError:
+            refused += 1
+    assert refused > 20  # lengths, modes and indices
+
+
+def test_no_file_and_other_files(tmp_path):
+    with pytest.raises(LoadingError, match=r'cannot read a checkpoint from ".*missing": FileNotFoundError'):
+        pn.resume(tmp_path / "missing")
+    path = pn.simulate(pn.load("four_bar"), 0.01).save(tmp_path / "trajectory")
+    with pytest.raises(LoadingError, match="it must be a file that simulate"):
+        pn.resume(path)
+
+
+def test_nothing_in_a_file_is_executed(tmp_path):
+    path = tmp_path / "run"
+
+    class Trap:
+        def __reduce__(self):
+            return (Path.touch, (tmp_path / "executed",))
+
+    with open(path, "wb") as file:
+        np.savez(file, header=np.array([Trap()], dtype=object), state=np.zeros(1, dtype=np.uint8))
+    with pytest.raises(LoadingError, match="cannot read a checkpoint from"):
+        pn.resume(path)
+    assert not (tmp_path / "executed").exists()
+
+
+def test_a_place_that_cannot_be_written(tmp_path):
+    path = tmp_path / "nowhere" / "run"
+    message = (
+        f'cannot write the checkpoint to "{path}": No such file or directory; name a file in a folder that '
+        "can be written"
+    )
+    with refuses(message, OutputError):
+        pn.simulate(pn.load("four_bar"), 0.1, checkpoint=path)
+
+
+def test_a_disk_that_fills_up(tmp_path, monkeypatch):
+    """A run that has a checkpoint does not die of a full disk."""
+    path, count = tmp_path / "run", []
+    write = checkpoint.whole_file
+
+    def fail_later(*arguments):
+        count.append(1)
+        if len(count) > 1:
+            raise OutputError("no room")
+        return write(*arguments)
+
+    monkeypatch.setattr(checkpoint, "whole_file", fail_later)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        run = pn.simulate(pn.load("four_bar"), 0.1, checkpoint=path, checkpoint_interval=0.0)
+    assert run.t[-1] == 0.1
+    assert str(told[0].message) == "no room; the run goes on, the last checkpoint stays"
+    monkeypatch.undo()
+    same(run, pn.resume(path))
+
+
+def test_methods_of_scipy_have_no_checkpoint(tmp_path):
+    message = (
+        'simulate: checkpoint needs one of the core\'s methods; "Radau" runs in SciPy, which does not give '
+        "its state away"
+    )
+    with refuses(message, InputError):
+        pn.simulate(pn.load("four_bar"), 0.1, method="Radau", checkpoint=tmp_path / "run")
+
+
+def test_runs_of_a_sweep_have_no_checkpoint(tmp_path):
+    message = "sweep: checkpoint is the file of one run; its runs would overwrite one another's"
+    with refuses(message, InputError):
+        pn.sweep(pn.load, [{"name": "four_bar"}], 0.1, checkpoint=tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    ("interval", "message"), [(-1.0, "must not be negative; got -1"), ("s", "must be a number")]
+)
+def test_intervals(interval, message, tmp_path):
+    with pytest.raises(InputError, match=f"simulate: checkpoint_interval {message}"):
+        pn.simulate(pn.load("four_bar"), 0.1, checkpoint=tmp_path / "run", checkpoint_interval=interval)
