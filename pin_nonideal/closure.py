@@ -22,6 +22,7 @@ SPREADS = (0.1, 0.3, 1.0)  # of the random starts [rad or m], in turn
 WELL_CONDITIONED = 1e-10
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def close_loops(
     model: Any, rows: Callable[[Array], tuple[Array, Array]], mass: Callable[[Array], Array], q: Array
 ) -> tuple[Array, float]:
@@ -66,6 +67,8 @@ def _descend(model: Any, rows: Callable[[Array], tuple[Array, Array]], q: Array)
         size = max(float(np.trace(G)) / len(G), 1e-300)
         step = -A.T @ np.linalg.solve(G + damping * size * np.eye(len(G)), phi)
         longest = float(np.abs(step).max(initial=0.0))
+        if not np.isfinite(longest):
+            break
         if longest > 1.0:
             step /= longest
         trial = pin.integrate(model, q, step)
@@ -87,7 +90,9 @@ def _gap(phi: Array) -> float:
 
 
 def _conditioning(M: Array) -> float:
-    """Smallest over largest eigenvalue of M scaled to unit diagonal."""
+    """Smallest over largest eigenvalue of M scaled to unit diagonal; 0 where M overflows."""
+    if not np.isfinite(M).all():
+        return 0.0
     diagonal = np.sqrt(np.maximum(np.diag(M), 1e-300))
     values = np.linalg.eigvalsh(M / np.outer(diagonal, diagonal))
     return float(values[0] / values[-1])

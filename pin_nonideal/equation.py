@@ -191,6 +191,7 @@ def _solve_lower(L: Array, X: Array) -> Array:
     return np.linalg.solve(L[::-1, ::-1], X[::-1])[::-1]
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _check_consistent(
     A: Array, b: Array, a: Array, E: Array, chosen: list[int], row_scale: Array, in_play: float
 ) -> None:
@@ -240,7 +241,7 @@ def _checked(
     if C.shape != (n,):
         raise InputError(f"C must have shape ({n},) to fit M, got {C.shape}; one force a coordinate")
     _check_mass(M)
-    return M / 2.0 + M.T / 2.0, F, A, b, C
+    return M + (M.T - M) / 2.0, F, A, b, C
 
 
 def _numbers(name: str, value: ArrayLike) -> Array:

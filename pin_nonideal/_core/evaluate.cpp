@@ -257,7 +257,8 @@ void solve_motion(const Program& p, Workspace& w, const VecX& force) {
     }
 }
 
-void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+// M, F, and the rows with their factor.
+static void assemble(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     ++w.evaluations;
     kinematics(p.mechanism, w.terms, q, v);
     inertia(p.mechanism, w.terms);
@@ -276,6 +277,10 @@ void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const Vec
             w.rows.refine = w.terms.D.maxCoeff() > refined_pivot_ratio * w.terms.D.minCoeff();
         }
     }
+}
+
+// a, lam and C of what has been assembled.
+static void respond(const Program& p, Workspace& w, double t, const VecX& v) {
     if (!p.has_laws()) {
         solve_motion(p, w, w.F);
     } else {
@@ -291,6 +296,11 @@ void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const Vec
     }
     if (!w.a.allFinite()) throw Failure(Failure::Kind::not_finite, t);
     if (is_immobile(p, w) && (v.array() == 0.0).all()) w.a.setZero();
+}
+
+void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    assemble(p, w, t, q, v);
+    respond(p, w, t, v);
 }
 
 // Residual of the dependent rows; the worst block, or -1 when all are met.
@@ -322,21 +332,31 @@ static int contradicting_block(const Program& p, Workspace& w, double& worst) {
     return found;
 }
 
-void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    w.ideal_decided = false;
-    evaluate(p, w, t, q, v);
-    if (w.rows.blocks.empty()) return;
-    double residual = 0.0;
-    const bool decided = !w.rows.orthogonal && (!w.rows.redundant || contradicting_block(p, w, residual) < 0);
-    if (decided) return;
+static void choose_rows(const Program& p, Workspace& w) {
     decide_rows(p.layout, p.blocks, w.B, w.rows);
     factor_rows(p.layout, p.blocks, w.B, w.rows);
     ++w.factorizations;
-    w.trial = w.F + w.C;
-    if (p.needs_reactions) solve_reactions(p, w, t, w.terms.q, v);
-    else if (p.has_laws()) solve_motion(p, w, w.trial);
-    else solve_motion(p, w, w.F);
-    const int block = contradicting_block(p, w, residual);
+}
+
+void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    w.ideal_decided = false;
+    assemble(p, w, t, q, v);
+    if (w.rows.blocks.empty()) {
+        respond(p, w, t, v);
+        return;
+    }
+    // Laws are asked only once the rows are independent: others give them multipliers that mean nothing.
+    const bool chosen = w.rows.orthogonal;
+    if (chosen) choose_rows(p, w);
+    respond(p, w, t, v);
+    double residual = 0.0;
+    if (!w.rows.redundant) return;
+    int block = contradicting_block(p, w, residual);
+    if (block >= 0 && !chosen) {  // what was dependent at an earlier step is not any more
+        choose_rows(p, w);
+        respond(p, w, t, v);
+        block = contradicting_block(p, w, residual);
+    }
     if (block < 0) return;
     // Name the contradicting block and those that share its dofs and carry the largest multipliers.
     std::vector<int> blame{block};

@@ -1,0 +1,51 @@
+"""What the stress runs measure, and linkages built for them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+import pin_nonideal as pn
+
+from ..mechanisms import body, empty, frame
+
+
+def at_most(what, value, bound):
+    """Prints what was measured beside what must hold (shown by `pytest -rP`), and holds it."""
+    print(f"{what}: {value:.2g}, at most {bound:.2g}")
+    assert value <= bound
+
+
+def ledger(run):
+    """Largest gap of the energy balance, as part of the energy in play."""
+    size = np.abs(run.energy["total"]).max() + run.energy["kinetic"].max()
+    return np.abs(run.energy["balance"]).max() / size
+
+
+def finite(run):
+    """Nothing that is no number came out."""
+    assert all(np.isfinite(x).all() for x in (run.t, run.q, run.v, run.violation, run.violation_rate))
+
+
+def rods(lengths, masses=None, *, prefix="j", model=None, start=(0.0, 0.0, 0.0)):
+    """A chain of uniform rods along x, hinged about y, with a frame "<prefix>tip" at its end."""
+    model = empty() if model is None else model
+    masses = np.ones(len(lengths)) if masses is None else masses
+    joint, place = 0, pin.SE3(np.eye(3), np.array(start, dtype=float))
+    for k, (length, mass) in enumerate(zip(lengths, masses, strict=True)):
+        about = mass * length**2 / 12.0 * np.eye(3)
+        lever = (0.5 * length, 0.0, 0.0)
+        joint = body(
+            model, joint, pin.JointModelRY(), f"{prefix}{k}", mass, place=place, lever=lever, inertia=about
+        )
+        place = pin.SE3(np.eye(3), np.array([length, 0.0, 0.0]))
+    frame(model, f"{prefix}tip", joint, place)
+    return model
+
+
+def linkage(lengths, q0, v0, masses=None, **more):
+    """A four-bar: crank, coupler and rocker of the given lengths, pinned at the fourth one from the start."""
+    model = rods(lengths[:3], masses)
+    frame(model, "pin", 0, pin.SE3(np.eye(3), np.array([lengths[3], 0.0, 0.0])))
+    loop = pn.PointAnchor("jtip", "pin", axes="xz", name="loop")
+    return pn.Scene(model, constraints=[loop], q0=q0, v0=v0, **more)
