@@ -61,15 +61,29 @@ double scene_size(const Workspace& w) {
     return std::sqrt(square);
 }
 
+// Size of a row of A, at least 1: a row that was scaled up leaves a gap as much larger.
+static double row_size(const Workspace& w, const Block& block, int row) {
+    double size = 1.0;
+    const size_t n = block.kept.size();
+    for (size_t k = 0; k < n; ++k) {
+        if (block.kept[k] != row) continue;
+        for (size_t l = 0; l < block.support.size(); ++l)
+            size = std::max(size, std::abs(w.A[block.offset + l * n + k]));
+    }
+    return size;
+}
+
 void require_closed(const Program& p, const Workspace& w, double t) {
-    double largest = open_gap * scene_size(w);
+    const double allowed = open_gap * scene_size(w);
+    double largest = 0.0;
     int worst = -1;
     for (int i = 0; i < p.constraints; ++i)
-        for (int k = 0; k < w.values[i].rows; ++k)
-            if (!(std::abs(w.values[i].residual[k]) <= largest)) {
-                largest = std::abs(w.values[i].residual[k]);
-                worst = i;
-            }
+        for (int k = 0; k < w.values[i].rows; ++k) {
+            const double gap = std::abs(w.values[i].residual[k]);
+            if (gap <= allowed || gap <= allowed * row_size(w, p.blocks[i], k) || gap < largest) continue;
+            largest = gap;
+            worst = i;
+        }
     if (worst >= 0) throw Failure(Failure::Kind::closure, t, {worst}, largest);
 }
 
