@@ -38,6 +38,11 @@ double gather(const Program& p, Workspace& w, bool position) {
     return largest;
 }
 
+// Iterations left when each takes as much as the last one did; factors of the new place cost less than three of them.
+double left_at_this_rate(double before, double now, double floor) {
+    return now < before ? std::log(now / std::max(floor, 1e-16)) / std::log(before / now) : HUGE_VAL;
+}
+
 // The same for rates A v + phi_t after a change of v, which needs no new look at the motion.
 double change_rates(const Program& p, Workspace& w, const VecX& change) {
     double largest = 0.0;
@@ -104,7 +109,7 @@ bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
         moved = true;
         look_at(p, w, t, q, v);
         const double now = gather(p, w, true);
-        if (!(now < 0.1 * last) && now > floor) refactor(p, w, t);
+        if (now > floor && left_at_this_rate(last, now, floor) > 3.0) refactor(p, w, t);
         if (it > 3 && now > 0.5 * last) break;  // as good as rounding allows
         last = now;
     }
