@@ -150,3 +150,38 @@ def test_a_pull_is_reported_when_it_begins(method, options, late, mu):
     assert "pull" in kinds(run)
     began = next(event.time for event in run.events if event.kind == "pull")
     assert -EVENT < began - GRAVITY / 30.0 < late
+
+
+def test_time_stepping_keeps_the_books_of_a_slip_that_turns():
+    """A force across the slip turns it by more than a half circle; friction only ever takes energy."""
+    scene = pn.Scene(
+        point_mass(),
+        contacts=[pn.PointContact("mass", mu=0.05, name="rub")],
+        actuation=lambda t, q, v: [-3.0 * v[1], 3.0 * v[0], 0.0],
+    )
+    options = {"v": [2.0, 0.0, 0.0], "record": "energy"}
+    fine = pn.simulate(scene, 1.5, rtol=1e-10, **options)
+    run = pn.simulate(scene, 1.5, method="moreau", dt=1e-3, **options)
+    assert run.energy["rub"][-1] == pytest.approx(fine.energy["rub"][-1], rel=1e-2)  # first order
+    assert (np.diff(run.energy["rub"]) <= 0.0).all()
+    assert np.abs(run.energy["balance"]).max() < 1e-8  # J of 2; what a step of 1 ms misses is of third order
+
+
+@pytest.mark.parametrize("legs", [3, 4])
+@pytest.mark.parametrize("speed", [0.0, 1.0])
+def test_a_table_on_more_contacts_than_it_needs(legs, speed):
+    """Nine or twelve rows on six freedoms: stands still, or slides as one point would, by mu g t^2 / 2."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "table")
+    inertia = pin.Inertia(
+        1.0, np.zeros(3), np.diag([0.1, 0.1, 0.15])
+    )  # centered on the ground: no tilting moment
+    model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    for i, (x, y) in enumerate([(0.3, 0.3), (-0.3, 0.3), (-0.3, -0.3), (0.3, -0.3)][:legs]):
+        place = pin.SE3(np.eye(3), np.array([x, y, 0.0]))
+        model.addFrame(pin.Frame(f"leg{i}", joint, place, pin.FrameType.OP_FRAME))
+    contacts = [pn.PointContact(f"leg{i}", mu=0.3) for i in range(legs)]
+    scene = pn.Scene(model, contacts=contacts, v0=[speed, 0.0, 0.0, 0.0, 0.0, 0.0])
+    run = pn.simulate(scene, 0.2, rtol=1e-10)
+    way = speed * 0.2 - (0.3 * GRAVITY * 0.2**2 / 2.0 if speed else 0.0)
+    assert run.q[-1, 0] == pytest.approx(way, abs=1e-9)

@@ -117,19 +117,28 @@ VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s) {
     return active_set(W, alpha0, s);
 }
 
+// Sweeps over disks and balls. Elements that share a load in ways that nothing tells apart, all near their limits, converge
+// no more than slowly; what is left then is a small part of the limits.
+constexpr int most_sweeps = 1000;
+
 // Disks and balls: block Gauss-Seidel, each block by its own radius; converges linearly.
 VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s) {
     const int n = static_cast<int>(alpha0.size());
     VecX f = VecX::Zero(n);
-    for (int sweep = 0; sweep < 20000; ++sweep) {
-        double change = 0.0, size = 0.0;
+    std::vector<Eigen::SelfAdjointEigenSolver<MatX>> blocks;
+    for (int e = 0, at = 0; e < static_cast<int>(dims.size()); at += dims[e], ++e)
+        blocks.emplace_back(W.block(at, at, dims[e], dims[e]));
+    // Forces that nothing answers may drift for long; what counts is the acceleration that a sweep changes.
+    const double enough = 1e-14 * alpha0.cwiseAbs().maxCoeff() + 1e-15 * W.cwiseAbs().maxCoeff() * s.maxCoeff();
+    for (int sweep = 0; sweep < most_sweeps; ++sweep) {
+        double change = 0.0;
         for (int e = 0, at = 0; e < static_cast<int>(dims.size()); at += dims[e], ++e) {
             const int d = dims[e];
             const MatX D = W.block(at, at, d, d);
             const VecX old = f.segment(at, d);
             const VecX r = alpha0.segment(at, d) + W.middleRows(at, d) * f - D * old;
             // min x^T D x / 2 + r^T x in |x| <= s: x = -(D + m I)^-1 r with the least m >= 0.
-            Eigen::SelfAdjointEigenSolver<MatX> eigen(D);
+            const auto& eigen = blocks[e];
             const VecX c = eigen.eigenvectors().transpose() * r, l = eigen.eigenvalues();
             const double tiny = 1e-14 * std::max(l.cwiseAbs().maxCoeff(), 1e-300);
             const auto length = [&](double m) {
@@ -152,11 +161,10 @@ VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dim
             if (s[e] > 0.0) {
                 for (int k = 0; k < d; ++k) x -= (c[k] / std::max(l[k] + m, tiny)) * eigen.eigenvectors().col(k);
             }
-            change = std::max(change, (x - old).cwiseAbs().maxCoeff());
-            size = std::max(size, x.cwiseAbs().maxCoeff());
+            change = std::max(change, (W.middleCols(at, d) * (x - old)).cwiseAbs().maxCoeff());
             f.segment(at, d) = x;
         }
-        if (change <= 1e-14 * size) break;
+        if (change <= enough) break;
     }
     return f;
 }

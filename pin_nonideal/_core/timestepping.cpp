@@ -134,6 +134,7 @@ void Simulation::step_in_time(double stop, double dt) {
     v_ = y.segment(system.nq, system.nv);
     begin_step(p, w, t, q_, v_);  // factors of the new modes: what sticks must not move as the rest is projected
     settle(t, y, derivative);
+    remember_directions();
     recorder.moved_energy += pending_energy;
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
         if (before[e] != w.mode[e])
