@@ -174,10 +174,7 @@ def test_a_motion_that_ends(method):
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.mark.parametrize("method", METHODS)
-def test_ctrl_c_keeps_what_was_computed(method, request):
-    # A shell that starts the tests in the background lets them ignore the signal.
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
+def test_ctrl_c_keeps_what_was_computed(method):
     threading.Thread(target=lambda: (time.sleep(0.3), os.kill(os.getpid(), signal.SIGINT))).start()
     with pytest.raises(RunInterrupted, match="the run was interrupted at t = ") as caught:
         pn.simulate(bare("four_bar"), 1e5, method=method, rtol=1e-9)
