@@ -1,4 +1,4 @@
-"""Ctrl-C as in a terminal: a shell in whose background the tests run lets them and their children ignore it."""
+"""Ctrl-C as in a terminal: shells let what they start in the background, and its children, ignore it."""
 
 from __future__ import annotations
 
