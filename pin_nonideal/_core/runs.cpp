@@ -1,0 +1,144 @@
+// Runs: options and states in, recordings out.
+#include "bindings.hpp"
+
+#include <atomic>
+#include <thread>
+
+#include <nanobind/stl/string.h>
+
+namespace pn {
+
+namespace {
+
+Options read_options(const nb::dict& d) {
+    Options o;
+    o.method = method_named(nb::cast<std::string>(d["method"]));
+    o.t0 = nb::cast<double>(d["t0"]);
+    o.duration = nb::cast<double>(d["duration"]);
+    o.rtol = nb::cast<double>(d["rtol"]);
+    o.dt = nb::cast<double>(d["dt"]);
+    o.output_dt = nb::cast<double>(d["output_dt"]);
+    read_into(nb::cast<nb::object>(d["atol"]), o.atol);
+    o.record = read_record(d);
+    const nb::object tick = nb::cast<nb::object>(d["tick"]);
+    o.tick = [tick, last = std::chrono::steady_clock::now()](double t) mutable {
+        const auto now = std::chrono::steady_clock::now();
+        if (now - last < std::chrono::milliseconds(50)) return;
+        last = now;
+        nb::gil_scoped_acquire gil;
+        if (PyErr_CheckSignals() != 0) throw nb::python_error();
+        if (!tick.is_none()) tick(t);
+    };
+    const nb::object save = nb::cast<nb::object>(d["save"]);
+    if (save.is_none()) return o;
+    o.save = [save](const std::string& state) {
+        nb::gil_scoped_acquire gil;
+        save(nb::bytes(state.data(), state.size()));
+    };
+    o.save_interval = std::chrono::duration_cast<Clock::duration>(
+        std::chrono::duration<double>(nb::cast<double>(d["save_interval"])));
+    return o;
+}
+
+}  // namespace
+
+RecordOptions read_record(const nb::dict& d) {
+    const auto wanted = [&](const char* key) { return nb::cast<bool>(d[key]); };
+    return {wanted("a"), wanted("forces"), wanted("energy"), wanted("power")};
+}
+
+nb::dict hand_over(const Workspace& w, const Recording& r) {
+    nb::dict out;
+    const std::pair<const char*, const std::vector<double>*> fields[] = {
+        {"t", &r.t}, {"q", &r.q}, {"v", &r.v}, {"violation", &r.violation}, {"violation_rate", &r.violation_rate},
+        {"a", &r.a}, {"F_ideal", &r.F_ideal}, {"F_nonideal", &r.F_nonideal}, {"lam", &r.lam},
+        {"lam_ideal", &r.lam_ideal}, {"energy", &r.energy}, {"power", &r.power}, {"z", &r.z}};
+    for (const auto& [name, values] : fields) out[name] = to_numpy(*values);
+    nb::list modes, events;
+    std::vector<double> mode_numbers(r.modes.begin(), r.modes.end());
+    out["modes"] = to_numpy(mode_numbers);
+    for (const Event& e : r.events) events.append(nb::make_tuple(e.time, static_cast<int>(e.kind), e.element));
+    out["events"] = events;
+    out["steps"] = r.steps;
+    out["rejected"] = r.rejected;
+    out["evaluations"] = w.evaluations;
+    out["factorizations"] = w.factorizations;
+    out["projections"] = w.projections;
+    out["iterations"] = w.iterations;
+    out["failure"] = r.failure ? nb::cast(std::string(r.failure->what())) : nb::none();
+    out["error"] = nb::none();
+    if (r.error) {
+        try {
+            std::rethrow_exception(r.error);
+        } catch (nb::python_error& e) {
+            out["error"] = nb::borrow(e.value());
+        } catch (const std::exception& e) {
+            out["error"] = nb::cast(std::string(e.what()));
+        }
+    }
+    return out;
+}
+
+nb::dict Runner::simulate(const Array& q_in, const Array& v_in, const Array& z, const nb::dict& options) {
+    const Options o = read_options(options);
+    const VecX q0 = map(q_in), v0 = map(v_in);
+    w->z = map(z);
+    w->has_override = false;
+    Recording recording;
+    {
+        nb::gil_scoped_release release;
+        pn::simulate(*p, *w, q0, v0, o, recording);
+    }
+    return hand_over(*w, recording);
+}
+
+nb::dict Runner::resume(const nb::bytes& state, const nb::dict& options) {
+    const Options o = read_options(options);
+    const std::string bytes(static_cast<const char*>(state.data()), state.size());
+    Recording recording;
+    {
+        nb::gil_scoped_release release;
+        pn::resume(*p, *w, bytes, o, recording);
+    }
+    return hand_over(*w, recording);
+}
+
+// States are drawn from one counter by native threads; every run has a workspace of its own.
+nb::list rollout(const Builder& b, const Array2& q, const Array2& v, const Array& z, const nb::dict& options,
+                 int threads) {
+    const size_t count = q.shape(0);
+    std::vector<Recording> recordings(count);
+    std::vector<std::unique_ptr<Workspace>> spaces;
+    for (size_t i = 0; i < count; ++i) spaces.emplace_back();
+    // Copied here and not in the threads: options hold Python's objects, whose counts need the lock.
+    const Options o = read_options(options);
+    Options silent = o;
+    silent.tick = nullptr;
+    const VecX z0 = map(z);
+    std::vector<VecX> q0, v0;
+    for (size_t i = 0; i < count; ++i) {
+        q0.push_back(Eigen::Map<const VecX>(q.data() + i * q.shape(1), q.shape(1)));
+        v0.push_back(Eigen::Map<const VecX>(v.data() + i * v.shape(1), v.shape(1)));
+    }
+    const Program& p = *b.p;
+    {
+        nb::gil_scoped_release release;
+        std::atomic<size_t> next{0};
+        const auto work = [&](const Options& mine) {
+            for (size_t i = next++; i < count; i = next++) {
+                spaces[i] = std::make_unique<Workspace>(p);
+                spaces[i]->z = z0;
+                simulate(p, *spaces[i], q0[i], v0[i], mine, recordings[i]);
+            }
+        };
+        std::vector<std::thread> pool;
+        for (int k = 1; k < threads; ++k) pool.emplace_back(work, std::cref(silent));
+        work(o);
+        for (std::thread& thread : pool) thread.join();
+    }
+    nb::list out;
+    for (size_t i = 0; i < count; ++i) out.append(hand_over(*spaces[i], recordings[i]));
+    return out;
+}
+
+}  // namespace pn
