@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any
 
@@ -58,7 +58,7 @@ class Problem:
     coulomb: Array | None = None
     viscous: Array | None = None
     notes: str = ""
-    levels: tuple[float, ...] = field(default=LEVELS)
+    levels: tuple[float, ...] = LEVELS
 
     @cached_property
     def solution(self) -> Reference:
@@ -135,7 +135,6 @@ def double_pendulum() -> Problem:
         q0=np.array([1.2, 0.8]),
         v0=np.zeros(2),
         duration=2.0,
-        reference=references.dense_motion,
     )
 
 
@@ -149,7 +148,6 @@ def panda() -> Problem:
         q0=q0,
         v0=np.zeros(scene.model.nv),
         duration=1.0,
-        reference=references.dense_motion,
         notes="fingers locked, no friction",
     )
 
@@ -207,7 +205,6 @@ def solo12() -> Problem:
         **bare(scene),
         hold=solo12_gains(scene.model),
         duration=1.0,
-        reference=references.dense_motion,
     )
 
 
@@ -226,33 +223,23 @@ def coulomb_pendulum() -> Problem:
 
 
 def coulomb_rest() -> Problem:
-    return Problem(
+    return replace(
+        coulomb_pendulum(),
         name="coulomb_rest",
         title="pendulum with Coulomb friction, rest angle at 10 s",
-        model=rods([1.0], [1.0]),
-        q0=np.array([1.2]),
-        v0=np.zeros(1),
         duration=10.0,
-        coulomb=np.array([0.5]),
-        reference=references.coulomb_swings,
-        levels=(1e-3, 1e-4, 1e-6, 1e-9),
     )
 
 
 def panda_friction() -> Problem:
     scene = pn.load("panda_friction")
-    q0, v0 = scene.initial_state()
-    coulomb = np.array([law.coulomb for law in scene.laws])
-    viscous = np.array([law.viscous for law in scene.laws])
     return Problem(
         name="panda_friction",
         title="Panda with joint friction, 1 s",
-        model=scene.model,
-        q0=q0,
-        v0=v0,
+        **bare(scene),
         duration=1.0,
-        coulomb=coulomb,
-        viscous=viscous,
+        coulomb=np.array([law.coulomb for law in scene.laws]),
+        viscous=np.array([law.viscous for law in scene.laws]),
         reference=references.dense_friction,
         levels=(1e-3, 1e-4, 1e-6, 1e-8),
     )

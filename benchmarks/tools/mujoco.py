@@ -57,43 +57,46 @@ def states(problem: Any) -> Any:
 
 
 class Coordinates:
-    """Maps configurations and velocities of a pinocchio.Model to MuJoCo's and back, joint by joint."""
+    """Maps configurations and velocities of a pinocchio.Model to MuJoCo's and back.
+
+    MuJoCo may order joints otherwise; its quaternions begin with their real part, and the linear velocity of
+    its free joints is in world axes.
+    """
 
     def __init__(self, model: Any, mj: Any) -> None:
-        self.model, self.mj = model, mj
-        self.parts = []
+        self.q_places: list[int] = []  # of Pinocchio's coordinates among MuJoCo's
+        self.v_places: list[int] = []
+        self.free: list[tuple[int, int]] = []  # where free joints begin in q and in v
         for i in range(1, model.njoints):
             joint, other = model.joints[i], mj.joint(model.names[i])
-            self.parts.append((joint.shortname() == "JointModelFreeFlyer", joint.idx_q, joint.idx_v,
-                               int(other.qposadr[0]), int(other.dofadr[0])))  # fmt: skip
+            is_free = joint.shortname() == "JointModelFreeFlyer"
+            self.q_places += [int(other.qposadr[0]) + k for k in ((0, 1, 2, 4, 5, 6, 3) if is_free else (0,))]
+            self.v_places += [int(other.dofadr[0]) + k for k in range(joint.nv)]
+            if is_free:
+                self.free.append((joint.idx_q, joint.idx_v))
 
     def there(self, q: Array, v: Array) -> tuple[Array, Array]:
         """The state in MuJoCo's coordinates."""
-        import pinocchio as pin
-
-        x, u = np.zeros(self.mj.nq), np.zeros(self.mj.nv)
-        for free, iq, iv, jq, jv in self.parts:
-            if not free:
-                x[jq], u[jv] = q[iq], v[iv]
-                continue
-            x[jq : jq + 3], x[jq + 3 : jq + 7] = q[iq : iq + 3], q[[iq + 6, iq + 3, iq + 4, iq + 5]]
-            R = pin.Quaternion(q[iq + 3 : iq + 7]).matrix()
-            u[jv : jv + 3], u[jv + 3 : jv + 6] = R @ v[iv : iv + 3], v[iv + 3 : iv + 6]
+        x, u, v = np.empty_like(q), np.empty_like(v), v.copy()
+        for iq, iv in self.free:
+            v[iv : iv + 3] = rotation(q, iq) @ v[iv : iv + 3]
+        x[self.q_places], u[self.v_places] = q, v
         return x, u
 
     def back(self, x: Array, u: Array) -> tuple[Array, Array]:
         """The state in Pinocchio's coordinates."""
-        import pinocchio as pin
-
-        q, v = np.zeros(self.model.nq), np.zeros(self.model.nv)
-        for free, iq, iv, jq, jv in self.parts:
-            if not free:
-                q[iq], v[iv] = x[jq], u[jv]
-                continue
-            q[iq : iq + 3], q[iq + 3 : iq + 7] = x[jq : jq + 3], x[[jq + 4, jq + 5, jq + 6, jq + 3]]
-            R = pin.Quaternion(q[iq + 3 : iq + 7]).matrix()
-            v[iv : iv + 3], v[iv + 3 : iv + 6] = R.T @ u[jv : jv + 3], u[jv + 3 : jv + 6]
+        q, v = x[self.q_places], u[self.v_places]
+        for iq, iv in self.free:
+            v[iv : iv + 3] = rotation(q, iq).T @ v[iv : iv + 3]
         return q, v
+
+
+def rotation(q: Array, start: int) -> Array:
+    """Of the free joint whose coordinates begin at `start`."""
+    import pinocchio as pin
+
+    matrix: Array = pin.Quaternion(q[start + 3 : start + 7]).matrix()
+    return matrix
 
 
 def lighten(mj: Any) -> None:
