@@ -1,0 +1,92 @@
+"""Replay pages in a headless browser without network."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pin_nonideal.replay import replay
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+FLAGS = [
+    "--no-sandbox",
+    "--no-first-run",
+    "--disable-quic",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
+SIZE = (1000, 720)
+TIMEOUT = 60_000  # milliseconds; a software renderer on a busy machine takes seconds
+MOVED = 2000  # pixels: a robot that fills the view moves several times as many
+
+
+@contextlib.contextmanager
+def headless_browser() -> Iterator[Any]:
+    """The browser; tests that need it are skipped where it is missing."""
+    api = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+    if BROWSER is None:
+        pytest.skip("needs chromium, chromium-browser or google-chrome on the path")
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=BROWSER, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+class Watched:
+    """A page opened without network, with all that it complained about and asked for."""
+
+    def __init__(self, browser: Any, path: Path, fragment: str = "paused") -> None:
+        self.context = browser.new_context(viewport={"width": SIZE[0], "height": SIZE[1]}, offline=True)
+        self.page = self.context.new_page()
+        self.page.set_default_timeout(TIMEOUT)
+        self.complaints: list[str] = []
+        self.requests: list[str] = []
+        self.page.on("console", lambda message: self.hear(message.type, message.text))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.goto(f"{path.resolve().as_uri()}#{fragment}")
+        self.page.wait_for_function("() => window.replayDone || window.replayError")
+
+    def hear(self, kind: str, text: str) -> None:
+        if kind in ("error", "warning") and "GPU stall" not in text and "GL Driver" not in text:
+            self.complaints.append(text)
+
+    def run(self, script: str, argument: object = None) -> Any:
+        return self.page.evaluate(script, argument)
+
+    def poses(self, time: float) -> Any:
+        return self.run("time => { replay.seek(time); return replay.poses(); }", time)
+
+    def picture(self, time: float) -> np.ndarray:
+        """The three-dimensional view at a time, as red, green and blue, (height, width, 3)."""
+        from PIL import Image
+
+        self.run("time => replay.seek(time)", time)
+        self.run("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        shot = self.page.locator("#scene").screenshot()
+        return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")).astype(int)
+
+
+@contextlib.contextmanager
+def opened_replay(browser: Any, run: Any, path: Path) -> Iterator[SimpleNamespace]:
+    """A run written as a page, and the page opened."""
+    watched = Watched(browser, replay(run, path))
+    yield SimpleNamespace(run=run, path=path, watched=watched, page=watched.page)
+    watched.context.close()
+
+
+def changed(one: np.ndarray, other: np.ndarray) -> int:
+    """Pixels that differ between two pictures by more than a shade."""
+    return int(np.count_nonzero(np.abs(other - one).max(axis=2) > 20))
