@@ -22,6 +22,7 @@ from pin_nonideal import checkpoint, simulation
 from pin_nonideal.errors import InputError, LoadingError, OutputError, RunInterrupted
 
 from .random_trees import add
+from .same_run import assert_same_run
 from .small_robots import refuses
 
 ALL = ("a", "forces", "energy", "power")
@@ -66,33 +67,6 @@ RUNS = {
 }
 
 
-def same(one, other):
-    """Every array bit by bit, events and counters."""
-    for key in (
-        "t",
-        "q",
-        "v",
-        "violation",
-        "violation_rate",
-        "a",
-        "F_ideal",
-        "F_nonideal",
-        "lam",
-        "lam_ideal",
-    ):
-        np.testing.assert_array_equal(getattr(one, key), getattr(other, key), err_msg=key, strict=True)
-    for key in ("z", "modes"):
-        np.testing.assert_array_equal(getattr(one, key), getattr(other, key), err_msg=key, strict=True)
-    for key in ("energy", "power"):
-        tables = getattr(one, key), getattr(other, key)
-        assert (tables[0] is None) == (tables[1] is None)
-        for name in tables[0] or {}:
-            np.testing.assert_array_equal(tables[0][name], tables[1][name], err_msg=name, strict=True)
-    assert one.events == other.events
-    counters = [{k: v for k, v in vars(run.stats).items() if k != "wall_s"} for run in (one, other)]
-    assert counters[0] == counters[1]
-
-
 @pytest.fixture
 def kept(monkeypatch):
     """Every file that a run writes, in order."""
@@ -115,12 +89,12 @@ def test_every_part_of_a_run_goes_on_bit_by_bit(case, kept, tmp_path):
     alone = pn.simulate(make(), duration, **options)
     path = tmp_path / "run"
     scene = make()
-    same(alone, pn.simulate(scene, duration, **options, checkpoint=path, checkpoint_interval=0.0))
+    assert_same_run(alone, pn.simulate(scene, duration, **options, checkpoint=path, checkpoint_interval=0.0))
     states, chosen = list(kept), np.random.default_rng(0)
     assert len(states) > alone.stats.steps  # one before each step, and the last
     for k in sorted({0, len(states) - 1, *chosen.integers(len(states), size=6).tolist()}):
         path.write_bytes(states[k])
-        same(alone, pn.resume(path, scene, checkpoint_interval=1e9))
+        assert_same_run(alone, pn.resume(path, scene, checkpoint_interval=1e9))
 
 
 def test_a_run_that_is_stopped_again_and_again(kept, tmp_path):
@@ -132,7 +106,7 @@ def test_a_run_that_is_stopped_again_and_again(kept, tmp_path):
     for _ in range(steps):
         kept.clear()
         run = pn.resume(path, cart(), checkpoint_interval=0.0)  # from each file by one step
-        same(alone, run)
+        assert_same_run(alone, run)
         if len(kept) < 3:
             break
         path.write_bytes(kept[1])
@@ -160,8 +134,8 @@ def test_a_killed_process_leaves_a_file_to_go_on_from(tmp_path):
         process.send_signal(signal.SIGKILL)
         process.wait()
         part += process.returncode == -signal.SIGKILL
-        same(alone, pn.resume(path, checkpoint_interval=1e9))  # made by load: no scene needed
-        same(alone, pn.resume(path))  # the end of the run was written as well
+        assert_same_run(alone, pn.resume(path, checkpoint_interval=1e9))  # made by load: no scene needed
+        assert_same_run(alone, pn.resume(path))  # the end of the run was written as well
     assert part > 0  # a killed run, not one that had ended
 
 
@@ -183,7 +157,7 @@ def test_an_interrupted_run_loses_nothing(tmp_path):
     stopped = caught.value.trajectory
     assert 0.0 < stopped.t[-1] < 100.0
     run = pn.resume(path)
-    same(alone, run)
+    assert_same_run(alone, run)
     assert run.stats.wall_s > stopped.stats.wall_s
 
 
@@ -193,7 +167,7 @@ def test_files_and_parameters_are_found_from_any_folder(tmp_path, monkeypatch):
     path = tmp_path / "run"
     alone = pn.simulate(scene, 0.1, checkpoint=path)
     monkeypatch.chdir(tmp_path)
-    same(alone, pn.resume(path))
+    assert_same_run(alone, pn.resume(path))
 
 
 # --- What is refused ---------------------------------------------------------------------------------------
@@ -287,7 +261,7 @@ def test_damaged_files(written):
         spoiled[place] ^= int(generator.integers(1, 256))
         written.write_bytes(bytes(spoiled))
         with contextlib.suppress(LoadingError):
-            same(alone, pn.resume(written, cart()))
+            assert_same_run(alone, pn.resume(written, cart()))
 
 
 def states_of(scene, duration):
@@ -366,7 +340,7 @@ def test_a_disk_that_fills_up(tmp_path, monkeypatch):
     assert run.t[-1] == 0.1
     assert str(told[0].message) == "no room; the run goes on, the last checkpoint stays"
     monkeypatch.undo()
-    same(run, pn.resume(path))
+    assert_same_run(run, pn.resume(path))
 
 
 def test_methods_of_scipy_have_no_checkpoint(tmp_path):

@@ -1,0 +1,27 @@
+"""Runs compared bit by bit."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+import pin_nonideal as pn
+
+
+def assert_same_run(one, other):
+    """Every array bit by bit, names, events and counters; all but the scene and the time that it took."""
+    for field in dataclasses.fields(pn.Trajectory):
+        first, second = getattr(one, field.name), getattr(other, field.name)
+        if field.name == "scene":
+            continue
+        if isinstance(first, np.ndarray):
+            np.testing.assert_array_equal(first, second, err_msg=field.name, strict=True)
+        elif isinstance(first, dict):
+            assert list(first) == list(second), field.name
+            for name, column in first.items():
+                np.testing.assert_array_equal(column, second[name], err_msg=name, strict=True)
+        elif field.name == "stats":
+            assert dataclasses.replace(first, wall_s=0.0) == dataclasses.replace(second, wall_s=0.0)
+        else:
+            assert first == second, field.name
