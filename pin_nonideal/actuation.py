@@ -104,4 +104,4 @@ class Table:
         object.__setattr__(self, "values", array(f"{who}: values", self.values, (times.size, None)))
 
 
-Actuation = SampledControl | HoldPosition | Table | Callable[..., Any] | NDArray[np.float64]
+Actuation = SampledControl | HoldPosition | Table | Callable[..., Any] | Sequence[float] | NDArray[np.float64]

@@ -9,12 +9,16 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from .actuation import Actuation
 from .checks import array, number, optional_text, sequence
 from .configurations import configuration, unit_parts
 from .consistency import Rows, nearest_state, nonholonomic_rows
+from .contacts import Contact
 from .equation import Solution
 from .errors import InputError, RunError
 from .failures import named_failure
+from .forces import Force
+from .laws import Law
 from .lowering import core, lower
 from .scene_analysis import check_model, check_user_constraints, drop_rows
 from .scene_report import report
@@ -64,10 +68,10 @@ class Scene:
         model: Any,
         *,
         constraints: Sequence[Any] = (),
-        laws: Sequence[Any] = (),
-        contacts: Sequence[Any] = (),
-        forces: Sequence[Any] = (),
-        actuation: Any = None,
+        laws: Sequence[Law] = (),
+        contacts: Sequence[Contact] = (),
+        forces: Sequence[Force] = (),
+        actuation: Actuation | None = None,
         q0: ArrayLike | None = None,
         v0: ArrayLike | None = None,
         visual_model: Any = None,
