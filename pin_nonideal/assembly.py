@@ -6,7 +6,7 @@ Every joint that the table names is looked up here; the Scene looks up the frame
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .actuation import HoldPosition
 from .checks import array, nonnegative, number
+from .configurations import CIRCLES, unit_parts
 from .constraints import JointCoupling, PrescribedMotion
 from .errors import InputError, LoadingError, nearest
 from .inertia_checks import require_positive_mass
@@ -160,12 +161,16 @@ def _change_joints(robot: RobotFile, table: Table, where: str, notes: list[str],
         notes.append(
             f"three revolute joints with massless links between are merged into a ball joint each: {balls}"
         )
-    geometries = [g for g in (robot.visual, robot.collision) if g is not None]
-    robot.model, edited = edit_joints(robot.model, geometries, chains, types, screws)
-    remaining = iter(edited)
-    robot.visual = next(remaining) if robot.visual is not None else None
-    robot.collision = next(remaining) if robot.collision is not None else None
+    _exchange(robot, lambda geometries: edit_joints(robot.model, geometries, chains, types, screws))
     robot.q0 = robot.v0 = None
+
+
+def _exchange(robot: RobotFile, edit: Callable[[list[Any]], tuple[Any, Iterable[Any]]]) -> None:
+    """Puts an edited model and its geometries in the place of the robot's own."""
+    given = [key for key in ("visual", "collision") if getattr(robot, key) is not None]
+    robot.model, edited = edit([getattr(robot, key) for key in given])
+    for key, geometry in zip(given, edited, strict=True):
+        setattr(robot, key, geometry)
 
 
 def _place_base(robot: RobotFile, table: Table, where: str) -> None:
@@ -240,7 +245,7 @@ def _joint_value(model: Any, j: int, key: str, value: Any, where: str) -> list[f
     """Values of one joint; an angle may stand for its cosine and sine."""
     size = model.nqs[j] if key == "q" else model.nvs[j]
     values = list(value) if isinstance(value, (list, tuple)) else [value]
-    turns = key == "q" and model.nqs[j] == model.nvs[j] + 1 and model.joints[j].shortname() in _angle_joints
+    turns = key == "q" and model.joints[j].shortname().startswith(CIRCLES)
     if turns and len(values) == model.nvs[j]:
         try:
             angle = number(where, values[-1])
@@ -250,34 +255,18 @@ def _joint_value(model: Any, j: int, key: str, value: Any, where: str) -> list[f
     return _vector(values, size, where)
 
 
-_angle_joints = (
-    "JointModelRUBX",
-    "JointModelRUBY",
-    "JointModelRUBZ",
-    "JointModelRevoluteUnboundedUnaligned",
-    "JointModelPlanar",
-)
-
-
 def _with_unit_quaternions(model: Any, q: NDArray[np.float64], where: str) -> NDArray[np.float64]:
     """Quaternions (and cosine-sine pairs) of unit length.
 
     Raises:
         LoadingError: one is far from unit length.
     """
-    for j in range(1, model.njoints):
-        extra = model.nqs[j] - model.nvs[j]
-        if extra != 1:
-            continue
-        width = 2 if model.joints[j].shortname() in _angle_joints else 4
-        end = model.idx_qs[j] + model.nqs[j]
-        length = float(np.linalg.norm(q[end - width : end]))
+    for joint, part in unit_parts(model):
+        length = float(np.linalg.norm(q[part]))
         if abs(length - 1.0) > UNIT_TOLERANCE:
-            what = "quaternion [x, y, z, w]" if width == 4 else "cosine and sine"
-            raise LoadingError(
-                f'{where}: {what} of joint "{model.names[j]}" must have length 1; got {length:g}'
-            )
-        q[end - width : end] /= length
+            what = "quaternion [x, y, z, w]" if part.stop - part.start == 4 else "cosine and sine"
+            raise LoadingError(f'{where}: {what} of joint "{joint}" must have length 1; got {length:g}')
+        q[part] /= length
     return q
 
 
@@ -297,11 +286,7 @@ def _lock(
     none = [np.zeros(0)]
     q = np.concatenate([q0[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]] for j in kept] or none)
     v = np.concatenate([v0[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] for j in kept] or none)
-    geometries = [g for g in (robot.visual, robot.collision) if g is not None]
-    robot.model, edited = pin.buildReducedModel(model, geometries, indices, q0)
-    remaining = iter(edited)
-    robot.visual = next(remaining) if robot.visual is not None else None
-    robot.collision = next(remaining) if robot.collision is not None else None
+    _exchange(robot, lambda geometries: pin.buildReducedModel(model, geometries, indices, q0))
     return q, v
 
 

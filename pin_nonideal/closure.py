@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# A gap below this part of the scene's size is left to Newton's method, which squares it each time.
+# A gap below this [m or rad] is left to Newton's method, which squares it each time.
 CLOSED = 1e-9
 # A gap that stays above this after projection [m or rad] is a loop that does not close.
 CLOSURE_TOLERANCE = 1e-8

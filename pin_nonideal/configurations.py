@@ -15,7 +15,8 @@ from .errors import InputError
 # Lengths off by less than this are rounding of a file or a printout and are restored; more is an error.
 UNIT_TOLERANCE = 1e-6
 
-_CIRCLES = ("JointModelRUB", "JointModelRevoluteUnbounded", "JointModelPlanar")
+# Joints whose configuration ends in the cosine and sine of an angle, by the beginnings of their names.
+CIRCLES = ("JointModelRUB", "JointModelRevoluteUnbounded", "JointModelPlanar")
 
 
 def unit_parts(model: Any) -> Iterator[tuple[str, slice]]:
@@ -36,7 +37,7 @@ def _parts(joint: Any) -> Iterator[slice]:
             yield from _parts(part)
     elif joint.nq != joint.nv:  # a quaternion or (cos, sin) ends the joint's stretch
         end = joint.idx_q + joint.nq
-        yield slice(end - (2 if kind.startswith(_CIRCLES) else 4), end)
+        yield slice(end - (2 if kind.startswith(CIRCLES) else 4), end)
 
 
 def configuration(

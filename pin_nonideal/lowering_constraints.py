@@ -154,8 +154,8 @@ def _(c: KnifeEdge, name: str, out: Lowered, where: Resolution) -> None:
 @lower_constraint.register
 def _(c: Rolling, name: str, out: Lowered, where: Resolution) -> None:
     who = words(c, name)
-    plane = where.plane(c.plane, words(c))
-    frame = where.frame(c.frame, words(c))
+    plane = where.plane(c.plane, who)
+    frame = where.frame(c.frame, who)
     t1, t2, n = axis_triad(unit_axis(who, c.normal))
     sphere = c.axis is None
     axle = [0.0, 0.0, 1.0] if c.axis is None else list(unit_axis(who, c.axis))
@@ -209,5 +209,5 @@ def lower_contact(c: Any, name: str, out: Lowered, where: Resolution) -> None:
     """
     if not isinstance(c, PointContact):
         raise InputError(f"a contact must be a PointContact; got {c!r}")
-    f1, f2, (_, _, normal) = where.contact(c)
+    f1, f2, (_, _, normal) = where.contact(c, words(c, name))
     out.add_rows(name, out.builder.add_contact(name, f1, f2, list(normal), c.radius), 1)

@@ -226,7 +226,7 @@ def lower_contact_friction(c: PointContact, name: str, out: Lowered, where: Reso
     """
     if c.mu == 0.0:
         return
-    f1, f2, (t1, t2, n) = where.contact(c)
+    f1, f2, (t1, t2, n) = where.contact(c, words(c, name))
     law = out.add_law(name)
     block = out.builder.add_contact_slip(name, f1, f2, c.radius, t1, t2, n)
     out.add_friction(

@@ -104,9 +104,8 @@ class Resolution:
         x, y, z = (float(x) for x in self.in_world(self.frame(hinge.frame1, who)).rotation @ np.array(axis))
         return (x, y, z)
 
-    def contact(self, c: PointContact) -> tuple[Frame, Frame, tuple[Vector3, Vector3, Vector3]]:
+    def contact(self, c: PointContact, who: str) -> tuple[Frame, Frame, tuple[Vector3, Vector3, Vector3]]:
         """Frame, plane, and right-handed directions (along, along, normal) in the axes of the plane."""
-        who = words(c)
         plane = self.plane(c.plane, who)
         return self.frame(c.frame, who), plane, axis_triad(unit_axis(who, c.normal))
 

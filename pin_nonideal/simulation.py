@@ -11,29 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .actuation import SampledControl
 from .checkpoint import Saver
-from .checks import array, choice, count, label, nonnegative, number, positive, sequence
+from .checks import array, choice, count
 from .errors import InputError, OutputError, RunError, RunInterrupted, UserFunctionError
 from .failures import check_closed
+from .run_options import SCIPY, run_options
 from .scene import Scene
 from .trajectory import Event, Stats, Trajectory
 
 Array = NDArray[np.float64]
 
-ADAPTIVE = ("dop853", "dopri5")
-FIXED = ("rk4", "semi_implicit_euler", "moreau")
-SCIPY = ("Radau", "BDF", "LSODA")
-RECORDS = ("a", "forces", "energy", "power")
-FIELDS = {"F_ideal": "forces", "F_nonideal": "forces", "lam": "forces", "lam_ideal": "forces"}
 EVENT_KINDS = ("stick", "slip", "reverse", "pull", "chatter")
-DEFAULT_RTOL, DEFAULT_ATOL = 1e-8, 1e-10
-# Times are floating-point numbers: a step of fewer of their spacings is off by more than a percent, and one
-# shorter than a spacing leads nowhere.
-LEAST_SPACINGS = 100.0
-MOST_SAMPLES = 1e8  # some gigabytes for a small robot
-# No step meets a tolerance below rounding; the square of what misses it must not overflow.
-LEAST_RTOL, LEAST_ATOL = 1e-14, 1e-100
 
 
 def simulate(
@@ -91,7 +79,7 @@ def simulate(
     """
     if not isinstance(scene, Scene):
         raise InputError(f"simulate: scene must be a Scene; got {type(scene).__name__}")
-    options = _options(scene, duration, t0, method, rtol, atol, dt, output_dt, record)
+    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, record)
     q0, v0 = (
         scene.project(q, v, options["t0"])
         if (q is not None or v is not None or t0)
@@ -174,7 +162,7 @@ def rollout(
         raise InputError(f"rollout: q and v must have as many rows; got {len(starts_q)} and {len(starts_v)}")
     if method in SCIPY:
         raise InputError(f'rollout: method must be one of the core\'s; "{method}" runs in SciPy')
-    options = _options(scene, duration, t0, method, rtol, atol, dt, output_dt, record)
+    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, record)
     starts = [scene.project(a, b, options["t0"]) for a, b in zip(starts_q, starts_v, strict=True)]
     begin = time.perf_counter()
     q0, v0 = (np.ascontiguousarray([s[i] for s in starts]).reshape(len(starts), -1) for i in (0, 1))
@@ -188,98 +176,6 @@ def rollout(
             error.index = i
             raise
     return results
-
-
-def _options(
-    scene: Scene,
-    duration: Any,
-    t0: Any,
-    method: Any,
-    rtol: Any,
-    atol: Any,
-    dt: Any,
-    output_dt: Any,
-    record: Any,
-) -> dict[str, Any]:
-    methods = (*ADAPTIVE, *FIXED, *SCIPY)
-    choice("simulate: method", method, methods)
-    if method in FIXED:
-        if dt is None:
-            raise InputError(f'simulate: method "{method}" needs a step dt')
-        unused = [name for name, value in (("rtol", rtol), ("atol", atol)) if value is not None]
-        if unused:
-            raise InputError(
-                f'simulate: method "{method}" takes steps of the length dt; leave {" and ".join(unused)} out'
-            )
-    elif dt is not None:
-        raise InputError(f'simulate: method "{method}" chooses its own steps; leave dt out, or set output_dt')
-    nv = scene.model.nv
-    if nv == 0:
-        raise InputError(f'simulate: "{scene.name}" has no joint that moves; there is nothing to simulate')
-    tolerance = np.full(2 * nv + scene.z0.size, DEFAULT_ATOL)
-    if atol is not None:
-        given = np.asarray(atol)
-        if given.ndim == 0:
-            tolerance[:] = nonnegative("simulate: atol", atol)
-        else:
-            tolerance[: 2 * nv] = array("simulate: atol", atol, (2 * nv,))
-            tolerance[2 * nv :] = tolerance[: 2 * nv].min()
-            if (tolerance < 0.0).any():
-                raise InputError(f"simulate: atol must not be negative; got {tolerance.min():g}")
-    relative = DEFAULT_RTOL if rtol is None else nonnegative("simulate: rtol", rtol)
-    if relative == 0.0 and not (tolerance > 0.0).all():
-        raise InputError("simulate: rtol and atol must not both be zero; set one of them")
-    begin, length = number("simulate: t0", t0), positive("simulate: duration", duration)
-    steps = {"dt": dt, "output_dt": output_dt}
-    lengths = {key: positive(f"simulate: {key}", value) for key, value in steps.items() if value is not None}
-    _check_clock(scene, begin, length, lengths)
-    wanted = {record} if isinstance(record, str) else set(sequence("simulate: record", record))
-    groups = set()
-    for name in wanted:
-        groups.add(FIELDS.get(name, name))
-        choice("simulate: record", FIELDS.get(name, name), RECORDS)
-    return {
-        "method": method,
-        "duration": length,
-        "t0": begin,
-        "rtol": max(relative, LEAST_RTOL) if relative else 0.0,
-        "atol": np.ascontiguousarray(np.maximum(tolerance, LEAST_ATOL)),
-        **{key: lengths.get(key, 0.0) for key in steps},
-        **{key: key in groups for key in RECORDS},
-        "tick": None,
-        "save": None,
-    }
-
-
-def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, float]) -> None:
-    """Refuses lengths of time that floating-point times near the end of the run cannot tell apart.
-
-    Args:
-        scene: what to simulate.
-        t0: initial time [s].
-        duration: length of time [s].
-        lengths: dt and output_dt, as far as given [s].
-
-    Raises:
-        InputError: a length is too short, or leaves more samples than a run can hold.
-    """
-    end = max(abs(t0), abs(t0 + duration))
-    spacing = float(np.spacing(end))
-    named = {f"simulate: {key}": value for key, value in {"duration": duration, **lengths}.items()}
-    if isinstance(scene.actuation, SampledControl):
-        named[f"{label(scene.actuation)}: period"] = scene.actuation.period
-    for what, value in named.items():
-        if not value >= LEAST_SPACINGS * spacing:  # also when the end is beyond all numbers
-            raise InputError(
-                f"{what} must be at least {LEAST_SPACINGS:g} times the spacing of floating-point times, "
-                f"which is {spacing:.2g} s at t = {end:g} s; got {value:g} s"
-            )
-    key = next((key for key in ("output_dt", "dt") if key in lengths), None)
-    if key is not None and duration / lengths[key] > MOST_SAMPLES:
-        raise InputError(
-            f"simulate: {key} must leave at most {MOST_SAMPLES:g} samples; {lengths[key]:g} s leaves "
-            f"{duration / lengths[key]:.2g}; set a longer {'output_dt' if key == 'dt' else key}"
-        )
 
 
 def finish(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: float) -> Trajectory:
@@ -368,12 +264,9 @@ def shaped(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: flo
         fields["energy"] = ledger
     if scene.z0.size:
         fields["z"] = table("z", scene.z0.size)
-    contacts = list(scene.constraint_slices)
-    names = {3: contacts}
-    events = [
-        Event(t, EVENT_KINDS[kind], names.get(kind, scene.element_names)[element])
-        for t, kind, element in raw["events"]
-    ]
+    names = dict.fromkeys(EVENT_KINDS, scene.element_names) | {"pull": list(scene.constraint_slices)}
+    kinds = [(t, EVENT_KINDS[kind], element) for t, kind, element in raw["events"]]
+    events = [Event(t, kind, names[kind][element]) for t, kind, element in kinds]
     counters = ("steps", "rejected", "evaluations", "factorizations", "projections", "iterations")
     return Trajectory(
         t=raw["t"],

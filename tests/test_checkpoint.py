@@ -18,8 +18,9 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal import checkpoint, simulation
+from pin_nonideal import checkpoint
 from pin_nonideal.errors import InputError, LoadingError, OutputError, RunInterrupted
+from pin_nonideal.run_options import run_options
 
 from .random_trees import add
 from .same_run import assert_same_run
@@ -267,7 +268,7 @@ def test_damaged_files(written):
 def states_of(scene, duration):
     """What the core hands over to be written, and the options to read it with."""
     states = []
-    options = simulation._options(scene, duration, 0.0, "dop853", 1e-6, None, None, None, ())
+    options = run_options(scene, duration, 0.0, "dop853", 1e-6, None, None, None, ())
     start = *scene.initial_state(), scene.z0
     scene.new_runner().simulate(*start, options | {"save": states.append, "save_interval": 0.0})
     return states, options
