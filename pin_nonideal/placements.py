@@ -1,4 +1,4 @@
-"""Where the joints of a tree are, without Pinocchio's Data.
+"""Where the frames and joints of a tree are, without Pinocchio's Data.
 
 Data holds tensors of nv^3 numbers, gigabytes from some five hundred degrees of freedom on.
 """
@@ -28,3 +28,21 @@ def joint_placements(model: Any, q: NDArray[Any]) -> list[Any]:
         joint.calc(data, q)
         found.append(found[model.parents[index]] * model.jointPlacements[index] * pin.SE3(data.M))
     return found
+
+
+def frame_on_joint(model: Any, name: str) -> tuple[int, Any]:
+    """The joint that carries a frame, and the frame's placement on it.
+
+    A joint without a frame of its own, which a model built by hand may hold, is found by its name as well.
+
+    Args:
+        model: pinocchio.Model.
+        name: of a frame or a joint of the model.
+
+    Returns:
+        Index of the joint, and a pinocchio.SE3.
+    """
+    if not model.existFrame(name) and model.existJointName(name):
+        return int(model.getJointId(name)), pin.SE3.Identity()
+    frame = model.frames[model.getFrameId(name)]
+    return int(frame.parentJoint), frame.placement

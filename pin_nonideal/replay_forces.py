@@ -27,6 +27,7 @@ from .constraints import (
 )
 from .contacts import PointContact
 from .forces import SpringDamper
+from .placements import frame_on_joint, joint_placements
 from .replay_geometry import joint_axis
 from .replay_motion import Motion
 
@@ -128,8 +129,7 @@ def _constraints(scene: Scene) -> list[tuple[str, Any]]:
 
 
 def _side(model: pin.Model, frame: str) -> _Side:
-    found = model.frames[model.getFrameId(frame)]
-    return _Side(int(found.parentJoint), found.placement)
+    return _Side(*frame_on_joint(model, frame))
 
 
 def _sides(scene: Scene, item: Any) -> tuple[_Side, _Side] | None:
@@ -145,9 +145,7 @@ def _sides(scene: Scene, item: Any) -> tuple[_Side, _Side] | None:
     first = _side(model, item.frame1)
     if item.frame2 is not None:
         return first, _side(model, item.frame2)
-    data = model.createData()
-    pin.forwardKinematics(model, data, scene.q0)
-    here = data.oMi[first.joint].act(first.point)
+    here = joint_placements(model, scene.q0)[first.joint].act(first.point)
     return first, _Side(0, pin.SE3(np.eye(3), here))
 
 

@@ -13,7 +13,7 @@ from .checks import Vector3, axis_triad, unit_axis
 from .constraints import HingeAnchor
 from .contacts import PointContact
 from .errors import InputError, UnknownNameError, nearest
-from .placements import joint_placements
+from .placements import frame_on_joint, joint_placements
 
 Array = NDArray[np.float64]
 # A frame as the core takes it: joint, orientation by rows, place.
@@ -52,11 +52,10 @@ class Resolution:
         raise UnknownNameError(f'{who}: no frame "{name}" in model "{self.model.name}"{nearest(name, names)}')
 
     def frame(self, name: str, who: str) -> Frame:
-        """A frame as the core takes it; a joint without a frame of its own stands for its own frame."""
-        if not self.model.existFrame(name) and self.model.existJointName(name):
-            return placed_on(self.model.getJointId(name), pin.SE3.Identity())
-        frame = self.model.frames[self.frame_id(name, who)]
-        return placed_on(frame.parentJoint, frame.placement)
+        """A frame, or a joint's own one, as the core takes it."""
+        if not self.model.existJointName(name):
+            self.frame_id(name, who)  # raises where there is neither
+        return placed_on(*frame_on_joint(self.model, name))
 
     def plane(self, name: str | None, who: str) -> Frame:
         """The frame that a plane belongs to: the world's when there is no name."""

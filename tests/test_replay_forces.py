@@ -68,6 +68,16 @@ def test_an_anchor_on_the_world_stays_where_its_frame_starts() -> None:
     assert mark.name == "PointAnchor"
 
 
+def test_a_joint_without_a_frame_of_its_own_is_marked_by_its_name() -> None:
+    model = jointed(pin.JointModelRZ(), pin.JointModelRZ())
+    assert not model.existFrame("j1")
+    run = run_of(model, [0.0, 1.0], lambda t: np.array([t, 0.0]), constraints=[PointAnchor("j1")])
+    (mark,) = marks_of(run.scene)
+    assert (mark.joint1, mark.joint2) == (2, 0)
+    np.testing.assert_allclose(mark.point1, np.zeros(3), atol=ROUNDING)
+    np.testing.assert_allclose(mark.point2, [0.4, 0.0, 0.0], atol=ROUNDING)
+
+
 def test_a_reaction_is_turned_from_the_second_frame_into_the_world_and_split() -> None:
     run = four_bar()
     by_kind = {arrow.kind: arrow for arrow in arrows(run) if arrow.name == "loop"}
