@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
-
-import pytest
-
-from pin_nonideal.errors import LoadingError
 
 DATA = Path(__file__).parent / "data"
 INERTIAL = (
@@ -52,7 +47,3 @@ def folder(path, yaml=None, urdf=None):
     if yaml is not None:
         (path / "robot.yaml").write_text(yaml)
     return path
-
-
-def refuses(message, error=LoadingError):
-    return pytest.raises(error, match=re.escape(message))

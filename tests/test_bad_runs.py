@@ -9,7 +9,7 @@ import pin_nonideal as pn
 from pin_nonideal.errors import InputError
 
 from .every_joint import INF, MODEL, NAN, Q, V, with_entry
-from .small_robots import refuses
+from .refusals import refuses
 
 METHODS = "'dop853', 'dopri5', 'rk4', 'semi_implicit_euler', 'moreau', 'Radau', 'BDF', 'LSODA'"
 RUNS = {

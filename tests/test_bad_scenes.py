@@ -12,7 +12,7 @@ from pin_nonideal.errors import InputError, SingularMassError, UnknownNameError
 
 from .every_joint import INF, MODEL, NAN, Q, V, scaled, with_entry
 from .random_trees import tree
-from .small_robots import refuses
+from .refusals import refuses
 
 FRAMES = '"universe", "j0 tip", "j1 tip", "j2 tip", "j3 tip", "j4 tip"'
 UNKNOWN = {

@@ -23,8 +23,8 @@ from pin_nonideal.errors import InputError, LoadingError, OutputError, RunInterr
 from pin_nonideal.run_options import run_options
 
 from .random_trees import add
+from .refusals import refuses
 from .same_run import assert_same_run
-from .small_robots import refuses
 
 ALL = ("a", "forces", "energy", "power")
 

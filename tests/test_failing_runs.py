@@ -16,7 +16,7 @@ from pin_nonideal.errors import (
 )
 
 from .random_trees import add, tree
-from .small_robots import refuses
+from .refusals import refuses
 
 # --- Constraints that cannot be met ------------------------------------------------------------------------
 

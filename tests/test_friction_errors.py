@@ -11,7 +11,8 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, LoadingError, UnknownNameError, UserFunctionError
 
-from .small_robots import folder, joint, link, refuses, robot
+from .refusals import refuses
+from .small_robots import folder, joint, link, robot
 
 NAN = math.nan
 STATIC = "static_ratio must be at least 1 (static friction is never below kinetic friction); got"

@@ -12,7 +12,8 @@ from pin_nonideal.inertia_checks import mass_diagnosis
 from pin_nonideal.model_edit import ball_chains, edit_joints
 from pin_nonideal.urdf import read_urdf
 
-from .small_robots import ARM, DATA, folder, joint, link, refuses, robot
+from .refusals import refuses
+from .small_robots import ARM, DATA, folder, joint, link, robot
 
 # Poses and energies of order one computed along two routes of some ten operations each.
 ROUNDING = 1e-12

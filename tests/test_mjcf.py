@@ -9,7 +9,7 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.constraints import Distance, FrameAnchor, JointCoupling, PointAnchor, PrescribedMotion
 
-from .small_robots import refuses
+from .refusals import refuses
 
 # Poses of order one computed along two routes of some ten operations each.
 ROUNDING = 1e-12

@@ -9,7 +9,8 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.errors import LoadingError
 
-from .small_robots import ARM, DATA, folder, joint, link, refuses, robot
+from .refusals import refuses
+from .small_robots import ARM, DATA, folder, joint, link, robot
 
 # Poses and energies of order one computed along two routes of some ten operations each.
 ROUNDING = 1e-12

@@ -14,7 +14,7 @@ import pin_nonideal as pn
 from pin_nonideal.constraints import PointAnchor, PrescribedMotion, Rolling
 from pin_nonideal.errors import InputError
 
-from .small_robots import refuses
+from .refusals import refuses
 
 NAMES = [name for name, _ in pn.robots()]
 # Robot files hold lengths to 12 digits; a loop of a few of them closes to a few units of the last one.

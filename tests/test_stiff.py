@@ -14,7 +14,7 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, NonFiniteError, RunInterrupted, StepSizeError, UserFunctionError
 
-from .small_robots import refuses
+from .refusals import refuses
 
 METHODS = ["Radau", "BDF", "LSODA"]
 # Global error over half a second at rtol 1e-8: multistep methods lose more of their tolerance than Radau.

@@ -14,8 +14,8 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, LoadingError, OutputError
 
+from .refusals import refuses
 from .same_run import assert_same_run
-from .small_robots import refuses
 
 
 @pytest.fixture(scope="module")

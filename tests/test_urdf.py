@@ -11,7 +11,8 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.errors import LoadingError
 
-from .small_robots import ARM, DATA, folder, joint, link, refuses, robot
+from .refusals import refuses
+from .small_robots import ARM, DATA, folder, joint, link, robot
 
 
 def test_link_with_two_parents_explains_robot_yaml(tmp_path):

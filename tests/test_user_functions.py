@@ -15,7 +15,7 @@ import pin_nonideal as pn
 from pin_nonideal.errors import InputError, RunInterrupted, UserFunctionError
 
 from .random_trees import tree
-from .small_robots import refuses
+from .refusals import refuses
 
 MODEL = tree(["revolute x", "prismatic y", "revolute z"], np.random.default_rng(0), parents=[0, 1, 2])
 ROW = np.array([[1.0, 0.0, 0.0]])
