@@ -11,18 +11,18 @@ namespace pn {
 static void fields(Archive& a, Wrench& x) { a(x.force, x.point, x.couple); }
 
 static void fields(Archive& a, RowValues& x) {
-    auto& [rows, geometric, wrench, drift, residual, rate, A, constant_A, has_A, b, scratch] = x;
-    a(rows, geometric, wrench, drift, residual, rate, A, constant_A, has_A, b, scratch);
+    auto& [rows, geometric, wrench, drift, residual, rate, phi_t, phi_tt, A, constant_A, has_A, b, scratch] = x;
+    a(rows, geometric, wrench, drift, residual, rate, phi_t, phi_tt, A, constant_A, has_A, b, scratch);
 }
 
 static void fields(Archive& a, Body& x) {
-    auto& [R, p, ref, v, acceleration, f, Y] = x;
-    a(R, p, ref, v, acceleration, f, Y);
+    auto& [R, p, ref, v, acceleration, f, own, Y] = x;
+    a(R, p, ref, v, acceleration, f, own, Y);
 }
 
 static void fields(Archive& a, Terms& x) {
     // What Pinocchio evaluates for foreign joints is evaluated anew each time.
-    auto& [body, J, Ag, nle, L, M, D, inv_sqrt_D, locked, q, foreign, foreign_motion] = x;
+    auto& [body, J, Ag, nle, L, M, D, inv_sqrt_D, locked, q, foreign, foreign_motion, rest] = x;
     a(body, J, Ag, nle, L, M, D, inv_sqrt_D, locked, q);
 }
 

@@ -30,105 +30,129 @@ Vec3 logarithm(const Mat3& R) {  // rotation vector
     return (wrapped / n) * q.vec();
 }
 
-// Row k: velocity of frame 1's origin along e, seen from body 2 (e is fixed in body 2).
-void point_row(const Pose& a, const Pose& b, const Vec3& e, double offset, int k, RowValues& out) {
-    const Vec3 u = a.velocity(a.x) - b.velocity(a.x);
-    const Vec3 w = a.acceleration(a.x) - b.acceleration(a.x) - 2.0 * b.omega().cross(u);
-    out.wrench[k] = {e, a.x, Vec3::Zero()};
-    out.residual[k] = e.dot(a.x - b.x) - offset;
-    out.rate[k] = e.dot(u);
-    out.drift[k] = e.dot(w);
-}
-
 double wrap(double x, double period) { return period > 0.0 ? std::remainder(x, period) : x; }
 
 double joint_angle(const Joint& j, const VecX& q) {
     return j.unbounded ? std::atan2(q[j.iq + 1], q[j.iq]) : q[j.iq];
 }
 
-// Sliding of body 1 against the plane of body 2 at a contact point that moves with rate c_rate.
-void contact_row(const Pose& a, const Pose& b, const Vec3& e, const Vec3& c, const Vec3& c_rate, int k,
-                 RowValues& out) {
-    const Vec3 va = a.velocity(c), vb = b.velocity(c), u = va - vb;
-    const Vec3 du = a.acceleration(c) + a.omega().cross(c_rate - va) - b.acceleration(c) -
-                    b.omega().cross(c_rate - vb) - b.omega().cross(u);
-    out.wrench[k] = {e, c, Vec3::Zero()};
-    out.residual[k] = 0.0;
-    out.rate[k] = e.dot(u);
-    out.drift[k] = e.dot(du);
-}
-
+// Formulas of all kinds, those of the parts before bodies move, or those of the motion.
+template <Part part>
 struct Evaluate {
+    static constexpr bool moving = part == Part::motion;
     const State& s;
     RowValues& out;
 
+    // Row k: velocity of frame 1's origin along e, seen from body 2 (e is fixed in body 2).
+    void point_row(const Pose& a, const Pose& b, const Vec3& e, double offset, int k) const {
+        if constexpr (moving) {
+            const Vec3 u = a.velocity(a.x) - b.velocity(a.x);
+            const Vec3 w = a.acceleration(a.x) - b.acceleration(a.x) - 2.0 * b.omega().cross(u);
+            out.rate[k] = e.dot(u);
+            out.drift[k] = e.dot(w);
+        } else {
+            out.wrench[k] = {e, a.x, Vec3::Zero()};
+            out.residual[k] = e.dot(a.x - b.x) - offset;
+        }
+    }
+
+    // Sliding of body 1 against the plane of body 2 at a contact point c that moves with rate c_rate.
+    void contact_row(const Pose& a, const Pose& b, const Vec3& e, const Vec3& c, const Vec3& c_rate, int k) const {
+        if constexpr (moving) {
+            const Vec3 va = a.velocity(c), vb = b.velocity(c), u = va - vb;
+            const Vec3 du = a.acceleration(c) + a.omega().cross(c_rate - va) - b.acceleration(c) -
+                            b.omega().cross(c_rate - vb) - b.omega().cross(u);
+            out.rate[k] = e.dot(u);
+            out.drift[k] = e.dot(du);
+        } else {
+            out.wrench[k] = {e, c, Vec3::Zero()};
+            out.residual[k] = 0.0;
+        }
+    }
+
     void operator()(const PointRows& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
-        for (size_t k = 0; k < c.axes.size(); ++k) point_row(a, b, b.R.col(c.axes[k]), 0.0, k, out);
+        for (size_t k = 0; k < c.axes.size(); ++k) point_row(a, b, b.R.col(c.axes[k]), 0.0, k);
     }
 
     void operator()(const ContactRow& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
-        point_row(a, b, b.R * c.normal, c.radius, 0, out);
+        point_row(a, b, b.R * c.normal, c.radius, 0);
     }
 
     void operator()(const FrameRows& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
-        const Vec3 gap = logarithm(b.R.transpose() * a.R), omega = a.omega() - b.omega();
-        const Vec3 alpha = a.alpha() - b.alpha() - b.omega().cross(omega);
-        for (int k = 0; k < 3; ++k) {
-            const Vec3 e = b.R.col(k);
-            point_row(a, b, e, 0.0, k, out);
-            out.wrench[k + 3] = {Vec3::Zero(), a.x, e};
-            out.residual[k + 3] = gap[k];
-            out.rate[k + 3] = e.dot(omega);
-            out.drift[k + 3] = e.dot(alpha);
+        for (int k = 0; k < 3; ++k) point_row(a, b, b.R.col(k), 0.0, k);
+        if constexpr (moving) {
+            const Vec3 omega = a.omega() - b.omega(), alpha = a.alpha() - b.alpha() - b.omega().cross(omega);
+            for (int k = 0; k < 3; ++k) {
+                out.rate[k + 3] = b.R.col(k).dot(omega);
+                out.drift[k + 3] = b.R.col(k).dot(alpha);
+            }
+        } else {
+            const Vec3 gap = logarithm(b.R.transpose() * a.R);
+            for (int k = 0; k < 3; ++k) {
+                out.wrench[k + 3] = {Vec3::Zero(), a.x, b.R.col(k)};
+                out.residual[k + 3] = gap[k];
+            }
         }
     }
 
     void operator()(const HingeRows& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
-        for (int k = 0; k < 3; ++k) point_row(a, b, b.R.col(k), 0.0, k, out);
+        for (int k = 0; k < 3; ++k) point_row(a, b, b.R.col(k), 0.0, k);
         // The axis e of frame 1 stays normal to n1 and n2 of frame 2; the angle between the axes scales the residual,
         // so that it tells the gap also when they point apart.
-        const Vec3 e = a.R * c.axis, axis2 = b.R * c.axis, omega = a.omega() - b.omega();
-        const double sine = e.cross(axis2).norm(), cosine = e.dot(axis2), angle = std::atan2(sine, cosine);
-        const double stretch = sine > 1e-9 ? angle / sine : 1.0;
+        const Vec3 e = a.R * c.axis;
         const Vec3 normals[2] = {b.R * c.normal1, b.R * c.normal2};
         for (int k = 0; k < 2; ++k) {
             const Vec3& n = normals[k];
             const Vec3 w = e.cross(n);
-            const Vec3 dw = a.omega().cross(e).cross(n) + e.cross(b.omega().cross(n));
-            out.wrench[k + 3] = {Vec3::Zero(), a.x, w};
-            out.residual[k + 3] = stretch * n.dot(e);
-            if (sine <= 1e-9 && cosine < 0.0) out.residual[k + 3] = k == 0 ? M_PI : 0.0;
-            out.rate[k + 3] = w.dot(omega);
-            out.drift[k + 3] = w.dot(a.alpha() - b.alpha()) + dw.dot(omega);
+            if constexpr (moving) {
+                const Vec3 dw = a.omega().cross(e).cross(n) + e.cross(b.omega().cross(n));
+                out.rate[k + 3] = w.dot(a.omega() - b.omega());
+                out.drift[k + 3] = w.dot(a.alpha() - b.alpha()) + dw.dot(a.omega() - b.omega());
+            } else {
+                const Vec3 axis2 = b.R * c.axis;
+                const double sine = e.cross(axis2).norm(), cosine = e.dot(axis2), angle = std::atan2(sine, cosine);
+                const double stretch = sine > 1e-9 ? angle / sine : 1.0;
+                out.wrench[k + 3] = {Vec3::Zero(), a.x, w};
+                out.residual[k + 3] = stretch * n.dot(e);
+                if (sine <= 1e-9 && cosine < 0.0) out.residual[k + 3] = k == 0 ? M_PI : 0.0;
+            }
         }
     }
 
     void operator()(const DistanceRows& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
-        const Jet length = evaluate(c.length, s.t);
         const Vec3 d = a.x - b.x;
         const double distance = d.norm();
         const Vec3 n = distance > 0.0 ? Vec3(d / distance) : Vec3::UnitX();
-        const Vec3 u = a.velocity(a.x) - b.velocity(b.x);
-        const double along = n.dot(u);
-        out.wrench[0] = {n, a.x, Vec3::Zero()};
-        out.residual[0] = distance - length[0];
-        out.rate[0] = along - length[1];
-        out.drift[0] = n.dot(a.acceleration(a.x) - b.acceleration(b.x)) - length[2];
-        if (distance > 0.0) out.drift[0] += (u.squaredNorm() - along * along) / distance;
+        if constexpr (moving) {
+            const Vec3 u = a.velocity(a.x) - b.velocity(b.x);
+            const double along = n.dot(u);
+            out.rate[0] = along + out.phi_t[0];
+            out.drift[0] = n.dot(a.acceleration(a.x) - b.acceleration(b.x)) + out.phi_tt[0];
+            if (distance > 0.0) out.drift[0] += (u.squaredNorm() - along * along) / distance;
+        } else {
+            const Jet length = evaluate(c.length, s.t);
+            out.wrench[0] = {n, a.x, Vec3::Zero()};
+            out.residual[0] = distance - length[0];
+            out.phi_t[0] = -length[1];
+            out.phi_tt[0] = -length[2];
+        }
     }
 
     void operator()(const KnifeRows& c) const {
         const Pose a(s, c.frame1);
-        const Vec3 e = a.R * c.axis, u = a.velocity(a.x);
-        out.wrench[0] = {e, a.x, Vec3::Zero()};
-        out.residual[0] = 0.0;
-        out.rate[0] = e.dot(u);
-        out.drift[0] = e.dot(a.acceleration(a.x)) + a.omega().cross(e).dot(u);
+        const Vec3 e = a.R * c.axis;
+        if constexpr (moving) {
+            const Vec3 u = a.velocity(a.x);
+            out.rate[0] = e.dot(u);
+            out.drift[0] = e.dot(a.acceleration(a.x)) + a.omega().cross(e).dot(u);
+        } else {
+            out.wrench[0] = {e, a.x, Vec3::Zero()};
+        }
     }
 
     void operator()(const RollingRows& c) const {
@@ -145,75 +169,89 @@ struct Evaluate {
             ddown = -(dw - w * (w.dot(dw) / (support * support))) / support;
         }
         const Vec3 contact = a.x + c.radius * down, rate = a.velocity(a.x) + c.radius * ddown;
-        contact_row(a, b, b.R * c.tangent1, contact, rate, 0, out);
-        contact_row(a, b, b.R * c.tangent2, contact, rate, 1, out);
-        contact_row(a, b, n, contact, rate, 2, out);
-        out.residual[2] = n.dot(a.x - b.x) - c.radius * support;
+        contact_row(a, b, b.R * c.tangent1, contact, rate, 0);
+        contact_row(a, b, b.R * c.tangent2, contact, rate, 1);
+        contact_row(a, b, n, contact, rate, 2);
+        if constexpr (!moving) out.residual[2] = n.dot(a.x - b.x) - c.radius * support;
     }
 
     void operator()(const HingeSlipRows& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
-        const Vec3 e = a.R * c.axis, omega = a.omega() - b.omega();
-        out.wrench[0] = {Vec3::Zero(), a.x, e};
-        out.residual[0] = 0.0;
-        out.rate[0] = e.dot(omega);
-        out.drift[0] = e.dot(a.alpha() - b.alpha()) + a.omega().cross(e).dot(omega);
+        const Vec3 e = a.R * c.axis;
+        if constexpr (moving) {
+            const Vec3 omega = a.omega() - b.omega();
+            out.rate[0] = e.dot(omega);
+            out.drift[0] = e.dot(a.alpha() - b.alpha()) + a.omega().cross(e).dot(omega);
+        } else {
+            out.wrench[0] = {Vec3::Zero(), a.x, e};
+        }
     }
 
     void operator()(const ContactSlipRows& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
         const Vec3 n = b.R * c.normal, contact = a.x - c.radius * n;
         const Vec3 rate = a.velocity(a.x) - c.radius * b.omega().cross(n);
-        contact_row(a, b, b.R * c.tangent1, contact, rate, 0, out);
-        contact_row(a, b, b.R * c.tangent2, contact, rate, 1, out);
+        contact_row(a, b, b.R * c.tangent1, contact, rate, 0);
+        contact_row(a, b, b.R * c.tangent2, contact, rate, 1);
     }
 
     void operator()(const CouplingRows& c) const {
         const Joint &j1 = s.mechanism.joints[c.joint1], &j2 = s.mechanism.joints[c.joint2];
+        if constexpr (moving) {
+            out.rate[0] = s.v[j1.iv] - c.ratio * s.v[j2.iv];
+            return;
+        }
         if (!out.has_A) {
             out.A(0, j1.iv) = 1.0;
             out.A(0, j2.iv) = -c.ratio;
         }
         const double gap = joint_angle(j1, s.q) - c.ratio * joint_angle(j2, s.q) - c.offset;
         out.residual[0] = c.position ? wrap(gap, c.period) : 0.0;
-        out.rate[0] = s.v[j1.iv] - c.ratio * s.v[j2.iv];
-        out.drift[0] = 0.0;
     }
 
     void operator()(const MotionRows& c) const {
         const Joint& j = s.mechanism.joints[c.joint];
+        if constexpr (moving) {
+            out.rate[0] = s.v[j.iv] + out.phi_t[0];
+            out.drift[0] = out.phi_tt[0];
+            return;
+        }
         const Jet f = evaluate(c.function, s.t);
         if (!out.has_A) out.A(0, j.iv) = 1.0;
         out.residual[0] = wrap(joint_angle(j, s.q) - f[0], c.period);
-        out.rate[0] = s.v[j.iv] - f[1];
-        out.drift[0] = -f[2];
+        out.phi_t[0] = -f[1];
+        out.phi_tt[0] = -f[2];
     }
 
+    // The user's A and b come together, with the place part.
     void operator()(const UserRows& c) const {
-        c.rows(s.t, s.q, s.v, out.A, out.b);
-        for (int k = 0; k < out.rows; ++k) out.drift[k] = -out.b[k];
-        if (c.residual) {
-            c.residual(s.t, s.q, out.scratch);
-            for (int k = 0; k < out.rows; ++k) out.residual[k] = out.scratch[k];
-        }
-        if (c.rate) {
+        if (moving && c.rate) {
             c.rate(s.t, s.q, s.v, out.scratch);
             for (int k = 0; k < out.rows; ++k) out.rate[k] = out.scratch[k];
         }
+        if (!moving && c.residual) {
+            c.residual(s.t, s.q, out.scratch);
+            for (int k = 0; k < out.rows; ++k) out.residual[k] = out.scratch[k];
+        }
+        if (part != Part::place) return;
+        c.rows(s.t, s.q, s.v, out.A, out.b);
+        for (int k = 0; k < out.rows; ++k) out.drift[k] = -out.b[k];
     }
 
     void operator()(const DofRows& c) const {
         for (int k = 0; k < c.count; ++k) {
-            if (!out.has_A) out.A(k, c.dof + k) = 1.0;
-            out.rate[k] = s.v[c.dof + k];
+            if (moving) out.rate[k] = s.v[c.dof + k];
+            else if (!out.has_A) out.A(k, c.dof + k) = 1.0;
         }
     }
 
     void operator()(const UserSlipRow& c) const {
-        c.direction(s.t, s.q, out.scratch);
-        out.A.row(0) = out.scratch.transpose();
-        out.residual[0] = 0.0;
-        out.rate[0] = out.scratch.dot(s.v);
+        if constexpr (!moving) {
+            c.direction(s.t, s.q, out.scratch);
+            out.A.row(0) = out.scratch.transpose();
+            return;
+        }
+        out.rate[0] = out.A.row(0).dot(s.v);
         // The direction's own rate, by a difference along the motion: d(n(t, q))/dt . v.
         const double h = 1e-6;
         VecX ahead(s.q.size()), row(s.v.size());
@@ -241,6 +279,8 @@ void RowValues::resize(int n, int nv, bool is_geometric) {
     drift.assign(n, 0.0);
     residual.assign(n, 0.0);
     rate.assign(n, 0.0);
+    phi_t.assign(n, 0.0);
+    phi_tt.assign(n, 0.0);
     if (is_geometric) return;
     A = MatX::Zero(n, nv);
     b = VecX::Zero(n);
@@ -299,7 +339,13 @@ int row_count(const Kind& kind, int user_size) {
     return std::visit(Count{user_size}, kind);
 }
 
-void evaluate(const Kind& kind, const State& s, RowValues& out) { std::visit(Evaluate{s, out}, kind); }
+void evaluate(const Kind& kind, const State& s, Part part, RowValues& out) {
+    switch (part) {
+        case Part::gap: std::visit(Evaluate<Part::gap>{s, out}, kind); break;
+        case Part::place: std::visit(Evaluate<Part::place>{s, out}, kind); break;
+        case Part::motion: std::visit(Evaluate<Part::motion>{s, out}, kind); break;
+    }
+}
 
 void fill_A(const Block& block, const Terms& terms, const RowValues& values, double* A) {
     const int r = static_cast<int>(block.kept.size()), n = static_cast<int>(block.support.size());

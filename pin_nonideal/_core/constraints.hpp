@@ -99,6 +99,7 @@ struct RowValues {
     bool geometric = false;  // rows are wrenches between joint1 and joint2
     std::vector<Wrench> wrench;
     std::vector<double> drift, residual, rate;
+    std::vector<double> phi_t, phi_tt;  // explicit rates in time of the residual
     MatX A;  // rows x nv, when not geometric
     bool constant_A = false, has_A = false;  // A that never changes is written once
     VecX b, scratch;
@@ -140,8 +141,10 @@ bool has_constant_rows(const Kind& kind);
 bool moves_in_time(const Kind& kind);
 int row_count(const Kind& kind, int user_size);
 
-// Residuals, rates and drifts of all rows of the kind, and its wrenches or A.
-void evaluate(const Kind& kind, const State& s, RowValues& out);
+// What of all rows of the kind is evaluated: the residuals alone; residuals and wrenches or A, which bodies in their
+// places give; or rates and drifts, which need bodies in motion, and the place part before.
+enum class Part { gap, place, motion };
+void evaluate(const Kind& kind, const State& s, Part part, RowValues& out);
 
 // A on the block's support from the wrenches or the dense rows; dof-major.
 void fill_A(const Block& block, const Terms& terms, const RowValues& values, double* A);

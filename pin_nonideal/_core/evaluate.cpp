@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "program.hpp"
+#include "projection.hpp"
 
 namespace pn {
 
@@ -104,6 +105,13 @@ void Program::finish() {
         moves_in_time |= pn::moves_in_time(blocks[i].kind);
         affine_rates &= !std::holds_alternative<UserRows>(blocks[i].kind);
     }
+    std::vector<char> touched(mechanism.joints.size(), 0);
+    for (int i = 0; i < constraints; ++i)
+        for (int joint : {blocks[i].joint1, blocks[i].joint2})
+            for (; joint != 0; joint = mechanism.joints[joint].parent) touched[joint] = 1;
+    touched_joints.clear();
+    for (size_t joint = 1; joint < touched.size(); ++joint)
+        if (touched[joint]) touched_joints.push_back(static_cast<int>(joint));
     for (Drag& d : drags) d.dofs = mechanism.dofs_of(d.frame.joint);
     driven = !forces.empty() || !std::holds_alternative<NoActuation>(actuation);
     for (const GivenForce& f : forces)
@@ -172,17 +180,39 @@ void factor_mass(const Program& p, Workspace& w, double t) {
     throw Failure(Failure::Kind::singular_mass, t, {dof});
 }
 
-void evaluate_rows(const Program& p, Workspace& w, double t, const VecX& v) {
+void gaps(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    place_bodies(p.mechanism, w.terms, q, p.touched_joints);
+    const State state{p.mechanism, w.terms, t, w.terms.q, v};
+    for (int i = 0; i < p.constraints; ++i) evaluate(p.blocks[i].kind, state, Part::gap, w.values[i]);
+}
+
+// Residuals and A; and the users' own b.
+static void place_rows(const Program& p, Workspace& w, double t, const VecX& v) {
     const State state{p.mechanism, w.terms, t, w.terms.q, v};
     for (size_t i = 0; i < p.blocks.size(); ++i) {
         const Block& block = p.blocks[i];
         RowValues& values = w.values[i];
-        evaluate(block.kind, state, values);
-        for (size_t k = 0; k < block.kept.size(); ++k) w.b[block.row + k] = -values.drift[block.kept[k]];
+        evaluate(block.kind, state, Part::place, values);
         if (values.has_A) continue;
         fill_A(block, w.terms, values, w.A.data() + block.offset);
         values.has_A = values.constant_A;
     }
+}
+
+// Rates and b.
+static void move_rows(const Program& p, Workspace& w, double t, const VecX& v) {
+    const State state{p.mechanism, w.terms, t, w.terms.q, v};
+    for (size_t i = 0; i < p.blocks.size(); ++i) {
+        const Block& block = p.blocks[i];
+        RowValues& values = w.values[i];
+        evaluate(block.kind, state, Part::motion, values);
+        for (size_t k = 0; k < block.kept.size(); ++k) w.b[block.row + k] = -values.drift[block.kept[k]];
+    }
+}
+
+void evaluate_rows(const Program& p, Workspace& w, double t, const VecX& v) {
+    place_rows(p, w, t, v);
+    move_rows(p, w, t, v);
 }
 
 void look_at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
@@ -257,26 +287,37 @@ void solve_motion(const Program& p, Workspace& w, const VecX& force) {
     }
 }
 
-// M, F, and the rows with their factor.
-static void assemble(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    ++w.evaluations;
-    kinematics(p.mechanism, w.terms, q, v);
-    inertia(p.mechanism, w.terms);
+static void factor_placed_rows(const Program& p, Workspace& w, double t, const VecX& v) {
+    place_rows(p, w, t, v);
+    if (w.rows.blocks.empty()) return;
+    scale_rows(p, w);
+    factor_rows(p.layout, p.blocks, w.B, w.rows);
+    ++w.factorizations;
+    w.rows.refine = w.terms.D.maxCoeff() > refined_pivot_ratio * w.terms.D.minCoeff();
+}
+
+void configure(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    place_bodies(p.mechanism, w.terms, q);
+    mass_matrix(p.mechanism, w.terms);
     factor_mass(p, w, t);
+    if (!p.blocks.empty()) factor_placed_rows(p, w, t, v);
+}
+
+void configure_velocity(const Program& p, Workspace& w, double t, const VecX& v) {
+    if (!p.affine_rates) factor_placed_rows(p, w, t, v);
+}
+
+// F and b, which depend on the velocity.
+static void drive(const Program& p, Workspace& w, double t, const VecX& v) {
+    ++w.evaluations;
+    move_bodies(p.mechanism, w.terms, v);
+    bias_forces(p.mechanism, w.terms);
     w.F = -w.terms.nle;
     if (p.driven || w.has_override) {
         given_forces(p, w, t, w.terms.q, v);
         w.F += w.tau + w.external;
     }
-    if (!p.blocks.empty()) {
-        evaluate_rows(p, w, t, v);
-        if (!w.rows.blocks.empty()) {
-            scale_rows(p, w);
-            factor_rows(p.layout, p.blocks, w.B, w.rows);
-            ++w.factorizations;
-            w.rows.refine = w.terms.D.maxCoeff() > refined_pivot_ratio * w.terms.D.minCoeff();
-        }
-    }
+    if (!p.blocks.empty()) move_rows(p, w, t, v);
 }
 
 // a, lam and C of what has been assembled.
@@ -299,7 +340,14 @@ static void respond(const Program& p, Workspace& w, double t, const VecX& v) {
 }
 
 void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    assemble(p, w, t, q, v);
+    configure(p, w, t, q, v);
+    drive(p, w, t, v);
+    respond(p, w, t, v);
+}
+
+void evaluate_on_constraints(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
+    project(p, w, t, q, v);
+    drive(p, w, t, v);
     respond(p, w, t, v);
 }
 
@@ -338,19 +386,21 @@ static void choose_rows(const Program& p, Workspace& w) {
     ++w.factorizations;
 }
 
-void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+// Factors of a step's start; returns whether the rows were chosen here.
+static bool configure_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     w.ideal_decided = false;
-    assemble(p, w, t, q, v);
-    if (w.rows.blocks.empty()) {
-        respond(p, w, t, v);
-        return;
-    }
-    // Laws are asked only once the rows are independent: others give them multipliers that mean nothing.
-    const bool chosen = w.rows.orthogonal;
-    if (chosen) choose_rows(p, w);
+    configure(p, w, t, q, v);
+    if (w.rows.blocks.empty() || !w.rows.orthogonal) return false;
+    choose_rows(p, w);
+    return true;
+}
+
+// Laws are asked only once the rows are independent: others give them multipliers that mean nothing.
+static void move_step(const Program& p, Workspace& w, double t, const VecX& v, bool chosen) {
+    drive(p, w, t, v);
     respond(p, w, t, v);
+    if (w.rows.blocks.empty() || !w.rows.redundant) return;
     double residual = 0.0;
-    if (!w.rows.redundant) return;
     int block = contradicting_block(p, w, residual);
     if (block >= 0 && !chosen) {  // what was dependent at an earlier step is not any more
         choose_rows(p, w);
@@ -369,6 +419,17 @@ void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const V
     }
     if (other >= 0) blame.push_back(other);
     throw Failure(Failure::Kind::inconsistent, t, blame, residual);
+}
+
+void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    move_step(p, w, t, v, configure_step(p, w, t, q, v));
+}
+
+bool begin_step_on_rates(const Program& p, Workspace& w, double t, const VecX& q, VecX& v) {
+    const bool chosen = configure_step(p, w, t, q, v);
+    const bool moved = project_velocity(p, w, t, v);
+    move_step(p, w, t, v, chosen);
+    return moved;
 }
 
 void violations(const Program& p, const Workspace& w, double& position, double& velocity) {

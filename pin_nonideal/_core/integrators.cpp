@@ -39,8 +39,7 @@ void System::derivative(double t, const VecX& y, VecX& dy) {
         collect(t, y, dy);
         return;
     }
-    project(p, w, t, q_buffer, v_buffer);
-    evaluate(p, w, t, q_buffer, v_buffer);
+    evaluate_on_constraints(p, w, t, q_buffer, v_buffer);
     smallest_pivot = std::min(smallest_pivot, w.rows.distance);
     projected = y;
     projected.head(nq) = q_buffer;

@@ -86,6 +86,7 @@ struct Program {
     bool has_body_forces = false;        // given forces that act on bodies
     bool moves_in_time = false;          // some constraint moves by itself
     bool affine_rates = true;            // A does not depend on v; a user's own rows may
+    std::vector<int> touched_joints;     // whose bodies the constraints touch, and all before them in the tree
 
     // Rows of constraints come first, rows of friction's directions after them.
     int constraint_rows() const {
@@ -142,7 +143,15 @@ struct Workspace {
 
 // The heart: acceleration a and multipliers lam at (t, q, v) for the modes and active rows in the workspace.
 void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// The parts of it that projection uses alone: motion and rows at a state, rows, M's factor, rows in its metric.
+// The same after the state was put on the constraints.
+void evaluate_on_constraints(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
+// The part of it that the configuration decides: placements, M and the rows, with their factors. A user's own A may
+// depend on v; where it does, a change of v has it taken anew.
+void configure(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
+void configure_velocity(const Program& p, Workspace& w, double t, const VecX& v);
+// Residuals of the constraints, and no more than they need.
+void gaps(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
+// Motion and rows at a state, rows, M's factor, rows in its metric.
 void look_at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 void evaluate_rows(const Program& p, Workspace& w, double t, const VecX& v);
 void factor_mass(const Program& p, Workspace& w, double t);
@@ -158,6 +167,8 @@ void actuation_torque(const Program& p, Workspace& w, double t, const VecX& q, c
 void want_rows(const Program& p, Workspace& w);
 // Evaluates at a step's start and decides which rows are independent here; contradicting rows are a failure.
 void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
+// The same after v was brought to A v + phi_t = 0, by the factors found here; returns whether it moved.
+bool begin_step_on_rates(const Program& p, Workspace& w, double t, const VecX& q, VecX& v);
 
 // Whether sticking elements and constraints leave no freedom at all: then nothing moves, exactly.
 bool is_immobile(const Program& p, const Workspace& w);

@@ -15,22 +15,14 @@ void least_move(const Program& p, Workspace& w, VecX& x) {
     solve_Rt(p.mechanism, w.terms, x);
 }
 
-void refactor(const Program& p, Workspace& w, double t) {
-    inertia(p.mechanism, w.terms);
-    factor_mass(p, w, t);
-    scale_rows(p, w);
-    factor_rows(p.layout, p.blocks, w.B, w.rows);
-    ++w.factorizations;
-}
-
-// Negative residuals or rates of the rows in use; returns the largest.
-double gather(const Program& p, Workspace& w, bool position) {
+// Takes a residual or rate of each kept row into r, negative; returns the largest of the rows in use.
+template <class Value>
+double gather(const Program& p, Workspace& w, Value value) {
     double largest = 0.0;
     for (int i : w.rows.blocks) {
         const Block& block = p.blocks[i];
-        const RowValues& values = w.values[i];
         for (size_t k = 0; k < block.kept.size(); ++k) {
-            const double x = position ? values.residual[block.kept[k]] : values.rate[block.kept[k]];
+            const double x = value(i, static_cast<int>(k));
             w.r[block.row + k] = -x;
             if (w.rows.active[block.row + k]) largest = std::max(largest, std::abs(x));
         }
@@ -38,31 +30,39 @@ double gather(const Program& p, Workspace& w, bool position) {
     return largest;
 }
 
+double gather_gaps(const Program& p, Workspace& w) {
+    return gather(p, w, [&](int i, int k) { return w.values[i].residual[p.blocks[i].kept[k]]; });
+}
+
+// A v + phi_t by the rows in the workspace, which needs no look at the motion; a user's rate is his own function.
+double gather_rates(const Program& p, Workspace& w, double t, const VecX& v) {
+    const State state{p.mechanism, w.terms, t, w.terms.q, v};
+    for (int i : w.rows.blocks) {
+        const Block& block = p.blocks[i];
+        if (std::holds_alternative<UserRows>(block.kind)) evaluate(block.kind, state, Part::motion, w.values[i]);
+        else multiply(block, w.A, v, w.miss);
+    }
+    return gather(p, w, [&](int i, int k) {
+        const Block& block = p.blocks[i];
+        const RowValues& values = w.values[i];
+        if (std::holds_alternative<UserRows>(block.kind)) return values.rate[block.kept[k]];
+        return w.miss[block.row + k] + values.phi_t[block.kept[k]];
+    });
+}
+
 // Iterations left when each takes as much as the last one did; factors of the new place cost less than three of them.
 double left_at_this_rate(double before, double now, double floor) {
     return now < before ? std::log(now / std::max(floor, 1e-16)) / std::log(before / now) : HUGE_VAL;
 }
 
-// The same for rates A v + phi_t after a change of v, which needs no new look at the motion.
-double change_rates(const Program& p, Workspace& w, const VecX& change) {
-    double largest = 0.0;
-    for (int i : w.rows.blocks) {
-        const Block& block = p.blocks[i];
-        multiply(block, w.A, change, w.miss);
-        for (size_t k = 0; k < block.kept.size(); ++k) {
-            const int row = block.row + k;
-            w.r[row] -= w.miss[row];
-            if (w.rows.active[row]) largest = std::max(largest, std::abs(w.r[row]));
-        }
-    }
-    return largest;
-}
+// What is rounding: near a singular position it would come back magnified, there every bit counts.
+double rounding_part(const Workspace& w) { return w.rows.distance < near_singular ? 0.0 : projection_floor; }
 
 }  // namespace
 
-double scene_size(const Workspace& w) {
+double scene_size(const Program& p, const Workspace& w) {
     double square = 1.0;
-    for (const Body& b : w.terms.body) square = std::max(square, (b.ref + b.p).squaredNorm());
+    for (int i : p.touched_joints) square = std::max(square, (w.terms.body[i].ref + w.terms.body[i].p).squaredNorm());
     return std::sqrt(square);
 }
 
@@ -79,7 +79,7 @@ static double row_size(const Workspace& w, const Block& block, int row) {
 }
 
 void require_closed(const Program& p, const Workspace& w, double t) {
-    const double allowed = open_gap * scene_size(w);
+    const double allowed = open_gap * scene_size(p, w);
     double largest = 0.0;
     int worst = -1;
     for (int i = 0; i < p.constraints; ++i)
@@ -92,41 +92,50 @@ void require_closed(const Program& p, const Workspace& w, double t) {
     if (worst >= 0) throw Failure(Failure::Kind::closure, t, {worst}, largest);
 }
 
-bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
-    for (int dof = 0; dof < p.mechanism.nv; ++dof)
-        if (w.terms.locked[dof]) v[dof] = 0.0;  // what sticks has exactly no velocity
+bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
     if (w.rows.blocks.empty()) return false;
-    look_at(p, w, t, q, v);
-    // Near a singular position what is left would come back magnified: there every bit counts.
-    const double part = w.rows.distance < near_singular ? 0.0 : projection_floor;
-    const double floor = part * scene_size(w);
+    gaps(p, w, t, q, v);
+    const double floor = rounding_part(w) * scene_size(p, w);
+    double last = gather_gaps(p, w);
     bool moved = false;
-    double last = gather(p, w, true);
     for (int it = 0; it < projection_limit && last > floor; ++it) {
         least_move(p, w, w.scaled);
-        w.trial = w.scaled;
-        retract(p.mechanism, q.data(), w.trial.data(), q.data());
+        retract(p.mechanism, q.data(), w.scaled.data(), q.data());
         moved = true;
-        look_at(p, w, t, q, v);
-        const double now = gather(p, w, true);
-        if (now > floor && left_at_this_rate(last, now, floor) > 3.0) refactor(p, w, t);
+        gaps(p, w, t, q, v);
+        const double now = gather_gaps(p, w);
+        if (now > floor && left_at_this_rate(last, now, floor) > 3.0) configure(p, w, t, q, v);
         if (it > 3 && now > 0.5 * last) break;  // as good as rounding allows
         last = now;
     }
-    const double speed = std::max(1.0, v.cwiseAbs().maxCoeff());
-    last = gather(p, w, false);
-    for (int it = 0; it < projection_limit && last > part * speed; ++it) {
+    if (moved) ++w.projections;
+    return moved;
+}
+
+bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
+    for (int dof = 0; dof < p.mechanism.nv; ++dof)
+        if (w.terms.locked[dof]) v[dof] = 0.0;  // what sticks has exactly no velocity
+    if (w.rows.blocks.empty()) return false;
+    const double floor = rounding_part(w) * std::max(1.0, v.cwiseAbs().maxCoeff());
+    double last = gather_rates(p, w, t, v);
+    bool moved = false;
+    for (int it = 0; it < projection_limit && last > floor; ++it) {
         least_move(p, w, w.scaled);
         v += w.scaled;
         moved = true;
-        const double now = p.affine_rates ? change_rates(p, w, w.scaled) : (look_at(p, w, t, q, v), gather(p, w, false));
-        if (!(now < 0.1 * last)) refactor(p, w, t);
+        configure_velocity(p, w, t, v);
+        const double now = gather_rates(p, w, t, v);
         if (it > 1 && now > 0.5 * last) break;
         last = now;
     }
     if (is_immobile(p, w) && v.cwiseAbs().maxCoeff() <= immobile_speed) v.setZero();
-    if (moved) ++w.projections;
     return moved;
+}
+
+bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
+    const bool moved = project_position(p, w, t, q, v);
+    configure(p, w, t, q, v);
+    return project_velocity(p, w, t, v) || moved;
 }
 
 }  // namespace pn

@@ -1,5 +1,5 @@
-// Back onto the constraints after a step: phi(q, t) = 0 by Newton's method and A v + phi_t = 0 by one solve, both in
-// the metric of M, with the factors of the step's last evaluation.
+// Back onto the constraints after a step, in the metric of M: phi(q, t) = 0 by Newton's method with the factors of the
+// step's last evaluation, and there A v + phi_t = 0 by one solve with the factors that the next step needs anyway.
 #pragma once
 
 #include "program.hpp"
@@ -19,14 +19,18 @@ constexpr double immobile_speed = 1e-8;
 // down to rounding, in singular positions too.
 constexpr double open_gap = 1e-9;
 
-// Moves q and v; returns false when nothing had to move. The workspace must hold factors near (t, q); afterwards it
-// wants a new evaluation.
+// Each returns false when nothing had to move.
+// Moves q; the workspace must hold factors near (t, q). v is only what a user's own rows are shown.
+bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
+// Moves v; the workspace must be configured at (t, q).
+bool project_velocity(const Program& p, Workspace& w, double t, VecX& v);
+// Moves both, and leaves the workspace configured there.
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 
 // Throws where a row's residual at the last look is open.
 void require_closed(const Program& p, const Workspace& w, double t);
 
-// Size of the scene: the largest distance of a body from the world's origin, at least 1 m.
-double scene_size(const Workspace& w);
+// Size of the scene: the largest distance of a body that the constraints touch from the world's origin, at least 1 m.
+double scene_size(const Program& p, const Workspace& w);
 
 }  // namespace pn

@@ -106,8 +106,8 @@ void Simulation::emit_between(double t_now) {
 double Simulation::energy_at(const VecX& state) {
     q_ = state.head(system.nq);
     v_ = state.segment(system.nq, system.nv);
-    kinematics(p.mechanism, w.terms, q_, v_);
-    inertia(p.mechanism, w.terms);
+    place_bodies(p.mechanism, w.terms, q_);
+    mass_matrix(p.mechanism, w.terms);
     return kinetic_energy(p.mechanism, w.terms, v_) + potential_energy(p.mechanism, w.terms);
 }
 
@@ -117,11 +117,11 @@ void Simulation::settle(double at, VecX& state, VecX& rate) {
     q_ = state.head(system.nq);
     v_ = state.segment(system.nq, system.nv);
     if (system.nz > 0) w.z = state.segment(system.nq + system.nv, system.nz);
-    const bool moved = project(p, w, at, q_, v_);
+    bool moved = project_position(p, w, at, q_, v_);
     require_closed(p, w, at);
+    moved |= begin_step_on_rates(p, w, at, q_, v_);
     state.head(system.nq) = q_;
     state.segment(system.nq, system.nv) = v_;
-    begin_step(p, w, at, q_, v_);
     system.collect(at, state, rate);
     if (moved && o.record.energy)
         pending_energy = kinetic_energy(p.mechanism, w.terms, v_) + potential_energy(p.mechanism, w.terms) - before;

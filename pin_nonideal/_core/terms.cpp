@@ -175,29 +175,49 @@ void Terms::allocate(const Mechanism& m) {
     inv_sqrt_D = VecX::Zero(m.nv);
     locked.assign(m.nv, 0);
     q = VecX::Zero(m.nq);
+    rest = VecX::Zero(m.nv);
     foreign = m.make_foreign();
 }
 
-void kinematics(const Mechanism& m, Terms& w, const VecX& q, const VecX& v) {
+// Places body i behind its parent.
+static void place_body(const Mechanism& m, Terms& w, int i) {
+    const Joint& j = m.joints[i];
+    if (j.kind == JointKind::other) w.foreign->evaluate(i, w.q, w.rest, w.foreign_motion);
+    place(j, w.body[j.parent], w.q, w.body[i], w.foreign_motion);
+    if (j.recenters) recenter(m, i, w);
+}
+
+void place_bodies(const Mechanism& m, Terms& w, const VecX& q, const std::vector<int>& joints) {
     w.q = q;
     normalize(m, w.q.data());
+    for (int i : joints) place_body(m, w, i);
+}
+
+void place_bodies(const Mechanism& m, Terms& w, const VecX& q) {
+    w.q = q;
+    normalize(m, w.q.data());
+    const int n = static_cast<int>(m.joints.size());
+    for (int i = 1; i < n; ++i) {
+        place_body(m, w, i);
+        const Joint& j = m.joints[i];
+        if (j.nv > 0) columns(j, w.body[i], w.foreign_motion, w.J.data() + j.iv);
+    }
+}
+
+void move_bodies(const Mechanism& m, Terms& w, const VecX& v) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
         const Joint& j = m.joints[i];
         Body& b = w.body[i];
         const Body& parent = w.body[j.parent];
-        if (j.kind == JointKind::other) w.foreign->evaluate(i, w.q, v, w.foreign_motion);
-        place(j, parent, w.q, b, w.foreign_motion);
-        if (j.recenters) recenter(m, i, w);
         b.v = parent.v;
         b.a = parent.a;
         if (j.nv == 0) continue;
-        Motion* J = w.J.data() + j.iv;
-        columns(j, b, w.foreign_motion, J);
         const Motion r = relative_velocity(j, w.J, v);
         b.v += r;
         b.a += cross(b.v, r);
         if (j.kind == JointKind::other) {
+            w.foreign->evaluate(i, w.q, v, w.foreign_motion);
             const Motion& c = w.foreign_motion.bias;
             Motion bias = turning(b, b.R * c.ang);
             bias.lin += b.R * c.lin;
@@ -206,44 +226,65 @@ void kinematics(const Mechanism& m, Terms& w, const VecX& q, const VecX& v) {
     }
 }
 
-void inertia(const Mechanism& m, Terms& w) {
+void mass_matrix(const Mechanism& m, Terms& w) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
         const Joint& j = m.joints[i];
         Body& b = w.body[i];
         const Vec3 c = b.p + b.R * j.com;
-        b.Y.mass = j.mass;
-        b.Y.first = j.mass * c;
-        b.Y.second.noalias() = (b.R * j.inertia) * b.R.transpose();
-        const double xx = c[0] * b.Y.first[0], yy = c[1] * b.Y.first[1], zz = c[2] * b.Y.first[2];
-        b.Y.second(0, 0) += yy + zz;
-        b.Y.second(1, 1) += xx + zz;
-        b.Y.second(2, 2) += xx + yy;
-        const double xy = c[0] * b.Y.first[1], xz = c[0] * b.Y.first[2], yz = c[1] * b.Y.first[2];
-        b.Y.second(0, 1) -= xy;
-        b.Y.second(1, 0) -= xy;
-        b.Y.second(0, 2) -= xz;
-        b.Y.second(2, 0) -= xz;
-        b.Y.second(1, 2) -= yz;
-        b.Y.second(2, 1) -= yz;
-        b.f = b.Y * b.a;
-        b.f += cross(b.v, b.Y * b.v);
+        Inertia& Y = b.own;
+        Y.mass = j.mass;
+        Y.first = j.mass * c;
+        Y.second.noalias() = (b.R * j.inertia) * b.R.transpose();
+        const double xx = c[0] * Y.first[0], yy = c[1] * Y.first[1], zz = c[2] * Y.first[2];
+        Y.second(0, 0) += yy + zz;
+        Y.second(1, 1) += xx + zz;
+        Y.second(2, 2) += xx + yy;
+        const double xy = c[0] * Y.first[1], xz = c[0] * Y.first[2], yz = c[1] * Y.first[2];
+        Y.second(0, 1) -= xy;
+        Y.second(1, 0) -= xy;
+        Y.second(0, 2) -= xz;
+        Y.second(2, 0) -= xz;
+        Y.second(1, 2) -= yz;
+        Y.second(2, 1) -= yz;
+        b.Y = Y;
     }
     for (int i = n - 1; i > 0; --i) {
         const Joint& j = m.joints[i];
         const Body& b = w.body[i];
         for (int dof = j.iv + j.nv - 1; dof >= j.iv; --dof) {
-            w.nle[dof] = dot(w.J[dof], b.f);
             w.Ag[dof] = b.Y * w.J[dof];
             double* row = w.M.data() + m.row_offset[dof];
             for (int k = dof; k >= 0; k = m.dof_parent[k]) *row++ = dot(w.J[k], w.Ag[dof]);
             w.M[m.row_offset[dof]] += m.armature[dof];
         }
-        if (j.parent != 0) {
-            w.body[j.parent].Y += b.Y;
-            w.body[j.parent].f += b.f;
-        }
+        if (j.parent != 0) w.body[j.parent].Y += b.Y;
     }
+}
+
+void bias_forces(const Mechanism& m, Terms& w) {
+    const int n = static_cast<int>(m.joints.size());
+    for (int i = 1; i < n; ++i) {
+        Body& b = w.body[i];
+        b.f = b.own * b.a;
+        b.f += cross(b.v, b.own * b.v);
+    }
+    for (int i = n - 1; i > 0; --i) {
+        const Joint& j = m.joints[i];
+        const Body& b = w.body[i];
+        for (int dof = j.iv; dof < j.iv + j.nv; ++dof) w.nle[dof] = dot(w.J[dof], b.f);
+        if (j.parent != 0) w.body[j.parent].f += b.f;
+    }
+}
+
+void kinematics(const Mechanism& m, Terms& w, const VecX& q, const VecX& v) {
+    place_bodies(m, w, q);
+    move_bodies(m, w, v);
+}
+
+void inertia(const Mechanism& m, Terms& w) {
+    mass_matrix(m, w);
+    bias_forces(m, w);
 }
 
 int factorize(const Mechanism& m, Terms& w) {

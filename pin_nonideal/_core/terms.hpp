@@ -18,7 +18,7 @@ struct Body {
     Motion v{Vec3::Zero(), Vec3::Zero()};
     Motion a{Vec3::Zero(), Vec3::Zero()};  // acceleration at zero qdd, minus gravity
     Force f{Vec3::Zero(), Vec3::Zero()};   // bias force of the subtree
-    Inertia Y;                             // of the body, then of the subtree
+    Inertia own, Y;                        // of the body; of the subtree
 };
 
 struct Terms {
@@ -33,13 +33,24 @@ struct Terms {
     VecX q;  // configuration with unit quaternions
     std::unique_ptr<ForeignJoints> foreign;
     JointMotion foreign_motion;
+    VecX rest;  // no velocity, for the placements of foreign joints
 
     void allocate(const Mechanism& m);
 };
 
-// Placements, J, velocities and bias accelerations.
+// Placements and J of all bodies; or placements alone, of the joints listed (each after its parent).
+void place_bodies(const Mechanism& m, Terms& w, const VecX& q);
+void place_bodies(const Mechanism& m, Terms& w, const VecX& q, const std::vector<int>& joints);
+// Velocities and bias accelerations of bodies in their places.
+void move_bodies(const Mechanism& m, Terms& w, const VecX& v);
+// Inertias and M(q) of bodies in their places.
+void mass_matrix(const Mechanism& m, Terms& w);
+// nle of bodies in motion; needs mass_matrix.
+void bias_forces(const Mechanism& m, Terms& w);
+
+// Bodies in their places and in motion.
 void kinematics(const Mechanism& m, Terms& w, const VecX& q, const VecX& v);
-// Composite inertias, M(q) and nle; needs kinematics.
+// M(q) and nle; needs kinematics.
 void inertia(const Mechanism& m, Terms& w);
 // M = L^T D L. Returns -1, or the dof whose pivot is not positive.
 int factorize(const Mechanism& m, Terms& w);
