@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .closure import CLOSURE_TOLERANCE, close_loops
+from .compiled import load_core
 from .constraints import KnifeEdge, Rolling, UserConstraint
 from .errors import InconsistentConstraintsError, LoopClosureError
 from .lowered import Lowered
 from .scene_analysis import rows_at
+
+core = load_core()
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
@@ -71,6 +74,38 @@ def nearest_state(
         raise _open_loops(rows_at(runner, on if after < before else q, v_on, t)[2], low, t)
     if not rate <= RATE_TOLERANCE * (1.0 + _largest(v_on)):
         raise _lost_velocity(rows_at(runner, on, v_on, t)[3], low, t)
+    return on, v_on
+
+
+def nearest_states(
+    model: Any, low: Lowered, nonholonomic: Rows, q: Array, v: Array, t: float, threads: int
+) -> tuple[Array, Array]:
+    """The `nearest_state` of each of many, taken on several threads as long as Newton's method suffices.
+
+    Args:
+        model: pinocchio.Model.
+        low: the program.
+        nonholonomic: rows that restrict the velocity only, (m,).
+        q: configurations, (n, nq).
+        v: velocities, (n, nv).
+        t: time [s].
+        threads: number of native threads.
+
+    Returns:
+        q (n, nq), v (n, nv).
+
+    Raises:
+        LoopClosureError: no configuration satisfies the constraints.
+        InconsistentConstraintsError: no velocity does.
+    """
+    if not low.slices:
+        return q, v
+    found_q, found_v, after, rate = core.nearest_states(low.builder, q, v, t, FAR, threads)
+    on, v_on = found_q.reshape(q.shape), found_v.reshape(v.shape)
+    closed = after <= CLOSURE_TOLERANCE
+    met = rate <= RATE_TOLERANCE * (1.0 + np.abs(v_on).max(axis=1, initial=0.0))
+    for i in np.flatnonzero(~(closed & met)):
+        on[i], v_on[i] = nearest_state(model, low, nonholonomic, q[i], v[i], t)
     return on, v_on
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from .actuation import Actuation
 from .checks import array, number, optional_text, sequence
 from .configurations import configuration, unit_parts
-from .consistency import Rows, nearest_state, nonholonomic_rows
+from .consistency import Rows, nearest_state, nearest_states, nonholonomic_rows
 from .contacts import Contact
 from .equation import Solution
 from .errors import InputError, RunError
@@ -184,6 +184,29 @@ class Scene:
     def _project(self, q: Array, v: Array, t: float) -> tuple[Array, Array]:
         try:
             return nearest_state(self.model, self._lowered, self._nonholonomic(), q, v, t)
+        except core.CoreFailure as failure:
+            raise self.failure(str(failure)) from None
+
+    def nearest_states(self, q: Array, v: Array, t: float, threads: int) -> tuple[Array, Array]:
+        """What `project` gives for each of many states.
+
+        Args:
+            q: configurations, (n, nq).
+            v: velocities, (n, nv).
+            t: time [s].
+            threads: number of native threads.
+
+        Returns:
+            q (n, nq), v (n, nv).
+
+        Raises:
+            LoopClosureError: the constraints cannot be met from one of them.
+            InputError: a quaternion or (cos, sin) pair is not of unit length.
+        """
+        if self._unit_parts:
+            q = np.array([self._configuration(one, "q") for one in q]).reshape(q.shape)
+        try:
+            return nearest_states(self.model, self._lowered, self._nonholonomic(), q, v, t, threads)
         except core.CoreFailure as failure:
             raise self.failure(str(failure)) from None
 

@@ -163,9 +163,8 @@ def rollout(
     if method in SCIPY:
         raise InputError(f'rollout: method must be one of the core\'s; "{method}" runs in SciPy')
     options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, record)
-    starts = [scene.project(a, b, options["t0"]) for a, b in zip(starts_q, starts_v, strict=True)]
     begin = time.perf_counter()
-    q0, v0 = (np.ascontiguousarray([s[i] for s in starts]).reshape(len(starts), -1) for i in (0, 1))
+    q0, v0 = scene.nearest_states(starts_q, starts_v, options["t0"], threads)
     raws = scene.roll_out(q0, v0, options, threads)
     wall = time.perf_counter() - begin
     results = []

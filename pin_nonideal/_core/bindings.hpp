@@ -31,7 +31,12 @@ inline nb::object to_numpy(const double* data, size_t n) {
     return nb::cast(nb::ndarray<nb::numpy, double, nb::ndim<1>>(copy, {n}, owner));
 }
 inline nb::object to_numpy(const VecX& x) { return to_numpy(x.data(), x.size()); }
-inline nb::object to_numpy(const std::vector<double>& x) { return to_numpy(x.data(), x.size()); }
+inline nb::object to_numpy(std::vector<double>&& x) {  // its numbers stay where they are
+    auto* kept = new std::vector<double>(std::move(x));
+    kept->reserve(1);  // an array has an address, an empty one too
+    nb::capsule owner(kept, [](void* v) noexcept { delete static_cast<std::vector<double>*>(v); });
+    return nb::cast(nb::ndarray<nb::numpy, double, nb::ndim<1>>(kept->data(), {kept->size()}, owner));
+}
 
 inline void read_into(const nb::object& from, VecX& to) {
     const Array a = nb::cast<Array>(from);
@@ -84,19 +89,21 @@ private:
     void set(const Array& q_in, const Array& v_in, const nb::object& tau);
     // Modes by velocity, and at rest by the complementarity problem; or the ones given.
     void choose_modes(double t, const nb::object& modes);
-    void project_here(double t);
     // Such a y with the core's watch of sticking elements behind it.
     VecX read_state(const System& system, const VecX& outside);
     double energy();
 };
 
+// q and v of many states on the constraints, by rows, and the largest residual and rate of each afterwards: NaN where the
+// state could not be taken. On several threads, each state as by Runner::project_state.
+nb::tuple nearest_states(const Builder& b, const Array2& q, const Array2& v, double t, double far, int threads);
 // Runs from many states, on several threads.
 nb::list rollout(const Builder& b, const Array2& q, const Array2& v, const Array& z, const nb::dict& options,
                  int threads);
 
 // What a run records, by names: from Python's options, and back to Python.
 RecordOptions read_record(const nb::dict& options);
-nb::dict hand_over(const Workspace& w, const Recording& r);
+nb::dict hand_over(const Workspace& w, Recording&& r);
 
 void bind_reactions(nb::module_& m);
 void bind_builder(nb::module_& m);

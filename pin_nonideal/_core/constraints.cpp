@@ -310,6 +310,27 @@ bool has_constant_rows(const Kind& kind) {
            std::holds_alternative<DofRows>(kind);
 }
 
+bool has_residual(const Kind& kind, int row) {
+    struct Has {
+        int row;
+        bool operator()(const KnifeRows&) const { return false; }
+        bool operator()(const RollingRows&) const { return row == 2; }
+        bool operator()(const CouplingRows& c) const { return c.position; }
+        bool operator()(const UserRows& c) const { return static_cast<bool>(c.residual); }
+        bool operator()(const DofRows&) const { return false; }
+        bool operator()(const HingeSlipRows&) const { return false; }
+        bool operator()(const ContactSlipRows&) const { return false; }
+        bool operator()(const UserSlipRow&) const { return false; }
+        bool operator()(const PointRows&) const { return true; }
+        bool operator()(const ContactRow&) const { return true; }
+        bool operator()(const FrameRows&) const { return true; }
+        bool operator()(const HingeRows&) const { return true; }
+        bool operator()(const DistanceRows&) const { return true; }
+        bool operator()(const MotionRows&) const { return true; }
+    };
+    return std::visit(Has{row}, kind);
+}
+
 bool moves_in_time(const Kind& kind) {
     if (const auto* d = std::get_if<DistanceRows>(&kind)) {
         const auto* polynomial = std::get_if<Polynomial>(&d->length);
@@ -371,9 +392,9 @@ void scale_rows(const Mechanism& m, const Terms& terms, const Block& block, cons
     for (int l = 0; l < n; ++l) {
         const int dof = block.support[l];
         const double* row = terms.L.data() + m.row_offset[dof];
-        double* x = B + l * r;
+        double* __restrict x = B + l * r;
         for (int p = block.parent[l], s = 1; p >= 0; p = block.parent[p], ++s) {
-            double* y = B + p * r;
+            double* __restrict y = B + p * r;  // of an ancestor
             for (int k = 0; k < r; ++k) y[k] -= row[s] * x[k];
         }
         const double d = terms.inv_sqrt_D[dof];

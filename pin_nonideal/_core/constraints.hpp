@@ -121,7 +121,7 @@ struct Block {
     int joint1 = 0, joint2 = 0;    // bodies of a geometric kind
     int total = 0;                 // rows of the description
     std::vector<int> kept;         // rows that act
-    std::vector<char> holonomic;   // of every row of the description: has a residual
+    std::vector<char> holonomic;   // of the kept rows: has a residual
     bool comparable_rows = false;  // rows are components of one vector, of one unit
     int user_row = 0;              // first row in the user's numbering
     int row = 0;                   // first row among the kept rows of the scene
@@ -137,6 +137,7 @@ bool is_geometric(const Kind& kind);
 const Frame* frame1(const Kind& kind);
 const Frame* frame2(const Kind& kind);
 bool has_constant_rows(const Kind& kind);
+bool has_residual(const Kind& kind, int row);
 // Whether its rate may differ from zero at zero velocity: it moves by itself.
 bool moves_in_time(const Kind& kind);
 int row_count(const Kind& kind, int user_size);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <type_traits>
 
 namespace pn {
 
@@ -173,6 +174,29 @@ void RowSystem::use_wanted(const std::vector<Block>& all) {
 
 constexpr int tile = 6;  // rows of an anchor at most; longer blocks are taken in parts
 
+// sum := x y^T summed over the common dofs of two blocks, for n1 rows of the one and n2 of the other.
+template <int n1, int n2>
+static void multiply_tile(const double* X, int r1, const double* Y, int r2, const RowLayout::Pair& pair,
+                          double (&sum)[tile][tile]) {
+    double local[n1][n2] = {};
+    for (const auto& [l, k] : pair.common) {
+        const double *x = X + l * r1, *y = Y + k * r2;
+        for (int i = 0; i < n1; ++i)
+            for (int j = 0; j < n2; ++j) local[i][j] += x[i] * y[j];
+    }
+    for (int i = 0; i < n1; ++i)
+        for (int j = 0; j < n2; ++j) sum[i][j] = local[i][j];
+}
+
+// Calls f with n, 1 to tile, as a constant: loops over rows of a length known to the compiler cost half.
+template <int n = tile, class F>
+static void with_constant(int value, F f) {
+    if constexpr (n > 1) {
+        if (value != n) return with_constant<n - 1>(value, f);
+    }
+    f(std::integral_constant<int, n>());
+}
+
 static void gram(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
                  const std::vector<char>& use, RowSystem& s) {
     for (const RowLayout::Pair& pair : layout.pairs) {
@@ -183,12 +207,10 @@ static void gram(const RowLayout& layout, const std::vector<Block>& blocks, cons
         for (int i0 = 0; i0 < r1; i0 += tile)
             for (int j0 = 0; j0 < r2; j0 += tile) {
                 const int ni = std::min(tile, r1 - i0), nj = std::min(tile, r2 - j0);
-                double sum[tile][tile] = {};
-                for (const auto& [l, k] : pair.common) {
-                    const double *x = X + l * r1 + i0, *y = Y + k * r2 + j0;
-                    for (int i = 0; i < ni; ++i)
-                        for (int j = 0; j < nj; ++j) sum[i][j] += x[i] * y[j];
-                }
+                double sum[tile][tile];
+                with_constant(ni, [&](auto n1) {
+                    with_constant(nj, [&](auto n2) { multiply_tile<n1, n2>(X + i0, r1, Y + j0, r2, pair, sum); });
+                });
                 for (int i = 0; i < ni; ++i)
                     for (int j = 0; j < nj; ++j) {
                         if (!use[b1.row + i0 + i] || !use[b2.row + j0 + j]) continue;

@@ -91,6 +91,15 @@ void Program::finish() {
         entries += block.support.size() * block.kept.size();
     }
     layout = layout_rows(blocks, mechanism.nv);
+    std::vector<char> reached(mechanism.nv, 0);
+    for (Block& block : blocks) {
+        for (int dof : block.support) reached[dof] = 1;
+        block.holonomic.clear();
+        for (int k : block.kept) block.holonomic.push_back(has_residual(block.kind, k));
+    }
+    touched_dofs.clear();
+    for (int dof = 0; dof < mechanism.nv; ++dof)
+        if (reached[dof]) touched_dofs.push_back(dof);
     for (const Friction& f : frictions) {
         needs_reactions |= f.reaction != Reaction::none;
         needs_joint_reactions |= f.reaction != Reaction::none && f.joint > 0;
@@ -141,6 +150,9 @@ Workspace::Workspace(const Program& p) {
     zero(reaction_body);
     motion.assign(n, Motion{Vec3::Zero(), Vec3::Zero()});
     momentum.assign(n, Force{Vec3::Zero(), Vec3::Zero()});
+    shift_start = VecX::Zero(p.mechanism.nq);
+    shift = VecX::Zero(p.layout.rows);
+    shift_steps.assign(projection_limit, shift);
     const size_t elements = p.frictions.size();
     mode.assign(elements, 1);
     limit.assign(elements, 0.0);

@@ -97,10 +97,11 @@ void Stepper::step(double t, double size) {
     h = size;
     has_dense = false;
     if (method.kind == Method::Kind::semi_implicit_euler) {
-        // v1 = v0 + h a(q0, v0), q1 = q0 moved by h v1; z and work by Euler's rule.
+        // v1 = v0 + h a(q0, v0), q1 = q0 moved by h v1, near the constraints; z and work by Euler's rule.
         const int nq = system.nq, nv = system.nv;
         y1 = y0 + h * K[0];
         system.v_buffer = h * y1.segment(nq, nv);
+        meet_second_order(system.p, system.w, h, system.v_buffer);
         retract(system.p.mechanism, y0.data(), system.v_buffer.data(), y1.data());
         return;
     }

@@ -134,6 +134,7 @@ Mechanism read_mechanism(const void* opaque) {
         j.nq = joint.nq();
         j.nv = joint.nv();
         j.R0 = model->jointPlacements[i].rotation();
+        j.aligned = j.R0 == Mat3::Identity();
         j.p0 = model->jointPlacements[i].translation();
         classify(joint, data, j);
         m.has_foreign |= j.kind == JointKind::other;
@@ -161,6 +162,7 @@ Mechanism read_mechanism(const void* opaque) {
     for (int dof = 0; dof < m.nv; ++dof) {
         m.row_offset.push_back(m.row_entries);
         m.row_entries += m.depth[dof] + 1;
+        for (int k = dof; k >= 0; k = m.dof_parent[k]) m.ancestors.push_back(k);
         m.max_depth = std::max(m.max_depth, m.depth[dof] + 1);
     }
     return m;

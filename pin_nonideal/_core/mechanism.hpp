@@ -22,6 +22,7 @@ struct Joint {
     bool recenters = false;  // first joint of its tree that turns: the tree's reference point moves here
     int iq = 0, iv = 0, nq = 0, nv = 0;
     Mat3 R0 = Mat3::Identity();  // placement in the parent joint's frame
+    bool aligned = false;        // R0 is the identity
     Vec3 p0 = Vec3::Zero();
     Vec3 axis = Vec3::UnitZ();
     int axis_index = -1;  // 0, 1, 2 for x, y, z; -1 for a general axis
@@ -60,6 +61,7 @@ struct Mechanism {
     Vec3 gravity = Vec3::Zero();
     VecX armature;
     std::vector<int> dof_joint, dof_parent, depth, row_offset;  // row of dof j: row_offset[j] + 0 .. depth[j]
+    std::vector<int> ancestors;  // dof of each entry of the rows
     int row_entries = 0;
     bool has_foreign = false;
     int max_depth = 0;

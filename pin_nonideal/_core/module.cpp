@@ -19,6 +19,7 @@ NB_MODULE(_core, m) {
     bind_reactions(m);
     bind_builder(m);
     bind_runner(m);
+    m.def("nearest_states", &nearest_states);
     m.def("rollout", &rollout);
 
     // The friction program on arrays, for tests against enumeration.

@@ -87,6 +87,7 @@ struct Program {
     bool moves_in_time = false;          // some constraint moves by itself
     bool affine_rates = true;            // A does not depend on v; a user's own rows may
     std::vector<int> touched_joints;     // whose bodies the constraints touch, and all before them in the tree
+    std::vector<int> touched_dofs;       // in the supports of the rows, ascending
 
     // Rows of constraints come first, rows of friction's directions after them.
     int constraint_rows() const {
@@ -111,6 +112,10 @@ struct Workspace {
     std::vector<Force> body_force, reaction_body;  // given forces; all external forces, then their subtree sums
     std::vector<Motion> motion;
     std::vector<Force> momentum;
+
+    // Of the projection of a position: where it starts, its multipliers, and the steps that these took.
+    VecX shift_start, shift;
+    std::vector<VecX> shift_steps;
 
     // Friction.
     std::vector<signed char> mode;    // +1, -1 slip, 0 stick

@@ -55,6 +55,38 @@ double left_at_this_rate(double before, double now, double floor) {
     return now < before ? std::log(now / std::max(floor, 1e-16)) / std::log(before / now) : HUGE_VAL;
 }
 
+// Product of multipliers of rows of unit length.
+double product(const Workspace& w, const VecX& x, const VecX& y) {
+    double sum = 0.0;
+    for (int k = 0; k < x.size(); ++k)
+        if (w.rows.active[k]) sum += x[k] * y[k] / (w.rows.scale[k] * w.rows.scale[k]);
+    return sum;
+}
+
+// Next step of the multipliers, s := (B B^T)^-1 r with Broyden's corrections: the factors are those of the place where
+// the move started, and each step has shown what they miss. [Kelley, Solving Nonlinear Equations with Newton's Method,
+// 2003, sec. 4.3.]
+void broyden_step(const Program& p, Workspace& w, int count) {
+    VecX& step = w.shift_steps[count];
+    solve_rows(p.layout, w.rows, w.r, step);
+    for (int j = 0; j < count; ++j) {
+        const VecX& known = w.shift_steps[j];
+        const double part = product(w, known, step) / product(w, known, known);
+        if (!(std::abs(part) < broyden_limit)) return;  // rounding, or far from where the factors serve
+        if (j + 1 < count) step += part * w.shift_steps[j + 1];
+        else step /= 1.0 - part;
+    }
+}
+
+// q := shift_start moved by R^-T B^T shift, on the given dofs.
+template <class... Dofs>
+void shift_position(const Program& p, Workspace& w, VecX& q, const Dofs&... dofs) {
+    w.scaled.setZero();
+    for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.B, w.shift, w.scaled);
+    solve_Rt(p.mechanism, w.terms, dofs..., w.scaled);
+    retract(p.mechanism, w.shift_start.data(), w.scaled.data(), q.data());
+}
+
 // What is rounding: near a singular position it would come back magnified, there every bit counts.
 double rounding_part(const Workspace& w) { return w.rows.distance < near_singular ? 0.0 : projection_floor; }
 
@@ -92,24 +124,46 @@ void require_closed(const Program& p, const Workspace& w, double t) {
     if (worst >= 0) throw Failure(Failure::Kind::closure, t, {worst}, largest);
 }
 
+void meet_second_order(const Program& p, Workspace& w, double h, VecX& move) {
+    if (w.rows.blocks.empty()) return;
+    w.r.setZero();
+    for (int i : w.rows.blocks) {
+        const Block& block = p.blocks[i];
+        for (size_t k = 0; k < block.kept.size(); ++k)
+            if (block.holonomic[k]) w.r[block.row + k] = -0.5 * h * h * w.b[block.row + k];
+    }
+    least_move(p, w, w.scaled);
+    move += w.scaled;
+}
+
 bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
     if (w.rows.blocks.empty()) return false;
     gaps(p, w, t, q, v);
     const double floor = rounding_part(w) * scene_size(p, w);
     double last = gather_gaps(p, w);
-    bool moved = false;
+    if (!(last > floor)) return false;
+    int count = 0;  // steps since the factors were taken
     for (int it = 0; it < projection_limit && last > floor; ++it) {
-        least_move(p, w, w.scaled);
-        retract(p.mechanism, q.data(), w.scaled.data(), q.data());
-        moved = true;
+        if (count == 0) {
+            w.shift_start = q;
+            w.shift.setZero();
+        }
+        broyden_step(p, w, count);
+        w.shift += w.shift_steps[count++];
+        shift_position(p, w, q, p.touched_dofs);  // the others move no gap
         gaps(p, w, t, q, v);
         const double now = gather_gaps(p, w);
-        if (now > floor && left_at_this_rate(last, now, floor) > 3.0) configure(p, w, t, q, v);
         if (it > 3 && now > 0.5 * last) break;  // as good as rounding allows
+        if (now > floor && left_at_this_rate(last, now, floor) > 3.0) {
+            shift_position(p, w, q);
+            configure(p, w, t, q, v);
+            count = 0;
+        }
         last = now;
     }
-    if (moved) ++w.projections;
-    return moved;
+    if (count > 0) shift_position(p, w, q);
+    ++w.projections;
+    return true;
 }
 
 bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
@@ -136,6 +190,28 @@ bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
     const bool moved = project_position(p, w, t, q, v);
     configure(p, w, t, q, v);
     return project_velocity(p, w, t, v) || moved;
+}
+
+void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
+    std::fill(w.mode.begin(), w.mode.end(), static_cast<signed char>(1));
+    want_rows(p, w);
+    configure(p, w, t, q, v);
+    if (w.rows.blocks.empty()) return;
+    decide_rows(p.layout, p.blocks, w.B, w.rows);
+    factor_rows(p.layout, p.blocks, w.B, w.rows);
+    project(p, w, t, q, v);
+}
+
+Closure close(const Program& p, Workspace& w, double t, VecX& q, VecX& v, double far) {
+    Closure found;
+    look_at(p, w, t, q, v);
+    violations(p, w, found.before, found.rate);
+    found.after = found.before;
+    if (!(found.before <= far)) return found;
+    project_anew(p, w, t, q, v);
+    look_at(p, w, t, q, v);
+    violations(p, w, found.after, found.rate);
+    return found;
 }
 
 }  // namespace pn

@@ -12,12 +12,18 @@ constexpr int projection_limit = 12;
 // A pivot of the rows' unit-diagonal factor below this is near a singular position: the square of the sine at which
 // the nearest row stands to the others.
 constexpr double near_singular = 2.5e-3;
+// A step of the iteration that keeps more than this part of an earlier one says nothing of what the factors miss.
+constexpr double broyden_limit = 0.3;
 // Where nothing can move, a velocity below this [rad/s or m/s] is what the last event left by rounding.
 constexpr double immobile_speed = 1e-8;
 
 // A larger gap than this part of the scene's size that projection leaves has opened for good: after every step it comes
 // down to rounding, in singular positions too.
 constexpr double open_gap = 1e-9;
+
+// To a step's move h v1, v1 = v0 + h a, adds the least one after which gaps are of third order: without it they are
+// h^2/2 b, since h v0 + h^2/2 a is the one that follows the constraints to that order. The workspace is that of (v0, a).
+void meet_second_order(const Program& p, Workspace& w, double h, VecX& move);
 
 // Each returns false when nothing had to move.
 // Moves q; the workspace must hold factors near (t, q). v is only what a user's own rows are shown.
@@ -26,6 +32,13 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
 bool project_velocity(const Program& p, Workspace& w, double t, VecX& v);
 // Moves both, and leaves the workspace configured there.
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
+
+// Where no step has left factors: those of the state itself serve, with the rows that are independent there, all elements
+// slipping.
+void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
+// Does so unless the largest residual is beyond `far`; residual before and after, and the largest rate.
+struct Closure { double before, after, rate; };
+Closure close(const Program& p, Workspace& w, double t, VecX& q, VecX& v, double far);
 
 // Throws where a row's residual at the last look is open.
 void require_closed(const Program& p, const Workspace& w, double t);

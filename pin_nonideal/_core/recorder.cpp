@@ -4,6 +4,12 @@ namespace pn {
 
 static void append(std::vector<double>& to, const VecX& x) { to.insert(to.end(), x.data(), x.data() + x.size()); }
 
+void Recorder::reserve(size_t samples) {
+    const std::pair<std::vector<double>*, int> widths[] = {
+        {&out.t, 1}, {&out.q, system.nq}, {&out.v, system.nv}, {&out.violation, 1}, {&out.violation_rate, 1}};
+    for (const auto& [values, width] : widths) values->reserve(samples * width);
+}
+
 void Recorder::sample(double t, const VecX& y, bool evaluated) {
     q_ = y.head(system.nq);
     v_ = y.segment(system.nq, system.nv);

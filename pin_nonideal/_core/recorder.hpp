@@ -38,6 +38,8 @@ public:
         : p(system.p), w(system.w), system(system), options(options), out(out) {}
     double moved_energy = 0.0;  // by projection, so far
 
+    // Room for so many samples.
+    void reserve(size_t samples);
     // The state at t; the workspace is evaluated there when `evaluated`, and anyway its rows are.
     void sample(double t, const VecX& y, bool evaluated);
 

@@ -165,7 +165,8 @@ nb::tuple Runner::rows(const Array& q_in, const Array& v_in, double t) {
             rate.push_back(values.rate[k]);
         }
     }
-    return nb::make_tuple(to_numpy(A), to_numpy(b), to_numpy(phi), to_numpy(rate));
+    return nb::make_tuple(to_numpy(std::move(A)), to_numpy(std::move(b)), to_numpy(std::move(phi)),
+                          to_numpy(std::move(rate)));
 }
 
 nb::tuple Runner::terms(const Array& q_in, const Array& v_in) {
@@ -177,36 +178,13 @@ nb::tuple Runner::terms(const Array& q_in, const Array& v_in) {
     for (int k = 0; k < m.nv; ++k)
         for (int i = k, s = 0; i >= 0; i = m.dof_parent[i], ++s)
             M[k * m.nv + i] = M[i * m.nv + k] = w->terms.M[m.row_offset[k] + s];
-    return nb::make_tuple(to_numpy(M), to_numpy(w->terms.nle));
+    return nb::make_tuple(to_numpy(std::move(M)), to_numpy(w->terms.nle));
 }
 
 nb::tuple Runner::project_state(const Array& q_in, const Array& v_in, double t, double far) {
     set(q_in, v_in, nb::none());
-    double before, after, rate;
-    look_at(*p, *w, t, q, v);
-    violations(*p, *w, before, rate);
-    after = before;
-    if (before <= far) {
-        project_here(t);
-        look_at(*p, *w, t, q, v);
-        violations(*p, *w, after, rate);
-    }
-    return nb::make_tuple(to_numpy(q), to_numpy(v), before, after, rate);
-}
-
-void Runner::project_here(double t) {
-    std::fill(w->mode.begin(), w->mode.end(), static_cast<signed char>(1));
-    want_rows(*p, *w);
-    kinematics(p->mechanism, w->terms, q, v);
-    inertia(p->mechanism, w->terms);
-    factor_mass(*p, *w, t);
-    evaluate_rows(*p, *w, t, v);
-    if (!w->rows.blocks.empty()) {
-        scale_rows(*p, *w);
-        decide_rows(p->layout, p->blocks, w->B, w->rows);
-        factor_rows(p->layout, p->blocks, w->B, w->rows);
-        project(*p, *w, t, q, v);
-    }
+    const Closure found = close(*p, *w, t, q, v, far);
+    return nb::make_tuple(to_numpy(q), to_numpy(v), found.before, found.after, found.rate);
 }
 
 nb::object Runner::derivative(double t, const Array& y_in, bool energy) {
@@ -222,7 +200,7 @@ nb::tuple Runner::settle(double t, const Array& y_in, bool with_energy) {
     System system(*p, *w, with_energy);
     VecX y = read_state(system, map(y_in));
     const double before = energy();
-    project_here(t);
+    project_anew(*p, *w, t, q, v);
     normalize(p->mechanism, q.data());
     y.head(system.nq) = q;
     y.segment(system.nq, system.nv) = v;
@@ -241,7 +219,7 @@ nb::dict Runner::record(const Array& times, const Array2& states, const Array& m
         recorder.moved_energy = moved.data()[k];
         recorder.sample(times.data()[k], y, true);
     }
-    return hand_over(*w, out);
+    return hand_over(*w, std::move(out));
 }
 
 VecX Runner::read_state(const System& system, const VecX& outside) {

@@ -47,16 +47,16 @@ RecordOptions read_record(const nb::dict& d) {
     return {wanted("a"), wanted("forces"), wanted("energy"), wanted("power")};
 }
 
-nb::dict hand_over(const Workspace& w, const Recording& r) {
+nb::dict hand_over(const Workspace& w, Recording&& r) {
     nb::dict out;
-    const std::pair<const char*, const std::vector<double>*> fields[] = {
+    const std::pair<const char*, std::vector<double>*> fields[] = {
         {"t", &r.t}, {"q", &r.q}, {"v", &r.v}, {"violation", &r.violation}, {"violation_rate", &r.violation_rate},
         {"a", &r.a}, {"F_ideal", &r.F_ideal}, {"F_nonideal", &r.F_nonideal}, {"lam", &r.lam},
         {"lam_ideal", &r.lam_ideal}, {"energy", &r.energy}, {"power", &r.power}, {"z", &r.z}};
-    for (const auto& [name, values] : fields) out[name] = to_numpy(*values);
+    for (const auto& [name, values] : fields) out[name] = to_numpy(std::move(*values));
     nb::list modes, events;
     std::vector<double> mode_numbers(r.modes.begin(), r.modes.end());
-    out["modes"] = to_numpy(mode_numbers);
+    out["modes"] = to_numpy(std::move(mode_numbers));
     for (const Event& e : r.events) events.append(nb::make_tuple(e.time, static_cast<int>(e.kind), e.element));
     out["events"] = events;
     out["steps"] = r.steps;
@@ -89,7 +89,7 @@ nb::dict Runner::simulate(const Array& q_in, const Array& v_in, const Array& z, 
         nb::gil_scoped_release release;
         pn::simulate(*p, *w, q0, v0, o, recording);
     }
-    return hand_over(*w, recording);
+    return hand_over(*w, std::move(recording));
 }
 
 nb::dict Runner::resume(const nb::bytes& state, const nb::dict& options) {
@@ -100,44 +100,62 @@ nb::dict Runner::resume(const nb::bytes& state, const nb::dict& options) {
         nb::gil_scoped_release release;
         pn::resume(*p, *w, bytes, o, recording);
     }
-    return hand_over(*w, recording);
+    return hand_over(*w, std::move(recording));
 }
 
-// States are drawn from one counter by native threads; every run has a workspace of its own.
+// Calls work(i, k) for every i below `count`, drawn from one counter by threads k; number 0 is the caller's.
+template <class Work>
+static void share_out(size_t count, int threads, Work work) {
+    nb::gil_scoped_release release;
+    std::atomic<size_t> next{0};
+    const auto draw = [&](int k) {
+        for (size_t i = next++; i < count; i = next++) work(i, k);
+    };
+    std::vector<std::thread> pool;
+    for (int k = 1; k < threads; ++k) pool.emplace_back(draw, k);
+    draw(0);
+    for (std::thread& thread : pool) thread.join();
+}
+
+nb::tuple nearest_states(const Builder& b, const Array2& q_in, const Array2& v_in, double t, double far, int threads) {
+    RowMajor q = map(q_in), v = map(v_in);
+    VecX after = VecX::Constant(q.rows(), NAN), rate = after;
+    std::vector<std::unique_ptr<Workspace>> spaces(threads);
+    share_out(q.rows(), threads, [&](size_t i, int k) {
+        if (!spaces[k]) spaces[k] = std::make_unique<Workspace>(*b.p);
+        VecX q_one = q.row(i), v_one = v.row(i);
+        try {
+            const Closure found = close(*b.p, *spaces[k], t, q_one, v_one, far);
+            after[i] = found.after;
+            rate[i] = found.rate;
+            q.row(i) = q_one;
+            v.row(i) = v_one;
+        } catch (...) {
+            // Told where the state is taken alone.
+        }
+    });
+    return nb::make_tuple(to_numpy(q.data(), q.size()), to_numpy(v.data(), v.size()), to_numpy(after), to_numpy(rate));
+}
+
+// Every run has a workspace of its own.
 nb::list rollout(const Builder& b, const Array2& q, const Array2& v, const Array& z, const nb::dict& options,
                  int threads) {
     const size_t count = q.shape(0);
     std::vector<Recording> recordings(count);
-    std::vector<std::unique_ptr<Workspace>> spaces;
-    for (size_t i = 0; i < count; ++i) spaces.emplace_back();
-    // Copied here and not in the threads: options hold Python's objects, whose counts need the lock.
+    std::vector<std::unique_ptr<Workspace>> spaces(count);
+    // Read here and not in the threads: options hold Python's objects, whose counts need the lock.
     const Options o = read_options(options);
     Options silent = o;
     silent.tick = nullptr;
     const VecX z0 = map(z);
-    std::vector<VecX> q0, v0;
-    for (size_t i = 0; i < count; ++i) {
-        q0.push_back(Eigen::Map<const VecX>(q.data() + i * q.shape(1), q.shape(1)));
-        v0.push_back(Eigen::Map<const VecX>(v.data() + i * v.shape(1), v.shape(1)));
-    }
-    const Program& p = *b.p;
-    {
-        nb::gil_scoped_release release;
-        std::atomic<size_t> next{0};
-        const auto work = [&](const Options& mine) {
-            for (size_t i = next++; i < count; i = next++) {
-                spaces[i] = std::make_unique<Workspace>(p);
-                spaces[i]->z = z0;
-                simulate(p, *spaces[i], q0[i], v0[i], mine, recordings[i]);
-            }
-        };
-        std::vector<std::thread> pool;
-        for (int k = 1; k < threads; ++k) pool.emplace_back(work, std::cref(silent));
-        work(o);
-        for (std::thread& thread : pool) thread.join();
-    }
+    const auto q_all = map(q), v_all = map(v);
+    share_out(count, threads, [&](size_t i, int k) {
+        spaces[i] = std::make_unique<Workspace>(*b.p);
+        spaces[i]->z = z0;
+        simulate(*b.p, *spaces[i], q_all.row(i), v_all.row(i), k == 0 ? o : silent, recordings[i]);
+    });
     nb::list out;
-    for (size_t i = 0; i < count; ++i) out.append(hand_over(*spaces[i], recordings[i]));
+    for (size_t i = 0; i < count; ++i) out.append(hand_over(*spaces[i], std::move(recordings[i])));
     return out;
 }
 

@@ -23,6 +23,9 @@ constexpr int detour_limit = 3;
 constexpr long early_steps = 20000;
 constexpr double least_progress = 1e-10;
 
+// Room for samples is taken at once up to this number; longer runs may stop before they fill it.
+constexpr double most_reserved = 1e5;
+
 }  // namespace
 
 Simulation::Simulation(const Program& program, Workspace& workspace, const Options& options, Recording& recording)
@@ -136,6 +139,8 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
     if (system.nz > 0) y.segment(system.nq + system.nv, system.nz) = w.z;
     next_sample = o.t0 + o.output_dt;
     samples = 1;
+    const double apart = o.output_dt > 0.0 ? o.output_dt : o.dt;  // the steps of adaptive methods are not known before
+    if (apart > 0.0) recorder.reserve(static_cast<size_t>(std::min(o.duration / apart + 2.0, most_reserved)));
     w.has_held = false;
     w.warm = false;
     next_period = 0;

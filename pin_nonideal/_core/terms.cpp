@@ -61,7 +61,8 @@ void place(const Joint& j, const Body& parent, const VecX& q, Body& b, const Joi
         R0 = j.R0;
         p0 = j.p0;
     } else {
-        R0.noalias() = parent.R * j.R0;
+        if (j.aligned) R0 = parent.R;
+        else R0.noalias() = parent.R * j.R0;
         p0 = parent.p + parent.R * j.p0;
     }
     const double* x = q.data() + j.iq;
@@ -255,8 +256,9 @@ void mass_matrix(const Mechanism& m, Terms& w) {
         for (int dof = j.iv + j.nv - 1; dof >= j.iv; --dof) {
             w.Ag[dof] = b.Y * w.J[dof];
             double* row = w.M.data() + m.row_offset[dof];
-            for (int k = dof; k >= 0; k = m.dof_parent[k]) *row++ = dot(w.J[k], w.Ag[dof]);
-            w.M[m.row_offset[dof]] += m.armature[dof];
+            const int* up = m.ancestors.data() + m.row_offset[dof];
+            for (int s = 0; s <= m.depth[dof]; ++s) row[s] = dot(w.J[up[s]], w.Ag[dof]);
+            row[0] += m.armature[dof];
         }
         if (j.parent != 0) w.body[j.parent].Y += b.Y;
     }
@@ -291,24 +293,25 @@ int factorize(const Mechanism& m, Terms& w) {
     // From the leaves to the root: row k eliminates itself from the rows of its ancestors.
     w.L = w.M;
     for (int k = m.nv - 1; k >= 0; --k) {
-        double* row = w.L.data() + m.row_offset[k];
+        const int depth = m.depth[k];
+        const int* up = m.ancestors.data() + m.row_offset[k];
+        double* __restrict row = w.L.data() + m.row_offset[k];
         if (w.locked[k]) {
-            std::fill(row + 1, row + m.depth[k] + 1, 0.0);
+            std::fill(row + 1, row + depth + 1, 0.0);
             w.D[k] = 1.0;
             w.inv_sqrt_D[k] = 0.0;
             continue;
         }
-        for (int s = 1, i = m.dof_parent[k]; i >= 0; ++s, i = m.dof_parent[i])
-            if (w.locked[i]) row[s] = 0.0;
+        for (int s = 1; s <= depth; ++s)
+            if (w.locked[up[s]]) row[s] = 0.0;
         const double pivot = row[0];
         if (!(pivot > 0.0)) return k;
         w.D[k] = pivot;
         w.inv_sqrt_D[k] = 1.0 / std::sqrt(pivot);
         const double inverse = 1.0 / pivot;
-        const int depth = m.depth[k];
-        for (int s = 1, i = m.dof_parent[k]; i >= 0; ++s, i = m.dof_parent[i]) {
+        for (int s = 1; s <= depth; ++s) {
             const double factor = row[s] * inverse;
-            double* target = w.L.data() + m.row_offset[i];
+            double* __restrict target = w.L.data() + m.row_offset[up[s]];  // never the row itself
             for (int t = s; t <= depth; ++t) target[t - s] -= factor * row[t];
             row[s] = factor;  // entries to the left of s are no longer read as M
         }
@@ -318,31 +321,46 @@ int factorize(const Mechanism& m, Terms& w) {
 
 void solve_R(const Mechanism& m, const Terms& w, VecX& x) {
     for (int k = m.nv - 1; k >= 0; --k) {
-        const double* row = w.L.data() + m.row_offset[k];
         const double xk = x[k];
         if (xk == 0.0) continue;
-        for (int i = m.dof_parent[k], s = 1; i >= 0; i = m.dof_parent[i], ++s) x[i] -= row[s] * xk;
+        const double* row = w.L.data() + m.row_offset[k];
+        const int* up = m.ancestors.data() + m.row_offset[k];
+        for (int s = 1; s <= m.depth[k]; ++s) x[up[s]] -= row[s] * xk;
         x[k] = xk * w.inv_sqrt_D[k];
     }
 }
 
-void solve_Rt(const Mechanism& m, const Terms& w, VecX& x) {
-    for (int k = 0; k < m.nv; ++k) {
-        const double* row = w.L.data() + m.row_offset[k];
-        double xk = x[k] * w.inv_sqrt_D[k];
-        for (int i = m.dof_parent[k], s = 1; i >= 0; i = m.dof_parent[i], ++s) xk -= row[s] * x[i];
-        x[k] = xk;
+// Row k of R^-T x, once those of its ancestors are there.
+static void solve_Rt_row(const Mechanism& m, const Terms& w, int k, VecX& x) {
+    const double* row = w.L.data() + m.row_offset[k];
+    const int* up = m.ancestors.data() + m.row_offset[k];
+    double even = x[k] * w.inv_sqrt_D[k], odd = 0.0;
+    int s = 1;
+    for (; s < m.depth[k]; s += 2) {
+        even -= row[s] * x[up[s]];
+        odd -= row[s + 1] * x[up[s + 1]];
     }
+    if (s == m.depth[k]) even -= row[s] * x[up[s]];
+    x[k] = even + odd;
+}
+
+void solve_Rt(const Mechanism& m, const Terms& w, VecX& x) {
+    for (int k = 0; k < m.nv; ++k) solve_Rt_row(m, w, k, x);
+}
+
+void solve_Rt(const Mechanism& m, const Terms& w, const std::vector<int>& dofs, VecX& x) {
+    for (int k : dofs) solve_Rt_row(m, w, k, x);
 }
 
 void multiply_M(const Mechanism& m, const Terms& w, const VecX& x, VecX& y) {
     y.setZero();
     for (int k = 0; k < m.nv; ++k) {
         const double* row = w.M.data() + m.row_offset[k];
+        const int* up = m.ancestors.data() + m.row_offset[k];
         y[k] += row[0] * x[k];
-        for (int i = m.dof_parent[k], s = 1; i >= 0; i = m.dof_parent[i], ++s) {
-            y[k] += row[s] * x[i];
-            y[i] += row[s] * x[k];
+        for (int s = 1; s <= m.depth[k]; ++s) {
+            y[k] += row[s] * x[up[s]];
+            y[up[s]] += row[s] * x[k];
         }
     }
 }

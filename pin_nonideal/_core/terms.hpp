@@ -58,6 +58,8 @@ int factorize(const Mechanism& m, Terms& w);
 // x := R^-1 x = D^-1/2 L^-T x, and x := R^-T x = L^-1 D^-1/2 x.
 void solve_R(const Mechanism& m, const Terms& w, VecX& x);
 void solve_Rt(const Mechanism& m, const Terms& w, VecX& x);
+// The latter for the dofs listed, after their ancestors, of an x that is zero elsewhere before.
+void solve_Rt(const Mechanism& m, const Terms& w, const std::vector<int>& dofs, VecX& x);
 // y := M x.
 void multiply_M(const Mechanism& m, const Terms& w, const VecX& x, VecX& y);
 
