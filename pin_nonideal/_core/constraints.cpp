@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unrolled.hpp"
+
 namespace pn {
 
 namespace {
@@ -24,7 +26,7 @@ struct Pose {  // a frame in the world
 Vec3 logarithm(const Mat3& R) {  // rotation vector
     const Eigen::Quaterniond q(R);
     const double n = q.vec().norm();
-    if (n < 1e-12) return 2.0 * q.vec();
+    if (n < 1e-4 && q.w() > 0.0) return (2.0 + n * n / 3.0) * q.vec();
     const double angle = 2.0 * std::atan2(n, q.w());
     const double wrapped = angle > M_PI ? angle - 2.0 * M_PI : angle;
     return (wrapped / n) * q.vec();
@@ -387,19 +389,21 @@ void fill_A(const Block& block, const Terms& terms, const RowValues& values, dou
 }
 
 void scale_rows(const Mechanism& m, const Terms& terms, const Block& block, const double* A, double* B) {
-    const int r = static_cast<int>(block.kept.size()), n = static_cast<int>(block.support.size());
-    std::copy(A, A + static_cast<size_t>(r) * n, B);
-    for (int l = 0; l < n; ++l) {
-        const int dof = block.support[l];
-        const double* row = terms.L.data() + m.row_offset[dof];
-        double* __restrict x = B + l * r;
-        for (int p = block.parent[l], s = 1; p >= 0; p = block.parent[p], ++s) {
-            double* __restrict y = B + p * r;  // of an ancestor
-            for (int k = 0; k < r; ++k) y[k] -= row[s] * x[k];
+    const int n = static_cast<int>(block.support.size());
+    std::copy(A, A + block.kept.size() * n, B);
+    with_rows(static_cast<int>(block.kept.size()), [&](auto r) {
+        for (int l = 0; l < n; ++l) {
+            const int dof = block.support[l];
+            const double* row = terms.L.data() + m.row_offset[dof];
+            double* __restrict x = B + l * r;
+            for (int p = block.parent[l], s = 1; p >= 0; p = block.parent[p], ++s) {
+                double* __restrict y = B + p * r;  // of an ancestor
+                for (int k = 0; k < r; ++k) y[k] -= row[s] * x[k];
+            }
+            const double d = terms.inv_sqrt_D[dof];
+            for (int k = 0; k < r; ++k) x[k] *= d;
         }
-        const double d = terms.inv_sqrt_D[dof];
-        for (int k = 0; k < r; ++k) x[k] *= d;
-    }
+    });
 }
 
 }  // namespace pn

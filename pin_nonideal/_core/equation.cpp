@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <type_traits>
+
+#include "unrolled.hpp"
 
 namespace pn {
 
@@ -172,8 +173,6 @@ void RowSystem::use_wanted(const std::vector<Block>& all) {
     orthogonal = false;
 }
 
-constexpr int tile = 6;  // rows of an anchor at most; longer blocks are taken in parts
-
 // sum := x y^T summed over the common dofs of two blocks, for n1 rows of the one and n2 of the other.
 template <int n1, int n2>
 static void multiply_tile(const double* X, int r1, const double* Y, int r2, const RowLayout::Pair& pair,
@@ -188,15 +187,6 @@ static void multiply_tile(const double* X, int r1, const double* Y, int r2, cons
         for (int j = 0; j < n2; ++j) sum[i][j] = local[i][j];
 }
 
-// Calls f with n, 1 to tile, as a constant: loops over rows of a length known to the compiler cost half.
-template <int n = tile, class F>
-static void with_constant(int value, F f) {
-    if constexpr (n > 1) {
-        if (value != n) return with_constant<n - 1>(value, f);
-    }
-    f(std::integral_constant<int, n>());
-}
-
 static void gram(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
                  const std::vector<char>& use, RowSystem& s) {
     for (const RowLayout::Pair& pair : layout.pairs) {
@@ -204,7 +194,7 @@ static void gram(const RowLayout& layout, const std::vector<Block>& blocks, cons
         const Block &b1 = blocks[pair.block1], &b2 = blocks[pair.block2];
         const int r1 = static_cast<int>(b1.kept.size()), r2 = static_cast<int>(b2.kept.size());
         const double *X = B.data() + b1.offset, *Y = B.data() + b2.offset;
-        for (int i0 = 0; i0 < r1; i0 += tile)
+        for (int i0 = 0; i0 < r1; i0 += tile)  // a tile at a time
             for (int j0 = 0; j0 < r2; j0 += tile) {
                 const int ni = std::min(tile, r1 - i0), nj = std::min(tile, r2 - j0);
                 double sum[tile][tile];
@@ -263,8 +253,8 @@ void factor_rows(const RowLayout& layout, const std::vector<Block>& blocks, cons
             const int column = layout.row_at[j];
             if (!s.active[column]) { Li[j] = 0.0; continue; }
             const double* Lj = L + layout.start[j];
-            double sum = Gi[j] * s.scale[row] * s.scale[column];
-            for (int k = std::max(first, layout.first[j]); k < j; ++k) sum -= Li[k] * Lj[k];
+            const int common = std::max(first, layout.first[j]);
+            const double sum = Gi[j] * s.scale[row] * s.scale[column] - dot(Li + common, Lj + common, j - common);
             Li[j] = sum * Lj[j];  // the diagonal holds inverse pivots
             pivot -= Li[j] * Li[j];
         }
@@ -312,42 +302,45 @@ void solve_rows(const RowLayout& layout, RowSystem& s, const VecX& r, VecX& lam)
         return;
     }
     const double* L = s.factor.data();
-    VecX& y = s.work;
+    double* __restrict y = s.work.data();
     for (int i = 0; i < layout.rows; ++i) {
         const int row = layout.row_at[i];
         if (!s.active[row]) { y[i] = 0.0; continue; }
         const double* Li = L + layout.start[i];
-        double sum = r[row] * s.scale[row];
-        for (int j = layout.first[i]; j < i; ++j) sum -= Li[j] * y[j];
-        y[i] = sum * Li[i];
+        const int first = layout.first[i];
+        y[i] = (r[row] * s.scale[row] - dot(Li + first, y + first, i - first)) * Li[i];
     }
     for (int i = layout.rows - 1; i >= 0; --i) {
         const int row = layout.row_at[i];
         if (!s.active[row]) continue;
         const double* Li = L + layout.start[i];
-        y[i] *= Li[i];
-        for (int j = layout.first[i]; j < i; ++j) y[j] -= Li[j] * y[i];
-        lam[row] = y[i] * s.scale[row];
+        const double yi = y[i] * Li[i];
+        for (int j = layout.first[i]; j < i; ++j) y[j] -= Li[j] * yi;
+        lam[row] = yi * s.scale[row];
     }
 }
 
 void add_transpose(const Block& block, const std::vector<double>& B, const VecX& lam, VecX& y) {
-    const int r = static_cast<int>(block.kept.size());
-    const double *x = B.data() + block.offset, *l = lam.data() + block.row;
-    for (size_t p = 0; p < block.support.size(); ++p, x += r) {
-        double sum = 0.0;
-        for (int k = 0; k < r; ++k) sum += x[k] * l[k];
-        y[block.support[p]] += sum;
-    }
+    with_rows(static_cast<int>(block.kept.size()), [&](auto r) {
+        const double *x = B.data() + block.offset, *l = lam.data() + block.row;
+        for (size_t p = 0; p < block.support.size(); ++p, x += r) {
+            double sum = 0.0;
+            for (int k = 0; k < r; ++k) sum += x[k] * l[k];
+            y[block.support[p]] += sum;
+        }
+    });
 }
 
 void multiply(const Block& block, const std::vector<double>& B, const VecX& x, VecX& r) {
-    const int n = static_cast<int>(block.kept.size());
-    const double* a = B.data() + block.offset;
-    double* out = r.data() + block.row;
-    for (int k = 0; k < n; ++k) out[k] = 0.0;
-    for (size_t p = 0; p < block.support.size(); ++p, a += n)
-        for (int k = 0; k < n; ++k) out[k] += a[k] * x[block.support[p]];
+    with_rows(static_cast<int>(block.kept.size()), [&](auto n) {
+        const double* a = B.data() + block.offset;
+        double* __restrict out = r.data() + block.row;
+        for (int k = 0; k < n; ++k) out[k] = 0.0;
+        for (size_t p = 0; p < block.support.size(); ++p, a += n) {
+            const double xp = x[block.support[p]];
+            for (int k = 0; k < n; ++k) out[k] += a[k] * xp;
+        }
+    });
 }
 
 }  // namespace pn

@@ -152,6 +152,7 @@ Workspace::Workspace(const Program& p) {
     momentum.assign(n, Force{Vec3::Zero(), Vec3::Zero()});
     shift_start = VecX::Zero(p.mechanism.nq);
     shift = VecX::Zero(p.layout.rows);
+    shift_sum = shift_third = shift;
     shift_steps.assign(projection_limit, shift);
     const size_t elements = p.frictions.size();
     mode.assign(elements, 1);
@@ -398,10 +399,9 @@ static void choose_rows(const Program& p, Workspace& w) {
     ++w.factorizations;
 }
 
-// Factors of a step's start; returns whether the rows were chosen here.
-static bool configure_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+// Chooses the rows of a step where the factors found there ask for it; returns whether it did.
+static bool configure_step(const Program& p, Workspace& w) {
     w.ideal_decided = false;
-    configure(p, w, t, q, v);
     if (w.rows.blocks.empty() || !w.rows.orthogonal) return false;
     choose_rows(p, w);
     return true;
@@ -434,11 +434,12 @@ static void move_step(const Program& p, Workspace& w, double t, const VecX& v, b
 }
 
 void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    move_step(p, w, t, v, configure_step(p, w, t, q, v));
+    configure(p, w, t, q, v);
+    move_step(p, w, t, v, configure_step(p, w));
 }
 
-bool begin_step_on_rates(const Program& p, Workspace& w, double t, const VecX& q, VecX& v) {
-    const bool chosen = configure_step(p, w, t, q, v);
+bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v) {
+    const bool chosen = configure_step(p, w);
     const bool moved = project_velocity(p, w, t, v);
     move_step(p, w, t, v, chosen);
     return moved;

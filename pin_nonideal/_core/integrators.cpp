@@ -101,7 +101,7 @@ void Stepper::step(double t, double size) {
         const int nq = system.nq, nv = system.nv;
         y1 = y0 + h * K[0];
         system.v_buffer = h * y1.segment(nq, nv);
-        meet_second_order(system.p, system.w, h, system.v_buffer);
+        follow_constraints(system.p, system.w, h, system.v_buffer);
         retract(system.p.mechanism, y0.data(), system.v_buffer.data(), y1.data());
         return;
     }

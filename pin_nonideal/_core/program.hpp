@@ -113,8 +113,9 @@ struct Workspace {
     std::vector<Motion> motion;
     std::vector<Force> momentum;
 
-    // Of the projection of a position: where it starts, its multipliers, and the steps that these took.
-    VecX shift_start, shift;
+    // Of the projection of a position: where its factors were taken, the multipliers from there and in all, those of
+    // third order in the step, over its cube, and the steps that the multipliers took.
+    VecX shift_start, shift, shift_sum, shift_third;
     std::vector<VecX> shift_steps;
 
     // Friction.
@@ -172,8 +173,8 @@ void actuation_torque(const Program& p, Workspace& w, double t, const VecX& q, c
 void want_rows(const Program& p, Workspace& w);
 // Evaluates at a step's start and decides which rows are independent here; contradicting rows are a failure.
 void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// The same after v was brought to A v + phi_t = 0, by the factors found here; returns whether it moved.
-bool begin_step_on_rates(const Program& p, Workspace& w, double t, const VecX& q, VecX& v);
+// The same where the workspace is configured, after v was brought to A v + phi_t = 0; returns whether v moved.
+bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v);
 
 // Whether sticking elements and constraints leave no freedom at all: then nothing moves, exactly.
 bool is_immobile(const Program& p, const Workspace& w);

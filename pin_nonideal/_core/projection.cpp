@@ -124,7 +124,7 @@ void require_closed(const Program& p, const Workspace& w, double t) {
     if (worst >= 0) throw Failure(Failure::Kind::closure, t, {worst}, largest);
 }
 
-void meet_second_order(const Program& p, Workspace& w, double h, VecX& move) {
+void follow_constraints(const Program& p, Workspace& w, double h, VecX& move) {
     if (w.rows.blocks.empty()) return;
     w.r.setZero();
     for (int i : w.rows.blocks) {
@@ -132,38 +132,62 @@ void meet_second_order(const Program& p, Workspace& w, double h, VecX& move) {
         for (size_t k = 0; k < block.kept.size(); ++k)
             if (block.holonomic[k]) w.r[block.row + k] = -0.5 * h * h * w.b[block.row + k];
     }
-    least_move(p, w, w.scaled);
+    solve_rows(p.layout, w.rows, w.r, w.shift);
+    // Terms of a series that do not fall predict nothing: close to a singular position, at great speed.
+    const double cube = h * h * h, second = product(w, w.shift, w.shift);
+    if (cube * cube * product(w, w.shift_third, w.shift_third) < falling_square * second) w.shift += cube * w.shift_third;
+    else w.shift_third.setZero();
+    w.scaled.setZero();
+    for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.B, w.shift, w.scaled);
+    solve_Rt(p.mechanism, w.terms, w.scaled);
     move += w.scaled;
 }
 
+void learn_third_order(Workspace& w, double h) { w.shift_third += w.shift_sum / (h * h * h); }
+
 bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
-    if (w.rows.blocks.empty()) return false;
-    gaps(p, w, t, q, v);
-    const double floor = rounding_part(w) * scene_size(p, w);
-    double last = gather_gaps(p, w);
-    if (!(last > floor)) return false;
-    int count = 0;  // steps since the factors were taken
-    for (int it = 0; it < projection_limit && last > floor; ++it) {
+    w.shift_sum.setZero();
+    double gap = 0.0, floor = 0.0;
+    if (!w.rows.blocks.empty()) {
+        gaps(p, w, t, q, v);
+        gap = gather_gaps(p, w);
+        floor = rounding_part(w) * scene_size(p, w);
+    }
+    const bool moves = gap > floor;
+    bool configured = false;
+    int count = 0;      // steps since the factors were taken
+    double rate = 1.0;  // of the gap, by the last of them
+    for (int it = 0; it < projection_limit && gap > floor; ++it) {
         if (count == 0) {
             w.shift_start = q;
             w.shift.setZero();
         }
         broyden_step(p, w, count);
-        w.shift += w.shift_steps[count++];
-        shift_position(p, w, q, p.touched_dofs);  // the others move no gap
-        gaps(p, w, t, q, v);
-        const double now = gather_gaps(p, w);
-        if (it > 3 && now > 0.5 * last) break;  // as good as rounding allows
-        if (now > floor && left_at_this_rate(last, now, floor) > 3.0) {
+        w.shift += w.shift_steps[count];
+        w.shift_sum += w.shift_steps[count++];
+        // A gap that goes on as it did, and so ends below rounding, is looked at where the step's end is configured.
+        configured = count > 1 && gap * rate < trusted_part * floor;
+        double now = gap;
+        if (!configured) {
+            shift_position(p, w, q, p.touched_dofs);  // the others move no gap
+            gaps(p, w, t, q, v);
+            now = gather_gaps(p, w);
+            configured = now > floor && left_at_this_rate(gap, now, floor) > 3.0;
+        }
+        if (configured) {
             shift_position(p, w, q);
             configure(p, w, t, q, v);
+            now = gather_gaps(p, w);
             count = 0;
         }
-        last = now;
+        if (it > 3 && now > 0.5 * gap) break;  // as good as rounding allows
+        rate = now / gap;
+        gap = now;
     }
     if (count > 0) shift_position(p, w, q);
-    ++w.projections;
-    return true;
+    if (!configured) configure(p, w, t, q, v);
+    if (moves) ++w.projections;
+    return moves;
 }
 
 bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
@@ -188,7 +212,6 @@ bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
 
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
     const bool moved = project_position(p, w, t, q, v);
-    configure(p, w, t, q, v);
     return project_velocity(p, w, t, v) || moved;
 }
 

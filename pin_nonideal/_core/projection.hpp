@@ -14,6 +14,10 @@ constexpr int projection_limit = 12;
 constexpr double near_singular = 2.5e-3;
 // A step of the iteration that keeps more than this part of an earlier one says nothing of what the factors miss.
 constexpr double broyden_limit = 0.3;
+// A step after which the gap should be below this part of rounding needs no look of its own.
+constexpr double trusted_part = 0.1;
+// The third-order part of a step's move counts where its square is less than this part of that of the second.
+constexpr double falling_square = 0.01;
 // Where nothing can move, a velocity below this [rad/s or m/s] is what the last event left by rounding.
 constexpr double immobile_speed = 1e-8;
 
@@ -21,12 +25,16 @@ constexpr double immobile_speed = 1e-8;
 // down to rounding, in singular positions too.
 constexpr double open_gap = 1e-9;
 
-// To a step's move h v1, v1 = v0 + h a, adds the least one after which gaps are of third order: without it they are
-// h^2/2 b, since h v0 + h^2/2 a is the one that follows the constraints to that order. The workspace is that of (v0, a).
-void meet_second_order(const Program& p, Workspace& w, double h, VecX& move);
+// To a step's move h v1, v1 = v0 + h a, adds the least one that follows the constraints to third order. Without it gaps are
+// h^2/2 b, since h v0 + h^2/2 a is what follows them to second order; the multipliers of h^3 are those that the projection
+// after the step before has shown. The workspace is that of (v0, a).
+void follow_constraints(const Program& p, Workspace& w, double h, VecX& move);
+// Keeps them, after the projection of the end of a step that was moved so.
+void learn_third_order(Workspace& w, double h);
 
 // Each returns false when nothing had to move.
-// Moves q; the workspace must hold factors near (t, q). v is only what a user's own rows are shown.
+// Moves q; the workspace must hold factors near (t, q), and is left configured there. v is only what a user's own rows are
+// shown.
 bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 // Moves v; the workspace must be configured at (t, q).
 bool project_velocity(const Program& p, Workspace& w, double t, VecX& v);

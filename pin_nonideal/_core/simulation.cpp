@@ -122,7 +122,7 @@ void Simulation::settle(double at, VecX& state, VecX& rate) {
     if (system.nz > 0) w.z = state.segment(system.nq + system.nv, system.nz);
     bool moved = project_position(p, w, at, q_, v_);
     require_closed(p, w, at);
-    moved |= begin_step_on_rates(p, w, at, q_, v_);
+    moved |= begin_step_on_rates(p, w, at, v_);
     state.head(system.nq) = q_;
     state.segment(system.nq, system.nv) = v_;
     system.collect(at, state, rate);
@@ -214,6 +214,7 @@ void Simulation::advance_to(double stop) {
         if (o.method.kind == Method::Kind::dop853) error = stepper.error_norm(o.rtol, o.atol);
         if (error <= 1.0) {
             settle(t + size, stepper.y1, stepper.f1);
+            if (o.method.kind == Method::Kind::semi_implicit_euler) learn_third_order(w, size);
             if (o.method.kind == Method::Kind::dopri5) error = stepper.error_norm(o.rtol, o.atol);
         }
     } catch (const Failure& failure) {

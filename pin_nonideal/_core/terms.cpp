@@ -233,21 +233,14 @@ void mass_matrix(const Mechanism& m, Terms& w) {
         const Joint& j = m.joints[i];
         Body& b = w.body[i];
         const Vec3 c = b.p + b.R * j.com;
+        const Mat3 turned = b.R * j.inertia;
         Inertia& Y = b.own;
         Y.mass = j.mass;
         Y.first = j.mass * c;
-        Y.second.noalias() = (b.R * j.inertia) * b.R.transpose();
-        const double xx = c[0] * Y.first[0], yy = c[1] * Y.first[1], zz = c[2] * Y.first[2];
-        Y.second(0, 0) += yy + zz;
-        Y.second(1, 1) += xx + zz;
-        Y.second(2, 2) += xx + yy;
-        const double xy = c[0] * Y.first[1], xz = c[0] * Y.first[2], yz = c[1] * Y.first[2];
-        Y.second(0, 1) -= xy;
-        Y.second(1, 0) -= xy;
-        Y.second(0, 2) -= xz;
-        Y.second(2, 0) -= xz;
-        Y.second(1, 2) -= yz;
-        Y.second(2, 1) -= yz;
+        for (int r = 0; r < 3; ++r)
+            for (int k = 0; k <= r; ++k)
+                Y.second(r, k) = Y.second(k, r) = turned.row(r).dot(b.R.row(k)) - c[r] * Y.first[k];
+        Y.second.diagonal().array() += c.dot(Y.first);
         b.Y = Y;
     }
     for (int i = n - 1; i > 0; --i) {
@@ -309,11 +302,23 @@ int factorize(const Mechanism& m, Terms& w) {
         w.D[k] = pivot;
         w.inv_sqrt_D[k] = 1.0 / std::sqrt(pivot);
         const double inverse = 1.0 / pivot;
-        for (int s = 1; s <= depth; ++s) {
-            const double factor = row[s] * inverse;
-            double* __restrict target = w.L.data() + m.row_offset[up[s]];  // never the row itself
-            for (int t = s; t <= depth; ++t) target[t - s] -= factor * row[t];
-            row[s] = factor;  // entries to the left of s are no longer read as M
+        int s = 1;
+        for (; s < depth; s += 2) {  // two ancestors at a time, whose rows are never the row itself
+            const double f = row[s] * inverse, g = row[s + 1] * inverse;
+            double* __restrict one = w.L.data() + m.row_offset[up[s]];
+            double* __restrict two = w.L.data() + m.row_offset[up[s + 1]];
+            one[0] -= f * row[s];
+            for (int t = s + 1; t <= depth; ++t) {
+                one[t - s] -= f * row[t];
+                two[t - s - 1] -= g * row[t];
+            }
+            row[s] = f;  // entries behind are no longer read as M
+            row[s + 1] = g;
+        }
+        if (s == depth) {
+            const double f = row[s] * inverse;
+            w.L[m.row_offset[up[s]]] -= f * row[s];
+            row[s] = f;
         }
     }
     return -1;
