@@ -38,10 +38,10 @@ def check_closed(scene: Any, trajectory: Any) -> None:
     Raises:
         LoopClosureError: with the samples before.
     """
-    left = np.flatnonzero(trajectory.violation > LEFT)
-    if not left.size:
+    left = trajectory.violation > LEFT
+    if not left.any():
         return
-    k = int(left[0])
+    k = int(left.argmax())
     t = float(trajectory.t[k])
     residual = np.abs(rows_at(scene.new_runner(), trajectory.q[k], trajectory.v[k], t)[2])
     gaps = {key: float(residual[rows].max()) for key, rows in scene.constraint_slices.items()}

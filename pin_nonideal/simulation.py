@@ -234,20 +234,21 @@ def shaped(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: flo
     """
     nt = len(raw["t"])
     model = scene.model
-    elements, laws = len(scene.element_names), scene.law_names
+    elements = len(scene.element_names)
 
     def table(key: str, width: int) -> Array:
         result: Array = raw[key].reshape(nt, width)
         return result
 
-    m = max((s.stop for s in scene.constraint_slices.values()), default=0)
     fields: dict[str, Any] = {}
     if options["a"]:
         fields["a"] = table("a", model.nv)
     if options["forces"]:
+        m = max((s.stop for s in scene.constraint_slices.values()), default=0)
         for key, width in (("F_ideal", model.nv), ("F_nonideal", model.nv), ("lam", m), ("lam_ideal", m)):
             fields[key] = table(key, width)
-    columns = ["actuation", "forces", "constraints", *_columns(laws)]
+    ledger_kept = options["power"] or options["energy"]
+    columns = ["actuation", "forces", "constraints", *_columns(scene.law_names)] if ledger_kept else []
     if options["power"]:
         fields["power"] = dict(zip(columns, table("power", len(columns)).T, strict=True))
     if options["energy"]:
@@ -263,9 +264,11 @@ def shaped(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: flo
         fields["energy"] = ledger
     if scene.z0.size:
         fields["z"] = table("z", scene.z0.size)
-    names = dict.fromkeys(EVENT_KINDS, scene.element_names) | {"pull": list(scene.constraint_slices)}
-    kinds = [(t, EVENT_KINDS[kind], element) for t, kind, element in raw["events"]]
-    events = [Event(t, kind, names[kind][element]) for t, kind, element in kinds]
+    events = []
+    if raw["events"]:
+        names = dict.fromkeys(EVENT_KINDS, scene.element_names) | {"pull": list(scene.constraint_slices)}
+        kinds = [(t, EVENT_KINDS[kind], element) for t, kind, element in raw["events"]]
+        events = [Event(t, kind, names[kind][element]) for t, kind, element in kinds]
     counters = ("steps", "rejected", "evaluations", "factorizations", "projections", "iterations")
     return Trajectory(
         t=raw["t"],

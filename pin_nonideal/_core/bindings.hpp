@@ -33,7 +33,7 @@ inline nb::object to_numpy(const double* data, size_t n) {
 inline nb::object to_numpy(const VecX& x) { return to_numpy(x.data(), x.size()); }
 inline nb::object to_numpy(std::vector<double>&& x) {  // its numbers stay where they are
     auto* kept = new std::vector<double>(std::move(x));
-    kept->reserve(1);  // an array has an address, an empty one too
+    kept->reserve(1);  // an array has an address, one without numbers too
     nb::capsule owner(kept, [](void* v) noexcept { delete static_cast<std::vector<double>*>(v); });
     return nb::cast(nb::ndarray<nb::numpy, double, nb::ndim<1>>(kept->data(), {kept->size()}, owner));
 }

@@ -53,10 +53,11 @@ nb::dict hand_over(const Workspace& w, Recording&& r) {
         {"t", &r.t}, {"q", &r.q}, {"v", &r.v}, {"violation", &r.violation}, {"violation_rate", &r.violation_rate},
         {"a", &r.a}, {"F_ideal", &r.F_ideal}, {"F_nonideal", &r.F_nonideal}, {"lam", &r.lam},
         {"lam_ideal", &r.lam_ideal}, {"energy", &r.energy}, {"power", &r.power}, {"z", &r.z}};
-    for (const auto& [name, values] : fields) out[name] = to_numpy(std::move(*values));
+    const nb::object empty = to_numpy(nullptr, 0);  // of all that was not recorded
+    for (const auto& [name, values] : fields) out[name] = values->empty() ? empty : to_numpy(std::move(*values));
     nb::list modes, events;
     std::vector<double> mode_numbers(r.modes.begin(), r.modes.end());
-    out["modes"] = to_numpy(std::move(mode_numbers));
+    out["modes"] = mode_numbers.empty() ? empty : to_numpy(std::move(mode_numbers));
     for (const Event& e : r.events) events.append(nb::make_tuple(e.time, static_cast<int>(e.kind), e.element));
     out["events"] = events;
     out["steps"] = r.steps;
@@ -152,7 +153,9 @@ nb::list rollout(const Builder& b, const Array2& q, const Array2& v, const Array
     share_out(count, threads, [&](size_t i, int k) {
         spaces[i] = std::make_unique<Workspace>(*b.p);
         spaces[i]->z = z0;
-        simulate(*b.p, *spaces[i], q_all.row(i), v_all.row(i), k == 0 ? o : silent, recordings[i]);
+        Recording mine;  // neighbors in one array would share lines of cache between the threads
+        simulate(*b.p, *spaces[i], q_all.row(i), v_all.row(i), k == 0 ? o : silent, mine);
+        recordings[i] = std::move(mine);
     });
     nb::list out;
     for (size_t i = 0; i < count; ++i) out.append(hand_over(*spaces[i], std::move(recordings[i])));
