@@ -60,7 +60,10 @@ def ours(scene: pn.Scene, q: Any, v: Any, steps: int, threads: int) -> Call:
 
 
 def theirs(problem: Problem, q: Any, v: Any, steps: int, threads: int, integrator: str) -> Call:
-    """A call of mujoco.rollout, with the constraints of its defaults."""
+    """A call of mujoco.rollout, with the constraints of its defaults.
+
+    Without warm start: its Newton method ends after one iteration on joints that are held, warm or cold.
+    """
     import mujoco
     from mujoco import rollout
 
@@ -68,6 +71,7 @@ def theirs(problem: Problem, q: Any, v: Any, steps: int, threads: int, integrato
 
     mj = states(problem)
     lighten(mj)
+    mj.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_WARMSTART
     mj.opt.timestep = DT
     mj.opt.integrator = getattr(mujoco.mjtIntegrator, INTEGRATORS[integrator])
     coordinates = Coordinates(problem.model, mj)

@@ -100,10 +100,11 @@ def rotation(q: Array, start: int) -> Array:
 
 
 def lighten(mj: Any) -> None:
-    """Leaves out what none of the problems needs: collisions and limits."""
+    """Leaves out what none of the problems needs: collisions, limits, the search for islands of constraints."""
     import mujoco
 
-    mj.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
+    bits = mujoco.mjtDisableBit
+    mj.opt.disableflags |= bits.mjDSBL_CONTACT | bits.mjDSBL_LIMIT | bits.mjDSBL_ISLAND
 
 
 def stiffen(mj: Any, h: float) -> None:
