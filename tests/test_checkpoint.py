@@ -265,6 +265,13 @@ def test_damaged_files(written):
             assert_same_run(alone, pn.resume(written, cart()))
 
 
+def test_a_damaged_header(written):
+    """A bracket left open in the header of an array, which NumPy refuses in words of Python's tokenizer."""
+    written.write_bytes(written.read_bytes().replace(b"'shape': ()", b"'shape': (("))
+    with pytest.raises(LoadingError, match="cannot read a checkpoint from"):
+        pn.resume(written, cart())
+
+
 def states_of(scene, duration):
     """What the core hands over to be written, and the options to read it with."""
     states = []
