@@ -16,7 +16,11 @@ struct Pose {  // a frame in the world
     const Mechanism& m;
 
     Pose(const State& s, const Frame& f)
-        : body(s.terms.body[f.joint]), R(body.R * f.R), x(body.ref + body.p + body.R * f.p), m(s.mechanism) {}
+        : body(s.terms.body[f.joint]), R(f.R), x(f.p), m(s.mechanism) {
+        if (f.joint == 0) return;  // fixed to the world
+        R.noalias() = body.R * f.R;
+        x = body.ref + body.p + body.R * f.p;
+    }
     const Vec3& omega() const { return body.v.ang; }
     const Vec3& alpha() const { return body.a.ang; }
     Vec3 velocity(const Vec3& at) const { return velocity_at(body, at); }

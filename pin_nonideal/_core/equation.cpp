@@ -248,13 +248,14 @@ void factor_rows(const RowLayout& layout, const std::vector<Block>& blocks, cons
         double* Li = L + layout.start[i];
         const double* Gi = s.G.data() + layout.start[i];
         const int first = layout.first[i];
+        const double scale = s.scale[row];
         double pivot = Gi[i] > 0.0 ? 1.0 : 0.0;  // a row of nothing: its dofs are locked
         for (int j = first; j < i; ++j) {
             const int column = layout.row_at[j];
             if (!s.active[column]) { Li[j] = 0.0; continue; }
             const double* Lj = L + layout.start[j];
             const int common = std::max(first, layout.first[j]);
-            const double sum = Gi[j] * s.scale[row] * s.scale[column] - dot(Li + common, Lj + common, j - common);
+            const double sum = Gi[j] * scale * s.scale[column] - dot(Li + common, Lj + common, j - common);
             Li[j] = sum * Lj[j];  // the diagonal holds inverse pivots
             pivot -= Li[j] * Li[j];
         }
@@ -304,11 +305,10 @@ void solve_rows(const RowLayout& layout, RowSystem& s, const VecX& r, VecX& lam)
     const double* L = s.factor.data();
     double* __restrict y = s.work.data();
     for (int i = 0; i < layout.rows; ++i) {
-        const int row = layout.row_at[i];
-        if (!s.active[row]) { y[i] = 0.0; continue; }
+        const int row = layout.row_at[i], first = layout.first[i];
         const double* Li = L + layout.start[i];
-        const int first = layout.first[i];
-        y[i] = (r[row] * s.scale[row] - dot(Li + first, y + first, i - first)) * Li[i];
+        y[i] = 0.0;
+        if (s.active[row]) y[i] = (r[row] * s.scale[row] - dot(Li + first, y + first, i - first)) * Li[i];
     }
     for (int i = layout.rows - 1; i >= 0; --i) {
         const int row = layout.row_at[i];

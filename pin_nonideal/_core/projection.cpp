@@ -184,7 +184,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
         rate = now / gap;
         gap = now;
     }
-    if (count > 0) shift_position(p, w, q);
+    if (count > 0 && static_cast<int>(p.touched_dofs.size()) < p.mechanism.nv) shift_position(p, w, q);
     if (!configured) configure(p, w, t, q, v);
     if (moves) ++w.projections;
     return moves;

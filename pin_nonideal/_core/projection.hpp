@@ -15,7 +15,7 @@ constexpr double near_singular = 2.5e-3;
 // A step of the iteration that keeps more than this part of an earlier one says nothing of what the factors miss.
 constexpr double broyden_limit = 0.3;
 // A step after which the gap should be below this part of rounding needs no look of its own.
-constexpr double trusted_part = 0.1;
+constexpr double trusted_part = 0.5;
 // The third-order part of a step's move counts where its square is less than this part of that of the second.
 constexpr double falling_square = 0.01;
 // Where nothing can move, a velocity below this [rad/s or m/s] is what the last event left by rounding.
