@@ -100,7 +100,7 @@ def rotation(q: Array, start: int) -> Array:
 
 
 def lighten(mj: Any) -> None:
-    """Leaves out what none of the problems needs: collisions, limits, the search for islands of constraints."""
+    """Leaves out what none of the problems needs: collisions, limits, the search for islands."""
     import mujoco
 
     bits = mujoco.mjtDisableBit
