@@ -136,6 +136,30 @@ class TestProgram:
             assert np.linalg.norm(fe) <= s * (1.0 + SLACK)
             np.testing.assert_allclose(np.linalg.norm(ae) * fe, -s * ae, rtol=0.0, atol=1e-8 * s * size)
 
+    @pytest.mark.parametrize("seed", range(120))
+    def test_shares_that_are_all_at_their_limits(self, seed):
+        """A load at the limit of what disks and balls can hold, or beside it by 1e-12 to 0.1 of that.
+
+        Both |f| = s and alpha = 0 hold there, or all but: the place where elements break away.
+        """
+        print("seed", seed)
+        rng = np.random.default_rng(4000 + seed)
+        dims = [int(d) for d in rng.integers(1, 4, 2 + seed % 6)]
+        n, ends = sum(dims), np.cumsum(dims)[:-1]
+        half = rng.standard_normal((n, int(rng.integers(1, n + 1))))
+        W, limits = half @ half.T, 10.0 ** rng.uniform(-2.0, 2.0, len(dims))
+        forces = np.split(rng.standard_normal(n), ends)
+        held = [s * part / np.linalg.norm(part) for s, part in zip(limits, forces, strict=True)]
+        beside = rng.choice([-1.0, 0.0, 1.0], len(dims)) * 10.0 ** rng.uniform(-12.0, -1.0, len(dims))
+        alpha0 = -W @ np.concatenate([(1.0 + e) * part for e, part in zip(beside, held, strict=True)])
+        f = friction_program(W, alpha0, dims, limits)
+        alpha = alpha0 + W @ f
+        size = np.abs(alpha0).max() + (np.abs(W) @ np.repeat(limits, dims)).max()
+        for fe, ae, s in zip(np.split(f, ends), np.split(alpha, ends), limits, strict=True):
+            assert np.linalg.norm(fe) <= s * (1.0 + 1e-12)
+            opposed = ae + np.linalg.norm(ae) * fe / s  # zero where alpha is
+            np.testing.assert_allclose(opposed, 0.0, rtol=0.0, atol=SLACK * size)
+
 
 class RandomTree:
     """Revolute and prismatic joints with load-dependent friction in each; some joints at rest, others not."""

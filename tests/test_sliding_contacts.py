@@ -167,21 +167,56 @@ def test_time_stepping_keeps_the_books_of_a_slip_that_turns():
     assert np.abs(run.energy["balance"]).max() < 1e-8  # J of 2; what a step of 1 ms misses is of third order
 
 
+def table(places, height=0.0, **keywords):
+    """A body of 1 kg that stands on contacts, its center at a height above them."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "table")
+    inertia = pin.Inertia(1.0, np.array([0.0, 0.0, height]), np.diag([0.1, 0.1, 0.15]))
+    model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    for i, (x, y) in enumerate(places):
+        place = pin.SE3(np.eye(3), np.array([x, y, 0.0]))
+        model.addFrame(pin.Frame(f"leg{i}", joint, place, pin.FrameType.OP_FRAME))
+    ratio = keywords.pop("static_ratio", 1.0)
+    contacts = [pn.PointContact(f"leg{i}", mu=0.3, static_ratio=ratio) for i in range(len(places))]
+    return pn.Scene(model, contacts=contacts, **keywords)
+
+
 @pytest.mark.parametrize("legs", [3, 4])
 @pytest.mark.parametrize("speed", [0.0, 1.0])
 def test_a_table_on_more_contacts_than_it_needs(legs, speed):
     """Nine or twelve rows on six freedoms: stands still, or slides as one point would, by mu g t^2 / 2."""
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "table")
-    inertia = pin.Inertia(
-        1.0, np.zeros(3), np.diag([0.1, 0.1, 0.15])
-    )  # centered on the ground: no tilting moment
-    model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
-    for i, (x, y) in enumerate([(0.3, 0.3), (-0.3, 0.3), (-0.3, -0.3), (0.3, -0.3)][:legs]):
-        place = pin.SE3(np.eye(3), np.array([x, y, 0.0]))
-        model.addFrame(pin.Frame(f"leg{i}", joint, place, pin.FrameType.OP_FRAME))
-    contacts = [pn.PointContact(f"leg{i}", mu=0.3) for i in range(legs)]
-    scene = pn.Scene(model, contacts=contacts, v0=[speed, 0.0, 0.0, 0.0, 0.0, 0.0])
+    corners = [(0.3, 0.3), (-0.3, 0.3), (-0.3, -0.3), (0.3, -0.3)][:legs]
+    scene = table(corners, v0=[speed, 0.0, 0.0, 0.0, 0.0, 0.0])  # centered on the ground: no tilting moment
     run = pn.simulate(scene, 0.2, rtol=1e-10)
     way = speed * 0.2 - (0.3 * GRAVITY * 0.2**2 / 2.0 if speed else 0.0)
     assert run.q[-1, 0] == pytest.approx(way, abs=1e-9)
+
+
+TRIPOD = [(0.3, 0.0), (-0.15, 0.26), (-0.15, -0.26)]
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1.3])
+@pytest.mark.parametrize("options", [{}, {"rtol": 1e-10}, {"method": "rk4", "dt": 0.01}])
+def test_three_legs_break_away_together(options, ratio):
+    """A growing force along x: nothing tells the legs' shares apart, and none yields before all must.
+
+    The legs' loads differ, and change with the tilting moment; what holds is mu m g in any case.
+    """
+    scene = table(TRIPOD, 0.1, static_ratio=ratio, actuation=lambda t, q, v: [t, 0.0, 0.0, 0.0, 0.0, 0.0])
+    limit = 0.3 * ratio * GRAVITY
+    run = pn.simulate(scene, limit + 0.01, **options)
+    assert kinds(run) == ["slip"] * 3
+    assert_close(times(run), limit, 1e-10)
+    assert (run.v[run.t < limit - 1e-9] == 0.0).all()
+
+
+def test_a_body_that_rocks_on_two_contacts():
+    """Slides, sticks and breaks away again about the line through both contacts, without chatter."""
+    scene = table(TRIPOD[:2], 0.1, v0=[1.0, 0.5, 0.0, 0.0, 0.0, 2.0])
+    run = pn.simulate(scene, 3.0, record="energy")
+    assert set(kinds(run)) >= {"stick", "slip"}
+    assert "chatter" not in kinds(run)
+    for leg in (0, 1):
+        lost = run.energy[f"PointContact(leg{leg})"]
+        assert (np.diff(lost) <= 1e-11 * -lost[-1]).all()
+    assert np.abs(run.energy["balance"]).max() < 1e-8

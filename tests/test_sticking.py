@@ -319,3 +319,28 @@ class TestModesAndLoads:
         np.testing.assert_array_equal(run.v[1:, dof(scene, "motor1")], 0.0)
         np.testing.assert_array_equal(run.modes[-1], exact.modes[-1])
         assert_close(run.v[-1], exact.v[-1], 6.0 * dt)
+
+
+@pytest.mark.parametrize(
+    "friction", [{"coulomb": 0.05, "viscous": 0.01}, {"mu": 0.01, "radius": 0.02, "preload": 0.01}]
+)
+@pytest.mark.parametrize("sway", [0.0, 0.05])
+def test_a_robot_on_four_feet_comes_to_rest(friction, sway):
+    """Twelve joints that rub hold six freedoms; in the even stance some that stick are all but redundant.
+
+    Where two joints hold what a third all but holds as well, forces within their limits tell whether it may.
+    """
+    standing = pn.load("solo12_standing")
+    joints = list(standing.model.names)[2:]
+    laws = [pn.JointFriction(joint, name=joint, **friction) for joint in joints]
+    scene = pn.Scene(
+        standing.model, constraints=standing.constraints, laws=laws, actuation=standing.actuation
+    )
+    q = standing.q0.copy()
+    q[7:] += sway * np.random.default_rng(0).standard_normal(12)
+    q, v = scene.project(q, standing.v0)
+    run = pn.simulate(scene, 2.0, q=q, v=v, record="energy")
+    assert (run.v[-1] == 0.0).all()
+    rise = max(np.diff(run.energy[joint]).max() for joint in joints)
+    assert rise < 1e-11  # J of 0.1: of work integrated to the tolerance, by joints that hardly move
+    assert np.abs(run.energy["balance"]).max() < 1e-8

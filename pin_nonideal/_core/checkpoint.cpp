@@ -39,15 +39,15 @@ static void fields(Archive& a, Workspace& x) {
     auto& [terms, tau, external, F, C, C_smooth, base_C, acceleration, scaled, scaled_free, trial, work, values, A, B,
            b, r, miss, lam, lam_step, lam_shared, rows, ideal_rows, ideal_locked, ideal_decided, body_force,
            reaction_body, motion, momentum, shift_start, shift, shift_sum, shift_third, shift_steps, mode, limit, load,
-           slip_direction, last_direction, speed, balance,
-           has_balance, slip_force, user_C, z, dz, law_force, want_laws, held_torque, override_torque, has_held,
+           indeterminate, slip_direction, last_direction, speed, balance, has_balance, slip_force, user_C, z, dz,
+           law_force, want_laws, held_torque, override_torque, has_held,
            has_override, unknown, image, newton_step, jacobian, warm, determinant, evaluations, factorizations,
            projections, iterations] = x;
     a(terms, tau, external, F, C, C_smooth, base_C, acceleration, scaled, scaled_free, trial, work, values, A, B, b,
       r, miss, lam, lam_step, lam_shared, rows, ideal_rows, ideal_locked, ideal_decided, body_force, reaction_body,
-      motion, momentum, shift_start, shift, shift_sum, shift_third, shift_steps, mode, limit, load, slip_direction,
-      last_direction, speed, balance, has_balance, slip_force,
-      user_C, z, dz, law_force, want_laws, held_torque, override_torque, has_held, has_override, unknown, image,
+      motion, momentum, shift_start, shift, shift_sum, shift_third, shift_steps, mode, limit, load, indeterminate,
+      slip_direction, last_direction, speed, balance, has_balance, slip_force, user_C, z, dz, law_force, want_laws,
+      held_torque, override_torque, has_held, has_override, unknown, image,
       newton_step);
     a.matrix(jacobian);
     a(warm, determinant, evaluations, factorizations, projections, iterations);
@@ -72,9 +72,9 @@ void Simulation::archive(Archive& a) {
     // A step leaves nothing in the stepper, nor in the buffers, that the next one reads; `opened` only chooses the
     // words of a failure.
     auto& [p, w, o, out, system, stepper, recorder, t, h, t_end, y, derivative, q_, v_, probe_, probe_rate_, samples, ticks,
-           next_save, next_sample, recent_events, slip_at_start, pulls, indeterminate, last_rejected, detours, opened,
+           next_save, next_sample, recent_events, slip_at_start, pulls, last_rejected, detours, opened,
            pending_energy, trigger_element, located_element, arrived, parting, released_together, next_period] = *this;
-    a(w, out, recorder.moved_energy, t, h, y, derivative, samples, next_sample, slip_at_start, pulls, indeterminate,
+    a(w, out, recorder.moved_energy, t, h, y, derivative, samples, next_sample, slip_at_start, pulls,
       last_rejected, detours, pending_energy, trigger_element, located_element, arrived, released_together, next_period);
     a.list(recent_events);
     const int elements = static_cast<int>(std::max(p.frictions.size(), p.blocks.size()));

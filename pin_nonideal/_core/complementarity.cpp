@@ -1,8 +1,8 @@
-// Friction forces of elements at rest, all at once: min f^T W f / 2 + alpha0^T f with |f_e| <= s_e.
+// Friction forces of elements at rest, all at once, each of one direction: min f^T W f / 2 + alpha0^T f in the box
+// |f_e| <= s_e, exactly.
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 
 #include "modes.hpp"
@@ -11,7 +11,7 @@ namespace pn {
 
 namespace {
 
-constexpr double rank_threshold = 1e-11;  // of W among elements that are to stick together
+constexpr double rank_threshold = 1e-13;  // of W among elements that are to stick together
 constexpr double met = 1e-9;              // part of the accelerations in play that counts as none
 
 // Least-norm x of W_FF x = r_F on the free elements F; zero on the others.
@@ -115,58 +115,6 @@ VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s) {
         }
     }
     return active_set(W, alpha0, s);
-}
-
-// Sweeps over disks and balls. Elements that share a load in ways that nothing tells apart, all near their limits, converge
-// no more than slowly; what is left then is a small part of the limits.
-constexpr int most_sweeps = 1000;
-
-// Disks and balls: block Gauss-Seidel, each block by its own radius; converges linearly.
-VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s) {
-    const int n = static_cast<int>(alpha0.size());
-    VecX f = VecX::Zero(n);
-    std::vector<Eigen::SelfAdjointEigenSolver<MatX>> blocks;
-    for (int e = 0, at = 0; e < static_cast<int>(dims.size()); at += dims[e], ++e)
-        blocks.emplace_back(W.block(at, at, dims[e], dims[e]));
-    // Forces that nothing answers may drift for long; what counts is the acceleration that a sweep changes.
-    const double enough = 1e-14 * alpha0.cwiseAbs().maxCoeff() + 1e-15 * W.cwiseAbs().maxCoeff() * s.maxCoeff();
-    for (int sweep = 0; sweep < most_sweeps; ++sweep) {
-        double change = 0.0;
-        for (int e = 0, at = 0; e < static_cast<int>(dims.size()); at += dims[e], ++e) {
-            const int d = dims[e];
-            const MatX D = W.block(at, at, d, d);
-            const VecX old = f.segment(at, d);
-            const VecX r = alpha0.segment(at, d) + W.middleRows(at, d) * f - D * old;
-            // min x^T D x / 2 + r^T x in |x| <= s: x = -(D + m I)^-1 r with the least m >= 0.
-            const auto& eigen = blocks[e];
-            const VecX c = eigen.eigenvectors().transpose() * r, l = eigen.eigenvalues();
-            const double tiny = 1e-14 * std::max(l.cwiseAbs().maxCoeff(), 1e-300);
-            const auto length = [&](double m) {
-                double sum = 0.0;
-                for (int k = 0; k < d; ++k) {
-                    const double x = c[k] / std::max(l[k] + m, tiny);
-                    sum += x * x;
-                }
-                return std::sqrt(sum);
-            };
-            double m = 0.0;
-            if (length(0.0) > s[e]) {
-                double low = 0.0, high = s[e] > 0.0 ? c.norm() / s[e] + l.cwiseAbs().maxCoeff() : 0.0;
-                for (int k = 0; k < 200 && high - low > 1e-16 * high; ++k) {
-                    m = 0.5 * (low + high);
-                    (length(m) > s[e] ? low : high) = m;
-                }
-            }
-            VecX x = VecX::Zero(d);
-            if (s[e] > 0.0) {
-                for (int k = 0; k < d; ++k) x -= (c[k] / std::max(l[k] + m, tiny)) * eigen.eigenvectors().col(k);
-            }
-            change = std::max(change, (W.middleCols(at, d) * (x - old)).cwiseAbs().maxCoeff());
-            f.segment(at, d) = x;
-        }
-        if (change <= enough) break;
-    }
-    return f;
 }
 
 }  // namespace

@@ -274,11 +274,11 @@ void factor_rows(const RowLayout& layout, const std::vector<Block>& blocks, cons
 }
 
 void decide_rows(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
-                 RowSystem& s) {
+                 RowSystem& s, double tolerance) {
     gram(layout, blocks, B, s.wanted, s);
     row_scales(layout, s.wanted, s);
     dense_columns(blocks, B, s.wanted, s);
-    s.rank = householder(s, static_cast<int>(s.columns.size()), true, rank_tolerance);
+    s.rank = householder(s, static_cast<int>(s.columns.size()), true, tolerance);
     std::fill(s.active.begin(), s.active.end(), char(0));
     for (int k = 0; k < s.rank; ++k) s.active[s.columns[k]] = 1;
     s.redundant = s.rank < static_cast<int>(s.columns.size());

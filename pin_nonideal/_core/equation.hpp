@@ -13,6 +13,9 @@ namespace pn {
 // Rank tolerance on the pivots of B^T with rows of unit length: rounding and the constraints' own violation reach
 // about 1e-12 on the manifold, true directions of light mechanisms lie above 1e-7.
 constexpr double rank_tolerance = 1e-10;
+// The same while elements stick. What they hold by a smaller part of their forces than this they do not hold: the
+// program that finds the modes takes such forces, square root of its own threshold, for none.
+constexpr double rank_tolerance_sticking = 3e-7;
 // Smallest pivot of the Cholesky factor of the unit-diagonal B B^T that is trusted: its relative error stays below
 // the machine precision divided by this; below it the orthogonal factorization of B^T takes over.
 constexpr double safe_pivot = 1e-5;
@@ -64,7 +67,7 @@ void factor_rows(const RowLayout& layout, const std::vector<Block>& blocks, cons
                  RowSystem& s);
 // Rank and independent subset of the wanted rows, by column-pivoted QR of B^T.
 void decide_rows(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
-                 RowSystem& s);
+                 RowSystem& s, double tolerance = rank_tolerance);
 // lam with (B B^T) lam = r on the active rows (zero on the others); r and lam by kept row.
 void solve_rows(const RowLayout& layout, RowSystem& s, const VecX& r, VecX& lam);
 

@@ -394,7 +394,8 @@ static int contradicting_block(const Program& p, Workspace& w, double& worst) {
 }
 
 static void choose_rows(const Program& p, Workspace& w) {
-    decide_rows(p.layout, p.blocks, w.B, w.rows);
+    const bool sticks = std::count(w.mode.begin(), w.mode.end(), sticking) > 0;
+    decide_rows(p.layout, p.blocks, w.B, w.rows, sticks ? rank_tolerance_sticking : rank_tolerance);
     factor_rows(p.layout, p.blocks, w.B, w.rows);
     ++w.factorizations;
 }

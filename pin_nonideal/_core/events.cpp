@@ -11,17 +11,17 @@
 
 namespace pn {
 
+// Slip speed the way that the mode says.
+double Simulation::speed_along(int e) const {
+    const Friction& f = p.frictions[e];
+    const Vec3 u = slip_velocity(w, f);
+    return f.dim == 1 ? w.mode[e] * u[0] : u.dot(w.slip_direction[e]);
+}
+
 // Positive before the event, zero at it. The workspace must be evaluated at the state.
 double Simulation::margin(const Watch& watch, double at, const VecX& state) {
     if (watch.contact >= 0) return w.lam[p.blocks[p.contacts[watch.contact]].row];
-    const Friction& f = p.frictions[watch.element];
-    if (watch.slip) {
-        const RowValues& values = w.values[f.block];
-        if (f.dim == 1) return w.mode[watch.element] * values.rate[0];
-        double along = 0.0;
-        for (int k = 0; k < f.dim; ++k) along += values.rate[k] * w.slip_direction[watch.element][k];
-        return along;
-    }
+    if (watch.slip) return speed_along(watch.element);
     q_ = state.head(system.nq);
     v_ = state.segment(system.nq, system.nv);
     return static_limit(p, w, watch.element, at, q_, v_) * (1.0 + 1e-12) - friction_force(p, w, watch.element).norm();
@@ -36,10 +36,10 @@ double Simulation::toward_rest(double size) {
         q_ = y.head(system.nq);
         v_ = derivative.segment(system.nq, system.nv);
         multiply(block, w.A, v_, w.r);
-        double slip = 0.0, change = 0.0;
+        const double slip = slip_velocity(w, f).squaredNorm();
+        double change = 0.0;
         for (int k = 0; k < f.dim; ++k) {
             const double rate = w.r[block.row + k] - w.b[block.row + k];
-            slip += w.values[f.block].rate[k] * w.values[f.block].rate[k];
             change += rate * rate;
         }
         if (slip < change * size * size) size = std::min(size, std::max(0.5 * std::sqrt(slip / change), 1e-3 * size));
@@ -59,9 +59,9 @@ std::vector<Simulation::Watch> Simulation::crossed() {
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
         const Watch watch{e, w.mode[e] != sticking};
         if (!watch.slip) {
+            if (w.indeterminate) continue;
             if (!gathered && p.needs_reactions) gather_reactions(p, w);
             gathered = true;
-            if (indeterminate[e]) continue;
             bool past = margin(watch, t1, stepper.y1) < 0.0;
             double least = HUGE_VAL, most = 0.0;  // or may have been past it inside, between two stages
             for (int i = 0; i < stepper.method.stages; ++i) {
@@ -76,12 +76,7 @@ std::vector<Simulation::Watch> Simulation::crossed() {
         const double speed = stepper.y1.segment(system.nq, system.nv).cwiseAbs().maxCoeff();
         const double noise = 1e-3 * rest_speed * (1.0 + speed);  // of an element that has just begun to slip
         if (p.frictions[e].dim > 1 && !stepper.method.adaptive) {
-            double square = 0.0;
-            for (int k = 0; k < p.frictions[e].dim; ++k) {
-                const double u = w.values[p.frictions[e].block].rate[k];
-                square += u * u;
-            }
-            const double now = std::sqrt(square);
+            const double now = slip_velocity(w, p.frictions[e]).norm();
             if (now < slip_at_start[e] && now <= arrived_speed * (1.0 + speed)) arrived = e;
         }
         if (margin(watch, t1, stepper.y1) < -noise) {
@@ -215,37 +210,37 @@ bool Simulation::locate_event() {
     // rest when hardly anything is left of the slip that the step began with.
     const Friction& f = p.frictions[found.element];
     if (found.slip && f.dim > 1) {
-        double square = 0.0;
-        for (int k = 0; k < f.dim; ++k) square += w.values[f.block].rate[k] * w.values[f.block].rate[k];
         const double speed = stepper.y1.segment(system.nq, system.nv).cwiseAbs().maxCoeff();
-        const double now = std::sqrt(square);
+        const double now = slip_velocity(w, f).norm();
         const bool passing = now > rest_part * slip_at_start[found.element] && now > 1e-6 * (1.0 + speed);
         if (passing) trigger_element = no_trigger;
     }
+    release_indeterminate();  // which may come earlier
     return true;
 }
 
 // Where redundant elements stick together, the multiplier of one says little: they hold as long as some forces within
-// all limits do. Halves the step down to the instant at which none do.
+// all limits do, those of elements included that slip but do not move. Halves the step down to the instant at which
+// none do.
 bool Simulation::release_indeterminate() {
-    std::vector<int> sticks;
-    bool any = false;
-    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
-        any |= indeterminate[e] != 0;
-        if (w.mode[e] == sticking) sticks.push_back(e);
-    }
-    if (!any) return false;
+    if (!w.indeterminate) return false;
     const double full = stepper.h, begin = stepper.t0;
     const std::vector<signed char> modes = w.mode;
+    std::vector<int> resting;
     const auto holds = [&](double at) {
         q_ = stepper.y1.head(system.nq);
         v_ = stepper.y1.segment(system.nq, system.nv);
-        resolve_modes(p, w, at, q_, v_, sticks);
-        const bool same = w.mode == modes;
+        resting.clear();
+        for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
+            if (at_rest(p, w, e, v_)) resting.push_back(e);
+        resolve_modes(p, w, at, q_, v_, resting);
+        const bool all_stick = std::all_of(resting.begin(), resting.end(), [&](int e) {
+            return w.mode[e] == sticking || modes[e] != sticking;
+        });
         w.mode = modes;
         want_rows(p, w);
         begin_step(p, w, at, q_, v_);
-        return same;
+        return all_stick;
     };
     if (holds(begin + full)) return false;
     double low = 0.0, high = full;
@@ -257,7 +252,7 @@ bool Simulation::release_indeterminate() {
     }
     stepper.step(begin, high);
     settle(begin + high, stepper.y1, stepper.f1);
-    trigger_element = sticks.front();
+    trigger_element = resting.front();
     released_together = true;
     return true;
 }
@@ -266,8 +261,7 @@ void Simulation::remember_directions() {
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
         const Friction& f = p.frictions[e];
         if (f.dim == 1 || !slips(w.mode[e])) continue;
-        Vec3 u = Vec3::Zero();
-        for (int k = 0; k < f.dim; ++k) u[k] = w.values[f.block].rate[k];
+        const Vec3 u = slip_velocity(w, f);
         slip_at_start[e] = u.norm();
         if (u.norm() > 1e-12) w.slip_direction[e] = w.last_direction[e] = u.normalized();
     }
@@ -302,35 +296,35 @@ void Simulation::switch_modes(double at, VecX& state, int trigger) {
     }
     std::vector<int> candidates;
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
-        const Friction& f = p.frictions[e];
-        const RowValues& values = w.values[f.block];
         if (e == trigger || at_rest(p, w, e, v_)) {
             candidates.push_back(e);
             continue;
         }
-        if (f.dim == 1) {
-            w.mode[e] = values.rate[0] > 0.0 ? 1 : -1;
-        } else {
-            w.mode[e] = 1;
-            Vec3 u = Vec3::Zero();
-            for (int k = 0; k < f.dim; ++k) u[k] = values.rate[k];
-            w.slip_direction[e] = w.last_direction[e] = u.normalized();
-        }
+        follow_velocity(p, w, e);
     }
     const int breaking = released_together ? any_at_limit : trigger >= 0 && before[trigger] == sticking ? trigger : -1;
     released_together = false;
-    resolve_modes(p, w, at, q_, v_, candidates, breaking);
-    // What sticks from now on has no slip velocity at all, not one of rounding.
-    project(p, w, at, q_, v_);
+    for (;;) {
+        resolve_modes(p, w, at, q_, v_, candidates, breaking);
+        // What sticks from now on has no slip velocity at all, not one of rounding.
+        project(p, w, at, q_, v_);
+        begin_step(p, w, at, q_, v_);
+        // Nearly redundant elements that stuck together leave one that slips a velocity, which may oppose its mode.
+        const auto moving = std::stable_partition(candidates.begin(), candidates.end(), [&](int e) {
+            return at_rest(p, w, e, v_) || speed_along(e) >= 0.0;
+        });
+        if (moving == candidates.end()) break;
+        std::for_each(moving, candidates.end(), [&](int e) { follow_velocity(p, w, e); });
+        candidates.erase(moving, candidates.end());
+    }
     state.head(system.nq) = q_;
     state.segment(system.nq, system.nv) = v_;
-    begin_step(p, w, at, q_, v_);
-    std::fill(indeterminate.begin(), indeterminate.end(), char(0));
     if (p.needs_reactions) gather_reactions(p, w);
+    w.indeterminate = false;
     for (int e : candidates)
         if (w.mode[e] == sticking && ((e == trigger && before[e] == sticking) ||
             friction_force(p, w, e).norm() > static_limit(p, w, e, at, q_, v_) * (1.0 + 1e-9)))
-            indeterminate[e] = 1;
+            w.indeterminate = true;
     system.collect(at, state, derivative);
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
         const bool turned = e == trigger && before[e] == 1 && w.mode[e] == 1 && p.frictions[e].dim > 1 &&

@@ -59,7 +59,7 @@ void System::collect(double t, const VecX& y, VecX& dy) {
     for (int e = 0; e < ne; ++e) {
         double& share = dy[ny - ne + e];
         share = 0.0;
-        if (w.mode[e] != sticking) continue;
+        if (w.mode[e] != sticking || w.indeterminate) continue;
         if (!gathered) gather_reactions(p, w);
         gathered = true;
         q_buffer = y.head(nq);

@@ -27,13 +27,6 @@ void add_along(const Program& p, Workspace& w, VecX& C, int law, int block_index
     }
 }
 
-Vec3 slip_velocity(const Workspace& w, const Friction& f) {
-    const RowValues& values = w.values[f.block];
-    Vec3 u = Vec3::Zero();
-    for (int k = 0; k < f.dim; ++k) u[k] = values.rate[k];
-    return u;
-}
-
 // Slip slower than this part of the scene's speed has no direction of its own but rounding.
 constexpr double directed_speed = 1e-9;
 
@@ -52,6 +45,13 @@ Vec3 force_direction(const Program& p, Workspace& w, size_t e, double scene_spee
 bool load_dependent(const Friction& f) { return f.reaction != Reaction::none; }
 
 }  // namespace
+
+Vec3 slip_velocity(const Workspace& w, const Friction& f) {
+    const RowValues& values = w.values[f.block];
+    Vec3 u = Vec3::Zero();
+    for (int k = 0; k < f.dim; ++k) u[k] = values.rate[k];
+    return u;
+}
 
 Force joint_wrench(const Program& p, const Workspace& w, int joint) {
     const Body& b = w.terms.body[joint];

@@ -75,6 +75,9 @@ struct UserLaw {
 Force joint_wrench(const Program& p, const Workspace& w, int joint);
 Force anchor_wrench(const Program& p, const Workspace& w, int block);
 
+// Slip velocity along an element's directions, of the rows evaluated last.
+Vec3 slip_velocity(const Workspace& w, const Friction& f);
+
 // Friction limit of an element for the load held in the workspace, and its factor at a slip speed.
 double load_limit(const Program& p, Workspace& w, const Friction& f, double t, const VecX& q, const VecX& v);
 double speed_factor(const Friction& f, double speed);

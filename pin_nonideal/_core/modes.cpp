@@ -13,7 +13,7 @@ constexpr int outer_patience = 6;         // after these, modes that stay the sa
 constexpr int most_enumerated = 8;        // elements whose combinations of modes are all tried at last
 constexpr double limit_tolerance = 1e-12; // relative change of the limits at which the outer iteration ends
 constexpr double slack = 1e-9;            // part of the limit by which a mode may miss its condition by rounding
-constexpr double least_response = 1e-11;  // part of an element's free response that the constraints must leave it
+constexpr double least_response = 1e-13;  // part of an element's free response that the constraints must leave it
 
 struct Candidates {
     const Program& p;
@@ -169,13 +169,19 @@ double static_limit(const Program& p, Workspace& w, int e, double t, const VecX&
     return w.load[e] * f.static_ratio;
 }
 
+void follow_velocity(const Program& p, Workspace& w, int e) {
+    const Vec3 u = slip_velocity(w, p.frictions[e]);
+    if (p.frictions[e].dim == 1) {
+        w.mode[e] = u[0] > 0.0 ? 1 : -1;
+    } else {
+        w.mode[e] = 1;
+        w.slip_direction[e] = w.last_direction[e] = u.normalized();
+    }
+}
+
 bool at_rest(const Program& p, const Workspace& w, int e, const VecX& v) {
     if (w.mode[e] == sticking) return true;
-    const Friction& f = p.frictions[e];
-    const RowValues& values = w.values[f.block];
-    double square = 0.0;
-    for (int k = 0; k < f.dim; ++k) square += values.rate[k] * values.rate[k];
-    return std::sqrt(square) <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
+    return slip_velocity(w, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
 }
 
 void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,

@@ -13,8 +13,9 @@ namespace pn {
 constexpr double rest_speed = 1e-11;
 
 // min f^T W f / 2 + alpha0^T f with |f_e| <= s_e: f for elements whose directions lie one after the other (dims[e]
-// rows each). Exact (principal pivoting) for elements of one direction.
+// rows each): a box for elements of one direction, disks and balls for the others.
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& limits);
+VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& limits);
 
 // Finds the modes of the candidate elements together, at rest along their directions; the workspace ends evaluated
 // there with the new modes. `breaking` is a candidate that stuck until now and has just reached its limit: it slips
@@ -27,6 +28,9 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
 Vec3 friction_force(const Program& p, Workspace& w, int element);
 // Largest force with which an element can stick now.
 double static_limit(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
+
+// The mode of an element that moves, by the slip velocity of the rows evaluated last.
+void follow_velocity(const Program& p, Workspace& w, int element);
 
 // Elements at rest at (q, v), as far as their slip speeds tell (rows must be evaluated).
 bool at_rest(const Program& p, const Workspace& w, int element, const VecX& v);

@@ -122,6 +122,7 @@ struct Workspace {
     std::vector<signed char> mode;    // +1, -1 slip, 0 stick
     std::vector<double> limit;        // kinetic, at the present load and slip speed
     std::vector<double> load;         // limit at rest before the static ratio
+    bool indeterminate = false;       // what sticks shares its load in several ways: one multiplier says little
     // For elements of two or three directions: of the step's start, and where slip last had a clear direction.
     std::vector<Vec3> slip_direction, last_direction;
     double speed = 0.0;               // largest velocity of the evaluation

@@ -41,9 +41,7 @@ struct Implicit {
 
     double slip_factor(size_t e) const {
         const Friction& f = p.frictions[e];
-        double square = 0.0;
-        for (int k = 0; k < f.dim; ++k) square += w.values[f.block].rate[k] * w.values[f.block].rate[k];
-        return speed_factor(f, w.mode[e] == 0 ? 0.0 : std::sqrt(square));
+        return speed_factor(f, w.mode[e] == sticking ? 0.0 : slip_velocity(w, f).norm());
     }
 
     void set(const VecX& y) {

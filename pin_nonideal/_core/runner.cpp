@@ -81,14 +81,8 @@ void Runner::choose_modes(double t, const nb::object& modes) {
         w->mode[e] = 1;
         if (at_rest(*p, *w, e, v)) {
             candidates.push_back(e);
-            continue;
-        }
-        const Friction& f = p->frictions[e];
-        if (f.dim == 1) w->mode[e] = w->values[f.block].rate[0] > 0.0 ? 1 : -1;
-        else {
-            Vec3 u = Vec3::Zero();
-            for (int k = 0; k < f.dim; ++k) u[k] = w->values[f.block].rate[k];
-            w->slip_direction[e] = w->last_direction[e] = u.normalized();
+        } else {
+            follow_velocity(*p, *w, e);
         }
     }
     resolve_modes(*p, *w, t, q, v, candidates);

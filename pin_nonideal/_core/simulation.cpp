@@ -36,7 +36,6 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
     q_ = VecX::Zero(system.nq);
     v_ = VecX::Zero(system.nv);
     pulls.assign(p.contacts.size(), 0);
-    indeterminate.assign(p.frictions.size(), 0);
     slip_at_start.assign(p.frictions.size(), 0.0);
 }
 

@@ -63,6 +63,7 @@ private:
     static constexpr double rest_part = 0.05, arrived_speed = 1e-7;
     double toward_rest(double size);
     struct Watch { int element; bool slip; int contact = -1; };  // a friction element, or a contact's pressure
+    double speed_along(int element) const;
     double margin(const Watch& watch, double t, const VecX& y);  // negative past the event; evaluated state
     std::vector<Watch> crossed();
     bool locate_event();
@@ -90,7 +91,7 @@ private:
     Clock::time_point next_save;
     double next_sample = 0.0;
     std::vector<double> recent_events, slip_at_start;
-    std::vector<char> pulls, indeterminate;
+    std::vector<char> pulls;
     bool last_rejected = false;
     int detours = 0;  // in a row, around a singular position
     std::optional<Failure> opened;  // a loop that a trial of this step could not close

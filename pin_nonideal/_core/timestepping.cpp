@@ -83,11 +83,9 @@ void Simulation::moreau_step(double step) {
         double change = 0.0, size = 0.0;
         for (int e = 0; e < n; ++e) {
             const Friction& friction = p.frictions[e];
-            double square = 0.0;
-            for (int k = 0; k < friction.dim; ++k) square += w.values[friction.block].rate[k] * w.values[friction.block].rate[k];
-            const bool resting = square == 0.0;
+            const double speed = slip_velocity(w, friction).norm();
             const double limit = load_limit(p, w, friction, mid, w.terms.q, v0) *
-                                 (resting ? friction.static_ratio : speed_factor(friction, std::sqrt(square)));
+                                 (speed == 0.0 ? friction.static_ratio : speed_factor(friction, speed));
             change = std::max(change, std::abs(limit - limits[e]));
             size = std::max(size, limit);
             limits[e] = limit;
