@@ -211,6 +211,26 @@ class TestBreakAway:
         slips = [event.time for event in run.events if event.kind == "slip"]
         assert_close(slips, first + np.pi * np.arange(6), 1e-9)
 
+    @pytest.mark.parametrize("excess", [1e-3, 1e-5, 1e-7])
+    @pytest.mark.parametrize("options", [{}, TIGHT, {"method": "rk4", "dt": 0.01}])
+    def test_load_that_hardly_passes_the_limit(self, options, excess):
+        """For sqrt(2 excess) / 3 s on either side of its peak, far less than a step."""
+        law = pn.JointFriction("pin", coulomb=1.0, static_ratio=1.5)
+        scene = rotor(law, lambda t, q, v: [1.5 * (1.0 + excess) * np.sin(3.0 * t)], inertia=1.0)
+        run = pn.simulate(scene, 1.0, **options)
+        assert run.events[0].kind == "slip"
+        # The time at which the load is known to 1e-12 is known worse as it passes ever slower.
+        assert_close(run.events[0].time, np.arcsin(1.0 / (1.0 + excess)) / 3.0, 1e-9)
+
+    @pytest.mark.parametrize("width", [0.01, 0.1, 1.0])
+    def test_pulse_after_a_long_rest(self, width):
+        """A torque 3 exp(-((t - 50) / width)^2) against a limit of 1, after 50 s in which nothing happens."""
+        law = pn.JointFriction("pin", coulomb=1.0)
+        scene = rotor(law, lambda t, q, v: [3.0 * np.exp(-(((t - 50.0) / width) ** 2))], inertia=1.0)
+        run = pn.simulate(scene, 60.0)
+        assert [event.kind for event in run.events] == ["slip", "stick"]
+        assert_close(run.events[0].time, 50.0 - width * np.sqrt(np.log(3.0)), 1e-9)
+
     def test_floor_that_shakes(self):
         """The same through the motion of the ground: |x''| = 1.1 |sin t| against mu g = 1."""
         model = empty()

@@ -123,6 +123,12 @@ void Program::finish() {
         if (touched[joint]) touched_joints.push_back(static_cast<int>(joint));
     for (Drag& d : drags) d.dofs = mechanism.dofs_of(d.frame.joint);
     driven = !forces.empty() || !std::holds_alternative<NoActuation>(actuation);
+    asks_functions = std::holds_alternative<TorqueFunction>(actuation) || !user_laws.empty() || moves_in_time;
+    for (const GivenForce& f : forces) {
+        const auto* wrench = std::get_if<FrameWrench>(&f);
+        asks_functions |= std::holds_alternative<UserForce>(f) || (wrench && wrench->function);
+    }
+    for (const Friction& f : frictions) asks_functions |= f.user_limit != nullptr;
     for (const GivenForce& f : forces)
         has_body_forces |= std::holds_alternative<SpringDamper>(f) || std::holds_alternative<FrameWrench>(f);
 }

@@ -65,7 +65,8 @@ void System::collect(double t, const VecX& y, VecX& dy) {
         q_buffer = y.head(nq);
         v_buffer = y.segment(nq, nv);
         const double limit = static_limit(p, w, e, t, q_buffer, v_buffer);
-        share = friction_force(p, w, e).norm() / std::max(limit, 1e-300);
+        const Vec3 force = friction_force(p, w, e);  // of one direction with its sign: smooth where it passes zero
+        share = (p.frictions[e].dim == 1 ? force[0] : force.norm()) / std::max(limit, 1e-300);
     }
 }
 

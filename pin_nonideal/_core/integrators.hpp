@@ -1,5 +1,5 @@
 // Explicit Runge-Kutta methods as data, and one stepping routine on the flat state y = (q, v, z, work, watch).
-// watch integrates |force| / limit of each sticking element, so that the step control resolves a load that comes and
+// watch integrates force / limit of each sticking element, so that the step control resolves a load that comes and
 // goes while nothing moves, and the stages tell whether a limit was passed.
 //
 // q is integrated in ambient coordinates (a quaternion as four numbers): the right-hand side extends smoothly off the

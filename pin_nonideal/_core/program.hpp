@@ -85,6 +85,7 @@ struct Program {
     bool driven = false;                 // forces or actuation
     bool has_body_forces = false;        // given forces that act on bodies
     bool moves_in_time = false;          // some constraint moves by itself
+    bool asks_functions = false;         // of the user's, for forces that may change while nothing moves
     bool affine_rates = true;            // A does not depend on v; a user's own rows may
     std::vector<int> touched_joints;     // whose bodies the constraints touch, and all before them in the tree
     std::vector<int> touched_dofs;       // in the supports of the rows, ascending

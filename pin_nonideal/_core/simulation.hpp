@@ -66,6 +66,8 @@ private:
     double speed_along(int element) const;
     double margin(const Watch& watch, double t, const VecX& y);  // negative past the event; evaluated state
     std::vector<Watch> crossed();
+    double first_crossing(const Watch& watch);
+    void step_onto(const Watch& found, double part);
     bool locate_event();
     bool release_indeterminate();
     void remember_directions();
