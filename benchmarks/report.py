@@ -51,8 +51,8 @@ Features added one at a time to the five-bar; a step is one of rk4, with its fou
 BATCHES = """## Batches
 
 Semi-implicit Euler at 2 ms from many states: `pn.rollout` against `mujoco.rollout` with its default
-constraints. Both record every step. Two threads over one are wall times, to be read beside what the machine
-could give at that moment.
+constraints, without its search for islands and without warm start, which make it slower here. Both record
+every step. Two threads over one are wall times, to be read beside what the machine could give at that moment.
 """
 
 
