@@ -76,7 +76,7 @@ def assert_conditions(m, run, i, conditions):
             assert abs(np.linalg.norm(f) - kinetic) <= SLACK * size, (i, name)
 
 
-@pytest.mark.parametrize("seed", range(QUICK))
+@pytest.mark.parametrize("seed", [*range(QUICK), 204])  # 204: a load jumps as a ball joint begins to slip
 def test_conditions(seed):
     check(seed)
 

@@ -12,6 +12,8 @@ namespace pn {
 
 // Part of its limit to which the force of a sticking element is resolved over a step.
 constexpr double watch_tolerance = 1e-4;
+// A load that jumps keeps its error in steps however short; shorter ones than this pass over it [s].
+constexpr double shortest_watch = 1e-9;
 
 Method method_named(const std::string& name) {
     using K = Method::Kind;
@@ -175,7 +177,7 @@ double Stepper::error_norm(double rtol, const VecX& atol) {
     magnitude(y0, scale_);
     magnitude(y1, scale_);
     scale_ = atol + rtol * scale_;
-    watch_scale_ = watch_tolerance * std::abs(h);
+    watch_scale_ = watch_tolerance * std::max(std::abs(h), shortest_watch);
     error5.setZero();
     if (method.kind == Method::Kind::dopri5) {
         for (int j = 0; j < 6; ++j) error5 += (h * tableau::dopri5_E[j]) * K[j];
