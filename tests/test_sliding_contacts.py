@@ -181,6 +181,19 @@ def table(places, height=0.0, **keywords):
     return pn.Scene(model, contacts=contacts, **keywords)
 
 
+@pytest.mark.parametrize("dt", [0.02, 0.003])
+def test_friction_in_time_stepping_only_takes_energy(dt):
+    """A mass on a spring that rubs turns inside of steps, whose mean velocity then goes with the friction."""
+    model = empty()
+    body(model, 0, pin.JointModelPX(), "slide", 1.0)
+    rub = pn.JointFriction("slide", coulomb=0.3, name="rub")
+    scene = pn.Scene(model, laws=[rub], forces=[pn.JointSpring("slide", stiffness=40.0)], q0=[0.5])
+    run = pn.simulate(scene, 5.0, method="moreau", dt=dt, record="energy")
+    assert kinds(run).count("reverse") > 3
+    assert (np.diff(run.energy["rub"]) <= 0.0).all()
+    assert np.abs(run.energy["balance"]).max() < 1e-12  # J of 5
+
+
 @pytest.mark.parametrize("legs", [3, 4])
 @pytest.mark.parametrize("speed", [0.0, 1.0])
 def test_a_table_on_more_contacts_than_it_needs(legs, speed):

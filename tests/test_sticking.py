@@ -342,6 +342,22 @@ class TestModesAndLoads:
 
 
 @pytest.mark.parametrize(
+    "law",
+    [
+        pn.JointFriction("pin0", coulomb=6.0),
+        pn.UserFriction(lambda t, q: [1.0, 0.0], lambda t, q, v, reactions: 6.0),
+    ],
+)
+def test_a_joint_that_sticks_while_others_move(law):
+    """Its velocity is exactly zero at every sample, by whichever law it sticks."""
+    run = pn.simulate(arm([law], (0.0, 1.0)), 5.0, v=[1.0, -2.0], output_dt=0.01)
+    stuck = run.modes[:, 0] == 0
+    assert stuck.sum() > 100
+    assert (run.v[stuck, 0] == 0.0).all()
+    assert np.abs(run.v[stuck, 1]).max() > 1.0
+
+
+@pytest.mark.parametrize(
     "friction", [{"coulomb": 0.05, "viscous": 0.01}, {"mu": 0.01, "radius": 0.02, "preload": 0.01}]
 )
 @pytest.mark.parametrize("sway", [0.0, 0.05])

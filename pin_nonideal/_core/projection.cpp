@@ -190,6 +190,21 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
     return moves;
 }
 
+// What sticks along a single dof has exactly no velocity there, like a joint that is locked, and not one of rounding.
+static void rest_alone(const Program& p, const Workspace& w, VecX& v) {
+    for (int i : w.rows.blocks) {
+        if (i < p.constraints) continue;
+        const Block& block = p.blocks[i];
+        const size_t n = block.kept.size();
+        for (size_t k = 0; k < n; ++k) {
+            int entries = 0, dof = -1;
+            for (size_t l = 0; l < block.support.size(); ++l)
+                if (w.A[block.offset + l * n + k] != 0.0) { ++entries; dof = block.support[l]; }
+            if (entries == 1 && std::abs(v[dof]) <= immobile_speed) v[dof] = 0.0;
+        }
+    }
+}
+
 bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
     for (int dof = 0; dof < p.mechanism.nv; ++dof)
         if (w.terms.locked[dof]) v[dof] = 0.0;  // what sticks has exactly no velocity
@@ -206,6 +221,7 @@ bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
         if (it > 1 && now > 0.5 * last) break;
         last = now;
     }
+    rest_alone(p, w, v);
     if (is_immobile(p, w) && v.cwiseAbs().maxCoeff() <= immobile_speed) v.setZero();
     return moved;
 }
