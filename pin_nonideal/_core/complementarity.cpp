@@ -11,8 +11,7 @@ namespace pn {
 
 namespace {
 
-constexpr double rank_threshold = 1e-13;  // of W among elements that are to stick together
-constexpr double met = 1e-9;              // part of the accelerations in play that counts as none
+constexpr double met = 1e-9;  // part of the accelerations in play that counts as none
 
 // Least-norm x of W_FF x = r_F on the free elements F; zero on the others.
 VecX solve_free(const MatX& W, const VecX& r, const std::vector<char>& is_free) {

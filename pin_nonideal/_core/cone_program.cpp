@@ -20,7 +20,7 @@ namespace {
 constexpr int most_steps = 60, most_newton = 12;
 constexpr double gap_tolerance = 1e-17;  // of z . y, part of the accelerations in play; rounding may end it before
 constexpr double to_boundary = 0.99;     // of the way to the cone's boundary that a step takes
-constexpr double newton_tolerance = 4e-16, condition = 1e-12, rank_threshold = 1e-13;
+constexpr double newton_tolerance = 4e-16, condition = 1e-12;
 
 // A vector of the cone's algebra; elements of one or two directions leave the rest of the tail zero.
 struct Cone {

@@ -13,8 +13,8 @@ namespace pn {
 // Rank tolerance on the pivots of B^T with rows of unit length: rounding and the constraints' own violation reach
 // about 1e-12 on the manifold, true directions of light mechanisms lie above 1e-7.
 constexpr double rank_tolerance = 1e-10;
-// The same while elements stick. What they hold by a smaller part of their forces than this they do not hold: the
-// program that finds the modes takes such forces, square root of its own threshold, for none.
+// The same while elements stick. What they hold by a smaller part of their forces than this they do not hold: it is the
+// square root of the threshold on responses in the program that finds the modes (rank_threshold).
 constexpr double rank_tolerance_sticking = 3e-7;
 // Smallest pivot of the Cholesky factor of the unit-diagonal B B^T that is trusted: its relative error stays below
 // the machine precision divided by this; below it the orthogonal factorization of B^T takes over.

@@ -12,6 +12,9 @@ namespace pn {
 // Slip slower than this part of the scene's speed is rest: rounding of the located event.
 constexpr double rest_speed = 1e-11;
 
+// Responses below this part of the largest are none; rank_tolerance_sticking is its square root.
+constexpr double rank_threshold = 1e-13;
+
 // min f^T W f / 2 + alpha0^T f with |f_e| <= s_e: f for elements whose directions lie one after the other (dims[e]
 // rows each): a box for elements of one direction, disks and balls for the others.
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& limits);
