@@ -77,6 +77,8 @@ private:
         same(static_cast<size_t>(x.size()));
         raw(x.data(), x.size() * sizeof(double));
     }
+    void item(Vec3& x) { raw(&x[0], 3 * sizeof(double)); }
+    void item(Mat3& x) { (*this)(x.c[0], x.c[1], x.c[2]); }
     void item(Motion& x) { (*this)(x.lin, x.ang); }
     void item(Force& x) { (*this)(x.lin, x.ang); }
     void item(Inertia& x) { (*this)(x.mass, x.first, x.second); }

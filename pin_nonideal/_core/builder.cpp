@@ -38,15 +38,15 @@ namespace {
 
 using FrameTuple = std::tuple<int, std::vector<double>, std::vector<double>>;  // joint, R by rows, p
 
+Vec3 vec3(const std::vector<double>& x) { return Vec3(x[0], x[1], x[2]); }
+
 Frame frame_of(const FrameTuple& f) {
     Frame out;
     out.joint = std::get<0>(f);
     out.R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(std::get<1>(f).data());
-    out.p = Eigen::Map<const Vec3>(std::get<2>(f).data());
+    out.p = vec3(std::get<2>(f));
     return out;
 }
-
-Vec3 vec3(const std::vector<double>& x) { return Vec3(x[0], x[1], x[2]); }
 
 Reaction reaction_named(const std::string& name) {
     return name == "total" ? Reaction::total : name == "ideal" ? Reaction::ideal : Reaction::none;

@@ -25,7 +25,7 @@ struct ReactionView {
     }
     nb::object six(const Force& f, const Mat3& R) const {
         VecX out(6);
-        out << R.transpose() * f.lin, R.transpose() * f.ang;
+        out << transpose_times(R, f.lin).eigen(), transpose_times(R, f.ang).eigen();
         return to_numpy(out);
     }
     nb::object of_joint(int joint) const { return six(joint_wrench(*p, *w, joint), w->terms.body[joint].R); }

@@ -17,6 +17,9 @@ namespace pn {
 
 namespace {
 
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
 constexpr int most_steps = 60, most_newton = 12;
 constexpr double gap_tolerance = 1e-17;  // of z . y, part of the accelerations in play; rounding may end it before
 constexpr double to_boundary = 0.99;     // of the way to the cone's boundary that a step takes
@@ -25,7 +28,7 @@ constexpr double newton_tolerance = 4e-16, condition = 1e-12;
 // A vector of the cone's algebra; elements of one or two directions leave the rest of the tail zero.
 struct Cone {
     double head = 0.0;
-    Vec3 tail = Vec3::Zero();
+    Vector3d tail = Vector3d::Zero();
 
     double dot(const Cone& o) const { return head * o.head + tail.dot(o.tail); }
     double determinant() const { return (head - tail.norm()) * (head + tail.norm()); }
@@ -106,8 +109,8 @@ struct ConeProgram {
         x = VecX::Zero(n);
     }
 
-    Vec3 tail(const VecX& rows, int e) const {
-        Vec3 out = Vec3::Zero();
+    Vector3d tail(const VecX& rows, int e) const {
+        Vector3d out = Vector3d::Zero();
         out.head(dims[e]) = rows.segment(at[e], dims[e]);
         return out;
     }
@@ -131,8 +134,8 @@ struct ConeProgram {
         for (int e = 0; e < elements; ++e) {
             scalings.emplace_back(z(e), y[e]);
             const Scaling& T = scalings.back();
-            const Eigen::Matrix3d block =
-                s[e] / (T.root * T.root) * (2.0 * T.w.tail * T.w.tail.transpose() + Eigen::Matrix3d::Identity());
+            const Matrix3d block =
+                s[e] / (T.root * T.root) * (2.0 * T.w.tail * T.w.tail.transpose() + Matrix3d::Identity());
             K.block(at[e], at[e], dims[e], dims[e]) += block.topLeftCorner(dims[e], dims[e]);
         }
         factor.compute(K);

@@ -15,20 +15,20 @@ struct Pose {  // a frame in the world
     Vec3 x;
     const Mechanism& m;
 
-    Pose(const State& s, const Frame& f)
+    PN_INLINE Pose(const State& s, const Frame& f)
         : body(s.terms.body[f.joint]), R(f.R), x(f.p), m(s.mechanism) {
         if (f.joint == 0) return;  // fixed to the world
-        R.noalias() = body.R * f.R;
+        R = body.R * f.R;
         x = body.ref + body.p + body.R * f.p;
     }
-    const Vec3& omega() const { return body.v.ang; }
-    const Vec3& alpha() const { return body.a.ang; }
-    Vec3 velocity(const Vec3& at) const { return velocity_at(body, at); }
-    Vec3 acceleration(const Vec3& at) const { return acceleration_at(m, body, at); }
+    PN_INLINE const Vec3& omega() const { return body.v.ang; }
+    PN_INLINE const Vec3& alpha() const { return body.a.ang; }
+    PN_INLINE Vec3 velocity(const Vec3& at) const { return velocity_at(body, at); }
+    PN_INLINE Vec3 acceleration(const Vec3& at) const { return acceleration_at(m, body, at); }
 };
 
 Vec3 logarithm(const Mat3& R) {  // rotation vector
-    const Eigen::Quaterniond q(R);
+    const Eigen::Quaterniond q(R.eigen());
     const double n = q.vec().norm();
     if (n < 1e-4 && q.w() > 0.0) return (2.0 + n * n / 3.0) * q.vec();
     const double angle = 2.0 * std::atan2(n, q.w());
@@ -49,13 +49,23 @@ struct Evaluate {
     const State& s;
     RowValues& out;
 
-    // Row k: velocity of frame 1's origin along e, seen from body 2 (e is fixed in body 2).
-    void point_row(const Pose& a, const Pose& b, const Vec3& e, double offset, int k) const {
+    // Velocity and acceleration of frame 1's origin, seen from body 2.
+    struct PointMotion {
+        Vec3 u, w;
+
+        PN_INLINE PointMotion(const Pose& a, const Pose& b) {
+            if constexpr (!moving) return;
+            u = a.velocity(a.x) - b.velocity(a.x);
+            w = a.acceleration(a.x) - b.acceleration(a.x) - 2.0 * b.omega().cross(u);
+        }
+    };
+
+    // Row k: that velocity along e, which is fixed in body 2.
+    PN_INLINE void point_row(const Pose& a, const Pose& b, const PointMotion& point, const Vec3& e, double offset,
+                             int k) const {
         if constexpr (moving) {
-            const Vec3 u = a.velocity(a.x) - b.velocity(a.x);
-            const Vec3 w = a.acceleration(a.x) - b.acceleration(a.x) - 2.0 * b.omega().cross(u);
-            out.rate[k] = e.dot(u);
-            out.drift[k] = e.dot(w);
+            out.rate[k] = e.dot(point.u);
+            out.drift[k] = e.dot(point.w);
         } else {
             out.wrench[k] = {e, a.x, Vec3::Zero()};
             out.residual[k] = e.dot(a.x - b.x) - offset;
@@ -63,7 +73,7 @@ struct Evaluate {
     }
 
     // Sliding of body 1 against the plane of body 2 at a contact point c that moves with rate c_rate.
-    void contact_row(const Pose& a, const Pose& b, const Vec3& e, const Vec3& c, const Vec3& c_rate, int k) const {
+    PN_INLINE void contact_row(const Pose& a, const Pose& b, const Vec3& e, const Vec3& c, const Vec3& c_rate, int k) const {
         if constexpr (moving) {
             const Vec3 va = a.velocity(c), vb = b.velocity(c), u = va - vb;
             const Vec3 du = a.acceleration(c) + a.omega().cross(c_rate - va) - b.acceleration(c) -
@@ -76,19 +86,21 @@ struct Evaluate {
         }
     }
 
-    void operator()(const PointRows& c) const {
+    PN_INLINE void operator()(const PointRows& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
-        for (size_t k = 0; k < c.axes.size(); ++k) point_row(a, b, b.R.col(c.axes[k]), 0.0, k);
+        const PointMotion point(a, b);
+        for (size_t k = 0; k < c.axes.size(); ++k) point_row(a, b, point, b.R.col(c.axes[k]), 0.0, k);
     }
 
-    void operator()(const ContactRow& c) const {
+    PN_INLINE void operator()(const ContactRow& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
-        point_row(a, b, b.R * c.normal, c.radius, 0);
+        point_row(a, b, {a, b}, b.R * c.normal, c.radius, 0);
     }
 
-    void operator()(const FrameRows& c) const {
+    PN_INLINE void operator()(const FrameRows& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
-        for (int k = 0; k < 3; ++k) point_row(a, b, b.R.col(k), 0.0, k);
+        const PointMotion point(a, b);
+        for (int k = 0; k < 3; ++k) point_row(a, b, point, b.R.col(k), 0.0, k);
         if constexpr (moving) {
             const Vec3 omega = a.omega() - b.omega(), alpha = a.alpha() - b.alpha() - b.omega().cross(omega);
             for (int k = 0; k < 3; ++k) {
@@ -96,7 +108,7 @@ struct Evaluate {
                 out.drift[k + 3] = b.R.col(k).dot(alpha);
             }
         } else {
-            const Vec3 gap = logarithm(b.R.transpose() * a.R);
+            const Vec3 gap = logarithm({transpose_times(b.R, a.R.c[0]), transpose_times(b.R, a.R.c[1]), transpose_times(b.R, a.R.c[2])});
             for (int k = 0; k < 3; ++k) {
                 out.wrench[k + 3] = {Vec3::Zero(), a.x, b.R.col(k)};
                 out.residual[k + 3] = gap[k];
@@ -104,9 +116,10 @@ struct Evaluate {
         }
     }
 
-    void operator()(const HingeRows& c) const {
+    PN_INLINE void operator()(const HingeRows& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
-        for (int k = 0; k < 3; ++k) point_row(a, b, b.R.col(k), 0.0, k);
+        const PointMotion point(a, b);
+        for (int k = 0; k < 3; ++k) point_row(a, b, point, b.R.col(k), 0.0, k);
         // The axis e of frame 1 stays normal to n1 and n2 of frame 2; the angle between the axes scales the residual,
         // so that it tells the gap also when they point apart.
         const Vec3 e = a.R * c.axis;
@@ -129,7 +142,7 @@ struct Evaluate {
         }
     }
 
-    void operator()(const DistanceRows& c) const {
+    PN_INLINE void operator()(const DistanceRows& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
         const Vec3 d = a.x - b.x;
         const double distance = d.norm();
@@ -149,7 +162,7 @@ struct Evaluate {
         }
     }
 
-    void operator()(const KnifeRows& c) const {
+    PN_INLINE void operator()(const KnifeRows& c) const {
         const Pose a(s, c.frame1);
         const Vec3 e = a.R * c.axis;
         if constexpr (moving) {
@@ -161,7 +174,7 @@ struct Evaluate {
         }
     }
 
-    void operator()(const RollingRows& c) const {
+    PN_INLINE void operator()(const RollingRows& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
         const Vec3 n = b.R * c.normal, dn = b.omega().cross(n);
         Vec3 down = -n, ddown = -dn;  // unit vector from the center to the contact, and its rate
@@ -181,7 +194,7 @@ struct Evaluate {
         if constexpr (!moving) out.residual[2] = n.dot(a.x - b.x) - c.radius * support;
     }
 
-    void operator()(const HingeSlipRows& c) const {
+    PN_INLINE void operator()(const HingeSlipRows& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
         const Vec3 e = a.R * c.axis;
         if constexpr (moving) {
@@ -193,7 +206,7 @@ struct Evaluate {
         }
     }
 
-    void operator()(const ContactSlipRows& c) const {
+    PN_INLINE void operator()(const ContactSlipRows& c) const {
         const Pose a(s, c.frame1), b(s, c.frame2);
         const Vec3 n = b.R * c.normal, contact = a.x - c.radius * n;
         const Vec3 rate = a.velocity(a.x) - c.radius * b.omega().cross(n);
@@ -201,7 +214,7 @@ struct Evaluate {
         contact_row(a, b, b.R * c.tangent2, contact, rate, 1);
     }
 
-    void operator()(const CouplingRows& c) const {
+    PN_INLINE void operator()(const CouplingRows& c) const {
         const Joint &j1 = s.mechanism.joints[c.joint1], &j2 = s.mechanism.joints[c.joint2];
         if constexpr (moving) {
             out.rate[0] = s.v[j1.iv] - c.ratio * s.v[j2.iv];
@@ -215,7 +228,7 @@ struct Evaluate {
         out.residual[0] = c.position ? wrap(gap, c.period) : 0.0;
     }
 
-    void operator()(const MotionRows& c) const {
+    PN_INLINE void operator()(const MotionRows& c) const {
         const Joint& j = s.mechanism.joints[c.joint];
         if constexpr (moving) {
             out.rate[0] = s.v[j.iv] + out.phi_t[0];
@@ -230,7 +243,7 @@ struct Evaluate {
     }
 
     // The user's A and b come together, with the place part.
-    void operator()(const UserRows& c) const {
+    PN_INLINE void operator()(const UserRows& c) const {
         if (moving && c.rate) {
             c.rate(s.t, s.q, s.v, out.scratch);
             for (int k = 0; k < out.rows; ++k) out.rate[k] = out.scratch[k];
@@ -244,14 +257,14 @@ struct Evaluate {
         for (int k = 0; k < out.rows; ++k) out.drift[k] = -out.b[k];
     }
 
-    void operator()(const DofRows& c) const {
+    PN_INLINE void operator()(const DofRows& c) const {
         for (int k = 0; k < c.count; ++k) {
             if (moving) out.rate[k] = s.v[c.dof + k];
             else if (!out.has_A) out.A(k, c.dof + k) = 1.0;
         }
     }
 
-    void operator()(const UserSlipRow& c) const {
+    PN_INLINE void operator()(const UserSlipRow& c) const {
         if constexpr (!moving) {
             c.direction(s.t, s.q, out.scratch);
             out.A.row(0) = out.scratch.transpose();
@@ -366,15 +379,26 @@ int row_count(const Kind& kind, int user_size) {
     return std::visit(Count{user_size}, kind);
 }
 
-void evaluate(const Kind& kind, const State& s, Part part, RowValues& out) {
+// Like std::visit, but part of the caller.
+template <class Formula, size_t... kind_index>
+static PN_INLINE void apply(const Formula& formula, const Kind& kind, std::index_sequence<kind_index...>) {
+    (void)((kind.index() == kind_index && (formula(*std::get_if<kind_index>(&kind)), true)) || ...);
+}
+
+template <Part part>
+static PN_INLINE void evaluate_part(const Kind& kind, const State& s, RowValues& out) {
+    apply(Evaluate<part>{s, out}, kind, std::make_index_sequence<std::variant_size_v<Kind>>());
+}
+
+PN_WIDE void evaluate(const Kind& kind, const State& s, Part part, RowValues& out) {
     switch (part) {
-        case Part::gap: std::visit(Evaluate<Part::gap>{s, out}, kind); break;
-        case Part::place: std::visit(Evaluate<Part::place>{s, out}, kind); break;
-        case Part::motion: std::visit(Evaluate<Part::motion>{s, out}, kind); break;
+        case Part::gap: evaluate_part<Part::gap>(kind, s, out); break;
+        case Part::place: evaluate_part<Part::place>(kind, s, out); break;
+        case Part::motion: evaluate_part<Part::motion>(kind, s, out); break;
     }
 }
 
-void fill_A(const Block& block, const Terms& terms, const RowValues& values, double* A) {
+PN_WIDE void fill_A(const Block& block, const Terms& terms, const RowValues& values, double* A) {
     const int r = static_cast<int>(block.kept.size()), n = static_cast<int>(block.support.size());
     if (!values.geometric) {
         for (int l = 0; l < n; ++l)

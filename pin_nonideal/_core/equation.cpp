@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "lanes.hpp"
 #include "unrolled.hpp"
 
 namespace pn {
@@ -188,7 +189,7 @@ static void multiply_tile(const double* X, int r1, const double* Y, int r2, cons
 }
 
 static void gram(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
-                 const std::vector<char>& use, RowSystem& s) {
+                 RowSystem& s) {
     for (const RowLayout::Pair& pair : layout.pairs) {
         if (!s.block_used[pair.block1] || !s.block_used[pair.block2]) continue;
         const Block &b1 = blocks[pair.block1], &b2 = blocks[pair.block2];
@@ -201,13 +202,13 @@ static void gram(const RowLayout& layout, const std::vector<Block>& blocks, cons
                 with_constant(ni, [&](auto n1) {
                     with_constant(nj, [&](auto n2) { multiply_tile<n1, n2>(X + i0, r1, Y + j0, r2, pair, sum); });
                 });
-                for (int i = 0; i < ni; ++i)
-                    for (int j = 0; j < nj; ++j) {
-                        if (!use[b1.row + i0 + i] || !use[b2.row + j0 + j]) continue;
-                        const int p1 = layout.position[b1.row + i0 + i], p2 = layout.position[b2.row + j0 + j];
-                        if (p1 >= p2) s.G[layout.start[p1] + p2] = sum[i][j];
-                        else s.G[layout.start[p2] + p1] = sum[i][j];
-                    }
+                // The rows of a block stand side by side in the layout, and those of the first block not before those
+                // of the second: below the diagonal.
+                const int p1 = layout.position[b1.row] + i0, p2 = layout.position[b2.row] + j0;
+                for (int i = 0; i < ni; ++i) {
+                    double* Gi = s.G.data() + layout.start[p1 + i] + p2;
+                    for (int j = 0; j < std::min(nj, p1 + i - p2 + 1); ++j) Gi[j] = sum[i][j];
+                }
             }
     }
 }
@@ -221,9 +222,9 @@ static void row_scales(const RowLayout& layout, const std::vector<char>& use, Ro
     }
 }
 
-void factor_rows(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
+PN_WIDE void factor_rows(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
                  RowSystem& s) {
-    gram(layout, blocks, B, s.active, s);
+    gram(layout, blocks, B, s);
     row_scales(layout, s.active, s);
     s.min_pivot = 1.0;
     s.orthogonal = false;
@@ -275,7 +276,7 @@ void factor_rows(const RowLayout& layout, const std::vector<Block>& blocks, cons
 
 void decide_rows(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
                  RowSystem& s, double tolerance) {
-    gram(layout, blocks, B, s.wanted, s);
+    gram(layout, blocks, B, s);
     row_scales(layout, s.wanted, s);
     dense_columns(blocks, B, s.wanted, s);
     s.rank = householder(s, static_cast<int>(s.columns.size()), true, tolerance);
@@ -284,7 +285,7 @@ void decide_rows(const RowLayout& layout, const std::vector<Block>& blocks, cons
     s.redundant = s.rank < static_cast<int>(s.columns.size());
 }
 
-void solve_rows(const RowLayout& layout, RowSystem& s, const VecX& r, VecX& lam) {
+PN_WIDE void solve_rows(const RowLayout& layout, RowSystem& s, const VecX& r, VecX& lam) {
     lam.setZero();
     if (s.orthogonal) {  // B^T = Q T: lam = T^-1 T^-T r
         const int k = static_cast<int>(s.columns.size());

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "lanes.hpp"
 #include "modes.hpp"
 #include "projection.hpp"
 #include "tableaux.hpp"
@@ -86,6 +87,35 @@ void powers(const Program& p, Workspace& w, const VecX& v, double* out) {
     for (size_t l = 0; l < p.law_names.size(); ++l) out[3 + l] = v.dot(w.law_force[l]);
 }
 
+// out = y + h (a_0 K_0 + ... + a_{n-1} K_{n-1})
+PN_WIDE static void combine(const VecX& y, double h, const double* a, int n, const std::vector<VecX>& K, VecX& out) {
+    constexpr int most_stages = 16;
+    double part[most_stages];
+    const double* rate[most_stages];
+    int terms = 0;
+    for (int j = 0; j < n; ++j) {
+        if (a[j] == 0.0) continue;
+        part[terms] = h * a[j];
+        rate[terms++] = K[j].data();
+    }
+    const int size = static_cast<int>(y.size());
+    int i = 0;
+    for (; i + 3 < size; i += 4) {
+        Lanes x, k;
+        load(y.data() + i, x);
+        for (int j = 0; j < terms; ++j) {
+            load(rate[j] + i, k);
+            x += part[j] * k;
+        }
+        store(x, out.data() + i);
+    }
+    for (; i < size; ++i) {
+        double x = y[i];
+        for (int j = 0; j < terms; ++j) x += part[j] * rate[j][i];
+        out[i] = x;
+    }
+}
+
 Stepper::Stepper(const Method& m, System& s) : method(m), system(s) {
     const int stages = m.kind == Method::Kind::dop853 ? 16 : std::max(m.stages, 1);
     K.assign(stages, VecX::Zero(s.ny));
@@ -109,15 +139,11 @@ void Stepper::step(double t, double size) {
         return;
     }
     const double* a = method.A;
-    for (int i = 1; i < method.stages; ++i) {
-        stage = y0;
-        for (int j = 0; j < i; ++j, ++a)
-            if (*a != 0.0) stage += (h * *a) * K[j];
+    for (int i = 1; i < method.stages; a += i++) {
+        combine(y0, h, a, i, K, stage);
         system.derivative(t + method.C[i] * h, stage, K[i]);
     }
-    y1 = y0;
-    for (int j = 0; j < method.stages; ++j)
-        if (method.B[j] != 0.0) y1 += (h * method.B[j]) * K[j];
+    combine(y0, h, method.B, method.stages, K, y1);
     normalize(system.p.mechanism, y1.data());
 }
 
@@ -185,10 +211,8 @@ double Stepper::error_norm(double rtol, const VecX& atol) {
         return norm(error5, scale_, y0);
     }
     error3.setZero();
-    for (int j = 0; j < 12; ++j) {
-        if (tableau::dop853_E5[j] != 0.0) error5 += tableau::dop853_E5[j] * K[j];
-        if (tableau::dop853_E3[j] != 0.0) error3 += tableau::dop853_E3[j] * K[j];
-    }
+    combine(error5, 1.0, tableau::dop853_E5, 12, K, error5);
+    combine(error3, 1.0, tableau::dop853_E3, 12, K, error3);
     const double e5 = norm(error5, scale_, y0), e3 = norm(error3, scale_, y0);
     if (e5 == 0.0 && e3 == 0.0) return 0.0;
     return std::abs(h) * e5 * e5 / std::sqrt(e5 * e5 + 0.01 * e3 * e3);
@@ -201,10 +225,8 @@ void Stepper::make_dense() {
     if (method.kind == Method::Kind::dop853) {
         const double* a = tableau::dop853_A_dense;
         K[12] = f1;
-        for (int i = 0; i < 3; ++i) {
-            stage = y0;
-            for (int j = 0; j < 13 + i; ++j, ++a)
-                if (*a != 0.0) stage += (h * *a) * K[j];
+        for (int i = 0; i < 3; a += 13 + i++) {
+            combine(y0, h, a, 13 + i, K, stage);
             system.derivative(t0 + tableau::dop853_C_dense[i] * h, stage, K[13 + i]);
         }
         dense[0] = delta;
@@ -212,7 +234,7 @@ void Stepper::make_dense() {
         dense[2] = 2.0 * delta - h * (f1 + K[0]);
         for (int i = 0; i < 4; ++i) {
             dense[3 + i].setZero();
-            for (int j = 0; j < 16; ++j) dense[3 + i] += (h * tableau::dop853_D[16 * i + j]) * K[j];
+            combine(dense[3 + i], h, tableau::dop853_D + 16 * i, 16, K, dense[3 + i]);
         }
         return;
     }

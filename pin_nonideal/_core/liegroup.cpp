@@ -9,6 +9,7 @@ namespace pn {
 namespace {
 
 using Quat = Eigen::Quaterniond;
+using Vector = Eigen::Vector3d;
 
 Quat quaternion(const double* q) { return Quat(q[3], q[0], q[1], q[2]); }
 
@@ -22,11 +23,11 @@ void quaternion_rate(const double* q, const double* w, double* dq) {
 
 // w with q' = q * (w, 0) / 2, for dq tangent to the unit sphere.
 void quaternion_tangent(const double* q, const double* dq, double* w) {
-    const Vec3 a(q[0], q[1], q[2]), d(dq[0], dq[1], dq[2]);
-    Eigen::Map<Vec3>{w} = 2.0 * (q[3] * d - dq[3] * a - a.cross(d));
+    const Vector a(q[0], q[1], q[2]), d(dq[0], dq[1], dq[2]);
+    Eigen::Map<Vector>{w} = 2.0 * (q[3] * d - dq[3] * a - a.cross(d));
 }
 
-Quat exponential(const Vec3& w) {
+Quat exponential(const Vector& w) {
     const double angle = w.norm();
     const double s = angle < 1e-8 ? 0.5 - angle * angle / 48.0 : std::sin(0.5 * angle) / angle;
     return Quat(std::cos(0.5 * angle), s * w[0], s * w[1], s * w[2]);
@@ -78,7 +79,7 @@ void configuration_rate(const Mechanism& m, const double* q, const double* v, do
                 d[3] = x[2] * w[2];
                 break;
             case Chart::Kind::pose:
-                Eigen::Map<Vec3>{d} = quaternion(x + 3).normalized() * Eigen::Map<const Vec3>{w};
+                Eigen::Map<Vector>{d} = quaternion(x + 3).normalized() * Eigen::Map<const Vector>{w};
                 quaternion_rate(x + 3, w + 3, d + 3);
                 break;
         }
@@ -120,8 +121,8 @@ void ambient_to_tangent(const Mechanism& m, const double* q, const double* dq, d
                 w[2] = x[2] * d[3] - x[3] * d[2];
                 break;
             case Chart::Kind::pose:
-                Eigen::Map<Vec3> lin(w);
-                lin = quaternion(x + 3).normalized().conjugate() * Eigen::Map<const Vec3>{d};
+                Eigen::Map<Vector> lin(w);
+                lin = quaternion(x + 3).normalized().conjugate() * Eigen::Map<const Vector>{d};
                 quaternion_tangent(x + 3, d + 3, w + 3);
                 break;
         }
@@ -142,7 +143,7 @@ void retract(const Mechanism& m, const double* q, const double* v, double* out) 
                 y[1] = a * sn + b * cs;
                 break;
             }
-            case Chart::Kind::quaternion: store(quaternion(x) * exponential(Vec3(w[0], w[1], w[2])), y); break;
+            case Chart::Kind::quaternion: store(quaternion(x) * exponential(Vector(w[0], w[1], w[2])), y); break;
             case Chart::Kind::plane: {
                 const double s = sinc(w[2]), u = versine(w[2]) * w[2], a = x[2], b = x[3];
                 const double lx = s * w[0] - u * w[1], ly = u * w[0] + s * w[1];
@@ -155,14 +156,14 @@ void retract(const Mechanism& m, const double* q, const double* v, double* out) 
                 break;
             }
             case Chart::Kind::pose: {
-                const Vec3 lin(w[0], w[1], w[2]), ang(w[3], w[4], w[5]);
+                const Vector lin(w[0], w[1], w[2]), ang(w[3], w[4], w[5]);
                 const double angle = ang.norm();
-                const Vec3 cr = ang.cross(lin);
-                const Vec3 step = lin + versine(angle) * cr + cubic(angle) * ang.cross(cr);
+                const Vector cr = ang.cross(lin);
+                const Vector step = lin + versine(angle) * cr + cubic(angle) * ang.cross(cr);
                 const Quat rot = quaternion(x + 3);
-                const Vec3 p = Eigen::Map<const Vec3>{x} + rot.normalized() * step;
+                const Vector p = Eigen::Map<const Vector>{x} + rot.normalized() * step;
                 store(rot * exponential(ang), y + 3);
-                Eigen::Map<Vec3>{y} = p;
+                Eigen::Map<Vector>{y} = p;
                 break;
             }
         }

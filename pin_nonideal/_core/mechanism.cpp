@@ -88,7 +88,11 @@ void add_charts(const Model::JointModel& joint, std::vector<Chart>& charts) {
     if (has("Composite")) {
         boost::apply_visitor(ChartsOfComposite(charts), joint.toVariant());
     } else if (nq == nv) {
-        charts.push_back({Chart::Kind::vector, iq, iv, nv});
+        Chart* last = charts.empty() ? nullptr : &charts.back();
+        if (last && last->kind == Chart::Kind::vector && last->iq + last->n == iq && last->iv + last->n == iv)
+            last->n += nv;  // one stretch of vectors
+        else
+            charts.push_back({Chart::Kind::vector, iq, iv, nv});
     } else if (has("FreeFlyer")) {
         charts.push_back({Chart::Kind::pose, iq, iv, 0});
     } else if (has("Spherical")) {
@@ -134,7 +138,7 @@ Mechanism read_mechanism(const void* opaque) {
         j.nq = joint.nq();
         j.nv = joint.nv();
         j.R0 = model->jointPlacements[i].rotation();
-        j.aligned = j.R0 == Mat3::Identity();
+        j.aligned = model->jointPlacements[i].rotation() == Eigen::Matrix3d::Identity();
         j.p0 = model->jointPlacements[i].translation();
         classify(joint, data, j);
         m.has_foreign |= j.kind == JointKind::other;

@@ -29,7 +29,7 @@ struct Joint {
     double pitch = 0.0;
     double mass = 0.0;
     Vec3 com = Vec3::Zero();
-    Mat3 inertia = Mat3::Zero();  // about the center of mass, in joint axes
+    Mat3 inertia;  // about the center of mass, in joint axes
     std::string name;
 };
 

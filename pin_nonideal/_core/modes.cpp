@@ -90,7 +90,7 @@ struct Candidates {
     // ends evaluated there.
     bool hold(const std::vector<signed char>& modes, int breaking) {
         try {
-            for (int e : list) w.slip_force[e].setZero();
+            for (int e : list) w.slip_force[e] = Vec3::Zero();
             apply_modes(modes);
         } catch (const Failure& failure) {
             if (failure.kind != Failure::Kind::paradox) throw;
@@ -141,9 +141,10 @@ struct Candidates {
             const VecX direction = slides ? VecX(ae.normalized()) : VecX(-fe.normalized());
             modes[i] = dims[i] > 1 || direction[0] > 0.0 ? 1 : -1;
             if (dims[i] == 1) continue;
-            w.slip_direction[list[i]].setZero();
-            w.slip_direction[list[i]].head(dims[i]) = direction;
-            w.last_direction[list[i]] = w.slip_direction[list[i]];
+            Vec3& slip = w.slip_direction[list[i]];
+            slip = Vec3::Zero();
+            for (int k = 0; k < dims[i]; ++k) slip[k] = direction[k];
+            w.last_direction[list[i]] = slip;
         }
         return modes;
     }
@@ -193,7 +194,7 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
         return;
     }
     // Without any friction of the candidates: alpha0, W, and first limits from the load there.
-    for (int e : candidates) w.slip_force[e].setZero();
+    for (int e : candidates) w.slip_force[e] = Vec3::Zero();
     const std::vector<signed char> unloaded_modes(candidates.size(), unloaded);
     c.apply_modes(unloaded_modes);
     const VecX C_smooth = w.C_smooth;
@@ -251,7 +252,7 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
             limits[i] = limit;
         }
     }
-    for (int e : candidates) w.slip_force[e].setZero();
+    for (int e : candidates) w.slip_force[e] = Vec3::Zero();
     c.apply_modes(modes);
 }
 

@@ -110,8 +110,8 @@ nb::dict Runner::solve(const Array& q_in, const Array& v_in, double t, nb::objec
     nb::dict out;
     nb::list forces, limits, used;
     for (size_t e = 0; e < p->frictions.size(); ++e) {
-        const Vec3 f = friction_force(*p, *w, static_cast<int>(e));
-        forces.append(to_numpy(f.data(), p->frictions[e].dim));
+        Vec3 f = friction_force(*p, *w, static_cast<int>(e));
+        forces.append(to_numpy(&f[0], p->frictions[e].dim));
         limits.append(w->mode[e] == sticking ? static_limit(*p, *w, static_cast<int>(e), t, q, v) : w->limit[e]);
         used.append(static_cast<int>(w->mode[e]));
     }

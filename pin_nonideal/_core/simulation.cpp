@@ -238,7 +238,7 @@ void Simulation::advance_to(double stop) {
         const double factor = std::isfinite(error) ? retry_safety * std::pow(error, -1.0 / o.method.order) : 0.0;
         h = size * std::max(shrink_limit, factor);
         last_rejected = true;
-        if (h < 4.0 * std::abs(std::nextafter(t, t_end) - t)) {
+        if (!(h >= 4.0 * std::abs(std::nextafter(t, t_end) - t))) {
             if (opened) throw *opened;
             throw Failure(Failure::Kind::step_size, t);
         }

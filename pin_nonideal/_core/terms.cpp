@@ -7,28 +7,13 @@ namespace pn {
 
 namespace {
 
-// Rotation by the angle with this sine and cosine about a unit axis.
-Mat3 rotation(const Joint& j, double c, double s) {
-    Mat3 R;
-    switch (j.axis_index) {
-        case 0: R << 1, 0, 0, 0, c, -s, 0, s, c; break;
-        case 1: R << c, 0, s, 0, 1, 0, -s, 0, c; break;
-        case 2: R << c, -s, 0, s, c, 0, 0, 0, 1; break;
-        default: {
-            const Vec3& a = j.axis;
-            const double t = 1.0 - c;
-            R << t * a[0] * a[0] + c, t * a[0] * a[1] - s * a[2], t * a[0] * a[2] + s * a[1],
-                 t * a[0] * a[1] + s * a[2], t * a[1] * a[1] + c, t * a[1] * a[2] - s * a[0],
-                 t * a[0] * a[2] - s * a[1], t * a[1] * a[2] + s * a[0], t * a[2] * a[2] + c;
-        }
-    }
-    return R;
-}
-
-// R0 turned about the joint's axis, touching only the columns that change.
-void turn(const Joint& j, const Mat3& R0, double c, double s, Mat3& R) {
+// R0 turned about the joint's axis by the angle with this cosine and sine, touching only the columns that change.
+PN_INLINE void turn(const Joint& j, const Mat3& R0, double c, double s, Mat3& R) {
     if (j.axis_index < 0) {
-        R.noalias() = R0 * rotation(j, c, s);
+        const Vec3& e = j.axis;
+        const Mat3 turned({c, s * e[2], -s * e[1]}, {-s * e[2], c, s * e[0]}, {s * e[1], -s * e[0], c});
+        R = R0 * Mat3(turned.c[0] + ((1.0 - c) * e[0]) * e, turned.c[1] + ((1.0 - c) * e[1]) * e,
+                      turned.c[2] + ((1.0 - c) * e[2]) * e);
         return;
     }
     const int k = j.axis_index, a = (k + 1) % 3, b = (k + 2) % 3;
@@ -37,23 +22,23 @@ void turn(const Joint& j, const Mat3& R0, double c, double s, Mat3& R) {
     R.col(b) = c * R0.col(b) - s * R0.col(a);
 }
 
-Vec3 axis_in_world(const Joint& j, const Mat3& R) {
+PN_INLINE Vec3 axis_in_world(const Joint& j, const Mat3& R) {
     if (j.axis_index >= 0) return R.col(j.axis_index);
     return R * j.axis;
 }
 
 // Columns for a dof that turns about direction w through the body's origin, or slides along it.
-Motion turning(const Body& b, const Vec3& w) { return {b.p.cross(w), w}; }
-Motion sliding(const Vec3& w) { return {w, Vec3::Zero()}; }
+PN_INLINE Motion turning(const Body& b, const Vec3& w) { return {b.p.cross(w), w}; }
+PN_INLINE Motion sliding(const Vec3& w) { return {w, Vec3::Zero()}; }
 
-Motion relative_velocity(const Joint& j, const std::vector<Motion>& J, const VecX& v) {
+PN_INLINE Motion relative_velocity(const Joint& j, const std::vector<Motion>& J, const VecX& v) {
     Motion r = v[j.iv] * J[j.iv];
     for (int k = 1; k < j.nv; ++k) r += v[j.iv + k] * J[j.iv + k];
     return r;
 }
 
 // Placement of the joint's moving frame; fills R, p and the reference of body b.
-void place(const Joint& j, const Body& parent, const VecX& q, Body& b, const JointMotion& foreign) {
+PN_INLINE void place(const Joint& j, const Body& parent, const VecX& q, Body& b, const JointMotion& foreign) {
     const bool is_root = j.parent == 0;
     Mat3 R0;
     Vec3 p0;
@@ -61,8 +46,7 @@ void place(const Joint& j, const Body& parent, const VecX& q, Body& b, const Joi
         R0 = j.R0;
         p0 = j.p0;
     } else {
-        if (j.aligned) R0 = parent.R;
-        else R0.noalias() = parent.R * j.R0;
+        R0 = j.aligned ? parent.R : parent.R * j.R0;
         p0 = parent.p + parent.R * j.p0;
     }
     const double* x = q.data() + j.iq;
@@ -83,32 +67,29 @@ void place(const Joint& j, const Body& parent, const VecX& q, Body& b, const Joi
             b.p = p0 + x[0] * axis_in_world(j, R0);
             break;
         case JointKind::spherical:
-            b.R.noalias() = R0 * Eigen::Quaterniond(x[3], x[0], x[1], x[2]).toRotationMatrix();
+            b.R = R0 * Mat3(Eigen::Quaterniond(x[3], x[0], x[1], x[2]).toRotationMatrix());
             b.p = p0;
             break;
         case JointKind::free_flyer:
-            b.R.noalias() = R0 * Eigen::Quaterniond(x[6], x[3], x[4], x[5]).toRotationMatrix();
+            b.R = R0 * Mat3(Eigen::Quaterniond(x[6], x[3], x[4], x[5]).toRotationMatrix());
             b.p = p0 + R0 * Vec3(x[0], x[1], x[2]);
             break;
-        case JointKind::planar: {
-            Mat3 turned;
-            turned << x[2], -x[3], 0, x[3], x[2], 0, 0, 0, 1;
-            b.R.noalias() = R0 * turned;
+        case JointKind::planar:
+            b.R = R0 * Mat3({x[2], x[3], 0.0}, {-x[3], x[2], 0.0}, {0.0, 0.0, 1.0});
             b.p = p0 + R0 * Vec3(x[0], x[1], 0.0);
             break;
-        }
         case JointKind::translation:
             b.R = R0;
             b.p = p0 + R0 * Vec3(x[0], x[1], x[2]);
             break;
         case JointKind::other:
-            b.R.noalias() = R0 * foreign.R;
+            b.R = R0 * foreign.R;
             b.p = p0 + R0 * foreign.p;
             break;
     }
     if (is_root) {  // the reference point of this tree is here
         b.ref = b.p;
-        b.p.setZero();
+        b.p = Vec3::Zero();
     } else {
         b.ref = parent.ref;
     }
@@ -126,7 +107,7 @@ void recenter(const Mechanism& m, int i, Terms& w) {
 }
 
 // Columns J of the joint's dofs in world axes.
-void columns(const Joint& j, const Body& b, const JointMotion& foreign, Motion* J) {
+PN_INLINE void columns(const Joint& j, const Body& b, const JointMotion& foreign, Motion* J) {
     switch (j.kind) {
         case JointKind::revolute: J[0] = turning(b, axis_in_world(j, b.R)); break;
         case JointKind::helical: {
@@ -155,8 +136,8 @@ void columns(const Joint& j, const Body& b, const JointMotion& foreign, Motion* 
             break;
         case JointKind::other:
             for (int k = 0; k < j.nv; ++k) {
-                J[k] = turning(b, b.R * foreign.S.col(k).tail<3>());
-                J[k].lin += b.R * foreign.S.col(k).head<3>();
+                J[k] = turning(b, b.R * Vec3(foreign.S.col(k).tail<3>()));
+                J[k].lin += b.R * Vec3(foreign.S.col(k).head<3>());
             }
             break;
     }
@@ -181,20 +162,20 @@ void Terms::allocate(const Mechanism& m) {
 }
 
 // Places body i behind its parent.
-static void place_body(const Mechanism& m, Terms& w, int i) {
+static PN_INLINE void place_body(const Mechanism& m, Terms& w, int i) {
     const Joint& j = m.joints[i];
     if (j.kind == JointKind::other) w.foreign->evaluate(i, w.q, w.rest, w.foreign_motion);
     place(j, w.body[j.parent], w.q, w.body[i], w.foreign_motion);
     if (j.recenters) recenter(m, i, w);
 }
 
-void place_bodies(const Mechanism& m, Terms& w, const VecX& q, const std::vector<int>& joints) {
+PN_WIDE void place_bodies(const Mechanism& m, Terms& w, const VecX& q, const std::vector<int>& joints) {
     w.q = q;
     normalize(m, w.q.data());
     for (int i : joints) place_body(m, w, i);
 }
 
-void place_bodies(const Mechanism& m, Terms& w, const VecX& q) {
+PN_WIDE void place_bodies(const Mechanism& m, Terms& w, const VecX& q) {
     w.q = q;
     normalize(m, w.q.data());
     const int n = static_cast<int>(m.joints.size());
@@ -205,7 +186,7 @@ void place_bodies(const Mechanism& m, Terms& w, const VecX& q) {
     }
 }
 
-void move_bodies(const Mechanism& m, Terms& w, const VecX& v) {
+PN_WIDE void move_bodies(const Mechanism& m, Terms& w, const VecX& v) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
         const Joint& j = m.joints[i];
@@ -227,20 +208,20 @@ void move_bodies(const Mechanism& m, Terms& w, const VecX& v) {
     }
 }
 
-void mass_matrix(const Mechanism& m, Terms& w) {
+PN_WIDE void mass_matrix(const Mechanism& m, Terms& w) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
         const Joint& j = m.joints[i];
         Body& b = w.body[i];
         const Vec3 c = b.p + b.R * j.com;
-        const Mat3 turned = b.R * j.inertia;
         Inertia& Y = b.own;
         Y.mass = j.mass;
         Y.first = j.mass * c;
-        for (int r = 0; r < 3; ++r)
-            for (int k = 0; k <= r; ++k)
-                Y.second(r, k) = Y.second(k, r) = turned.row(r).dot(b.R.row(k)) - c[r] * Y.first[k];
-        Y.second.diagonal().array() += c.dot(Y.first);
+        Y.second = times_transpose(b.R * j.inertia, b.R);
+        const double square = c.dot(Y.first);
+        Y.second.c[0] += square * Vec3::UnitX() - c[0] * Y.first;
+        Y.second.c[1] += square * Vec3::UnitY() - c[1] * Y.first;
+        Y.second.c[2] += square * Vec3::UnitZ() - c[2] * Y.first;
         b.Y = Y;
     }
     for (int i = n - 1; i > 0; --i) {
@@ -257,7 +238,7 @@ void mass_matrix(const Mechanism& m, Terms& w) {
     }
 }
 
-void bias_forces(const Mechanism& m, Terms& w) {
+PN_WIDE void bias_forces(const Mechanism& m, Terms& w) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
         Body& b = w.body[i];

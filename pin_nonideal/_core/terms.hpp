@@ -67,8 +67,8 @@ double kinetic_energy(const Mechanism& m, Terms& w, const VecX& v);
 double potential_energy(const Mechanism& m, const Terms& w);
 
 // World position, velocity and classical acceleration (at zero qdd, without gravity) of the point of a body at x.
-inline Vec3 velocity_at(const Body& b, const Vec3& x) { return b.v.lin + b.v.ang.cross(x - b.ref); }
-inline Vec3 acceleration_at(const Mechanism& m, const Body& b, const Vec3& x) {
+PN_INLINE Vec3 velocity_at(const Body& b, const Vec3& x) { return b.v.lin + b.v.ang.cross(x - b.ref); }
+PN_INLINE Vec3 acceleration_at(const Mechanism& m, const Body& b, const Vec3& x) {
     const Vec3 r = x - b.ref;  // Body::a carries minus gravity, also that of the world
     return b.a.lin + m.gravity + b.a.ang.cross(r) + b.v.ang.cross(b.v.lin + b.v.ang.cross(r));
 }

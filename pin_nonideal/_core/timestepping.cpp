@@ -75,7 +75,7 @@ void Simulation::moreau_step(double step) {
         w.a = a_free + response * f;
         w.lam = lam_free + multipliers * f;
         for (int e = 0, at = 0; e < n; ++e) {
-            w.slip_force[e].setZero();
+            w.slip_force[e] = Vec3::Zero();
             for (int k = 0; k < dims[e]; ++k) w.slip_force[e][k] = f[at++];
             w.mode[e] = 1;
         }

@@ -1,4 +1,4 @@
-// Short loops: over the rows of a block, whose number is one of a few, and over the entries that two rows share.
+// Loops over the rows of a block, whose number is one of a few.
 #pragma once
 
 #include <type_traits>
@@ -21,20 +21,6 @@ template <class F>
 inline void with_rows(int value, F&& f) {
     if (value <= tile) with_constant(value, f);
     else f(value);
-}
-
-// Four sums side by side, so that none waits for the one before.
-inline double dot(const double* x, const double* y, int n) {
-    double a = 0.0, b = 0.0, c = 0.0, d = 0.0;
-    int k = 0;
-    for (; k + 3 < n; k += 4) {
-        a += x[k] * y[k];
-        b += x[k + 1] * y[k + 1];
-        c += x[k + 2] * y[k + 2];
-        d += x[k + 3] * y[k + 3];
-    }
-    for (; k < n; ++k) a += x[k] * y[k];
-    return (a + b) + (c + d);
 }
 
 }  // namespace pn
