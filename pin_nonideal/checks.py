@@ -38,6 +38,8 @@ def number(what: str, value: Any) -> float:
     Raises:
         InputError: `value` is no real number, or NaN, or infinite.
     """
+    if type(value) is float and math.isfinite(value):
+        return value
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (Real, np.ndarray)):
         raise InputError(f"{what} must be a number; got {value!r}")
     if isinstance(value, np.ndarray) and (value.ndim != 0 or value.dtype.kind not in "fiu"):
