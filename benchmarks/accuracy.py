@@ -20,6 +20,9 @@ OURS = Package.name
 # A family has met its floor when its last settings, ever finer, do not halve the errors of as many before
 # them.  Errors of order one tell nothing yet, and one lucky setting among the others must not end the search.
 WINDOW, TELLING = 3, 0.1
+# Length of one turn of a race [s]: a run of a millisecond is timed among its like, not in the caches that a
+# long run of another tool has left.
+TURN_SECONDS = 0.02
 
 
 def sweep(problem: Problem, tool: Tool, limit: float, stride: int = 1) -> list[dict[str, Any]]:
@@ -114,7 +117,8 @@ def race(
                 setting = found(tool.settings(problem), row)
                 batches[tool.name] = timing.per_call(tool.prepare(problem, setting))
         slowest = max((row["seconds"] for row in winners.values() if row), default=0.0)
-        times = timing.paired(batches, max(3, min(rounds, int(seconds / max(slowest, 1e-3)))))
+        most = int(seconds / max(slowest, TURN_SECONDS))
+        times = timing.paired(batches, max(3, min(rounds, most)), TURN_SECONDS)
         entry: dict[str, Any] = {"level": level, "tools": {}}
         for name, row in winners.items():
             if row is None:
@@ -165,5 +169,5 @@ def measure(
         "notes": problem.notes,
         "reference": {"how": reference.how, "uncertainty": reference.uncertainty},
         "runs": rows,
-        "levels": race(problem, taking_part, rows, *((5, 0.1) if quick else (15, 2.0))),
+        "levels": race(problem, taking_part, rows, *((5, 0.1) if quick else (15, 3.0))),
     }
