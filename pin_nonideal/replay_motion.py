@@ -11,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from .errors import InputError
+from .placements import joint_placements
 from .replay_geometry import Visual
 
 if TYPE_CHECKING:
@@ -84,12 +85,10 @@ def sample(run: Trajectory, fps: float) -> Motion:
     length = t[np.minimum(before + 1, len(t) - 1)] - t[before]
     part = np.divide(times - t[before], length, out=np.zeros(count), where=length > 0.0)
 
-    data = model.createData()
     poses = np.empty((count, model.njoints, 7))
     for frame in range(count):
         q = _configuration(model, run, int(before[frame]), float(part[frame]))
-        pin.forwardKinematics(model, data, q)
-        poses[frame] = [pin.SE3ToXYZQUAT(placement) for placement in data.oMi]
+        poses[frame] = [pin.SE3ToXYZQUAT(placement) for placement in joint_placements(model, q)]
     # q and -q are one rotation: neighbors in time take the nearer sign, so that they can be blended.
     turned = np.sum(poses[1:, :, 3:] * poses[:-1, :, 3:], axis=2) < 0.0
     poses[1:, :, 3:] *= np.cumprod(np.where(turned, -1.0, 1.0), axis=0)[:, :, None]

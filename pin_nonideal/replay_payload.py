@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from .placements import joint_placements
 from .replay_forces import Arrow, arrows_of, marks_of
 from .replay_geometry import Shape, Visual, sticks, visuals_of
 from .replay_motion import sample, view
@@ -118,11 +119,11 @@ def _shortest(poses: Array) -> Array:
 
 def _skeleton_size(model: pin.Model, q: Array) -> float:
     """Diagonal of the box around all joints and frames at a configuration [m]."""
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, q)
+    joints = joint_placements(model, q)
     points = np.array(
-        [placement.translation for placement in [*data.oMi, *data.oMf]]
-        + [data.oMi[joint].act(model.inertias[joint].lever) for joint in range(1, model.njoints)]
+        [placement.translation for placement in joints]
+        + [joints[frame.parentJoint].act(frame.placement.translation) for frame in model.frames]
+        + [joints[joint].act(model.inertias[joint].lever) for joint in range(1, model.njoints)]
     )
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     return size if size > 1e-6 else 1.0

@@ -115,6 +115,18 @@ def test_equal_shapes_are_stored_once() -> None:
     assert len(header["shapes"]) == 2
 
 
+def test_no_data_of_a_model_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They hold nv^3 numbers: gigabytes for a chain of a thousand joints."""
+    run = four_bar()
+
+    def refused(*_: object) -> None:
+        raise AssertionError("a replay asked for the data of its model")
+
+    monkeypatch.setattr(pin.Model, "createData", refused)
+    monkeypatch.setattr(pin, "Data", refused)
+    assert replay(run).text
+
+
 def test_a_missing_viewer_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     message = "a replay needs the package meshcat, which is missing: pip install meshcat"
