@@ -1,8 +1,8 @@
 """Work and precision: wall time of one run from its start against the error of its end, tool by tool.
 
 First every setting runs once or a few times, which gives its error and a rough time.  Then, for each error
-level, the fastest setting of every tool that reached it runs again, all tools in turn, and the ratios are
-medians over the rounds.
+level, the settings of every tool that reached it and may be its fastest run again, all in turn; the ratios
+are medians over the rounds, between the fastest ones.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ WINDOW, TELLING = 3, 0.1
 # Length of one turn of a race [s]: a run of a millisecond is timed among its like, not in the caches that a
 # long run of another tool has left.
 TURN_SECONDS = 0.02
+# Settings of one tool that race for a level, and how much longer than its fastest they may have taken before.
+ENTRANTS, ROUGH = 3, 1.5
 
 
 def sweep(problem: Problem, tool: Tool, limit: float, stride: int = 1) -> list[dict[str, Any]]:
@@ -97,10 +99,11 @@ def judged(problem: Problem, outcome: Outcome) -> dict[str, Any]:
     return found
 
 
-def fastest(rows: Sequence[dict[str, Any]], tool: str, level: float) -> dict[str, Any] | None:
-    """The fastest setting of a tool that reached a level."""
+def fastest(rows: Sequence[dict[str, Any]], tool: str, level: float) -> list[dict[str, Any]]:
+    """The settings of a tool that reached a level and may be its fastest, by times that are rough."""
     reached = [r for r in rows if r["tool"] == tool and r.get("error") is not None and r["error"] <= level]
-    return min(reached, key=lambda r: r["seconds"], default=None)
+    reached.sort(key=lambda r: r["seconds"])
+    return [r for r in reached[:ENTRANTS] if r["seconds"] < ROUGH * reached[0]["seconds"]]
 
 
 def race(
@@ -109,29 +112,34 @@ def race(
     """For each level, the winners' times measured in turn, fewer than `rounds` times when they take long."""
     results = []
     for level in problem.levels:
-        winners = {tool.name: fastest(rows, tool.name, level) for tool in tools}
+        entrants = {tool.name: fastest(rows, tool.name, level) for tool in tools}
         batches = {}
         for tool in tools:
-            row = winners[tool.name]
-            if row is not None:
+            for k, row in enumerate(entrants[tool.name]):
                 setting = found(tool.settings(problem), row)
-                batches[tool.name] = timing.per_call(tool.prepare(problem, setting))
-        slowest = max((row["seconds"] for row in winners.values() if row), default=0.0)
+                batches[tool.name, k] = timing.per_call(tool.prepare(problem, setting))
+        slowest = max((row["seconds"] for group in entrants.values() for row in group), default=0.0)
         most = int(seconds / max(slowest, TURN_SECONDS))
         times = timing.paired(batches, max(3, min(rounds, most)), TURN_SECONDS)
+        ranks = {
+            tool.name: sorted((times[who].best, who) for who in times if who[0] == tool.name)
+            for tool in tools
+        }
         entry: dict[str, Any] = {"level": level, "tools": {}}
-        for name, row in winners.items():
-            if row is None:
+        for name, group in entrants.items():
+            if not group:
                 reached = [r["error"] for r in rows if r["tool"] == name and r.get("error") is not None]
                 entry["tools"][name] = {"best_error": min(reached, default=None)}
                 continue
+            who = ranks[name][0][1]
+            row, won = group[who[1]], times[who]
             entry["tools"][name] = {
                 "setting": f"{row['family']} {row['setting']}",
                 "error": row["error"],
-                "seconds": times[name].best,
+                "seconds": won.best,
             }
-            if name != OURS and OURS in times:
-                entry["tools"][name]["ratio"] = timing.ratio(times[name], times[OURS])
+            if name != OURS and ranks.get(OURS):
+                entry["tools"][name]["ratio"] = timing.ratio(won, times[ranks[OURS][0][1]])
         results.append(entry)
     return results
 
