@@ -121,27 +121,28 @@ def race(
         slowest = max((row["seconds"] for group in entrants.values() for row in group), default=0.0)
         most = int(seconds / max(slowest, TURN_SECONDS))
         times = timing.paired(batches, max(3, min(rounds, most)), TURN_SECONDS)
-        ranks = {
-            tool.name: sorted((times[who].best, who) for who in times if who[0] == tool.name)
-            for tool in tools
-        }
+        winners = {name: winner(times, name, len(group)) for name, group in entrants.items() if group}
         entry: dict[str, Any] = {"level": level, "tools": {}}
         for name, group in entrants.items():
             if not group:
                 reached = [r["error"] for r in rows if r["tool"] == name and r.get("error") is not None]
                 entry["tools"][name] = {"best_error": min(reached, default=None)}
                 continue
-            who = ranks[name][0][1]
-            row, won = group[who[1]], times[who]
+            row, won = group[winners[name]], times[name, winners[name]]
             entry["tools"][name] = {
                 "setting": f"{row['family']} {row['setting']}",
                 "error": row["error"],
                 "seconds": won.best,
             }
-            if name != OURS and ranks.get(OURS):
-                entry["tools"][name]["ratio"] = timing.ratio(won, times[ranks[OURS][0][1]])
+            if name != OURS and OURS in winners:
+                entry["tools"][name]["ratio"] = timing.ratio(won, times[OURS, winners[OURS]])
         results.append(entry)
     return results
+
+
+def winner(times: dict[tuple[str, int], timing.Times], tool: str, entrants: int) -> int:
+    """Which of a tool's entrants is the fastest, round by round."""
+    return min(range(entrants), key=lambda k: timing.ratio(times[tool, k], times[tool, 0]))
 
 
 def found(settings: list[Setting], row: dict[str, Any]) -> Setting:
