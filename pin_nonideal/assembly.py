@@ -6,6 +6,7 @@ Every joint that the table names is looked up here; the Scene looks up the frame
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -262,7 +263,7 @@ def _with_unit_quaternions(model: Any, q: NDArray[np.float64], where: str) -> ND
         LoadingError: one is far from unit length.
     """
     for joint, part in unit_parts(model):
-        length = float(np.linalg.norm(q[part]))
+        length = math.hypot(*q[part])
         if abs(length - 1.0) > UNIT_TOLERANCE:
             what = "quaternion [x, y, z, w]" if part.stop - part.start == 4 else "cosine and sine"
             raise LoadingError(f'{where}: {what} of joint "{joint}" must have length 1; got {length:g}')

@@ -1,7 +1,8 @@
-"""Configurations at the door: quaternions and (cos, sin) pairs must have unit length, or nearly so."""
+"""Configurations at the door: unit lengths restored, and coordinates too large to move refused."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -14,6 +15,10 @@ from .errors import InputError
 
 # Lengths off by less than this are rounding of a file or a printout and are restored; more is an error.
 UNIT_TOLERANCE = 1e-6
+
+# Coarsest spacing of floating-point numbers about a coordinate of an initial state [m or rad]: a joint that
+# its own steps cannot move stands still whatever drives it.
+COARSEST_SPACING = 1e-3
 
 # Joints whose configuration ends in the cosine and sine of an angle, by the beginnings of their names.
 CIRCLES = ("JointModelRUB", "JointModelRevoluteUnbounded", "JointModelPlanar")
@@ -59,10 +64,33 @@ def configuration(
     if not parts:
         return result
     for joint, part in parts:
-        length = float(np.linalg.norm(result[part]))
+        length = math.hypot(*result[part])
         if abs(length - 1.0) > UNIT_TOLERANCE:
             kind = "quaternion" if part.stop - part.start == 4 else "(cos, sin) pair"
             raise InputError(
                 f'{what}: the {kind} of joint "{joint}" must have length 1; got {length:g}; normalize it'
             )
     return np.asarray(pin.normalize(model, result))
+
+
+def require_resolved(model: Any, q: NDArray[np.float64]) -> None:
+    """Refuses initial states in which a joint cannot move by less than `COARSEST_SPACING`.
+
+    Args:
+        model: pinocchio.Model.
+        q: configuration, or several, (..., nq).
+
+    Raises:
+        InputError: a coordinate is too large; names its joint.
+    """
+    farthest = np.abs(q).max(initial=0.0)
+    spacing = np.spacing(farthest)
+    if spacing <= COARSEST_SPACING:
+        return
+    k = int(np.argmax(np.abs(q))) % model.nq
+    joint = next(i for i, j in enumerate(model.joints) if i and j.idx_q <= k < j.idx_q + j.nq)
+    raise InputError(
+        f'q: joint "{model.names[joint]}" must start where floating-point numbers are at most '
+        f"{COARSEST_SPACING:g} (m or rad) apart; at {farthest:g} they are {spacing:.2g} apart; "
+        "leave out whole turns, or move the origin"
+    )

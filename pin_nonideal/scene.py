@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .actuation import Actuation
 from .checks import array, number, optional_text, sequence
-from .configurations import configuration, unit_parts
+from .configurations import configuration, require_resolved, unit_parts
 from .consistency import Rows, nearest_state, nearest_states, nonholonomic_rows
 from .contacts import Contact
 from .equation import Solution
@@ -173,15 +173,18 @@ class Scene:
 
         Raises:
             LoopClosureError: the constraints cannot be met from here; `gaps` names each gap.
-            InputError: wrong shapes or numbers.
+            InputError: wrong shapes or numbers, or a coordinate where floating-point numbers are more than
+                a millimetre or milliradian apart.
         """
-        if q is None and v is None and t == 0.0:
+        time = number("t", t)
+        if q is None and v is None and time == 0.0:
             return self.initial_state()
         q_in = self.q0 if q is None else self._configuration(q, "q")
         v_in = self.v0 if v is None else self._velocity(v, "v")
-        return self._project(q_in, v_in, number("t", t))
+        return self._project(q_in, v_in, time)
 
     def _project(self, q: Array, v: Array, t: float) -> tuple[Array, Array]:
+        require_resolved(self.model, q)
         try:
             return nearest_state(self.model, self._lowered, self._nonholonomic(), q, v, t)
         except core.CoreFailure as failure:
@@ -201,10 +204,11 @@ class Scene:
 
         Raises:
             LoopClosureError: the constraints cannot be met from one of them.
-            InputError: a quaternion or (cos, sin) pair is not of unit length.
+            InputError: a quaternion or (cos, sin) pair is not of unit length, or a coordinate is too large.
         """
         if self._unit_parts:
             q = np.array([self._configuration(one, "q") for one in q]).reshape(q.shape)
+        require_resolved(self.model, q)
         try:
             return nearest_states(self.model, self._lowered, self._nonholonomic(), q, v, t, threads)
         except core.CoreFailure as failure:

@@ -60,10 +60,12 @@ class Sinusoid:
             object.__setattr__(self, key, number(f"Sinusoid: {key}", getattr(self, key)))
 
     def __call__(self, t: float) -> Sample:
-        """(value, rate, acceleration) at time t [s]."""
+        """(value, rate, acceleration) at time t [s]; no numbers where the angle leaves their range."""
         w = self.frequency
-        s = self.amplitude * math.sin(w * t + self.phase)
-        c = self.amplitude * math.cos(w * t + self.phase)
+        angle = w * t + self.phase
+        if not math.isfinite(angle):
+            return (math.nan, math.nan, math.nan)
+        s, c = self.amplitude * math.sin(angle), self.amplitude * math.cos(angle)
         return (self.offset + s, w * c, -w * w * s)
 
 

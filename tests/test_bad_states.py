@@ -18,6 +18,7 @@ from .refusals import refuses
         (scaled(2, 4, 1.1), 'the quaternion of joint "j2" must have length 1; got 1.1; normalize it'),
         (scaled(6, 2, 0.9), 'the (cos, sin) pair of joint "j3" must have length 1; got 0.9; normalize it'),
         (scaled(11, 4, 0.0), 'the quaternion of joint "j4" must have length 1; got 0; normalize it'),
+        (scaled(11, 4, 1e300), 'the quaternion of joint "j4" must have length 1; got 1e+300; normalize it'),
     ],
 )
 def test_configurations_far_from_unit_length(q, what):
@@ -27,6 +28,30 @@ def test_configurations_far_from_unit_length(q, what):
             call(q, V)
     with refuses(f"q0: {what}", InputError):
         pn.Scene(MODEL, q0=q)
+
+
+def test_times_that_are_none_are_refused_for_the_initial_state_as_well():
+    with refuses("t must be one number; got an array of shape (0,)", InputError):
+        pn.Scene(MODEL).project(t=np.array([]))
+
+
+def test_coordinates_that_cannot_move_are_refused_where_motion_is_asked_for():
+    scene, q = pn.Scene(MODEL), with_entry(Q, 0, 1e16)
+    message = (
+        f'q: joint "{MODEL.names[1]}" must start where floating-point numbers are at most 0.001 (m or rad) '
+        "apart; at 1e+16 they are 2 apart; leave out whole turns, or move the origin"
+    )
+    calls = (
+        lambda: scene.project(q, V),
+        lambda: pn.simulate(scene, 0.1, q, V),
+        lambda: pn.rollout(scene, q[None], V[None], 0.1),
+        lambda: pn.Scene(MODEL, q0=q).initial_state(),
+    )
+    for call in calls:
+        with refuses(message, InputError):
+            call()
+    assert np.isfinite(scene.acceleration(q, V)).all()
+    scene.project(with_entry(Q, 0, 1e12), V)
 
 
 def test_configurations_close_to_unit_length_are_normalized():

@@ -40,6 +40,10 @@ def test_sinusoid_is_offset_plus_amplitude_times_sine():
     assert sinusoid(2.0, 3.0, 0.5, 1.0)(0.25)[0] == pytest.approx(1.0 + 2.0 * math.sin(1.25), rel=1e-15)
 
 
+def test_sinusoid_beyond_the_range_of_angles_is_no_number():
+    assert np.isnan(sinusoid(2.0, 1e300)(1e300)).all()
+
+
 def test_polynomial_runs_from_low_power_to_high():
     assert polynomial([1, 2, 3, 4])(2.0) == (49.0, 62.0, 54.0)
 

@@ -13,6 +13,9 @@ namespace pn {
 
 // Part of its limit to which the force of a sticking element is resolved over a step.
 constexpr double watch_tolerance = 1e-4;
+// Rounding in one velocity, as a part of the largest: a joint that constraints drive slowly beside fast ones has no
+// digits below it, and no step is short enough to find some.
+constexpr double velocity_rounding = 64 * 2.2e-16;
 // A load that jumps keeps its error in steps however short; shorter ones than this pass over it [s].
 constexpr double shortest_watch = 1e-9;
 
@@ -161,6 +164,14 @@ void Stepper::magnitude(const VecX& y, VecX& out) const {
     for (int k = 0; k < nv + system.nz; ++k) out[nv + k] = std::max(out[nv + k], std::abs(y[nq + k]));
 }
 
+// Turns magnitudes into the errors that a step may make.
+void Stepper::allow(double rtol, const VecX& atol) {
+    const double rounding = velocity_rounding * scale_.segment(system.nv, system.nv).maxCoeff();
+    scale_ = atol + rtol * scale_;
+    auto velocities = scale_.segment(system.nv, system.nv);
+    velocities = velocities.cwiseMax(rounding);
+}
+
 double Stepper::norm(const VecX& dy, const VecX& scale, const VecX& y) {
     const int nq = system.nq, nv = system.nv;
     int n = 2 * nv + system.nz;
@@ -202,7 +213,7 @@ double Stepper::error_norm(double rtol, const VecX& atol) {
     scale_.setZero();
     magnitude(y0, scale_);
     magnitude(y1, scale_);
-    scale_ = atol + rtol * scale_;
+    allow(rtol, atol);
     watch_scale_ = watch_tolerance * std::max(std::abs(h), shortest_watch);
     error5.setZero();
     if (method.kind == Method::Kind::dopri5) {
@@ -273,7 +284,7 @@ void Stepper::interpolate(double s, VecX& y) const {
 double Stepper::initial_step(double t, const VecX& y, double rtol, const VecX& atol, double limit) {
     scale_.setZero();
     magnitude(y, scale_);
-    scale_ = atol + rtol * scale_;
+    allow(rtol, atol);
     watch_scale_ = watch_tolerance;
     VecX plain = y;
     for (const Chart& c : system.p.mechanism.charts)

@@ -68,6 +68,7 @@ struct Stepper {
 private:
     // Largest size so far of each tangent coordinate, velocity and state.
     void magnitude(const VecX& y, VecX& out) const;
+    void allow(double rtol, const VecX& atol);
     void remove_normal_part(int start);
     double norm(const VecX& dy, const VecX& scale, const VecX& y);
     VecX scale_, probe_, probe_rate_;

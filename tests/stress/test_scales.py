@@ -43,6 +43,17 @@ def test_a_light_pendulum_on_a_heavy_one_moves_as_on_a_wall(ratio):
     at_most("difference [rad]", gap, 20.0 / ratio + 1e-10)
 
 
+@pytest.mark.parametrize("speed", [1e8, 1e12, 1e16])
+def test_a_joint_driven_slowly_beside_fast_ones_asks_for_no_more_steps(speed):
+    """Its velocity is known to the rounding of the others, far above its own tolerance."""
+    scene = pn.load("five_bar")
+    one = np.ones(scene.model.nv)
+    slow, fast = (pn.simulate(scene, 0.5 / s, v=s * one) for s in (1e7, speed))
+    np.testing.assert_allclose(fast.q[-1], slow.q[-1], atol=1e-5)  # drag takes a part of 1e-6 of the slow one
+    print(f"{fast.stats.steps} steps, {slow.stats.steps} at 1e7 rad/s")
+    assert fast.stats.steps <= slow.stats.steps + 2
+
+
 def windows(lengths):
     """Four-bars of several sizes in one scene."""
     model, constraints = empty(), []
