@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .errors import InputError, OutputError
 from .files import file_path, whole_file
-from .replay_signals import MODES, Plot, check_scene, mode_bands, plots_of
+from .replay_signals import MODES, Plot, check_scene, mode_bands, plots_of, wanted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,7 +47,7 @@ def plot(
         The matplotlib figure, to be changed, shown or saved.
 
     Raises:
-        InputError: something asked for was not recorded, or `what` is empty.
+        InputError: something asked for was not recorded, or `what` is empty or no list of plots.
         UnknownNameError: a name in `what` is none of the above.
         OutputError: the file cannot be written, or matplotlib has no such format.
     """
@@ -60,14 +60,13 @@ def plot(
             *(["violation"] if run.scene.constraint_slices else []),
             *(["modes"] if run.modes is not None else []),
         ]
-    if isinstance(what, str):
-        what = [what]
-    if not what:
+    items = wanted("plot: what", what)
+    if not items:
         raise InputError("plot: what must name at least one plot; got none")
-    if "modes" in what and run.modes is None:
+    if "modes" in items and run.modes is None:
         raise InputError('plot "modes" needs an element that sticks or slips, and this scene has none')
     plots: list[Plot | None] = []
-    for item in what:
+    for item in items:
         plots += [None] if item == "modes" else plots_of(run, [item])
 
     heights = [0.4 + 0.22 * len(run.element_names) if item is None else HEIGHT for item in plots]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from .checks import sequence
 from .errors import InputError, UnknownNameError, nearest
 from .replay_geometry import joint_axis
 
@@ -135,6 +136,28 @@ def velocities(model: pin.Model, v: Array, per: str = "/s") -> list[Coordinate]:
     return found
 
 
+def wanted(what: str, chosen: Any) -> list[Any]:
+    """Plots asked for, as a list of names and of pairs of a title and curves by label.
+
+    Args:
+        what: words for messages.
+        chosen: one name, or a list.
+
+    Raises:
+        InputError: something else.
+    """
+    items = [chosen] if isinstance(chosen, str) else list(sequence(what, chosen))
+    for item in items:
+        pair = isinstance(item, (list, tuple)) and len(item) == 2
+        if not (
+            isinstance(item, str) or (pair and isinstance(item[0], str) and isinstance(item[1], Mapping))
+        ):
+            raise InputError(
+                f"{what} must hold names, and pairs of a title and curves by label; got {item!r}"
+            )
+    return items
+
+
 def plots_of(run: Trajectory, chosen: Chosen | None) -> list[Plot]:
     """Plots by name.
 
@@ -146,12 +169,13 @@ def plots_of(run: Trajectory, chosen: Chosen | None) -> list[Plot]:
 
     Raises:
         UnknownNameError: no plot and no joint has that name.
-        InputError: the run did not record what a plot shows, or a curve has a wrong length.
+        InputError: the run did not record what a plot shows, a curve has a wrong length, or `chosen` is
+            something else.
     """
     if chosen is None:
         chosen = [name for name in ("energy", "violation", "reactions", "q") if _recorded(run, name)]
     plots: list[Plot] = []
-    for item in [chosen] if isinstance(chosen, str) else chosen:
+    for item in wanted("plots", chosen):
         plots += _plot(run, item) if isinstance(item, str) else [_given(run, *item)]
     return plots
 
@@ -204,12 +228,16 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
 def _given(run: Trajectory, title: str, curves: Mapping[str, Array]) -> Plot:
     """A plot of the user's own curves."""
     what, _, unit = title.partition("[")
-    values = {str(label): np.asarray(curve, dtype=np.float64) for label, curve in curves.items()}
-    for label, curve in values.items():
-        if curve.shape != (len(run.t),):
+    values = {}
+    for label, curve in curves.items():
+        where = f'curve "{label}" of plot "{title}"'
+        try:
+            values[str(label)] = given = np.asarray(curve, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            raise InputError(f"{where} must hold numbers; got {curve!r}") from None
+        if given.shape != (len(run.t),):
             raise InputError(
-                f'curve "{label}" of plot "{title}" must have shape ({len(run.t)},), one value a sample; '
-                f"got {curve.shape}"
+                f"{where} must have shape ({len(run.t)},), one value a sample; got {given.shape}"
             )
     return Plot(what.strip(), unit.strip(" ]"), np.asarray(run.t), values)
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from .checks import function, sequence
+from .checks import count, function, sequence
 from .errors import InputError
 from .scene import Scene
 from .simulation import simulate
 from .trajectory import Trajectory
+
+MOST_JOBS = 100_000  # counted down from all processors as well
 
 
 def sweep(
@@ -29,14 +31,14 @@ def sweep(
         make: builds a scene from one entry of `parameters`; for processes it must be a function of a module.
         parameters: keyword arguments, one mapping a run.
         duration: length of time [s].
-        jobs: number of parallel jobs; joblib's choice when None, all processors when -1.
+        jobs: number of parallel jobs; joblib's choice when None, all processors when -1, all but one when -2.
         options: passed to `simulate`.
 
     Returns:
         One Trajectory a run, in order; `scene` is None when it came from another process.
 
     Raises:
-        InputError: `make` cannot be called, or `parameters` holds no mappings.
+        InputError: `make` cannot be called, `parameters` holds no mappings, or `jobs` is no number of jobs.
         RunError: a run stopped early.
     """
     from joblib import Parallel, delayed
@@ -46,6 +48,8 @@ def sweep(
     for entry in table:
         if not isinstance(entry, Mapping):
             raise InputError(f"sweep: parameters must hold mappings of keyword arguments; got {entry!r}")
+    if jobs is not None and count("sweep: jobs", jobs, least=-MOST_JOBS) == 0:
+        raise InputError("sweep: jobs must not be zero; leave it out for joblib's choice")
     if options.get("checkpoint") is not None:
         raise InputError("sweep: checkpoint is the file of one run; its runs would overwrite one another's")
     options.setdefault("progress", False)

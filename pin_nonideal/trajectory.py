@@ -7,6 +7,7 @@ import os
 import tokenize
 import zipfile
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ FORMAT = 1
 UNREADABLE: tuple[type[Exception], ...] = (OSError, ValueError, LookupError, TypeError, AttributeError)
 UNREADABLE += (EOFError, RuntimeError, tokenize.TokenError, zipfile.BadZipFile, zlib.error)
 REQUIRED = ("t", "q", "v", "violation", "violation_rate")
+LEDGER = ("kinetic", "potential", "total", "balance")  # columns of every ledger of energy
 OPTIONAL = ("a", "F_ideal", "F_nonideal", "lam", "lam_ideal", "z", "modes")
 
 
@@ -225,6 +227,7 @@ class Trajectory:
             fields: dict[str, Any] = {key: arrays.get(key) for key in (*REQUIRED, *OPTIONAL)}
             for group in ("energy", "power"):
                 if header[group] is not None:
+                    _check_columns(group, header[group], source)
                     fields[group] = {name: arrays[f"{group}/{i}"] for i, name in enumerate(header[group])}
             events = [Event(float(t), str(kind), str(element)) for t, kind, element in header["events"]]
             return cls(
@@ -241,6 +244,17 @@ class Trajectory:
                 f'cannot read a trajectory from "{source}": {type(error).__name__}: {error}; '
                 "it must be an .npz file written by Trajectory.save"
             ) from error
+
+
+def _check_columns(group: str, names: Sequence[str], source: Path) -> None:
+    """Raises unless the ledger has the columns that every ledger has.
+
+    Raises:
+        LoadingError: one is missing.
+    """
+    missing = [name for name in LEDGER if name not in names] if group == "energy" else []
+    if missing:
+        raise LoadingError(f'"{source}" is no trajectory: its energy has no {", ".join(missing)}')
 
 
 def _check_arrays(arrays: dict[str, Any], source: Path) -> None:

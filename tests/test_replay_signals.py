@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import pin_nonideal as pn
 from pin_nonideal.errors import InputError, UnknownNameError
 from pin_nonideal.replay_signals import (
     INTERVALS,
@@ -61,6 +62,19 @@ def test_curves_of_ones_own_carry_title_and_unit() -> None:
     (plot,) = plots_of(run, [("Tip height [mm]", {"tip": 2.0 * run.t})])
     assert (plot.title, plot.unit) == ("Tip height", "mm")
     np.testing.assert_array_equal(plot.curves["tip"], 2.0 * run.t)
+
+
+@pytest.mark.parametrize("chosen", [3, object, [None], [("Tip", [1.0])], [("Tip [m]", {}, {})], [(0, {})]])
+def test_what_is_no_list_of_plots_is_refused(chosen) -> None:
+    run = four_bar()
+    for what, call in (("plots", plots_of), ("plot: what", lambda run, x: pn.plot(run, what=x))):
+        with pytest.raises(InputError, match=f"^{what} must (be a list|hold names, and pairs of a title)"):
+            call(run, chosen)
+
+
+def test_curves_of_no_numbers_are_refused() -> None:
+    with pytest.raises(InputError, match=r"curve \"tip\" of plot \"Tip\" must hold numbers; got \['a'\]"):
+        plots_of(four_bar(), [("Tip", {"tip": ["a"]})])
 
 
 def test_what_cannot_be_plotted_is_refused() -> None:

@@ -33,6 +33,11 @@ def test_parameters_must_be_mappings():
         pn.sweep(ladder, [3], 0.1)
     with pytest.raises(pn.InputError, match="sweep: parameters must be a list; got None"):
         pn.sweep(ladder, None, 0.1)
+    with pytest.raises(pn.InputError, match="sweep: jobs must not be zero"):
+        pn.sweep(ladder, [], 0.1, jobs=0)
+    for jobs in (False, 2.0, float("nan"), "all"):
+        with pytest.raises(pn.InputError, match="sweep: jobs must be an integer"):
+            pn.sweep(ladder, [], 0.1, jobs=jobs)
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

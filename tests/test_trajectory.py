@@ -239,6 +239,7 @@ def rewrite(path, **changes):
         ({"v": np.zeros((2, 3))}, "v must have 7 rows as t has; got shape (2, 3)"),
         ({"t": np.zeros((7, 2))}, "t must be one column; got shape (7, 2)"),
         ({"lam": np.array(["a"] * 7)}, "lam must hold numbers; got str"),
+        ({"header": {"energy": ["kinetic", "total"]}}, "its energy has no potential, balance"),
     ],
 )
 def test_a_file_that_is_no_trajectory_of_this_version(run, tmp_path, changes, message):
