@@ -21,8 +21,8 @@ static void fields(Archive& a, Body& x) {
 }
 
 static void fields(Archive& a, Terms& x) {
-    // What Pinocchio evaluates for foreign joints is evaluated anew each time.
-    auto& [body, J, Ag, nle, L, M, D, inv_sqrt_D, locked, q, foreign, foreign_motion, rest] = x;
+    // Cosines and sines, and what Pinocchio evaluates for foreign joints, are evaluated anew each time.
+    auto& [body, turn, J, Ag, nle, L, M, D, inv_sqrt_D, locked, q, foreign, foreign_motion, rest] = x;
     a(body, J, Ag, nle, L, M, D, inv_sqrt_D, locked, q);
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "angles.hpp"
+
 namespace pn {
 
 namespace {
@@ -38,7 +40,8 @@ PN_INLINE Motion relative_velocity(const Joint& j, const std::vector<Motion>& J,
 }
 
 // Placement of the joint's moving frame; fills R, p and the reference of body b.
-PN_INLINE void place(const Joint& j, const Body& parent, const VecX& q, Body& b, const JointMotion& foreign) {
+PN_INLINE void place(const Joint& j, const Body& parent, const VecX& q, const Turn& turned, Body& b,
+                     const JointMotion& foreign) {
     const bool is_root = j.parent == 0;
     Mat3 R0;
     Vec3 p0;
@@ -53,8 +56,7 @@ PN_INLINE void place(const Joint& j, const Body& parent, const VecX& q, Body& b,
     switch (j.kind) {
         case JointKind::revolute:
         case JointKind::helical: {
-            const double c = j.unbounded ? x[0] : std::cos(x[0]), s = j.unbounded ? x[1] : std::sin(x[0]);
-            turn(j, R0, c, s, b.R);
+            turn(j, R0, j.unbounded ? x[0] : turned.c, j.unbounded ? x[1] : turned.s, b.R);
             b.p = p0;
             if (j.kind == JointKind::helical) {
                 const double angle = j.unbounded ? std::atan2(x[1], x[0]) : x[0];
@@ -147,6 +149,7 @@ PN_INLINE void columns(const Joint& j, const Body& b, const JointMotion& foreign
 
 void Terms::allocate(const Mechanism& m) {
     body.assign(m.joints.size(), Body{});
+    turn.assign(m.joints.size(), Turn{});
     body[0].a = {-m.gravity, Vec3::Zero()};
     J.assign(m.nv, Motion{Vec3::Zero(), Vec3::Zero()});
     Ag.assign(m.nv, Force{Vec3::Zero(), Vec3::Zero()});
@@ -165,19 +168,37 @@ void Terms::allocate(const Mechanism& m) {
 static PN_INLINE void place_body(const Mechanism& m, Terms& w, int i) {
     const Joint& j = m.joints[i];
     if (j.kind == JointKind::other) w.foreign->evaluate(i, w.q, w.rest, w.foreign_motion);
-    place(j, w.body[j.parent], w.q, w.body[i], w.foreign_motion);
+    place(j, w.body[j.parent], w.q, w.turn[i], w.body[i], w.foreign_motion);
     if (j.recenters) recenter(m, i, w);
+}
+
+// Cosines and sines of the angles among the joints listed, by fours.
+static PN_INLINE void turn_joints(const Mechanism& m, Terms& w, const std::vector<int>& joints) {
+    const int n = static_cast<int>(joints.size());
+    for (int k = 0; k < n;) {
+        int four[4], found = 0;
+        for (; k < n && found < 4; ++k)
+            if (m.joints[joints[k]].has_angle) four[found++] = joints[k];
+        if (found == 0) return;
+        for (; found < 4; ++found) four[found] = four[0];
+        Lanes angles, c, s;
+        for (int i = 0; i < 4; ++i) angles[i] = w.q[m.joints[four[i]].iq];
+        cosines_and_sines(angles, c, s);
+        for (int i = 0; i < 4; ++i) w.turn[four[i]] = {c[i], s[i]};
+    }
 }
 
 PN_WIDE void place_bodies(const Mechanism& m, Terms& w, const VecX& q, const std::vector<int>& joints) {
     w.q = q;
     normalize(m, w.q.data());
+    turn_joints(m, w, joints);
     for (int i : joints) place_body(m, w, i);
 }
 
 PN_WIDE void place_bodies(const Mechanism& m, Terms& w, const VecX& q) {
     w.q = q;
     normalize(m, w.q.data());
+    turn_joints(m, w, m.angled);
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
         place_body(m, w, i);

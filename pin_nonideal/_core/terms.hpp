@@ -21,8 +21,13 @@ struct Body {
     Inertia own, Y;                        // of the body; of the subtree
 };
 
+struct Turn {
+    double c = 1.0, s = 0.0;
+};
+
 struct Terms {
     std::vector<Body> body;
+    std::vector<Turn> turn;  // cosine and sine of each joint with one bounded angle
     std::vector<Motion> J;  // motion per unit velocity of each dof
     std::vector<Force> Ag;  // subtree momentum per unit velocity of each dof
     VecX nle;               // bias generalized force: Coriolis, centrifugal, gravity
