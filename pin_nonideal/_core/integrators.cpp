@@ -91,41 +91,59 @@ void powers(const Program& p, Workspace& w, const VecX& v, double* out) {
 }
 
 // out = y + h (a_0 K_0 + ... + a_{n-1} K_{n-1})
-PN_WIDE static void combine(const VecX& y, double h, const double* a, int n, const std::vector<VecX>& K, VecX& out) {
-    constexpr int most_stages = 16;
+PN_WIDE static void combine(const VecX& y, double h, const Combination& sum, VecX& out) {
     double part[most_stages];
-    const double* rate[most_stages];
-    int terms = 0;
-    for (int j = 0; j < n; ++j) {
-        if (a[j] == 0.0) continue;
-        part[terms] = h * a[j];
-        rate[terms++] = K[j].data();
-    }
+    for (int j = 0; j < sum.terms; ++j) part[j] = h * sum.weight[j];
     const int size = static_cast<int>(y.size());
     int i = 0;
     for (; i + 3 < size; i += 4) {
         Lanes x, k;
         load(y.data() + i, x);
-        for (int j = 0; j < terms; ++j) {
-            load(rate[j] + i, k);
+        for (int j = 0; j < sum.terms; ++j) {
+            load(sum.rate[j] + i, k);
             x += part[j] * k;
         }
         store(x, out.data() + i);
     }
-    for (; i < size; ++i) {
+    if (i + 1 < size) {
+        Pair x, k;
+        load(y.data() + i, x);
+        for (int j = 0; j < sum.terms; ++j) {
+            load(sum.rate[j] + i, k);
+            x += part[j] * k;
+        }
+        store(x, out.data() + i);
+        i += 2;
+    }
+    if (i < size) {
         double x = y[i];
-        for (int j = 0; j < terms; ++j) x += part[j] * rate[j][i];
+        for (int j = 0; j < sum.terms; ++j) x += part[j] * sum.rate[j][i];
         out[i] = x;
     }
 }
 
+Combination::Combination(const double* weights, int n, const std::vector<VecX>& K) {
+    for (int j = 0; j < n; ++j) {
+        if (weights[j] == 0.0) continue;
+        weight[terms] = weights[j];
+        rate[terms++] = K[j].data();
+    }
+}
+
 Stepper::Stepper(const Method& m, System& s) : method(m), system(s) {
-    const int stages = m.kind == Method::Kind::dop853 ? 16 : std::max(m.stages, 1);
+    const int stages = m.kind == Method::Kind::dop853 ? most_stages : std::max(m.stages, 1);
     K.assign(stages, VecX::Zero(s.ny));
     for (VecX* x : {&y0, &y1, &stage, &error5, &error3, &f1, &probe_, &probe_rate_}) *x = VecX::Zero(s.ny);
     tangent = VecX::Zero(2 * s.nv + s.nz);
     scale_ = tangent;
     dense.assign(m.kind == Method::Kind::dop853 ? 7 : 4, VecX::Zero(s.ny));
+    if (!m.A) return;
+    const double* a = m.A;
+    for (int i = 1; i < m.stages; a += i++) to_stage_.emplace_back(a, i, K);
+    to_end_ = Combination(m.B, m.stages, K);
+    if (m.kind != Method::Kind::dop853) return;
+    to_error5_ = Combination(tableau::dop853_E5, m.stages, K);
+    to_error3_ = Combination(tableau::dop853_E3, m.stages, K);
 }
 
 void Stepper::step(double t, double size) {
@@ -141,12 +159,11 @@ void Stepper::step(double t, double size) {
         retract(system.p.mechanism, y0.data(), system.v_buffer.data(), y1.data());
         return;
     }
-    const double* a = method.A;
-    for (int i = 1; i < method.stages; a += i++) {
-        combine(y0, h, a, i, K, stage);
+    for (int i = 1; i < method.stages; ++i) {
+        combine(y0, h, to_stage_[i - 1], stage);
         system.derivative(t + method.C[i] * h, stage, K[i]);
     }
-    combine(y0, h, method.B, method.stages, K, y1);
+    combine(y0, h, to_end_, y1);
     normalize(system.p.mechanism, y1.data());
 }
 
@@ -222,8 +239,8 @@ double Stepper::error_norm(double rtol, const VecX& atol) {
         return norm(error5, scale_, y0);
     }
     error3.setZero();
-    combine(error5, 1.0, tableau::dop853_E5, 12, K, error5);
-    combine(error3, 1.0, tableau::dop853_E3, 12, K, error3);
+    combine(error5, 1.0, to_error5_, error5);
+    combine(error3, 1.0, to_error3_, error3);
     const double e5 = norm(error5, scale_, y0), e3 = norm(error3, scale_, y0);
     if (e5 == 0.0 && e3 == 0.0) return 0.0;
     return std::abs(h) * e5 * e5 / std::sqrt(e5 * e5 + 0.01 * e3 * e3);
@@ -237,7 +254,7 @@ void Stepper::make_dense() {
         const double* a = tableau::dop853_A_dense;
         K[12] = f1;
         for (int i = 0; i < 3; a += 13 + i++) {
-            combine(y0, h, a, 13 + i, K, stage);
+            combine(y0, h, Combination(a, 13 + i, K), stage);
             system.derivative(t0 + tableau::dop853_C_dense[i] * h, stage, K[13 + i]);
         }
         dense[0] = delta;
@@ -245,7 +262,7 @@ void Stepper::make_dense() {
         dense[2] = 2.0 * delta - h * (f1 + K[0]);
         for (int i = 0; i < 4; ++i) {
             dense[3 + i].setZero();
-            combine(dense[3 + i], h, tableau::dop853_D + 16 * i, 16, K, dense[3 + i]);
+            combine(dense[3 + i], h, Combination(tableau::dop853_D + 16 * i, 16, K), dense[3 + i]);
         }
         return;
     }

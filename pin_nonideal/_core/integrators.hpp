@@ -45,6 +45,17 @@ struct System {
 // Power of actuation, given forces, constraints, and each law, at the evaluation in the workspace.
 void powers(const Program& p, Workspace& w, const VecX& v, double* out);
 
+constexpr int most_stages = 16;
+
+// A weighted sum of stage derivatives: those whose weight is not zero.
+struct Combination {
+    int terms = 0;
+    double weight[most_stages];
+    const double* rate[most_stages];
+    Combination() {}
+    Combination(const double* weights, int n, const std::vector<VecX>& K);
+};
+
 struct Stepper {
     Method method;
     System& system;
@@ -71,6 +82,8 @@ private:
     void allow(double rtol, const VecX& atol);
     void remove_normal_part(int start);
     double norm(const VecX& dy, const VecX& scale, const VecX& y);
+    std::vector<Combination> to_stage_;
+    Combination to_end_, to_error5_, to_error3_;
     VecX scale_, probe_, probe_rate_;
     double watch_scale_ = 1.0;
 };

@@ -17,8 +17,12 @@ namespace pn {
 
 using Lanes = double __attribute__((vector_size(32)));
 
-PN_INLINE void load(const double* from, Lanes& x) { std::memcpy(&x, from, sizeof x); }
-PN_INLINE void store(const Lanes& x, double* to) { std::memcpy(to, &x, sizeof x); }
+using Pair = double __attribute__((vector_size(16)));
+
+template <class Several>
+PN_INLINE void load(const double* from, Several& x) { std::memcpy(&x, from, sizeof x); }
+template <class Several>
+PN_INLINE void store(const Several& x, double* to) { std::memcpy(to, &x, sizeof x); }
 
 PN_INLINE double sum(const Lanes& x) { return (x[0] + x[2]) + (x[1] + x[3]); }
 

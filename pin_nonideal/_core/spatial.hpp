@@ -59,10 +59,9 @@ PN_INLINE Vec3 turned_round(const Vec3& a) {
     return Vec3(__builtin_shufflevector(a.x, a.x, 1, 2, 0, 3));
 #else
     // By halves: registers of two numbers shuffle these, and where there are four GCC sees one permutation.
-    using Half = double __attribute__((vector_size(16)));
     using Indices = long long __attribute__((vector_size(16)));
-    const Half low = {a.x[0], a.x[1]}, high = {a.x[2], a.x[3]};
-    const Half yz = __builtin_shuffle(low, high, Indices{1, 2}), x0 = __builtin_shuffle(low, high, Indices{0, 3});
+    const Pair low = {a.x[0], a.x[1]}, high = {a.x[2], a.x[3]};
+    const Pair yz = __builtin_shuffle(low, high, Indices{1, 2}), x0 = __builtin_shuffle(low, high, Indices{0, 3});
     return Vec3(Lanes{yz[0], yz[1], x0[0], x0[1]});
 #endif
 }

@@ -338,7 +338,7 @@ void solve_R(const Mechanism& m, const Terms& w, VecX& x) {
 }
 
 // Row k of R^-T x, once those of its ancestors are there.
-static void solve_Rt_row(const Mechanism& m, const Terms& w, int k, VecX& x) {
+static inline void solve_Rt_row(const Mechanism& m, const Terms& w, int k, VecX& x) {
     const double* row = w.L.data() + m.row_offset[k];
     const int* up = m.ancestors.data() + m.row_offset[k];
     double even = x[k] * w.inv_sqrt_D[k], odd = 0.0;
