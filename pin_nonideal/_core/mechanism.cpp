@@ -36,7 +36,7 @@ struct PinocchioJoints final : ForeignJoints {
 
 int unit_axis(const Vec3& a) {
     for (int k = 0; k < 3; ++k)
-        if (a[k] == 1.0) return k;
+        if (std::abs(a[k]) == 1.0) return k;
     return -1;
 }
 
@@ -64,6 +64,7 @@ void classify(const Model::JointModel& joint, const JointData& data, Joint& out)
         out.pitch = lin.dot(ang);
     }
     out.axis_index = unit_axis(out.axis);
+    if (out.axis_index >= 0) out.axis_sign = out.axis[out.axis_index];
 }
 
 bool slides(const Joint& j) { return j.kind == JointKind::prismatic || j.kind == JointKind::translation; }

@@ -19,13 +19,14 @@ PN_INLINE void turn(const Joint& j, const Mat3& R0, double c, double s, Mat3& R)
         return;
     }
     const int k = j.axis_index, a = (k + 1) % 3, b = (k + 2) % 3;
+    s *= j.axis_sign;
     R.col(k) = R0.col(k);
     R.col(a) = c * R0.col(a) + s * R0.col(b);
     R.col(b) = c * R0.col(b) - s * R0.col(a);
 }
 
 PN_INLINE Vec3 axis_in_world(const Joint& j, const Mat3& R) {
-    if (j.axis_index >= 0) return R.col(j.axis_index);
+    if (j.axis_index >= 0) return j.axis_sign * R.col(j.axis_index);
     return R * j.axis;
 }
 

@@ -8,10 +8,10 @@ namespace pn {
 constexpr int tile = 6;  // rows of an anchor at most
 
 // Calls f with n, 1 to tile, as a constant of the type: loops of a length known to the compiler cost half.
-template <int n = tile, class F>
+template <int n = 1, class F>
 inline void with_constant(int value, F&& f) {
-    if constexpr (n > 1) {
-        if (value != n) return with_constant<n - 1>(value, f);
+    if constexpr (n < tile) {
+        if (value != n) return with_constant<n + 1>(value, f);
     }
     f(std::integral_constant<int, n>());
 }
