@@ -174,18 +174,23 @@ void RowSystem::use_wanted(const std::vector<Block>& all) {
     orthogonal = false;
 }
 
-// sum := x y^T summed over the common dofs of two blocks, for n1 rows of the one and n2 of the other.
+// G of n1 rows of one block, from position p1, with n2 of another, from p2: B B^T summed over their common dofs, below
+// the diagonal.
 template <int n1, int n2>
 static void multiply_tile(const double* X, int r1, const double* Y, int r2, const RowLayout::Pair& pair,
-                          double (&sum)[tile][tile]) {
-    double local[n1][n2] = {};
+                          const RowLayout& layout, int p1, int p2, double* G) {
+    double sum[n1][n2] = {};
     for (const auto& [l, k] : pair.common) {
         const double *x = X + l * r1, *y = Y + k * r2;
         for (int i = 0; i < n1; ++i)
-            for (int j = 0; j < n2; ++j) local[i][j] += x[i] * y[j];
+            for (int j = 0; j < n2; ++j) sum[i][j] += x[i] * y[j];
     }
-    for (int i = 0; i < n1; ++i)
-        for (int j = 0; j < n2; ++j) sum[i][j] = local[i][j];
+    for (int i = 0; i < n1; ++i) {
+        double* row = G + layout.start[p1 + i] + p2;
+        const int end = p1 + i - p2;  // the diagonal
+        for (int j = 0; j < n2; ++j)
+            if (j <= end) row[j] = sum[i][j];
+    }
 }
 
 static void gram(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
@@ -197,18 +202,14 @@ static void gram(const RowLayout& layout, const std::vector<Block>& blocks, cons
         const double *X = B.data() + b1.offset, *Y = B.data() + b2.offset;
         for (int i0 = 0; i0 < r1; i0 += tile)  // a tile at a time
             for (int j0 = 0; j0 < r2; j0 += tile) {
-                const int ni = std::min(tile, r1 - i0), nj = std::min(tile, r2 - j0);
-                double sum[tile][tile];
-                with_constant(ni, [&](auto n1) {
-                    with_constant(nj, [&](auto n2) { multiply_tile<n1, n2>(X + i0, r1, Y + j0, r2, pair, sum); });
-                });
                 // The rows of a block stand side by side in the layout, and those of the first block not before those
-                // of the second: below the diagonal.
+                // of the second.
                 const int p1 = layout.position[b1.row] + i0, p2 = layout.position[b2.row] + j0;
-                for (int i = 0; i < ni; ++i) {
-                    double* Gi = s.G.data() + layout.start[p1 + i] + p2;
-                    for (int j = 0; j < std::min(nj, p1 + i - p2 + 1); ++j) Gi[j] = sum[i][j];
-                }
+                with_constant(std::min(tile, r1 - i0), [&](auto n1) {
+                    with_constant(std::min(tile, r2 - j0), [&](auto n2) {
+                        multiply_tile<n1, n2>(X + i0, r1, Y + j0, r2, pair, layout, p1, p2, s.G.data());
+                    });
+                });
             }
     }
 }
