@@ -20,9 +20,10 @@ OURS = Package.name
 # A family has met its floor when its last settings, ever finer, do not halve the errors of as many before
 # them.  Errors of order one tell nothing yet, and one lucky setting among the others must not end the search.
 WINDOW, TELLING = 3, 0.1
-# Length of one turn of a race [s]: a run of a millisecond is timed among its like, not in the caches that a
-# long run of another tool has left.
-TURN_SECONDS = 0.02
+# Length of one turn of a race [s]: everybody's is as long as one run of the slowest, within these bounds, so
+# that all meet as many of the machine's slow moments, and a run of a millisecond is timed among its like, not
+# in the caches that a long run of another tool has left.
+SHORTEST_TURN, LONGEST_TURN = 0.02, 0.4
 # Settings of one tool that race for a level, and how much longer than its fastest they may have taken before.
 ENTRANTS, ROUGH = 3, 1.5
 
@@ -119,8 +120,9 @@ def race(
                 setting = found(tool.settings(problem), row)
                 batches[tool.name, k] = timing.per_call(tool.prepare(problem, setting))
         slowest = max((row["seconds"] for group in entrants.values() for row in group), default=0.0)
-        most = int(seconds / max(slowest, TURN_SECONDS))
-        times = timing.paired(batches, max(3, min(rounds, most)), TURN_SECONDS)
+        turn = min(max(slowest, SHORTEST_TURN), LONGEST_TURN)
+        most = int(seconds / max(slowest, turn))
+        times = timing.paired(batches, max(3, min(rounds, most)), turn)
         winners = {name: winner(times, name, len(group)) for name, group in entrants.items() if group}
         entry: dict[str, Any] = {"level": level, "tools": {}}
         for name, group in entrants.items():
