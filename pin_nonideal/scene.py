@@ -301,6 +301,8 @@ class Scene:
     def roll_out(self, q: Array, v: Array, options: dict[str, Any], threads: int) -> Any:
         """Runs of many states in native threads, as the core returns them.
 
+        Those not begun when one was interrupted are None.
+
         Args:
             q: configurations, (n, nq).
             v: velocities, (n, nv).

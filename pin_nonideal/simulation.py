@@ -148,6 +148,7 @@ def rollout(
     Raises:
         InputError: an argument does not fit.
         RunError: a run stopped early; `trajectory` of the first one that did, and `index` tells which.
+        RunInterrupted: Ctrl-C, which ends all runs; the same, of the run that it met.
     """
     if not isinstance(scene, Scene):
         raise InputError(f"rollout: scene must be a Scene; got {type(scene).__name__}")
@@ -167,13 +168,16 @@ def rollout(
     q0, v0 = scene.nearest_states(starts_q, starts_v, options["t0"], threads)
     raws = scene.roll_out(q0, v0, options, threads)
     wall = time.perf_counter() - begin
-    results = []
+    results: list[Trajectory] = []
+    failed: list[RunError] = []
     for i, raw in enumerate(raws):
         try:
-            results.append(finish(scene, raw, options, wall))
+            results += [] if raw is None else [finish(scene, raw, options, wall)]
         except RunError as error:
             error.index = i
-            raise
+            failed.append(error)
+    if failed:  # an interrupt before the runs that it ended in other threads
+        raise min(failed, key=lambda error: not isinstance(error, RunInterrupted))
     return results
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import threading
 
 import joblib
 import numpy as np
@@ -81,3 +82,24 @@ def test_a_failing_state_is_named():
     with pytest.raises(pn.UserFunctionError, match="too fast") as caught:
         pn.rollout(scene, (np.tile(scene.q0, (3, 1)), v), 0.05)
     assert caught.value.index == 1
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_an_interrupt_ends_all_runs(threads):
+    model = pn.load("panda_friction").model
+    begun = []
+
+    def interrupting(t, q, v):
+        if t == 0.0:
+            begun.append(v[0])
+        if threading.current_thread() is threading.main_thread() and t > 0.01:
+            raise KeyboardInterrupt
+        return 0.0 * v
+
+    scene = pn.Scene(model, actuation=interrupting)
+    v = 0.1 * np.arange(40)[:, None] * np.ones(model.nv)
+    with pytest.raises(pn.RunInterrupted) as caught:
+        pn.rollout(scene, (np.tile(scene.q0, (40, 1)), v), 5.0, threads=threads)
+    assert 0.0 < caught.value.trajectory.t[-1] < 5.0
+    assert caught.value.trajectory.v[0, 0] == v[caught.value.index, 0]
+    assert len(set(begun)) <= threads + 1  # another thread may have ended a run before

@@ -62,13 +62,13 @@ def test_all_kinds_of_joints_in_one_tree_with_armature(seed):
     assert_free_acceleration_matches(model, rng)
 
 
-ANGLES = [0.0, -0.0, 5e-324, 1e-8, -0.3, 0.7853981633974483, 0.7853981633974484, 1.0, 1.5707963267948966, -3.0, 6.3]
-ANGLES += [*np.linspace(-50.0, 50.0, 1001), 1e4 * np.pi, -7.5e5, 7.999999e5, 8.1e5, -1e9, 1e22]
+ANGLES = [0.0, -0.0, 5e-324, 1e-8, -0.3, 0.7853981633974483, 0.7853981633974484, 1.0, 1.5707963267948966]
+ANGLES += [-3.0, 6.3, *np.linspace(-50.0, 50.0, 1001), 1e4 * np.pi, -7.5e5, 7.999999e5, 8.1e5, -1e9, 1e22]
 
 
 @pytest.mark.parametrize("together", [1, 4, 6])
 def test_cosines_and_sines_of_all_angles(together):
-    """Gravity's moment on a body at distance 1 is the cosine or the sine, however many joints turn together."""
+    """Gravity's moment on a body at distance 1, however many joints turn together."""
     model = empty()
     for k in range(together):
         body(model, 0, pin.JointModelRY(), f"j{k}", 1.0, lever=(1.0, 0.0, 0.0), inertia=np.eye(3))

@@ -97,13 +97,13 @@ private:
 // q and v of many states on the constraints, by rows, and the largest residual and rate of each afterwards: NaN where the
 // state could not be taken. On several threads, each state as by Runner::project_state.
 nb::tuple nearest_states(const Builder& b, const Array2& q, const Array2& v, double t, double far, int threads);
-// Runs from many states, on several threads.
+// Runs from many states, on several threads. Where one is interrupted all stop, and those that had not begun are None.
 nb::list rollout(const Builder& b, const Array2& q, const Array2& v, const Array& z, const nb::dict& options,
                  int threads);
 
 // What a run records, by names: from Python's options, and back to Python.
 RecordOptions read_record(const nb::dict& options);
-nb::dict hand_over(const Workspace& w, Recording&& r);
+nb::dict hand_over(const Counters& counters, Recording&& r);
 
 void bind_reactions(nb::module_& m);
 void bind_builder(nb::module_& m);

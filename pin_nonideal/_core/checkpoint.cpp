@@ -35,14 +35,15 @@ static void fields(Archive& a, RowSystem& x) {
     a.indices(columns, static_cast<int>(active.size()));
 }
 
+static void fields(Archive& a, Counters& x) { a(x.evaluations, x.factorizations, x.projections, x.iterations); }
+
 static void fields(Archive& a, Workspace& x) {
     auto& [terms, tau, external, F, C, C_smooth, base_C, acceleration, scaled, scaled_free, trial, work, values, A, B,
            b, r, miss, lam, lam_step, lam_shared, rows, ideal_rows, ideal_locked, ideal_decided, body_force,
            reaction_body, motion, momentum, shift_start, shift, shift_sum, shift_third, shift_steps, mode, limit, load,
            indeterminate, slip_direction, last_direction, speed, balance, has_balance, slip_force, user_C, z, dz,
            law_force, want_laws, held_torque, override_torque, has_held,
-           has_override, unknown, image, newton_step, jacobian, warm, determinant, evaluations, factorizations,
-           projections, iterations] = x;
+           has_override, unknown, image, newton_step, jacobian, warm, determinant, counters] = x;
     a(terms, tau, external, F, C, C_smooth, base_C, acceleration, scaled, scaled_free, trial, work, values, A, B, b,
       r, miss, lam, lam_step, lam_shared, rows, ideal_rows, ideal_locked, ideal_decided, body_force, reaction_body,
       motion, momentum, shift_start, shift, shift_sum, shift_third, shift_steps, mode, limit, load, indeterminate,
@@ -50,7 +51,7 @@ static void fields(Archive& a, Workspace& x) {
       held_torque, override_torque, has_held, has_override, unknown, image,
       newton_step);
     a.matrix(jacobian);
-    a(warm, determinant, evaluations, factorizations, projections, iterations);
+    a(warm, determinant, counters);
     for (signed char m : mode) a.require(slips(m) || m == sticking || m == unloaded);
 }
 

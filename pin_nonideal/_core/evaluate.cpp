@@ -155,7 +155,7 @@ static void factor_placed_rows(const Program& p, Workspace& w, double t, const V
     if (w.rows.blocks.empty()) return;
     scale_rows(p, w);
     factor_rows(p.layout, p.blocks, w.B, w.rows);
-    ++w.factorizations;
+    ++w.counters.factorizations;
     w.rows.refine = w.terms.D.maxCoeff() > refined_pivot_ratio * w.terms.D.minCoeff();
 }
 
@@ -172,7 +172,7 @@ void configure_velocity(const Program& p, Workspace& w, double t, const VecX& v)
 
 // F and b, which depend on the velocity.
 static void drive(const Program& p, Workspace& w, double t, const VecX& v) {
-    ++w.evaluations;
+    ++w.counters.evaluations;
     move_bodies(p.mechanism, w.terms, v);
     bias_forces(p.mechanism, w.terms);
     w.F = -w.terms.nle;
@@ -247,7 +247,7 @@ static void choose_rows(const Program& p, Workspace& w) {
     const bool sticks = std::count(w.mode.begin(), w.mode.end(), sticking) > 0;
     decide_rows(p.layout, p.blocks, w.B, w.rows, sticks ? rank_tolerance_sticking : rank_tolerance);
     factor_rows(p.layout, p.blocks, w.B, w.rows);
-    ++w.factorizations;
+    ++w.counters.factorizations;
 }
 
 // Chooses the rows of a step where the factors found there ask for it; returns whether it did.

@@ -99,6 +99,10 @@ struct Program {
     void finish();
 };
 
+struct Counters {
+    long evaluations = 0, factorizations = 0, projections = 0, iterations = 0;
+};
+
 struct Workspace {
     Terms terms;
     VecX tau, external, F, C, C_smooth, base_C, a;  // generalized forces and acceleration
@@ -144,7 +148,7 @@ struct Workspace {
     bool warm = false;
     double determinant = 1.0;
 
-    long evaluations = 0, factorizations = 0, projections = 0, iterations = 0;
+    Counters counters;
 
     explicit Workspace(const Program& p);
 };

@@ -186,7 +186,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
     }
     if (count > 0 && static_cast<int>(p.touched_dofs.size()) < p.mechanism.nv) shift_position(p, w, q);
     if (!configured) configure(p, w, t, q, v);
-    if (moves) ++w.projections;
+    if (moves) ++w.counters.projections;
     return moves;
 }
 

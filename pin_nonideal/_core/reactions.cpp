@@ -84,7 +84,7 @@ struct Implicit {
             g.segment(k, nv()) = w.user_C[i];
             k += nv();
         }
-        ++w.iterations;
+        ++w.counters.iterations;
     }
 
     std::vector<int> unknown_elements() const {

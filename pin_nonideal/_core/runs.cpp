@@ -47,7 +47,7 @@ RecordOptions read_record(const nb::dict& d) {
     return {wanted("a"), wanted("forces"), wanted("energy"), wanted("power")};
 }
 
-nb::dict hand_over(const Workspace& w, Recording&& r) {
+nb::dict hand_over(const Counters& counters, Recording&& r) {
     nb::dict out;
     const std::pair<const char*, std::vector<double>*> fields[] = {
         {"t", &r.t}, {"q", &r.q}, {"v", &r.v}, {"violation", &r.violation}, {"violation_rate", &r.violation_rate},
@@ -62,10 +62,10 @@ nb::dict hand_over(const Workspace& w, Recording&& r) {
     out["events"] = events;
     out["steps"] = r.steps;
     out["rejected"] = r.rejected;
-    out["evaluations"] = w.evaluations;
-    out["factorizations"] = w.factorizations;
-    out["projections"] = w.projections;
-    out["iterations"] = w.iterations;
+    out["evaluations"] = counters.evaluations;
+    out["factorizations"] = counters.factorizations;
+    out["projections"] = counters.projections;
+    out["iterations"] = counters.iterations;
     out["failure"] = r.failure ? nb::cast(std::string(r.failure->what())) : nb::none();
     out["error"] = nb::none();
     if (r.error) {
@@ -90,7 +90,7 @@ nb::dict Runner::simulate(const Array& q_in, const Array& v_in, const Array& z, 
         nb::gil_scoped_release release;
         pn::simulate(*p, *w, q0, v0, o, recording);
     }
-    return hand_over(*w, std::move(recording));
+    return hand_over(w->counters, std::move(recording));
 }
 
 nb::dict Runner::resume(const nb::bytes& state, const nb::dict& options) {
@@ -101,7 +101,7 @@ nb::dict Runner::resume(const nb::bytes& state, const nb::dict& options) {
         nb::gil_scoped_release release;
         pn::resume(*p, *w, bytes, o, recording);
     }
-    return hand_over(*w, std::move(recording));
+    return hand_over(w->counters, std::move(recording));
 }
 
 // Calls work(i, k) for every i below `count`, drawn from one counter by threads k; number 0 is the caller's.
@@ -138,27 +138,46 @@ nb::tuple nearest_states(const Builder& b, const Array2& q_in, const Array2& v_i
     return nb::make_tuple(to_numpy(q.data(), q.size()), to_numpy(v.data(), v.size()), to_numpy(after), to_numpy(rate));
 }
 
+static bool is_interrupt(const std::exception_ptr& error) {
+    if (!error) return false;
+    nb::gil_scoped_acquire gil;
+    try {
+        std::rethrow_exception(error);
+    } catch (const nb::python_error& e) {
+        return e.matches(PyExc_KeyboardInterrupt);
+    } catch (...) {
+        return false;
+    }
+}
+
 // Every run has a workspace of its own.
 nb::list rollout(const Builder& b, const Array2& q, const Array2& v, const Array& z, const nb::dict& options,
                  int threads) {
     const size_t count = q.shape(0);
     std::vector<Recording> recordings(count);
-    std::vector<std::unique_ptr<Workspace>> spaces(count);
+    std::vector<std::optional<Counters>> counters(count);
+    std::atomic<bool> stopped{false};
     // Read here and not in the threads: options hold Python's objects, whose counts need the lock.
-    const Options o = read_options(options);
-    Options silent = o;
-    silent.tick = nullptr;
+    const Options own = read_options(options);
+    Options others = own;  // Python tells its signals to the caller's thread
+    others.tick = [&stopped](double t) {
+        if (stopped) throw Failure(Failure::Kind::interrupted, t);
+    };
     const VecX z0 = map(z);
     const auto q_all = map(q), v_all = map(v);
     share_out(count, threads, [&](size_t i, int k) {
-        spaces[i] = std::make_unique<Workspace>(*b.p);
-        spaces[i]->z = z0;
+        if (stopped) return;
+        Workspace space(*b.p);
+        space.z = z0;
         Recording mine;  // neighbors in one array would share lines of cache between the threads
-        simulate(*b.p, *spaces[i], q_all.row(i), v_all.row(i), k == 0 ? o : silent, mine);
+        simulate(*b.p, space, q_all.row(i), v_all.row(i), k == 0 ? own : others, mine);
+        if (is_interrupt(mine.error)) stopped = true;
         recordings[i] = std::move(mine);
+        counters[i] = space.counters;
     });
     nb::list out;
-    for (size_t i = 0; i < count; ++i) out.append(hand_over(*spaces[i], std::move(recordings[i])));
+    for (size_t i = 0; i < count; ++i)
+        out.append(counters[i] ? nb::object(hand_over(*counters[i], std::move(recordings[i]))) : nb::none());
     return out;
 }
 
