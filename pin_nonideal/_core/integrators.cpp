@@ -90,36 +90,30 @@ void powers(const Program& p, Workspace& w, const VecX& v, double* out) {
     for (size_t l = 0; l < p.law_names.size(); ++l) out[3 + l] = v.dot(w.law_force[l]);
 }
 
+// out = y + (part_0 K_0 + ... + part_{n-1} K_{n-1}) for as many numbers from i as `Several` holds.
+template <class Several>
+static PN_INLINE void combine_at(int i, const VecX& y, const double* part, const Combination& sum, VecX& out) {
+    Several x, k;
+    load(y.data() + i, x);
+    for (int j = 0; j < sum.terms; ++j) {
+        load(sum.rate[j] + i, k);
+        x += part[j] * k;
+    }
+    store(x, out.data() + i);
+}
+
 // out = y + h (a_0 K_0 + ... + a_{n-1} K_{n-1})
 PN_WIDE static void combine(const VecX& y, double h, const Combination& sum, VecX& out) {
     double part[most_stages];
     for (int j = 0; j < sum.terms; ++j) part[j] = h * sum.weight[j];
     const int size = static_cast<int>(y.size());
     int i = 0;
-    for (; i + 3 < size; i += 4) {
-        Lanes x, k;
-        load(y.data() + i, x);
-        for (int j = 0; j < sum.terms; ++j) {
-            load(sum.rate[j] + i, k);
-            x += part[j] * k;
-        }
-        store(x, out.data() + i);
-    }
+    for (; i + 3 < size; i += 4) combine_at<Lanes>(i, y, part, sum, out);
     if (i + 1 < size) {
-        Pair x, k;
-        load(y.data() + i, x);
-        for (int j = 0; j < sum.terms; ++j) {
-            load(sum.rate[j] + i, k);
-            x += part[j] * k;
-        }
-        store(x, out.data() + i);
+        combine_at<Pair>(i, y, part, sum, out);
         i += 2;
     }
-    if (i < size) {
-        double x = y[i];
-        for (int j = 0; j < sum.terms; ++j) x += part[j] * sum.rate[j][i];
-        out[i] = x;
-    }
+    if (i < size) combine_at<double>(i, y, part, sum, out);
 }
 
 Combination::Combination(const double* weights, int n, const std::vector<VecX>& K) {

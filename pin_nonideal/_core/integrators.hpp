@@ -47,7 +47,7 @@ void powers(const Program& p, Workspace& w, const VecX& v, double* out);
 
 constexpr int most_stages = 16;
 
-// A weighted sum of stage derivatives: those whose weight is not zero.
+// A weighted sum of stage derivatives: those whose weight is not zero, where they stand.
 struct Combination {
     int terms = 0;
     double weight[most_stages];
@@ -66,6 +66,8 @@ struct Stepper {
     double t0 = 0.0, h = 0.0;
     bool has_dense = false;
     Stepper(const Method& m, System& s);
+    Stepper(const Stepper&) = delete;  // its combinations point into K
+    Stepper& operator=(const Stepper&) = delete;
 
     // y1 = one step of size h from (t0, y0); K[0] must hold the derivative there.
     void step(double t, double size);
