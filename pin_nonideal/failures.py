@@ -14,6 +14,7 @@ from .errors import (
     LoopClosureError,
     NonFiniteError,
     RunError,
+    RunInterrupted,
     SingularMassError,
     StepSizeError,
 )
@@ -21,7 +22,7 @@ from .lowered import Lowered
 from .scene_analysis import rows_at
 
 # Kinds of failure, as the core numbers them.
-SINGULAR, INCONSISTENT, NOT_FINITE, PARADOX, CLOSURE, STEP_SIZE = 0, 1, 2, 3, 4, 5
+SINGULAR, INCONSISTENT, NOT_FINITE, PARADOX, CLOSURE, STEP_SIZE, INTERRUPTED = range(7)
 
 # A sample with a larger gap than this [m or rad] has left the constraints: after every step projection comes
 # down to rounding, and in singular positions to the square root of it.
@@ -90,6 +91,8 @@ def named_failure(text: str, model: Any, low: Lowered) -> RunError:
     if kind == CLOSURE:
         name = list(low.blocks)[items[0]]
         return _opened(name, {name: value}, t)
+    if kind == INTERRUPTED:
+        return RunInterrupted(f"the run was interrupted at t = {t:.4g} s", time=t)
     if kind == STEP_SIZE and value:
         return StepSizeError(
             f"the run would never end: after {value:.0f} steps it has come to t = {t:.4g} s; "

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
+import signal
 import threading
+import time
 
 import joblib
 import numpy as np
@@ -103,3 +106,54 @@ def test_an_interrupt_ends_all_runs(threads):
     assert 0.0 < caught.value.trajectory.t[-1] < 5.0
     assert caught.value.trajectory.v[0, 0] == v[caught.value.index, 0]
     assert len(set(begun)) <= threads + 1  # another thread may have ended a run before
+
+
+def rollout_of_two(torque, duration):
+    """Two states, one of them with each of two threads, while the torques are these."""
+    model = pn.load("panda_friction").model
+    scene = pn.Scene(model, actuation=lambda t, q, v: torque(t, in_main_thread()) * v)
+    v = np.ones((2, model.nv)) * [[0.1], [0.2]]
+    return pn.rollout(scene, (np.tile(scene.q0, (2, 1)), v), duration, threads=2)
+
+
+def in_main_thread():
+    return threading.current_thread() is threading.main_thread()
+
+
+def test_an_interrupt_is_seen_when_the_calling_thread_has_nothing_left_to_do():
+    failed, sent = [], []
+
+    def torque(t, main):
+        if main:
+            time.sleep(0.2)  # the other thread takes its run
+            failed.append(time.monotonic())
+            raise ValueError("this one ends early")
+        if not sent and failed and time.monotonic() > failed[0] + 0.2:
+            sent.append(t)
+            os.kill(os.getpid(), signal.SIGINT)
+        return 0.0
+
+    with pytest.raises(pn.RunInterrupted) as caught:
+        rollout_of_two(torque, 1e4)
+    assert 0.0 < caught.value.trajectory.t[-1] < 1e4
+
+
+def test_an_interrupt_in_another_thread_ends_the_run_of_the_calling_one():
+    last = {True: 0.0, False: 0.0}
+
+    def torque(t, main):
+        last[main] = t
+        if not main and t > 0.01:
+            raise KeyboardInterrupt
+        return 0.0
+
+    with pytest.raises(pn.RunInterrupted):
+        rollout_of_two(torque, 30.0)
+    assert max(last.values()) < 30.0
+
+
+def test_threads_beyond_the_states_are_not_started():
+    scene = pn.load("four_bar")
+    q, v = scene.initial_state()
+    (run,) = pn.rollout(scene, q[None], v[None], 0.01, threads=100_000)
+    assert_same_run(run, pn.simulate(scene, 0.01))

@@ -1,7 +1,11 @@
 // Runs: options and states in, recordings out.
 #include "bindings.hpp"
 
+#include <algorithm>
 #include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <system_error>
 #include <thread>
 
 #include <nanobind/stl/string.h>
@@ -104,25 +108,67 @@ nb::dict Runner::resume(const nb::bytes& state, const nb::dict& options) {
     return hand_over(w->counters, std::move(recording));
 }
 
-// Calls work(i, k) for every i below `count`, drawn from one counter by threads k; number 0 is the caller's.
+// Calls work(i, k) for every i below `count`, drawn from one counter by threads k; number 0 is the caller's. What one of
+// them throws, a signal of Python's among it, stops the drawing and is thrown at the end.
 template <class Work>
-static void share_out(size_t count, int threads, Work work) {
+static void share_out(size_t count, int threads, std::atomic<bool>& stopped, Work work) {
     nb::gil_scoped_release release;
     std::atomic<size_t> next{0};
-    const auto draw = [&](int k) {
-        for (size_t i = next++; i < count; i = next++) work(i, k);
+    std::mutex mutex;
+    std::condition_variable ended;
+    int running = 0;
+    std::exception_ptr error;
+    const auto keep = [&](const std::exception_ptr& thrown) {
+        const std::lock_guard<std::mutex> guard(mutex);
+        if (!error) error = thrown;
+        stopped = true;
     };
+    const auto draw = [&](int k) {
+        try {
+            for (size_t i = next++; i < count && !stopped; i = next++) work(i, k);
+        } catch (...) {
+            keep(std::current_exception());
+        }
+    };
+    const auto follow = [&](int k) {
+        draw(k);
+        const std::lock_guard<std::mutex> guard(mutex);
+        --running;
+        ended.notify_one();
+    };
+    const int useful = static_cast<int>(std::min<size_t>(threads, count));
     std::vector<std::thread> pool;
-    for (int k = 1; k < threads; ++k) pool.emplace_back(draw, k);
+    pool.reserve(useful);
+    for (int k = 1; k < useful; ++k) {
+        std::unique_lock<std::mutex> guard(mutex);
+        try {
+            pool.emplace_back(follow, k);
+        } catch (const std::system_error&) {
+            break;  // fewer threads do the same work
+        }
+        ++running;
+    }
     draw(0);
+    std::unique_lock<std::mutex> guard(mutex);
+    while (!ended.wait_for(guard, std::chrono::milliseconds(50), [&] { return running == 0; })) {
+        guard.unlock();
+        {
+            nb::gil_scoped_acquire gil;
+            if (PyErr_CheckSignals() != 0) keep(std::make_exception_ptr(nb::python_error()));
+        }
+        guard.lock();
+    }
+    guard.unlock();
     for (std::thread& thread : pool) thread.join();
+    if (error) std::rethrow_exception(error);
 }
 
 nb::tuple nearest_states(const Builder& b, const Array2& q_in, const Array2& v_in, double t, double far, int threads) {
     RowMajor q = map(q_in), v = map(v_in);
     VecX after = VecX::Constant(q.rows(), NAN), rate = after;
     std::vector<std::unique_ptr<Workspace>> spaces(threads);
-    share_out(q.rows(), threads, [&](size_t i, int k) {
+    std::atomic<bool> stopped{false};
+    share_out(q.rows(), threads, stopped, [&](size_t i, int k) {
         if (!spaces[k]) spaces[k] = std::make_unique<Workspace>(*b.p);
         VecX q_one = q.row(i), v_one = v.row(i);
         try {
@@ -157,24 +203,32 @@ nb::list rollout(const Builder& b, const Array2& q, const Array2& v, const Array
     std::vector<Recording> recordings(count);
     std::vector<std::optional<Counters>> counters(count);
     std::atomic<bool> stopped{false};
-    // Read here and not in the threads: options hold Python's objects, whose counts need the lock.
-    const Options own = read_options(options);
-    Options others = own;  // Python tells its signals to the caller's thread
-    others.tick = [&stopped](double t) {
+    const auto stop = [&stopped](double t) {
         if (stopped) throw Failure(Failure::Kind::interrupted, t);
+    };
+    // Read here and not in the threads: options hold Python's objects, whose counts need the lock.
+    Options own = read_options(options), others = own;
+    others.tick = stop;  // Python tells its signals to the caller's thread
+    own.tick = [stop, signals = own.tick](double t) {
+        stop(t);
+        signals(t);
     };
     const VecX z0 = map(z);
     const auto q_all = map(q), v_all = map(v);
-    share_out(count, threads, [&](size_t i, int k) {
-        if (stopped) return;
-        Workspace space(*b.p);
-        space.z = z0;
-        Recording mine;  // neighbors in one array would share lines of cache between the threads
-        simulate(*b.p, space, q_all.row(i), v_all.row(i), k == 0 ? own : others, mine);
-        if (is_interrupt(mine.error)) stopped = true;
-        recordings[i] = std::move(mine);
-        counters[i] = space.counters;
-    });
+    try {
+        share_out(count, threads, stopped, [&](size_t i, int k) {
+            Workspace space(*b.p);
+            space.z = z0;
+            Recording mine;  // neighbors in one array would share lines of cache between the threads
+            simulate(*b.p, space, q_all.row(i), v_all.row(i), k == 0 ? own : others, mine);
+            if (is_interrupt(mine.error)) stopped = true;
+            recordings[i] = std::move(mine);
+            counters[i] = space.counters;
+        });
+    } catch (...) {  // a run that the interrupt ended tells of it
+        const auto tells = [](const Recording& r) { return r.failure && r.failure->kind == Failure::Kind::interrupted; };
+        if (!is_interrupt(std::current_exception()) || std::none_of(recordings.begin(), recordings.end(), tells)) throw;
+    }
     nb::list out;
     for (size_t i = 0; i < count; ++i)
         out.append(counters[i] ? nb::object(hand_over(*counters[i], std::move(recordings[i]))) : nb::none());
