@@ -1,4 +1,4 @@
-"""Work and precision: wall time of one run from its start against the error of its end, tool by tool.
+"""Work and precision: processor time of one run from its start against the error of its end, tool by tool.
 
 First every setting runs once or a few times, which gives its error and a rough time.  Then, for each error
 level, the settings of every tool that reached it and may be its fastest run again, all in turn; the ratios
@@ -100,7 +100,7 @@ def judged(problem: Problem, outcome: Outcome) -> dict[str, Any]:
     return found
 
 
-def fastest(rows: Sequence[dict[str, Any]], tool: str, level: float) -> list[dict[str, Any]]:
+def entrants(rows: Sequence[dict[str, Any]], tool: str, level: float) -> list[dict[str, Any]]:
     """The settings of a tool that reached a level and may be its fastest, by times that are rough."""
     reached = [r for r in rows if r["tool"] == tool and r.get("error") is not None and r["error"] <= level]
     reached.sort(key=lambda r: r["seconds"])
@@ -110,22 +110,22 @@ def fastest(rows: Sequence[dict[str, Any]], tool: str, level: float) -> list[dic
 def race(
     problem: Problem, tools: Sequence[Tool], rows: list[dict[str, Any]], rounds: int, seconds: float
 ) -> list[dict[str, Any]]:
-    """For each level, the winners' times measured in turn, fewer than `rounds` times when they take long."""
+    """For each level, the times of all entrants in turn, at most `rounds` of each, and the winners."""
     results = []
     for level in problem.levels:
-        entrants = {tool.name: fastest(rows, tool.name, level) for tool in tools}
+        racing = {tool.name: entrants(rows, tool.name, level) for tool in tools}
         batches = {}
         for tool in tools:
-            for k, row in enumerate(entrants[tool.name]):
+            for k, row in enumerate(racing[tool.name]):
                 setting = found(tool.settings(problem), row)
                 batches[tool.name, k] = timing.per_call(tool.prepare(problem, setting))
-        slowest = max((row["seconds"] for group in entrants.values() for row in group), default=0.0)
+        slowest = max((row["seconds"] for group in racing.values() for row in group), default=0.0)
         turn = min(max(slowest, SHORTEST_TURN), LONGEST_TURN)
         most = int(seconds / max(slowest, turn))
         times = timing.paired(batches, max(3, min(rounds, most)), turn)
-        winners = {name: winner(times, name, len(group)) for name, group in entrants.items() if group}
+        winners = {name: winner(times, name, len(group)) for name, group in racing.items() if group}
         entry: dict[str, Any] = {"level": level, "tools": {}}
-        for name, group in entrants.items():
+        for name, group in racing.items():
             if not group:
                 reached = [r["error"] for r in rows if r["tool"] == name and r.get("error") is not None]
                 entry["tools"][name] = {"best_error": min(reached, default=None)}

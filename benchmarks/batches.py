@@ -12,7 +12,7 @@ import math
 import multiprocessing
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -105,9 +105,10 @@ def half(name: str, states: int, steps: int, which: int) -> Call:
 def follow(name: str, states: int, steps: int, orders: Connection) -> None:
     """What the second process does: its half of the batch, whenever it is told to."""
     call = half(name, states, steps, 1)
-    while orders.recv():
-        call()
-        orders.send(True)
+    with suppress(EOFError):  # the first process is done
+        while orders.recv():
+            call()
+            orders.send(True)
 
 
 @contextmanager
@@ -117,6 +118,7 @@ def two_processes(name: str, states: int, steps: int) -> Iterator[Callable[[], o
     orders, theirs_end = context.Pipe()
     other = context.Process(target=follow, args=(name, states, steps, theirs_end), daemon=True)
     other.start()
+    theirs_end.close()  # so that the end of the other process is heard
     call = half(name, states, steps, 0)
 
     def both() -> None:
@@ -124,9 +126,11 @@ def two_processes(name: str, states: int, steps: int) -> Iterator[Callable[[], o
         call()
         orders.recv()
 
-    yield both
-    orders.send(False)
-    other.join()
+    try:
+        yield both
+    finally:
+        orders.close()
+        other.join()
 
 
 def batch_of(function: Callable[[], Any], clock: Callable[[], float]) -> timing.Batch:

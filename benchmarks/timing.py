@@ -1,4 +1,4 @@
-"""Timing on a machine that others use too: short batches, contestants in turn, minima, medians of ratios.
+"""Timing on a machine that others use too: batches, contestants in turn, minima, medians of ratios.
 
 `clock` counts the processor time of the calling thread.  On an idle machine that is wall time, since tools
 run on one thread; on a busy one wall time would punish long runs, which lose the processor more often.

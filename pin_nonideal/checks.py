@@ -74,16 +74,18 @@ def positive(what: str, value: Any) -> float:
     return result
 
 
-def count(what: str, value: Any, *, least: int = 0) -> int:
-    """An integer >= `least`.
+def count(what: str, value: Any, *, least: int = 0, most: int = 1_000_000_000) -> int:
+    """An integer from `least` to `most`.
 
     Raises:
-        InputError: it is no integer, or too small.
+        InputError: it is no integer, too small or too large.
     """
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
         raise InputError(f"{what} must be an integer; got {value!r}")
     if value < least:
         raise InputError(f"{what} must be at least {least}; got {value}")
+    if value > most:
+        raise InputError(f"{what} must be at most {most}; got {value}")
     return int(value)
 
 

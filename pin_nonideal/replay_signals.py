@@ -232,9 +232,12 @@ def _given(run: Trajectory, title: str, curves: Mapping[str, Array]) -> Plot:
     for label, curve in curves.items():
         where = f'curve "{label}" of plot "{title}"'
         try:
-            values[str(label)] = given = np.asarray(curve, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
-            raise InputError(f"{where} must hold numbers; got {curve!r}") from None
+            given = np.asarray(curve)
+        except ValueError:  # lists of unequal length
+            given = np.asarray(None)
+        if given.dtype.kind not in "fiub":
+            raise InputError(f"{where} must hold numbers; got {curve!r}")
+        values[str(label)] = given.astype(np.float64)
         if given.shape != (len(run.t),):
             raise InputError(
                 f"{where} must have shape ({len(run.t)},), one value a sample; got {given.shape}"

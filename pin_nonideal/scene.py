@@ -150,6 +150,7 @@ class Scene:
 
         Raises:
             LoopClosureError: the loops cannot be closed.
+            InputError: a coordinate is too large to move.
         """
         if self._closed is None:
             self._closed = self._project(self.q0, self.v0, 0.0)

@@ -43,9 +43,9 @@ def simulate(
 ) -> Trajectory:
     """Integrates a scene in time, on its constraints.
 
-    Adaptive methods keep the local error of every coordinate below atol + rtol |y|; the state is put back on
-    the constraints after every step, so that violations stay at rounding.  Dry friction sticks and slips at
-    located events.
+    Adaptive methods keep the local error of every coordinate below atol + rtol |y| (that of a velocity not
+    below the rounding of the largest one); the state is put back on the constraints after every step, so that
+    violations stay at rounding.  Dry friction sticks and slips at located events.
 
     Args:
         scene: what to simulate.
@@ -148,7 +148,7 @@ def rollout(
     Raises:
         InputError: an argument does not fit.
         RunError: a run stopped early; `trajectory` of the first one that did, and `index` tells which.
-        RunInterrupted: Ctrl-C, which ends all runs; the same, of the run that it met.
+        RunInterrupted: Ctrl-C, which ends all runs; the same, of one that it met.  Others are lost.
     """
     if not isinstance(scene, Scene):
         raise InputError(f"rollout: scene must be a Scene; got {type(scene).__name__}")

@@ -11,7 +11,7 @@ from .scene import Scene
 from .simulation import simulate
 from .trajectory import Trajectory
 
-MOST_JOBS = 100_000  # counted down from all processors as well
+MOST_JOBS = 100_000  # also of negative numbers: -n leaves n - 1 processors free
 
 
 def sweep(
@@ -48,7 +48,7 @@ def sweep(
     for entry in table:
         if not isinstance(entry, Mapping):
             raise InputError(f"sweep: parameters must hold mappings of keyword arguments; got {entry!r}")
-    if jobs is not None and count("sweep: jobs", jobs, least=-MOST_JOBS) == 0:
+    if jobs is not None and count("sweep: jobs", jobs, least=-MOST_JOBS, most=MOST_JOBS) == 0:
         raise InputError("sweep: jobs must not be zero; leave it out for joblib's choice")
     if options.get("checkpoint") is not None:
         raise InputError("sweep: checkpoint is the file of one run; its runs would overwrite one another's")

@@ -227,7 +227,8 @@ class Trajectory:
             fields: dict[str, Any] = {key: arrays.get(key) for key in (*REQUIRED, *OPTIONAL)}
             for group in ("energy", "power"):
                 if header[group] is not None:
-                    _check_columns(group, header[group], source)
+                    if group == "energy":
+                        _check_ledger(header[group], source)
                     fields[group] = {name: arrays[f"{group}/{i}"] for i, name in enumerate(header[group])}
             events = [Event(float(t), str(kind), str(element)) for t, kind, element in header["events"]]
             return cls(
@@ -246,13 +247,13 @@ class Trajectory:
             ) from error
 
 
-def _check_columns(group: str, names: Sequence[str], source: Path) -> None:
+def _check_ledger(names: Sequence[str], source: Path) -> None:
     """Raises unless the ledger has the columns that every ledger has.
 
     Raises:
         LoadingError: one is missing.
     """
-    missing = [name for name in LEDGER if name not in names] if group == "energy" else []
+    missing = [name for name in LEDGER if name not in names]
     if missing:
         raise LoadingError(f'"{source}" is no trajectory: its energy has no {", ".join(missing)}')
 

@@ -109,6 +109,7 @@ ROLLOUTS = {
         "rollout: q and v must have as many rows; got 2 and 1",
     ),
     "threads": ({"threads": 0}, "rollout: threads must be at least 1; got 0"),
+    "threads many": ({"threads": 2**31}, "rollout: threads must be at most 1000000000; got 2147483648"),
     "threads float": ({"threads": 1.5}, "rollout: threads must be an integer; got 1.5"),
     "method": ({"method": "Radau"}, 'rollout: method must be one of the core\'s; "Radau" runs in SciPy'),
     "length": (

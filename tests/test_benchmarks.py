@@ -210,6 +210,20 @@ def test_key_figures_take_the_fastest_rival_that_got_there() -> None:
     assert goals.earlier("x", tools, tools).value == 3.0
 
 
+def test_a_setting_that_is_fastest_in_turns_wins_whatever_its_rough_time_was() -> None:
+    from benchmarks import accuracy, timing
+
+    rough = {"a": 1.0, "b": 1.1, "c": 1.3, "d": 1.4, "slow": 2.0}
+    rows = [{"tool": "T", "setting": k, "error": 1e-7, "seconds": x} for k, x in rough.items()]
+    rows += [{"tool": "T", "setting": "coarse", "error": 1e-5, "seconds": 0.1}]
+    rows += [{"tool": "other", "setting": "a", "error": 1e-9, "seconds": 0.5}]
+    racing = accuracy.entrants(rows, "T", 1e-6)
+    assert [row["setting"] for row in racing] == ["a", "b", "c"]
+    # Slow moments hit all alike: b is faster in two rounds of three, though a has the least time of all.
+    turns = {("T", 0): [2.0, 4.0, 0.5], ("T", 1): [1.8, 3.6, 0.6], ("T", 2): [2.2, 4.4, 0.7]}
+    assert accuracy.winner({k: timing.Times(x) for k, x in turns.items()}, "T", 3) == 1
+
+
 def test_a_floor_is_seen_and_one_lucky_setting_is_none() -> None:
     from benchmarks.accuracy import has_met_its_floor
 

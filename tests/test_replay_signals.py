@@ -72,9 +72,11 @@ def test_what_is_no_list_of_plots_is_refused(chosen) -> None:
             call(run, chosen)
 
 
-def test_curves_of_no_numbers_are_refused() -> None:
-    with pytest.raises(InputError, match=r"curve \"tip\" of plot \"Tip\" must hold numbers; got \['a'\]"):
-        plots_of(four_bar(), [("Tip", {"tip": ["a"]})])
+@pytest.mark.parametrize("curve", [["a"], [None], np.array([1.0 + 2.0j]), [[1.0], [1.0, 2.0]]])
+def test_curves_of_no_numbers_are_refused(curve) -> None:
+    message = f'curve "tip" of plot "Tip" must hold numbers; got {curve!r}'
+    with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+        plots_of(four_bar(), [("Tip", {"tip": curve})])
 
 
 def test_what_cannot_be_plotted_is_refused() -> None:

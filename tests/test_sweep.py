@@ -39,6 +39,9 @@ def test_parameters_must_be_mappings():
         pn.sweep(ladder, None, 0.1)
     with pytest.raises(pn.InputError, match="sweep: jobs must not be zero"):
         pn.sweep(ladder, [], 0.1, jobs=0)
+    for jobs, bound in ((10**30, "most 100000"), (-(10**30), "least -100000")):
+        with pytest.raises(pn.InputError, match=f"sweep: jobs must be at {bound}"):
+            pn.sweep(ladder, [], 0.1, jobs=jobs)
     for jobs in (False, 2.0, float("nan"), "all"):
         with pytest.raises(pn.InputError, match="sweep: jobs must be an integer"):
             pn.sweep(ladder, [], 0.1, jobs=jobs)

@@ -1,6 +1,6 @@
-// Cosines and sines of four angles at once, in the same bits on all processors: x = n pi/2 + r with r in two numbers
-// (Cody and Waite's reduction, pi/2 in three parts), and the minimax polynomials of both functions on |r| <= pi/4.
-// Errors stay below one unit in the last place of 1.
+// Cosines and sines of four angles at once: x = n pi/2 + r with r in two numbers (Cody and Waite's reduction, pi/2 in
+// three parts), and the minimax polynomials of both functions on |r| <= pi/4. Errors stay below one unit in the last
+// place; angles far away are left to the system's library.
 #pragma once
 
 #include <cmath>

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "lanes.hpp"
@@ -15,7 +16,7 @@ namespace pn {
 constexpr double watch_tolerance = 1e-4;
 // Rounding in one velocity, as a part of the largest: a joint that constraints drive slowly beside fast ones has no
 // digits below it, and no step is short enough to find some.
-constexpr double velocity_rounding = 64 * 2.2e-16;
+constexpr double velocity_rounding = 64 * std::numeric_limits<double>::epsilon();
 // A load that jumps keeps its error in steps however short; shorter ones than this pass over it [s].
 constexpr double shortest_watch = 1e-9;
 
@@ -32,7 +33,8 @@ Method method_named(const std::string& name) {
 
 System::System(const Program& program, Workspace& workspace, bool with_energy)
     : p(program), w(workspace), energy(with_energy), nq(p.mechanism.nq), nv(p.mechanism.nv), nz(p.states),
-      nw(with_energy ? 3 + static_cast<int>(p.law_names.size()) : 0), ne(static_cast<int>(program.frictions.size())), ny(nq + nv + nz + nw + ne),
+      nw(with_energy ? 3 + static_cast<int>(p.law_names.size()) : 0), ne(static_cast<int>(program.frictions.size())),
+      ny(nq + nv + nz + nw + ne),
       q_buffer(VecX::Zero(nq)), v_buffer(VecX::Zero(nv)), projected(VecX::Zero(ny)) {}
 
 void System::derivative(double t, const VecX& y, VecX& dy) {
@@ -110,7 +112,7 @@ PN_WIDE static void combine(const VecX& y, double h, const Combination& sum, Vec
     int i = 0;
     for (; i + 3 < size; i += 4) combine_at<Lanes>(i, y, part, sum, out);
     if (i + 1 < size) {
-        combine_at<Pair>(i, y, part, sum, out);
+        combine_at<TwoLanes>(i, y, part, sum, out);
         i += 2;
     }
     if (i < size) combine_at<double>(i, y, part, sum, out);
@@ -176,7 +178,7 @@ void Stepper::magnitude(const VecX& y, VecX& out) const {
 }
 
 // Turns magnitudes into the errors that a step may make.
-void Stepper::allow(double rtol, const VecX& atol) {
+void Stepper::to_tolerances(double rtol, const VecX& atol) {
     const double rounding = velocity_rounding * scale_.segment(system.nv, system.nv).maxCoeff();
     scale_ = atol + rtol * scale_;
     auto velocities = scale_.segment(system.nv, system.nv);
@@ -224,7 +226,7 @@ double Stepper::error_norm(double rtol, const VecX& atol) {
     scale_.setZero();
     magnitude(y0, scale_);
     magnitude(y1, scale_);
-    allow(rtol, atol);
+    to_tolerances(rtol, atol);
     watch_scale_ = watch_tolerance * std::max(std::abs(h), shortest_watch);
     error5.setZero();
     if (method.kind == Method::Kind::dopri5) {
@@ -295,7 +297,7 @@ void Stepper::interpolate(double s, VecX& y) const {
 double Stepper::initial_step(double t, const VecX& y, double rtol, const VecX& atol, double limit) {
     scale_.setZero();
     magnitude(y, scale_);
-    allow(rtol, atol);
+    to_tolerances(rtol, atol);
     watch_scale_ = watch_tolerance;
     VecX plain = y;
     for (const Chart& c : system.p.mechanism.charts)

@@ -1,6 +1,6 @@
 // Four numbers at a time. Functions marked PN_WIDE are compiled twice, and on a processor with registers of four numbers
-// (AVX2) the loader takes the version that uses them. Products and sums are not fused there, so that all processors
-// give the same numbers.
+// (AVX2) the loader takes the version that uses them. Neither version fuses products and sums, so that both give the
+// same numbers.
 #pragma once
 
 #include <cstring>
@@ -17,7 +17,7 @@ namespace pn {
 
 using Lanes = double __attribute__((vector_size(32)));
 
-using Pair = double __attribute__((vector_size(16)));
+using TwoLanes = double __attribute__((vector_size(16)));
 
 template <class Several>
 PN_INLINE void load(const double* from, Several& x) { std::memcpy(&x, from, sizeof x); }

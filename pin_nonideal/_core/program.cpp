@@ -126,8 +126,8 @@ void Program::finish() {
 Workspace::Workspace(const Program& p) {
     const int nv = p.mechanism.nv, n = static_cast<int>(p.mechanism.joints.size());
     terms.allocate(p.mechanism);
-    for (VecX* x : {&tau, &external, &F, &C, &C_smooth, &base_C, &a, &balance, &scaled, &scaled_free, &trial, &work, &held_torque,
-                    &override_torque})
+    for (VecX* x : {&tau, &external, &F, &C, &C_smooth, &base_C, &a, &balance, &scaled, &scaled_free, &trial, &work,
+                    &held_torque, &override_torque})
         *x = VecX::Zero(nv);
     values.resize(p.blocks.size());
     for (size_t i = 0; i < p.blocks.size(); ++i) {

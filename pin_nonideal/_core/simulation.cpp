@@ -247,7 +247,8 @@ void Simulation::advance_to(double stop) {
         return;
     }
     if (o.method.adaptive) {
-        double factor = error == 0.0 ? growth_limit : std::min(growth_limit, safety * std::pow(error, -1.0 / o.method.order));
+        double factor = growth_limit;
+        if (error > 0.0) factor = std::min(factor, safety * std::pow(error, -1.0 / o.method.order));
         if (last_rejected) factor = std::min(1.0, factor);
         last_rejected = false;
         if (!(last && factor * size < h)) h = size * std::max(factor, shrink_limit);

@@ -60,8 +60,8 @@ PN_INLINE Vec3 turned_round(const Vec3& a) {
 #else
     // By halves: registers of two numbers shuffle these, and where there are four GCC sees one permutation.
     using Indices = long long __attribute__((vector_size(16)));
-    const Pair low = {a.x[0], a.x[1]}, high = {a.x[2], a.x[3]};
-    const Pair yz = __builtin_shuffle(low, high, Indices{1, 2}), x0 = __builtin_shuffle(low, high, Indices{0, 3});
+    const TwoLanes low = {a.x[0], a.x[1]}, high = {a.x[2], a.x[3]};
+    const TwoLanes yz = __builtin_shuffle(low, high, Indices{1, 2}), x0 = __builtin_shuffle(low, high, Indices{0, 3});
     return Vec3(Lanes{yz[0], yz[1], x0[0], x0[1]});
 #endif
 }
@@ -101,6 +101,10 @@ struct Mat3 {
 PN_INLINE Vec3 operator*(const Mat3& m, const Vec3& v) { return v[0] * m.c[0] + v[1] * m.c[1] + v[2] * m.c[2]; }
 PN_INLINE Mat3 operator*(const Mat3& a, const Mat3& b) { return {a * b.c[0], a * b.c[1], a * b.c[2]}; }
 PN_INLINE Vec3 transpose_times(const Mat3& m, const Vec3& v) { return {m.c[0].dot(v), m.c[1].dot(v), m.c[2].dot(v)}; }
+// a^T b
+PN_INLINE Mat3 transpose_times(const Mat3& a, const Mat3& b) {
+    return {transpose_times(a, b.c[0]), transpose_times(a, b.c[1]), transpose_times(a, b.c[2])};
+}
 // a b^T
 PN_INLINE Mat3 times_transpose(const Mat3& a, const Mat3& b) {
     Mat3 out;

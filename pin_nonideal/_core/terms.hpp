@@ -27,7 +27,7 @@ struct Turn {
 
 struct Terms {
     std::vector<Body> body;
-    std::vector<Turn> turn;  // cosine and sine of each joint with one bounded angle
+    std::vector<Turn> turn;  // of each joint whose configuration is an angle
     std::vector<Motion> J;  // motion per unit velocity of each dof
     std::vector<Force> Ag;  // subtree momentum per unit velocity of each dof
     VecX nle;               // bias generalized force: Coriolis, centrifugal, gravity

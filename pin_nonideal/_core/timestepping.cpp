@@ -112,8 +112,8 @@ void Simulation::moreau_step(double step) {
         const int at = nq + nv + system.nz;
         // Where a slip turns inside the step its mean velocity may go with the friction that meets its end: that is
         // work of the scheme, not of friction.
-        for (const Friction& f : p.frictions) {
-            double& power = probe_rate_[at + 3 + f.law];
+        for (const Friction& friction : p.frictions) {
+            double& power = probe_rate_[at + 3 + friction.law];
             if (!(power > 0.0)) continue;
             recorder.moved_energy += step * power;
             power = 0.0;
