@@ -44,7 +44,7 @@ void factor_mass(const Program& p, Workspace& w, double t) {
 }
 
 void gaps(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    place_bodies(p.mechanism, w.terms, q, p.touched_joints);
+    place_bodies(p.mechanism, w.terms, q, p.touched_joints, p.touched_angles);
     const State state{p.mechanism, w.terms, t, w.terms.q, v};
     for (int i = 0; i < p.constraints; ++i) evaluate(p.blocks[i].kind, state, Part::gap, w.values[i]);
 }

@@ -142,8 +142,7 @@ Mechanism read_mechanism(const void* opaque) {
         j.aligned = model->jointPlacements[i].rotation() == Eigen::Matrix3d::Identity();
         j.p0 = model->jointPlacements[i].translation();
         classify(joint, data, j);
-        j.has_angle = (j.kind == JointKind::revolute || j.kind == JointKind::helical) && !j.unbounded;
-        if (j.has_angle) m.angled.push_back(i);
+        if ((j.kind == JointKind::revolute || j.kind == JointKind::helical) && !j.unbounded) m.angles.push_back({i, j.iq});
         m.has_foreign |= j.kind == JointKind::other;
         j.recenters = j.root != i && !slides(j);
         for (int k = j.root; k < i && j.recenters; ++k)

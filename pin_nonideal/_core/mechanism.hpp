@@ -18,7 +18,6 @@ enum class JointKind { revolute, prismatic, helical, spherical, free_flyer, plan
 struct Joint {
     JointKind kind = JointKind::other;
     bool unbounded = false;  // configuration is (cos, sin) of the angle
-    bool has_angle = false;  // configuration is the angle
     int parent = 0, root = 0;
     bool recenters = false;  // first joint of its tree that turns: the tree's reference point moves here
     int iq = 0, iv = 0, nq = 0, nv = 0;
@@ -56,9 +55,13 @@ public:
     virtual void evaluate(int joint, const VecX& q, const VecX& v, JointMotion& out) = 0;
 };
 
+struct Angle {  // a joint whose configuration is an angle, and its place there
+    int joint, iq;
+};
+
 struct Mechanism {
     std::vector<Joint> joints;  // joints[0] is the world
-    std::vector<int> angled;    // joints with an angle
+    std::vector<Angle> angles;  // of all joints that have one
     std::vector<Chart> charts;
     int nq = 0, nv = 0;
     Vec3 gravity = Vec3::Zero();

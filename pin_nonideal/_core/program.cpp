@@ -111,6 +111,9 @@ void Program::finish() {
     touched_joints.clear();
     for (size_t joint = 1; joint < touched.size(); ++joint)
         if (touched[joint]) touched_joints.push_back(static_cast<int>(joint));
+    touched_angles.clear();
+    for (const Angle& angle : mechanism.angles)
+        if (touched[angle.joint]) touched_angles.push_back(angle);
     for (Drag& d : drags) d.dofs = mechanism.dofs_of(d.frame.joint);
     driven = !forces.empty() || !std::holds_alternative<NoActuation>(actuation);
     asks_functions = std::holds_alternative<TorqueFunction>(actuation) || !user_laws.empty() || moves_in_time;

@@ -88,6 +88,7 @@ struct Program {
     bool asks_functions = false;         // of the user's, for forces that may change while nothing moves
     bool affine_rates = true;            // A does not depend on v; a user's own rows may
     std::vector<int> touched_joints;     // whose bodies the constraints touch, and all before them in the tree
+    std::vector<Angle> touched_angles;   // of these joints
     std::vector<int> touched_dofs;       // in the supports of the rows, ascending
 
     // Rows of constraints come first, rows of friction's directions after them.

@@ -173,33 +173,29 @@ static PN_INLINE void place_body(const Mechanism& m, Terms& w, int i) {
     if (j.recenters) recenter(m, i, w);
 }
 
-// Cosines and sines of the angles among the joints listed, by fours.
-static PN_INLINE void turn_joints(const Mechanism& m, Terms& w, const std::vector<int>& joints) {
-    const int n = static_cast<int>(joints.size());
-    for (int k = 0; k < n;) {
-        int four[4], found = 0;
-        for (; k < n && found < 4; ++k)
-            if (m.joints[joints[k]].has_angle) four[found++] = joints[k];
-        if (found == 0) return;
-        for (; found < 4; ++found) four[found] = four[0];
-        Lanes angles, c, s;
-        for (int i = 0; i < 4; ++i) angles[i] = w.q[m.joints[four[i]].iq];
-        cosines_and_sines(angles, c, s);
-        for (int i = 0; i < 4; ++i) w.turn[four[i]] = {c[i], s[i]};
+// Cosines and sines of angles, by fours; the last group is filled up with the last angle.
+static PN_INLINE void turn_joints(Terms& w, const std::vector<Angle>& angles) {
+    const int n = static_cast<int>(angles.size());
+    for (int k = 0; k < n; k += 4) {
+        Lanes x, c, s;
+        for (int i = 0; i < 4; ++i) x[i] = w.q[angles[std::min(k + i, n - 1)].iq];
+        cosines_and_sines(x, c, s);
+        for (int i = 0; i < 4; ++i) w.turn[angles[std::min(k + i, n - 1)].joint] = {c[i], s[i]};
     }
 }
 
-PN_WIDE void place_bodies(const Mechanism& m, Terms& w, const VecX& q, const std::vector<int>& joints) {
+PN_WIDE void place_bodies(const Mechanism& m, Terms& w, const VecX& q, const std::vector<int>& joints,
+                          const std::vector<Angle>& angles) {
     w.q = q;
     normalize(m, w.q.data());
-    turn_joints(m, w, joints);
+    turn_joints(w, angles);
     for (int i : joints) place_body(m, w, i);
 }
 
 PN_WIDE void place_bodies(const Mechanism& m, Terms& w, const VecX& q) {
     w.q = q;
     normalize(m, w.q.data());
-    turn_joints(m, w, m.angled);
+    turn_joints(w, m.angles);
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
         place_body(m, w, i);

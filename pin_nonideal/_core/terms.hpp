@@ -43,9 +43,10 @@ struct Terms {
     void allocate(const Mechanism& m);
 };
 
-// Placements and J of all bodies; or placements alone, of the joints listed (each after its parent).
+// Placements and J of all bodies; or placements alone, of the joints listed (each after its parent), with their angles.
 void place_bodies(const Mechanism& m, Terms& w, const VecX& q);
-void place_bodies(const Mechanism& m, Terms& w, const VecX& q, const std::vector<int>& joints);
+void place_bodies(const Mechanism& m, Terms& w, const VecX& q, const std::vector<int>& joints,
+                  const std::vector<Angle>& angles);
 // Velocities and bias accelerations of bodies in their places.
 void move_bodies(const Mechanism& m, Terms& w, const VecX& v);
 // Inertias and M(q) of bodies in their places.
