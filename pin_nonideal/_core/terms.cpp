@@ -173,6 +173,20 @@ static PN_INLINE void place_body(const Mechanism& m, Terms& w, int i) {
     if (j.recenters) recenter(m, i, w);
 }
 
+// Inertia of a body in its place.
+static PN_INLINE void weigh_body(const Joint& j, Body& b) {
+    const Vec3 c = b.p + b.R * j.com;
+    Inertia& Y = b.own;
+    Y.mass = j.mass;
+    Y.first = j.mass * c;
+    Y.second = times_transpose(b.R * j.inertia, b.R);
+    const double square = c.dot(Y.first);
+    Y.second.c[0] += square * Vec3::UnitX() - c[0] * Y.first;
+    Y.second.c[1] += square * Vec3::UnitY() - c[1] * Y.first;
+    Y.second.c[2] += square * Vec3::UnitZ() - c[2] * Y.first;
+    b.Y = Y;
+}
+
 // Cosines and sines of angles, by fours; the last group is filled up with the last angle.
 static PN_INLINE void turn_joints(Terms& w, const std::vector<Angle>& angles) {
     const int n = static_cast<int>(angles.size());
@@ -201,6 +215,10 @@ PN_WIDE void place_bodies(const Mechanism& m, Terms& w, const VecX& q) {
         place_body(m, w, i);
         const Joint& j = m.joints[i];
         if (j.nv > 0) columns(j, w.body[i], w.foreign_motion, w.J.data() + j.iv);
+        weigh_body(j, w.body[i]);
+        if (!j.recenters) continue;
+        for (int k = j.root; k < i; ++k)  // about their new reference
+            if (m.joints[k].root == j.root) weigh_body(m.joints[k], w.body[k]);
     }
 }
 
@@ -228,20 +246,6 @@ PN_WIDE void move_bodies(const Mechanism& m, Terms& w, const VecX& v) {
 
 PN_WIDE void mass_matrix(const Mechanism& m, Terms& w) {
     const int n = static_cast<int>(m.joints.size());
-    for (int i = 1; i < n; ++i) {
-        const Joint& j = m.joints[i];
-        Body& b = w.body[i];
-        const Vec3 c = b.p + b.R * j.com;
-        Inertia& Y = b.own;
-        Y.mass = j.mass;
-        Y.first = j.mass * c;
-        Y.second = times_transpose(b.R * j.inertia, b.R);
-        const double square = c.dot(Y.first);
-        Y.second.c[0] += square * Vec3::UnitX() - c[0] * Y.first;
-        Y.second.c[1] += square * Vec3::UnitY() - c[1] * Y.first;
-        Y.second.c[2] += square * Vec3::UnitZ() - c[2] * Y.first;
-        b.Y = Y;
-    }
     for (int i = n - 1; i > 0; --i) {
         const Joint& j = m.joints[i];
         const Body& b = w.body[i];

@@ -43,15 +43,16 @@ struct Terms {
     void allocate(const Mechanism& m);
 };
 
-// Placements and J of all bodies; or placements alone, of the joints listed (each after its parent), with their angles.
+// Placements, J and inertias of all bodies; or placements alone, of the joints listed (each after its parent), with
+// their angles.
 void place_bodies(const Mechanism& m, Terms& w, const VecX& q);
 void place_bodies(const Mechanism& m, Terms& w, const VecX& q, const std::vector<int>& joints,
                   const std::vector<Angle>& angles);
 // Velocities and bias accelerations of bodies in their places.
 void move_bodies(const Mechanism& m, Terms& w, const VecX& v);
-// Inertias and M(q) of bodies in their places.
+// M(q) of bodies in their places, once for each placement: it sums inertias up the trees.
 void mass_matrix(const Mechanism& m, Terms& w);
-// nle of bodies in motion; needs mass_matrix.
+// nle of bodies in motion.
 void bias_forces(const Mechanism& m, Terms& w);
 
 // Bodies in their places and in motion.
