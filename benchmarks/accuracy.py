@@ -142,9 +142,9 @@ def race(
     return results
 
 
-def winner(times: dict[tuple[str, int], timing.Times], tool: str, entrants: int) -> int:
+def winner(times: dict[tuple[str, int], timing.Times], tool: str, count: int) -> int:
     """Which of a tool's entrants is the fastest, round by round."""
-    return min(range(entrants), key=lambda k: timing.ratio(times[tool, k], times[tool, 0]))
+    return min(range(count), key=lambda k: timing.ratio(times[tool, k], times[tool, 0]))
 
 
 def found(settings: list[Setting], row: dict[str, Any]) -> Setting:

@@ -175,7 +175,7 @@ class Scene:
         Raises:
             LoopClosureError: the constraints cannot be met from here; `gaps` names each gap.
             InputError: wrong shapes or numbers, or a coordinate where floating-point numbers are more than
-                a millimetre or milliradian apart.
+                a millimeter or milliradian apart.
         """
         time = number("t", t)
         if q is None and v is None and time == 0.0:

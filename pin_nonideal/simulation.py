@@ -172,7 +172,8 @@ def rollout(
     failed: list[RunError] = []
     for i, raw in enumerate(raws):
         try:
-            results += [] if raw is None else [finish(scene, raw, options, wall)]
+            if raw is not None:
+                results.append(finish(scene, raw, options, wall))
         except RunError as error:
             error.index = i
             failed.append(error)

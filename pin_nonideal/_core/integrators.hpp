@@ -81,7 +81,7 @@ struct Stepper {
 private:
     // Largest size so far of each tangent coordinate, velocity and state.
     void magnitude(const VecX& y, VecX& out) const;
-    void to_tolerances(double rtol, const VecX& atol);  // these sizes
+    void to_tolerances(double rtol, const VecX& atol);  // of these sizes, in place
     void remove_normal_part(int start);
     double norm(const VecX& dy, const VecX& scale, const VecX& y);
     std::vector<Combination> to_stage_;

@@ -108,6 +108,8 @@ nb::dict Runner::resume(const nb::bytes& state, const nb::dict& options) {
     return hand_over(w->counters, std::move(recording));
 }
 
+static int useful_threads(size_t count, int threads) { return static_cast<int>(std::min<size_t>(threads, count)); }
+
 // Calls work(i, k) for every i below `count`, drawn from one counter by threads k; number 0 is the caller's. What one of
 // them throws, a signal of Python's among it, stops the drawing and is thrown at the end.
 template <class Work>
@@ -136,7 +138,7 @@ static void share_out(size_t count, int threads, std::atomic<bool>& stopped, Wor
         --running;
         ended.notify_one();
     };
-    const int useful = static_cast<int>(std::min<size_t>(threads, count));
+    const int useful = useful_threads(count, threads);
     std::vector<std::thread> pool;
     pool.reserve(useful);
     for (int k = 1; k < useful; ++k) {
@@ -166,7 +168,7 @@ static void share_out(size_t count, int threads, std::atomic<bool>& stopped, Wor
 nb::tuple nearest_states(const Builder& b, const Array2& q_in, const Array2& v_in, double t, double far, int threads) {
     RowMajor q = map(q_in), v = map(v_in);
     VecX after = VecX::Constant(q.rows(), NAN), rate = after;
-    std::vector<std::unique_ptr<Workspace>> spaces(threads);
+    std::vector<std::unique_ptr<Workspace>> spaces(useful_threads(q.rows(), threads));
     std::atomic<bool> stopped{false};
     share_out(q.rows(), threads, stopped, [&](size_t i, int k) {
         if (!spaces[k]) spaces[k] = std::make_unique<Workspace>(*b.p);

@@ -21,7 +21,7 @@ struct Body {
     Inertia own, Y;                        // of the body; of the subtree
 };
 
-struct Turn {
+struct Turn {  // cosine and sine of an angle
     double c = 1.0, s = 0.0;
 };
 
