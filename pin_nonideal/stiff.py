@@ -110,7 +110,7 @@ class _Run:
         width = self.scene.model.nq + self.scene.model.nv + self.scene.z0.size + self.work
         rows = np.array(states).reshape(len(times), width)
         raw: dict[str, Any] = self.runner.record(np.array(times), rows, np.array(moved), self.options)
-        return raw | {"steps": self.steps}
+        return raw | {"counters": (self.steps, *raw["counters"][1:])}
 
 
 class _Grid:

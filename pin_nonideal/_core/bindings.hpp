@@ -94,16 +94,28 @@ private:
     double energy();
 };
 
-// q and v of many states on the constraints, by rows, and the largest residual and rate of each afterwards: NaN where the
-// state could not be taken. On several threads, each state as by Runner::project_state.
+// q and v of many states on the constraints, by rows, and the largest residual and rate of each afterwards: NaN where
+// the state could not be taken. On several threads, each state as by Runner::project_state.
 nb::tuple nearest_states(const Builder& b, const Array2& q, const Array2& v, double t, double far, int threads);
-// Runs from many states, on several threads. Where one is interrupted all stop, and those that had not begun are None.
+// A run that has ended. Its samples are in one array, field after field up to the end of each: a batch hands over many
+// runs, where an array of its own for each field would cost Python as much as a short run.
+struct Outcome {
+    Outcome(const Counters& counted, Recording&& recorded);
+    // To Python, once.
+    nb::dict hand_over();
+
+    Counters counters;
+    Recording rest;  // without samples
+    double largest_violation = 0.0;
+    std::vector<double> numbers;
+    std::vector<std::pair<const char*, size_t>> ends;
+};
+
+// Outcomes of runs from many states, on several threads. Where one is interrupted all stop, and the others are None.
 nb::list rollout(const Builder& b, const Array2& q, const Array2& v, const Array& z, const nb::dict& options,
                  int threads);
 
-// What a run records, by names: from Python's options, and back to Python.
 RecordOptions read_record(const nb::dict& options);
-nb::dict hand_over(const Counters& counters, Recording&& r);
 
 void bind_reactions(nb::module_& m);
 void bind_builder(nb::module_& m);

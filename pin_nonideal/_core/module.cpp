@@ -20,6 +20,7 @@ NB_MODULE(_core, m) {
     bind_builder(m);
     bind_runner(m);
     m.def("nearest_states", &nearest_states);
+    nb::class_<Outcome>(m, "Outcome").def("hand_over", &Outcome::hand_over);
     m.def("rollout", &rollout);
 
     // The friction program on arrays, for tests against enumeration.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <condition_variable>
 #include <mutex>
 #include <system_error>
@@ -51,30 +52,44 @@ RecordOptions read_record(const nb::dict& d) {
     return {wanted("a"), wanted("forces"), wanted("energy"), wanted("power")};
 }
 
-nb::dict hand_over(const Counters& counters, Recording&& r) {
-    nb::dict out;
+Outcome::Outcome(const Counters& counted, Recording&& recorded) : counters(counted), rest(std::move(recorded)) {
+    std::vector<double> modes(rest.modes.begin(), rest.modes.end());
     const std::pair<const char*, std::vector<double>*> fields[] = {
-        {"t", &r.t}, {"q", &r.q}, {"v", &r.v}, {"violation", &r.violation}, {"violation_rate", &r.violation_rate},
-        {"a", &r.a}, {"F_ideal", &r.F_ideal}, {"F_nonideal", &r.F_nonideal}, {"lam", &r.lam},
-        {"lam_ideal", &r.lam_ideal}, {"energy", &r.energy}, {"power", &r.power}, {"z", &r.z}};
-    const nb::object empty = to_numpy(nullptr, 0);  // of all that was not recorded
-    for (const auto& [name, values] : fields) out[name] = values->empty() ? empty : to_numpy(std::move(*values));
-    nb::list modes, events;
-    std::vector<double> mode_numbers(r.modes.begin(), r.modes.end());
-    out["modes"] = mode_numbers.empty() ? empty : to_numpy(std::move(mode_numbers));
-    for (const Event& e : r.events) events.append(nb::make_tuple(e.time, static_cast<int>(e.kind), e.element));
+        {"t", &rest.t}, {"q", &rest.q}, {"v", &rest.v}, {"violation", &rest.violation},
+        {"violation_rate", &rest.violation_rate}, {"a", &rest.a}, {"F_ideal", &rest.F_ideal},
+        {"F_nonideal", &rest.F_nonideal}, {"lam", &rest.lam}, {"lam_ideal", &rest.lam_ideal}, {"energy", &rest.energy},
+        {"power", &rest.power}, {"z", &rest.z}, {"modes", &modes}};
+    for (const double gap : rest.violation) largest_violation = std::fmax(largest_violation, gap);
+    size_t total = 0;
+    for (const auto& [name, values] : fields) total += values->size();
+    numbers.reserve(total);
+    for (const auto& [name, values] : fields) {
+        if (values->empty()) continue;
+        numbers.insert(numbers.end(), values->begin(), values->end());
+        ends.emplace_back(name, numbers.size());
+        std::vector<double>().swap(*values);  // not twice in memory
+    }
+}
+
+nb::dict Outcome::hand_over() {
+    nb::dict out;
+    const nb::object samples = to_numpy(std::move(numbers));
+    size_t begin = 0;
+    for (const auto& [name, end] : ends) {
+        out[name] = nb::steal(PySequence_GetSlice(samples.ptr(), begin, end));
+        begin = end;
+    }
+    nb::list events;
+    for (const Event& e : rest.events) events.append(nb::make_tuple(e.time, static_cast<int>(e.kind), e.element));
     out["events"] = events;
-    out["steps"] = r.steps;
-    out["rejected"] = r.rejected;
-    out["evaluations"] = counters.evaluations;
-    out["factorizations"] = counters.factorizations;
-    out["projections"] = counters.projections;
-    out["iterations"] = counters.iterations;
-    out["failure"] = r.failure ? nb::cast(std::string(r.failure->what())) : nb::none();
+    out["largest_violation"] = largest_violation;
+    out["counters"] = nb::make_tuple(rest.steps, rest.rejected, counters.evaluations, counters.factorizations,
+                                     counters.projections, counters.iterations);
+    out["failure"] = rest.failure ? nb::cast(std::string(rest.failure->what())) : nb::none();
     out["error"] = nb::none();
-    if (r.error) {
+    if (rest.error) {
         try {
-            std::rethrow_exception(r.error);
+            std::rethrow_exception(rest.error);
         } catch (nb::python_error& e) {
             out["error"] = nb::borrow(e.value());
         } catch (const std::exception& e) {
@@ -94,7 +109,7 @@ nb::dict Runner::simulate(const Array& q_in, const Array& v_in, const Array& z, 
         nb::gil_scoped_release release;
         pn::simulate(*p, *w, q0, v0, o, recording);
     }
-    return hand_over(w->counters, std::move(recording));
+    return Outcome(w->counters, std::move(recording)).hand_over();
 }
 
 nb::dict Runner::resume(const nb::bytes& state, const nb::dict& options) {
@@ -105,7 +120,7 @@ nb::dict Runner::resume(const nb::bytes& state, const nb::dict& options) {
         nb::gil_scoped_release release;
         pn::resume(*p, *w, bytes, o, recording);
     }
-    return hand_over(w->counters, std::move(recording));
+    return Outcome(w->counters, std::move(recording)).hand_over();
 }
 
 static int useful_threads(size_t count, int threads) { return static_cast<int>(std::min<size_t>(threads, count)); }
@@ -202,8 +217,7 @@ static bool is_interrupt(const std::exception_ptr& error) {
 nb::list rollout(const Builder& b, const Array2& q, const Array2& v, const Array& z, const nb::dict& options,
                  int threads) {
     const size_t count = q.shape(0);
-    std::vector<Recording> recordings(count);
-    std::vector<std::optional<Counters>> counters(count);
+    std::vector<std::optional<Outcome>> outcomes(count);
     std::atomic<bool> stopped{false};
     const auto stop = [&stopped](double t) {
         if (stopped) throw Failure(Failure::Kind::interrupted, t);
@@ -224,16 +238,16 @@ nb::list rollout(const Builder& b, const Array2& q, const Array2& v, const Array
             Recording mine;  // neighbors in one array would share lines of cache between the threads
             simulate(*b.p, space, q_all.row(i), v_all.row(i), k == 0 ? own : others, mine);
             if (is_interrupt(mine.error)) stopped = true;
-            recordings[i] = std::move(mine);
-            counters[i] = space.counters;
+            outcomes[i].emplace(space.counters, std::move(mine));
         });
     } catch (...) {  // a run that the interrupt ended tells of it
-        const auto tells = [](const Recording& r) { return r.failure && r.failure->kind == Failure::Kind::interrupted; };
-        if (!is_interrupt(std::current_exception()) || std::none_of(recordings.begin(), recordings.end(), tells)) throw;
+        const auto tells = [](const std::optional<Outcome>& one) {
+            return one && one->rest.failure && one->rest.failure->kind == Failure::Kind::interrupted;
+        };
+        if (!is_interrupt(std::current_exception()) || std::none_of(outcomes.begin(), outcomes.end(), tells)) throw;
     }
     nb::list out;
-    for (size_t i = 0; i < count; ++i)
-        out.append(counters[i] ? nb::object(hand_over(*counters[i], std::move(recordings[i]))) : nb::none());
+    for (std::optional<Outcome>& one : outcomes) out.append(one ? nb::cast(std::move(*one)) : nb::none());
     return out;
 }
 
