@@ -29,8 +29,11 @@ static void fields(Archive& a, Terms& x) {
 static void fields(Archive& a, RowSystem& x) {
     auto& [G, factor, scale, active, wanted, blocks, block_used, orthogonal, redundant, refine, min_pivot, distance, rank,
            Q, tau, work, columns] = x;
-    a(G, factor, scale, active, wanted, block_used, orthogonal, redundant, refine, min_pivot, distance, rank, Q, tau,
-      work);
+    a(G, factor, scale, active, wanted, block_used, orthogonal, redundant, refine, min_pivot, distance, rank, tau, work);
+    bool has_Q = Q.cols() > 0;
+    a(has_Q);
+    if (a.reading()) Q.resize(Q.rows(), has_Q ? scale.size() : 0);
+    a(Q);
     a.indices(blocks, static_cast<int>(block_used.size()));
     a.indices(columns, static_cast<int>(active.size()));
 }

@@ -39,6 +39,7 @@ std::vector<int> elimination_order(const std::vector<std::vector<int>>& neighbor
 
 void dense_columns(const std::vector<Block>& blocks, const std::vector<double>& B,
                    const std::vector<char>& use, RowSystem& s) {
+    if (s.Q.cols() == 0) s.Q.resize(s.Q.rows(), s.scale.size());
     s.columns.clear();
     for (int index : s.blocks) {
         const Block& block = blocks[index];
@@ -156,7 +157,7 @@ void RowSystem::allocate(const RowLayout& layout, int block_count, int nv) {
     scale = VecX::Zero(layout.rows);
     active.assign(layout.rows, 0);
     wanted.assign(layout.rows, 0);
-    Q = MatX::Zero(nv, layout.rows);
+    Q.resize(nv, 0);
     tau = VecX::Zero(layout.rows);
     work = VecX::Zero(std::max(nv, layout.rows));
     columns.reserve(layout.rows);

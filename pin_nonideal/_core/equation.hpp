@@ -52,7 +52,8 @@ struct RowSystem {
     // (a singular position turns a row into zero): small near a singular position.
     double distance = 1.0;
     int rank = 0;
-    // Orthogonal factorization of the scaled active rows, one column a row.
+    // Orthogonal factorization of the scaled active rows, one column a row: no columns before it is first wanted, for
+    // in a mechanism of many loops it takes far more room than all else.
     MatX Q;
     VecX tau, work;
     std::vector<int> columns;
