@@ -122,6 +122,16 @@ SCRIPT = """
 """
 
 
+def test_the_state_of_a_run_grows_no_faster_than_the_robot(tmp_path):
+    """Local loops need room for themselves, and none for pairs of loops that share nothing."""
+    sizes = []
+    for N in (40, 80, 160):
+        path = tmp_path / f"{N}"
+        pn.simulate(pn.load("n_four_bar", N=N), 0.01, method="rk4", dt=0.005, checkpoint=path)
+        sizes.append(path.stat().st_size)
+    assert sizes[2] - sizes[1] <= 2.1 * (sizes[1] - sizes[0])
+
+
 def test_a_killed_process_leaves_a_file_to_go_on_from(tmp_path):
     alone = pn.simulate(pn.load("n_four_bar", N=3), 6.0, record="energy")
     generator = np.random.default_rng()

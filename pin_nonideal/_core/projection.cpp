@@ -236,8 +236,10 @@ void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
     want_rows(p, w);
     configure(p, w, t, q, v);
     if (w.rows.blocks.empty()) return;
-    decide_rows(p.layout, p.blocks, w.B, w.rows);
-    factor_rows(p.layout, p.blocks, w.B, w.rows);
+    if (w.rows.orthogonal) {  // their Cholesky factor does not show that they are independent
+        decide_rows(p.layout, p.blocks, w.B, w.rows);
+        factor_rows(p.layout, p.blocks, w.B, w.rows);
+    }
     project(p, w, t, q, v);
 }
 
