@@ -148,7 +148,7 @@ def batch_of(function: Callable[[], Any], clock: Callable[[], float]) -> timing.
 
 
 def long_batch(problem: Problem, scene: pn.Scene, steps: int) -> int:
-    """The number of states of a batch that lasts long enough, a multiple of STATES."""
+    """The number of states of a batch that lasts long enough: a multiple of STATES, 64 at most."""
     call = ours(scene, *starts(problem, scene, STATES), steps, 1)
     seconds = min(batch_of(call, time.process_time)(1) for _ in range(3))
     return STATES * math.ceil(LONG / max(seconds, LONG / 64))

@@ -97,18 +97,12 @@ private:
 // q and v of many states on the constraints, by rows, and the largest residual and rate of each afterwards: NaN where
 // the state could not be taken. On several threads, each state as by Runner::project_state.
 nb::tuple nearest_states(const Builder& b, const Array2& q, const Array2& v, double t, double far, int threads);
-// A run that has ended. Its samples are in one array, field after field up to the end of each: a batch hands over many
-// runs, where an array of its own for each field would cost Python as much as a short run.
+// A run that has ended. A batch hands its runs over one at a time, while their numbers are still near.
 struct Outcome {
-    Outcome(const Counters& counted, Recording&& recorded);
-    // To Python, once.
-    nb::dict hand_over();
-
     Counters counters;
-    Recording rest;  // without samples
-    double largest_violation = 0.0;
-    std::vector<double> numbers;
-    std::vector<std::pair<const char*, size_t>> ends;
+    Recording recording;
+    // To Python, once; fields without a number are left out.
+    nb::dict hand_over();
 };
 
 // Outcomes of runs from many states, on several threads. Where one is interrupted all stop, and the others are None.

@@ -213,7 +213,7 @@ nb::dict Runner::record(const Array& times, const Array2& states, const Array& m
         recorder.moved_energy = moved.data()[k];
         recorder.sample(times.data()[k], y, true);
     }
-    return Outcome(w->counters, std::move(out)).hand_over();
+    return Outcome{w->counters, std::move(out)}.hand_over();
 }
 
 VecX Runner::read_state(const System& system, const VecX& outside) {

@@ -52,44 +52,29 @@ RecordOptions read_record(const nb::dict& d) {
     return {wanted("a"), wanted("forces"), wanted("energy"), wanted("power")};
 }
 
-Outcome::Outcome(const Counters& counted, Recording&& recorded) : counters(counted), rest(std::move(recorded)) {
-    std::vector<double> modes(rest.modes.begin(), rest.modes.end());
-    const std::pair<const char*, std::vector<double>*> fields[] = {
-        {"t", &rest.t}, {"q", &rest.q}, {"v", &rest.v}, {"violation", &rest.violation},
-        {"violation_rate", &rest.violation_rate}, {"a", &rest.a}, {"F_ideal", &rest.F_ideal},
-        {"F_nonideal", &rest.F_nonideal}, {"lam", &rest.lam}, {"lam_ideal", &rest.lam_ideal}, {"energy", &rest.energy},
-        {"power", &rest.power}, {"z", &rest.z}, {"modes", &modes}};
-    for (const double gap : rest.violation) largest_violation = std::fmax(largest_violation, gap);
-    size_t total = 0;
-    for (const auto& [name, values] : fields) total += values->size();
-    numbers.reserve(total);
-    for (const auto& [name, values] : fields) {
-        if (values->empty()) continue;
-        numbers.insert(numbers.end(), values->begin(), values->end());
-        ends.emplace_back(name, numbers.size());
-        std::vector<double>().swap(*values);  // not twice in memory
-    }
-}
-
 nb::dict Outcome::hand_over() {
     nb::dict out;
-    const nb::object samples = to_numpy(std::move(numbers));
-    size_t begin = 0;
-    for (const auto& [name, end] : ends) {
-        out[name] = nb::steal(PySequence_GetSlice(samples.ptr(), begin, end));
-        begin = end;
-    }
+    Recording& r = recording;
+    const std::pair<const char*, std::vector<double>*> fields[] = {
+        {"t", &r.t}, {"q", &r.q}, {"v", &r.v}, {"violation", &r.violation}, {"violation_rate", &r.violation_rate},
+        {"a", &r.a}, {"F_ideal", &r.F_ideal}, {"F_nonideal", &r.F_nonideal}, {"lam", &r.lam},
+        {"lam_ideal", &r.lam_ideal}, {"energy", &r.energy}, {"power", &r.power}, {"z", &r.z}};
+    double largest_violation = 0.0;
+    for (const double gap : r.violation) largest_violation = std::fmax(largest_violation, gap);
+    for (const auto& [name, values] : fields)
+        if (!values->empty()) out[name] = to_numpy(std::move(*values));
+    if (!r.modes.empty()) out["modes"] = to_numpy(std::vector<double>(r.modes.begin(), r.modes.end()));
     nb::list events;
-    for (const Event& e : rest.events) events.append(nb::make_tuple(e.time, static_cast<int>(e.kind), e.element));
+    for (const Event& e : r.events) events.append(nb::make_tuple(e.time, static_cast<int>(e.kind), e.element));
     out["events"] = events;
     out["largest_violation"] = largest_violation;
-    out["counters"] = nb::make_tuple(rest.steps, rest.rejected, counters.evaluations, counters.factorizations,
+    out["counters"] = nb::make_tuple(r.steps, r.rejected, counters.evaluations, counters.factorizations,
                                      counters.projections, counters.iterations);
-    out["failure"] = rest.failure ? nb::cast(std::string(rest.failure->what())) : nb::none();
+    out["failure"] = r.failure ? nb::cast(std::string(r.failure->what())) : nb::none();
     out["error"] = nb::none();
-    if (rest.error) {
+    if (r.error) {
         try {
-            std::rethrow_exception(rest.error);
+            std::rethrow_exception(r.error);
         } catch (nb::python_error& e) {
             out["error"] = nb::borrow(e.value());
         } catch (const std::exception& e) {
@@ -109,7 +94,7 @@ nb::dict Runner::simulate(const Array& q_in, const Array& v_in, const Array& z, 
         nb::gil_scoped_release release;
         pn::simulate(*p, *w, q0, v0, o, recording);
     }
-    return Outcome(w->counters, std::move(recording)).hand_over();
+    return Outcome{w->counters, std::move(recording)}.hand_over();
 }
 
 nb::dict Runner::resume(const nb::bytes& state, const nb::dict& options) {
@@ -120,7 +105,7 @@ nb::dict Runner::resume(const nb::bytes& state, const nb::dict& options) {
         nb::gil_scoped_release release;
         pn::resume(*p, *w, bytes, o, recording);
     }
-    return Outcome(w->counters, std::move(recording)).hand_over();
+    return Outcome{w->counters, std::move(recording)}.hand_over();
 }
 
 static int useful_threads(size_t count, int threads) { return static_cast<int>(std::min<size_t>(threads, count)); }
@@ -238,11 +223,12 @@ nb::list rollout(const Builder& b, const Array2& q, const Array2& v, const Array
             Recording mine;  // neighbors in one array would share lines of cache between the threads
             simulate(*b.p, space, q_all.row(i), v_all.row(i), k == 0 ? own : others, mine);
             if (is_interrupt(mine.error)) stopped = true;
-            outcomes[i].emplace(space.counters, std::move(mine));
+            outcomes[i] = Outcome{space.counters, std::move(mine)};
         });
     } catch (...) {  // a run that the interrupt ended tells of it
         const auto tells = [](const std::optional<Outcome>& one) {
-            return one && one->rest.failure && one->rest.failure->kind == Failure::Kind::interrupted;
+            const auto failure = one ? one->recording.failure : std::nullopt;
+            return failure && failure->kind == Failure::Kind::interrupted;
         };
         if (!is_interrupt(std::current_exception()) || std::none_of(outcomes.begin(), outcomes.end(), tells)) throw;
     }
