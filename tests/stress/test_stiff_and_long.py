@@ -98,7 +98,10 @@ def test_a_four_bar_turns_for_a_day(duration):
     run = pn.simulate(spun, duration, output_dt=duration / 100.0, record="energy")
     assert np.ptp(run.q[:, 0]) > duration  # it turns: more than a radian a second
     finite(run)
-    at_most("violation [m]", run.violation.max(), 1e-10)
+    # Angles of a million radians are 1.2e-10 apart, and so are the places of a link of a meter: projection
+    # ends within a few of these, or within the rounding of the residual.
+    spacing = np.spacing(np.abs(run.q).max(axis=1))
+    at_most("violation over the spacing of angles", (run.violation / (spacing + 1e-14)).max(), 4.0)
     at_most("energy balance, a step", ledger(run) / run.stats.steps, 1e-8)
 
 
