@@ -27,6 +27,7 @@ from .problems import Problem
 DT = 2e-3
 STATES, STEPS = 64, 200
 LONG = 0.2  # seconds of a batch in one thread, at least
+MOST_STATES = 4096
 SPREAD = 0.05  # of the velocities of the batch around the scene's [rad/s or m/s]
 OURS, RIVALS = "pin_nonideal", ("mujoco Euler", "mujoco implicitfast")
 
@@ -148,10 +149,10 @@ def batch_of(function: Callable[[], Any], clock: Callable[[], float]) -> timing.
 
 
 def long_batch(problem: Problem, scene: pn.Scene, steps: int) -> int:
-    """The number of states of a batch that lasts long enough: a multiple of STATES, 64 at most."""
+    """The number of states of a batch that lasts long enough, in whole multiples of STATES."""
     call = ours(scene, *starts(problem, scene, STATES), steps, 1)
     seconds = min(batch_of(call, time.process_time)(1) for _ in range(3))
-    return STATES * math.ceil(LONG / max(seconds, LONG / 64))
+    return min(STATES * math.ceil(LONG / seconds), MOST_STATES)
 
 
 def measure_case(name: str, states: int | None, steps: int, rounds: int) -> dict[str, Any]:
