@@ -44,7 +44,7 @@ from .laws import Drag, JointFriction, LuGre, SigmoidFriction, UserFriction, Use
 from .loading import load, robots
 from .plotting import plot
 from .replay import replay
-from .resume import resume
+from .runs.resume import resume
 from .scene import Scene
 from .simulation import rollout, simulate
 from .sweep import sweep

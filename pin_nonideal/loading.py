@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from .assembly import scene_arguments
 from .checks import sequence
 from .errors import InputError, LoadingError, UnknownNameError, nearest
-from .generators import GENERATORS
-from .mjcf import read_mjcf
-from .robot_yaml import MODEL_KEYS, Table, check_keys, optional_string, read_yaml
+from .formats.assembly import scene_arguments
+from .formats.generators import GENERATORS
+from .formats.mjcf import read_mjcf
+from .formats.robot_yaml import MODEL_KEYS, Table, check_keys, optional_string, read_yaml
+from .formats.urdf import RobotFile, read_mimics, read_urdf
 from .scene import Scene
-from .urdf import RobotFile, read_mimics, read_urdf
 
 FILE_PARAMETERS = ("free_flyer", "package_dirs", "merge_ball_joints")
 

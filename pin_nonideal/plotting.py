@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .errors import InputError, OutputError
 from .files import file_path, whole_file
-from .replay_signals import MODES, Plot, check_scene, mode_bands, plots_of, wanted
+from .page.signals import MODES, Plot, check_scene, mode_bands, plots_of, wanted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -23,8 +23,8 @@ import pinocchio as pin
 from .checks import positive
 from .errors import InputError, OutputError
 from .files import file_path, whole_file
-from .replay_payload import packed_run
-from .replay_signals import Chosen, check_scene
+from .page.payload import packed_run
+from .page.signals import Chosen, check_scene
 
 if TYPE_CHECKING:
     from .trajectory import Trajectory
@@ -121,7 +121,7 @@ def _page(
 ) -> str:
     """The whole page."""
     library, notices = _viewer_library()
-    folder = Path(__file__).parent / "replay_page"
+    folder = Path(__file__).parent / "page" / "assets"
 
     def packed(content: bytes) -> str:
         stored = gzip.compress(content, COMPRESSION, mtime=0) if compress else content

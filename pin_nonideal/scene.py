@@ -11,17 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from .actuation import Actuation
 from .checks import array, number, optional_text, sequence
-from .configurations import configuration, require_resolved, unit_parts
-from .consistency import Rows, nearest_state, nearest_states, nonholonomic_rows
+from .compilation.analysis import check_model, check_user_constraints, drop_rows
+from .compilation.failures import named_failure
+from .compilation.report import report
+from .compilation.scene import core, lower
 from .contacts import Contact
 from .equation import Solution
 from .errors import InputError, RunError
-from .failures import named_failure
 from .forces import Force
 from .laws import Law
-from .lowering import core, lower
-from .scene_analysis import check_model, check_user_constraints, drop_rows
-from .scene_report import report
+from .states.configurations import configuration, require_resolved, unit_parts
+from .states.projection import Rows, nearest_state, nearest_states, nonholonomic_rows
 
 Array = NDArray[np.float64]
 

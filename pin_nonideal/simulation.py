@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .checkpoint import Saver
 from .checks import array, choice, count
+from .compilation.failures import LEFT, check_closed
 from .errors import InputError, OutputError, RunError, RunInterrupted, UserFunctionError
-from .failures import LEFT, check_closed
-from .run_options import SCIPY, run_options
+from .runs.checkpoint import Saver
+from .runs.options import SCIPY, run_options
 from .scene import Scene
 from .trajectory import Event, Stats, Trajectory
 
@@ -100,7 +100,7 @@ def simulate(
     begin = time.perf_counter()
     try:
         if method in SCIPY:
-            from .stiff import simulate_stiff
+            from .runs.scipy_methods import simulate_stiff
 
             raw = simulate_stiff(scene, q0, v0, options)
         else:

@@ -18,9 +18,9 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal import checkpoint
 from pin_nonideal.errors import InputError, LoadingError, OutputError, RunInterrupted
-from pin_nonideal.run_options import run_options
+from pin_nonideal.runs import checkpoint
+from pin_nonideal.runs.options import run_options
 
 from .random_trees import add
 from .refusals import refuses

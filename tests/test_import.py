@@ -14,7 +14,7 @@ import pinocchio
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal import compiled
+from pin_nonideal import core as compiled
 
 AGAIN = 'run "pip install ." in the checkout, which builds the core for the Pinocchio that it needs'
 HEAVY = ["IPython", "joblib", "matplotlib", "meshcat", "scipy", "tqdm", "yaml"]

@@ -18,8 +18,8 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, OutputError
+from pin_nonideal.page.payload import packed_run
 from pin_nonideal.replay import replay
-from pin_nonideal.replay_payload import packed_run
 
 from .replay_runs import four_bar, jointed, run_of
 

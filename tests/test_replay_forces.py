@@ -17,8 +17,8 @@ from pin_nonideal.constraints import (
 )
 from pin_nonideal.contacts import PointContact
 from pin_nonideal.forces import SpringDamper
-from pin_nonideal.replay_forces import arrows_of, marks_of
-from pin_nonideal.replay_motion import sample
+from pin_nonideal.page.forces import arrows_of, marks_of
+from pin_nonideal.page.motion import sample
 from pin_nonideal.timefunctions import constant
 
 from .replay_runs import add_frame, four_bar, jointed, run_of

@@ -7,8 +7,8 @@ import pinocchio as pin
 import pytest
 
 from pin_nonideal.errors import InputError
-from pin_nonideal.replay_geometry import Shape, Visual, sticks
-from pin_nonideal.replay_motion import MAX_FRAMES, sample, view
+from pin_nonideal.page.geometry import Shape, Visual, sticks
+from pin_nonideal.page.motion import MAX_FRAMES, sample, view
 
 from .replay_runs import four_bar, jointed, panda, run_of
 

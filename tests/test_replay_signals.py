@@ -10,7 +10,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, UnknownNameError
-from pin_nonideal.replay_signals import (
+from pin_nonideal.page.signals import (
     INTERVALS,
     MAX_CURVES,
     Plot,

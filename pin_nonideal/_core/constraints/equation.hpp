@@ -1,0 +1,79 @@
+// Eq. (40) in factor form. With M = R R^T, B = A R^-T and a_s' = R^-1 (F + C):
+//     B B^T lam = b - B a_s',   a_s = a_s' + B^T lam,   a = R^-T a_s,
+// for the rows in use, which are independent: copies and vanishing rows were dropped before the run, other redundancy
+// is decided at each step's start (decide_rows) and held over the step.
+#pragma once
+
+#include <vector>
+
+#include "constraints/constraints.hpp"
+
+namespace pn {
+
+// Rank tolerance on the pivots of B^T with rows of unit length: rounding and the constraints' own violation reach
+// about 1e-12 on the manifold, true directions of light mechanisms lie above 1e-7.
+constexpr double rank_tolerance = 1e-10;
+// The same while elements stick. What they hold by a smaller part of their forces than this they do not hold: it is the
+// square root of the threshold on responses in the program that finds the modes (rank_threshold).
+constexpr double rank_tolerance_sticking = 3e-7;
+// Smallest pivot of the Cholesky factor of the unit-diagonal B B^T that is trusted: its relative error stays below
+// the machine precision divided by this; below it the orthogonal factorization of B^T takes over.
+constexpr double safe_pivot = 1e-5;
+
+// Rows stored so that row i of the symmetric matrix keeps columns first[i] .. i (an envelope): blocks that share no
+// dof leave no entry, and the Cholesky factor stays inside.
+struct RowLayout {
+    int rows = 0;
+    std::vector<int> position;  // of each kept row in elimination order
+    std::vector<int> row_at;    // inverse of position
+    std::vector<int> first, start;
+    size_t entries = 0;
+    struct Pair {  // blocks with common dofs, and where these stand in the two supports
+        int block1, block2;
+        std::vector<std::pair<int, int>> common;
+    };
+    std::vector<Pair> pairs;
+};
+
+RowLayout layout_rows(const std::vector<Block>& blocks, int nv);
+
+struct RowSystem {
+    std::vector<double> G, factor;  // B B^T and its Cholesky factor, in the envelope
+    VecX scale;                     // 1 / length of each row of B
+    std::vector<char> active;       // rows in use
+    std::vector<char> wanted;       // rows that must hold (constraints, sticking elements)
+    std::vector<int> blocks;        // blocks with a wanted row
+    std::vector<char> block_used;
+    bool orthogonal = false;        // B^T = Q T in use instead of the Cholesky factor
+    bool redundant = false;         // some wanted row is not active
+    bool refine = false;            // very unequal pivots of M: solutions are refined
+    double min_pivot = 1.0;
+    // Square of the sine at which some row stands to the others, or of its length beside the other rows of its block
+    // (a singular position turns a row into zero): small near a singular position.
+    double distance = 1.0;
+    int rank = 0;
+    // Orthogonal factorization of the scaled active rows, one column a row: no columns before it is first wanted, for
+    // in a mechanism of many loops it takes far more room than all else.
+    MatX Q;
+    VecX tau, work;
+    std::vector<int> columns;
+
+    void allocate(const RowLayout& layout, int blocks, int nv);
+    // Blocks with a wanted row, and all wanted rows in use.
+    void use_wanted(const std::vector<Block>& all);
+};
+
+// B B^T and its factor for the active rows; falls back to the orthogonal factorization.
+void factor_rows(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
+                 RowSystem& s);
+// Rank and independent subset of the wanted rows, by column-pivoted QR of B^T.
+void decide_rows(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
+                 RowSystem& s, double tolerance = rank_tolerance);
+// lam with (B B^T) lam = r on the active rows (zero on the others); r and lam by kept row.
+void solve_rows(const RowLayout& layout, RowSystem& s, const VecX& r, VecX& lam);
+
+// y += B^T lam and r = B x for one block; the same functions serve A with the array A.
+void add_transpose(const Block& block, const std::vector<double>& B, const VecX& lam, VecX& y);
+void multiply(const Block& block, const std::vector<double>& B, const VecX& x, VecX& r);
+
+}  // namespace pn

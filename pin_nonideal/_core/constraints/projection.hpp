@@ -1,0 +1,57 @@
+// Back onto the constraints after a step, in the metric of M: phi(q, t) = 0 by Newton's method with the factors of the
+// step's last evaluation, and there A v + phi_t = 0 by one solve with the factors that the next step needs anyway.
+#pragma once
+
+#include "dynamics/program.hpp"
+
+namespace pn {
+
+// Residuals below this part of the scene's size are rounding: a few hundred operations of unit roundoff.
+constexpr double projection_floor = 2e-14;
+constexpr int projection_limit = 12;
+// A pivot of the rows' unit-diagonal factor below this is near a singular position: the square of the sine at which
+// the nearest row stands to the others.
+constexpr double near_singular = 2.5e-3;
+// A step of the iteration that keeps more than this part of an earlier one says nothing of what the factors miss.
+constexpr double broyden_limit = 0.3;
+// A step after which the gap should be below this part of rounding needs no look of its own.
+constexpr double trusted_part = 0.5;
+// The third-order part of a step's move counts where its square is less than this part of that of the second.
+constexpr double falling_square = 0.01;
+// Where nothing can move, a velocity below this [rad/s or m/s] is what the last event left by rounding.
+constexpr double immobile_speed = 1e-8;
+
+// A larger gap than this part of the scene's size that projection leaves has opened for good: after every step it comes
+// down to rounding, in singular positions too.
+constexpr double open_gap = 1e-9;
+
+// To a step's move h v1, v1 = v0 + h a, adds the least one that follows the constraints to third order. Without it gaps are
+// h^2/2 b, since h v0 + h^2/2 a is what follows them to second order; the multipliers of h^3 are those that the projection
+// after the step before has shown. The workspace is that of (v0, a).
+void follow_constraints(const Program& p, Workspace& w, double h, VecX& move);
+// Keeps them, after the projection of the end of a step that was moved so.
+void learn_third_order(Workspace& w, double h);
+
+// Each returns false when nothing had to move.
+// Moves q; the workspace must hold factors near (t, q), and is left configured there. v is only what a user's own rows are
+// shown.
+bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
+// Moves v; the workspace must be configured at (t, q).
+bool project_velocity(const Program& p, Workspace& w, double t, VecX& v);
+// Moves both, and leaves the workspace configured there.
+bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
+
+// Where no step has left factors: those of the state itself serve, with the rows that are independent there, all elements
+// slipping.
+void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
+// Does so unless the largest residual is beyond `far`; residual before and after, and the largest rate.
+struct Closure { double before, after, rate; };
+Closure close(const Program& p, Workspace& w, double t, VecX& q, VecX& v, double far);
+
+// Throws where a row's residual at the last look is open.
+void require_closed(const Program& p, const Workspace& w, double t);
+
+// Size of the scene: the largest distance of a body that the constraints touch from the world's origin, at least 1 m.
+double scene_size(const Program& p, const Workspace& w);
+
+}  // namespace pn

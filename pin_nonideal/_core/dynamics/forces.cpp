@@ -1,0 +1,124 @@
+// Given forces F: springs, wrenches, user forces and actuation.
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/program.hpp"
+
+namespace pn {
+
+namespace {
+
+double joint_position(const Joint& j, const VecX& q) {
+    return j.unbounded ? std::atan2(q[j.iq + 1], q[j.iq]) : q[j.iq];
+}
+
+struct Apply {
+    const Program& p;
+    Workspace& w;
+    double t;
+    const VecX &q, &v;
+
+    // Force at a world point of a body, and couple.
+    void push(int joint, const Vec3& point, const Vec3& force, const Vec3& couple) const {
+        if (joint == 0) return;
+        w.body_force[joint] += Force{force, couple + (point - w.terms.body[joint].ref).cross(force)};
+    }
+    Vec3 position(const Frame& f) const {
+        const Body& b = w.terms.body[f.joint];
+        return b.ref + b.p + b.R * f.p;
+    }
+
+    void operator()(const SpringDamper& s) const {
+        const Vec3 x1 = position(s.frame1), x2 = position(s.frame2), d = x1 - x2;
+        const Vec3 u = velocity_at(w.terms.body[s.frame1.joint], x1) - velocity_at(w.terms.body[s.frame2.joint], x2);
+        const double length = d.norm();
+        Vec3 force = -s.stiffness * d;
+        if (length > 0.0) {
+            const Vec3 e = d / length;
+            force = -(s.stiffness * (length - s.rest_length) + s.damping * e.dot(u)) * e;
+        }
+        push(s.frame1.joint, x1, force, Vec3::Zero());
+        push(s.frame2.joint, x2, -force, Vec3::Zero());
+    }
+    void operator()(const JointSpring& s) const {
+        const Joint& j = p.mechanism.joints[s.joint];
+        w.external[j.iv] -= s.stiffness * (joint_position(j, q) - s.rest) + s.damping * v[j.iv];
+    }
+    void operator()(const FrameWrench& f) const {
+        double six[6];
+        std::copy(f.value, f.value + 6, six);
+        if (f.function) f.function(t, six);
+        push(f.frame.joint, position(f.frame), Vec3(six[0], six[1], six[2]), Vec3(six[3], six[4], six[5]));
+    }
+    void operator()(const UserForce& f) const {
+        f.function(t, q, v, w.work);
+        w.external += w.work;
+    }
+};
+
+struct Torque {
+    const Program& p;
+    Workspace& w;
+    double t;
+    const VecX &q, &v;
+    VecX& tau;
+
+    void operator()(const NoActuation&) const { tau.setZero(); }
+    void operator()(const ConstantTorque& c) const { tau = c.tau; }
+    void operator()(const TorqueFunction& f) const { f.function(t, q, v, tau); }
+    void operator()(const SampledTorque& s) const {
+        if (w.has_held) tau = w.held_torque;
+        else s.function(t, q, v, tau);
+    }
+    void operator()(const HoldPosition& h) const {
+        for (const Chart& c : p.mechanism.charts) {
+            if (c.kind == Chart::Kind::vector) {
+                for (int k = 0; k < c.n; ++k) {
+                    const int d = c.iv + k;
+                    tau[d] = h.kp[d] * (h.q[c.iq + k] - q[c.iq + k]) - h.kd[d] * v[d];
+                }
+            } else if (c.kind == Chart::Kind::circle) {
+                const double *x = q.data() + c.iq, *y = h.q.data() + c.iq;
+                const double gap = std::atan2(x[0] * y[1] - x[1] * y[0], x[0] * y[0] + x[1] * y[1]);
+                tau[c.iv] = h.kp[c.iv] * gap - h.kd[c.iv] * v[c.iv];
+            } else {
+                const int n = c.kind == Chart::Kind::pose ? 6 : 3;
+                for (int k = 0; k < n; ++k) tau[c.iv + k] = -h.kd[c.iv + k] * v[c.iv + k];
+            }
+        }
+    }
+    void operator()(const TorqueTable& table) const {
+        const auto& x = table.times;
+        if (t <= x.front()) { tau = table.values.col(0); return; }
+        if (t >= x.back()) { tau = table.values.col(table.values.cols() - 1); return; }
+        const int k = static_cast<int>(std::upper_bound(x.begin(), x.end(), t) - x.begin()) - 1;
+        const double s = (t - x[k]) / (x[k + 1] - x[k]);
+        tau = (1.0 - s) * table.values.col(k) + s * table.values.col(k + 1);
+    }
+};
+
+}  // namespace
+
+void actuation_torque(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& tau) {
+    if (w.has_override) tau = w.override_torque;
+    else std::visit(Torque{p, w, t, q, v, tau}, p.actuation);
+}
+
+void given_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    actuation_torque(p, w, t, q, v, w.tau);
+    w.external.setZero();
+    if (p.forces.empty()) return;
+    const Apply apply{p, w, t, q, v};
+    if (p.has_body_forces) std::fill(w.body_force.begin(), w.body_force.end(), Force{Vec3::Zero(), Vec3::Zero()});
+    for (const GivenForce& f : p.forces) std::visit(apply, f);
+    if (!p.has_body_forces) return;
+    // From the leaves to the root: each joint feels the forces on its subtree.
+    std::copy(w.body_force.begin(), w.body_force.end(), w.reaction_body.begin());
+    for (int i = static_cast<int>(p.mechanism.joints.size()) - 1; i > 0; --i) {
+        const Joint& j = p.mechanism.joints[i];
+        for (int k = j.iv; k < j.iv + j.nv; ++k) w.external[k] += dot(w.terms.J[k], w.reaction_body[i]);
+        if (j.parent != 0) w.reaction_body[j.parent] += w.reaction_body[i];
+    }
+}
+
+}  // namespace pn

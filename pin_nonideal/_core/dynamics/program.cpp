@@ -1,0 +1,172 @@
+// What a scene consists of, laid out for the evaluation, and the room that it works in.
+#include <algorithm>
+#include <cstdio>
+
+#include "dynamics/program.hpp"
+#include "constraints/projection.hpp"
+
+namespace pn {
+
+namespace {
+
+void zero(std::vector<Force>& f) { std::fill(f.begin(), f.end(), Force{Vec3::Zero(), Vec3::Zero()}); }
+
+// Support of a block: the dofs of its rows and all their ancestors, descending.
+void find_support(const Mechanism& m, const std::vector<int>& dofs, Block& block) {
+    std::vector<char> in(m.nv, 0);
+    for (int dof : dofs)
+        for (int d = dof; d >= 0 && !in[d]; d = m.dof_parent[d]) in[d] = 1;
+    std::vector<int> place(m.nv, -1);
+    for (int d = m.nv - 1; d >= 0; --d)
+        if (in[d]) {
+            place[d] = static_cast<int>(block.support.size());
+            block.support.push_back(d);
+        }
+    for (int d : block.support) block.parent.push_back(m.dof_parent[d] < 0 ? -1 : place[m.dof_parent[d]]);
+    if (!is_geometric(block.kind)) return;
+    // A differs from zero only on dofs that move one body and not the other.
+    const std::vector<int> d1 = m.dofs_of(block.joint1), d2 = m.dofs_of(block.joint2);
+    for (int d : d1)
+        if (std::find(d2.begin(), d2.end(), d) == d2.end()) block.entries.push_back({place[d], d, 1.0});
+    for (int d : d2)
+        if (std::find(d1.begin(), d1.end(), d) == d1.end()) block.entries.push_back({place[d], d, -1.0});
+}
+
+std::vector<int> moved_dofs(const Mechanism& m, const Block& block) {
+    if (is_geometric(block.kind)) {
+        std::vector<int> dofs = m.dofs_of(block.joint1);
+        for (int d : m.dofs_of(block.joint2)) dofs.push_back(d);
+        return dofs;
+    }
+    if (const auto* c = std::get_if<CouplingRows>(&block.kind))
+        return {m.joints[c->joint1].iv, m.joints[c->joint2].iv};
+    if (const auto* c = std::get_if<MotionRows>(&block.kind)) return {m.joints[c->joint].iv};
+    if (const auto* c = std::get_if<DofRows>(&block.kind)) {
+        std::vector<int> dofs;
+        for (int k = 0; k < c->count; ++k) dofs.push_back(c->dof + k);
+        return dofs;
+    }
+    std::vector<int> all(m.nv);
+    for (int k = 0; k < m.nv; ++k) all[k] = k;
+    return all;
+}
+
+}  // namespace
+
+std::string Failure::encode(Kind k, double t, const std::vector<int>& e, double x) {
+    std::string text = std::to_string(static_cast<int>(k));
+    char number[40];
+    for (double value : {t, x}) {
+        std::snprintf(number, sizeof number, " %.17g", value);
+        text += number;
+    }
+    for (int element : e) text += " " + std::to_string(element);
+    return text;
+}
+
+void Program::finish() {
+    int row = 0;
+    entries = 0;
+    for (size_t i = 0; i < blocks.size(); ++i) {
+        Block& block = blocks[i];
+        block.values = static_cast<int>(i);
+        block.comparable_rows = std::holds_alternative<PointRows>(block.kind);
+        block.row = row;
+        row += static_cast<int>(block.kept.size());
+        block.support.clear();
+        block.parent.clear();
+        block.entries.clear();
+        find_support(mechanism, moved_dofs(mechanism, block), block);
+        block.offset = static_cast<int>(entries);
+        entries += block.support.size() * block.kept.size();
+    }
+    layout = layout_rows(blocks, mechanism.nv);
+    std::vector<char> reached(mechanism.nv, 0);
+    for (Block& block : blocks) {
+        for (int dof : block.support) reached[dof] = 1;
+        block.holonomic.clear();
+        for (int k : block.kept) block.holonomic.push_back(has_residual(block.kind, k));
+    }
+    touched_dofs.clear();
+    for (int dof = 0; dof < mechanism.nv; ++dof)
+        if (reached[dof]) touched_dofs.push_back(dof);
+    for (const Friction& f : frictions) {
+        needs_reactions |= f.reaction != Reaction::none;
+        needs_joint_reactions |= f.reaction != Reaction::none && f.joint > 0;
+    }
+    for (const UserLaw& law : user_laws) {
+        needs_reactions |= law.reaction != Reaction::none;
+        needs_joint_reactions |= law.reaction != Reaction::none;
+    }
+    for (const Friction& f : frictions)
+        needs_joint_reactions |= f.load == Friction::Load::user;
+    for (int i = 0; i < constraints; ++i) {
+        moves_in_time |= pn::moves_in_time(blocks[i].kind);
+        affine_rates &= !std::holds_alternative<UserRows>(blocks[i].kind);
+    }
+    std::vector<char> touched(mechanism.joints.size(), 0);
+    for (int i = 0; i < constraints; ++i)
+        for (int joint : {blocks[i].joint1, blocks[i].joint2})
+            for (; joint != 0; joint = mechanism.joints[joint].parent) touched[joint] = 1;
+    touched_joints.clear();
+    for (size_t joint = 1; joint < touched.size(); ++joint)
+        if (touched[joint]) touched_joints.push_back(static_cast<int>(joint));
+    touched_angles.clear();
+    for (const Angle& angle : mechanism.angles)
+        if (touched[angle.joint]) touched_angles.push_back(angle);
+    for (Drag& d : drags) d.dofs = mechanism.dofs_of(d.frame.joint);
+    driven = !forces.empty() || !std::holds_alternative<NoActuation>(actuation);
+    asks_functions = std::holds_alternative<TorqueFunction>(actuation) || !user_laws.empty() || moves_in_time;
+    for (const GivenForce& f : forces) {
+        const auto* wrench = std::get_if<FrameWrench>(&f);
+        asks_functions |= std::holds_alternative<UserForce>(f) || (wrench && wrench->function);
+    }
+    for (const Friction& f : frictions) asks_functions |= f.user_limit != nullptr;
+    for (const GivenForce& f : forces)
+        has_body_forces |= std::holds_alternative<SpringDamper>(f) || std::holds_alternative<FrameWrench>(f);
+}
+
+Workspace::Workspace(const Program& p) {
+    const int nv = p.mechanism.nv, n = static_cast<int>(p.mechanism.joints.size());
+    terms.allocate(p.mechanism);
+    for (VecX* x : {&tau, &external, &F, &C, &C_smooth, &base_C, &a, &balance, &scaled, &scaled_free, &trial, &work,
+                    &held_torque, &override_torque})
+        *x = VecX::Zero(nv);
+    values.resize(p.blocks.size());
+    for (size_t i = 0; i < p.blocks.size(); ++i) {
+        values[i].resize(p.blocks[i].total, nv, is_geometric(p.blocks[i].kind));
+        values[i].constant_A = has_constant_rows(p.blocks[i].kind);
+    }
+    A.assign(p.entries, 0.0);
+    B.assign(p.entries, 0.0);
+    for (VecX* x : {&b, &r, &miss, &lam, &lam_step, &lam_shared}) *x = VecX::Zero(p.layout.rows);
+    rows.allocate(p.layout, static_cast<int>(p.blocks.size()), nv);
+    ideal_rows = rows;
+    ideal_locked.assign(nv, 0);
+    body_force.resize(n);
+    reaction_body.resize(n);
+    zero(body_force);
+    zero(reaction_body);
+    motion.assign(n, Motion{Vec3::Zero(), Vec3::Zero()});
+    momentum.assign(n, Force{Vec3::Zero(), Vec3::Zero()});
+    shift_start = VecX::Zero(p.mechanism.nq);
+    shift = VecX::Zero(p.layout.rows);
+    shift_sum = shift_third = shift;
+    shift_steps.assign(projection_limit, shift);
+    const size_t elements = p.frictions.size();
+    mode.assign(elements, 1);
+    limit.assign(elements, 0.0);
+    load.assign(elements, 0.0);
+    slip_direction.assign(elements, Vec3::UnitX());
+    last_direction = slip_direction;
+    slip_force.assign(elements, Vec3::Zero());
+    user_C.assign(p.user_laws.size(), VecX::Zero(nv));
+    z = VecX::Zero(p.states);
+    dz = VecX::Zero(p.states);
+    law_force.assign(p.law_names.size(), VecX::Zero(nv));
+    const size_t unknowns = elements + p.user_laws.size() * nv;
+    for (VecX* x : {&unknown, &image, &newton_step}) *x = VecX::Zero(unknowns);
+    want_rows(p, *this);
+}
+
+}  // namespace pn

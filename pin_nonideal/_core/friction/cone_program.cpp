@@ -1,0 +1,302 @@
+// Friction forces in disks and balls: min f^T W f / 2 + alpha0^T f with |f_e| <= s_e, a second-order cone program.
+//
+// With f = s x and slip accelerations alpha, the pairs z_e = (1, x_e) and y_e = (u_e, alpha_e) lie in the cone
+// |tail| <= head, and are complementary at the solution: x_e = -alpha_e / |alpha_e| or alpha_e = 0. A primal-dual
+// interior-point method in Nesterov and Todd's scaling (Vandenberghe, "The CVXOPT linear and quadratic cone program
+// solvers", 2010) needs some fifteen steps however singular W is, and ends at the most even shares of a load that
+// nothing tells apart. Newton's method then solves the equations of the modes that it found to rounding.
+#include <cmath>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+
+#include "friction/modes.hpp"
+
+namespace pn {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr int most_steps = 60, most_newton = 12;
+constexpr double gap_tolerance = 1e-17;  // of z . y, part of the accelerations in play; rounding may end it before
+constexpr double to_boundary = 0.99;     // of the way to the cone's boundary that a step takes
+constexpr double newton_tolerance = 4e-16, condition = 1e-12;
+
+// A vector of the cone's algebra; elements of one or two directions leave the rest of the tail zero.
+struct Cone {
+    double head = 0.0;
+    Vector3d tail = Vector3d::Zero();
+
+    double dot(const Cone& o) const { return head * o.head + tail.dot(o.tail); }
+    double determinant() const { return (head - tail.norm()) * (head + tail.norm()); }
+    Cone mirrored() const { return {head, -tail}; }
+    Cone operator+(const Cone& o) const { return {head + o.head, tail + o.tail}; }
+    Cone operator-(const Cone& o) const { return {head - o.head, tail - o.tail}; }
+    Cone operator*(double k) const { return {k * head, k * tail}; }
+};
+
+Cone product(const Cone& a, const Cone& b) { return {a.dot(b), a.head * b.tail + b.head * a.tail}; }
+
+// x with product(a, x) = b.
+Cone quotient(const Cone& b, const Cone& a) {
+    const double head = (a.head * b.head - a.tail.dot(b.tail)) / a.determinant();
+    return {head, (b.tail - head * a.tail) / a.head};
+}
+
+// Largest step along d that stays in the cone.
+double room(const Cone& u, const Cone& d) {
+    const double a = d.head * d.head - d.tail.squaredNorm();
+    const double b = u.head * d.head - u.tail.dot(d.tail), c = u.determinant();
+    const double root = std::sqrt(std::max(b * b - a * c, 0.0)), q = -(b + std::copysign(root, b));
+    double least = HUGE_VAL;
+    if (a != 0.0 && q / a > 0.0) least = q / a;
+    if (q != 0.0 && c / q > 0.0) least = std::min(least, c / q);
+    return least;
+}
+
+// The symmetric map T with T y = T^-1 z.
+struct Scaling {
+    Cone w, v;     // T^2 = beta (2 w w^T - J), T = sqrt(beta) (2 v v^T - J), J the mirror
+    double root;   // sqrt(beta)
+    Cone scaled;   // T y
+
+    Scaling(const Cone& z, const Cone& y) {
+        const double dz = z.determinant(), dy = y.determinant();
+        const Cone zn = z * (1.0 / std::sqrt(dz)), yn = y * (1.0 / std::sqrt(dy));
+        const double gamma = std::sqrt(0.5 * (1.0 + zn.dot(yn)));
+        w = (zn + yn.mirrored()) * (0.5 / gamma);
+        v = w;
+        v.head += 1.0;
+        v = v * (1.0 / std::sqrt(2.0 * v.head));
+        root = std::sqrt(std::sqrt(dz / dy));
+        scaled = forth(y);
+    }
+    Cone forth(const Cone& u) const { return (v * (2.0 * v.dot(u)) - u.mirrored()) * root; }
+    Cone back(const Cone& u) const {
+        const Cone m = v.mirrored();
+        return (m * (2.0 * m.dot(u)) - u.mirrored()) * (1.0 / root);
+    }
+};
+
+struct ConeProgram {
+    const MatX& W;
+    const VecX& alpha0;
+    const std::vector<int>& dims;
+    const VecX& s;
+    int n, elements;
+    std::vector<int> at;
+    VecX scale;            // s of each row
+    double size = 0.0;     // of the accelerations in play
+    MatX V, K;             // W s / size, and the matrix of a step
+    VecX r0, x;
+    std::vector<Cone> y;
+    std::vector<Scaling> scalings;
+    Eigen::LLT<MatX> factor;
+
+    ConeProgram(const MatX& W_, const VecX& alpha0_, const std::vector<int>& dims_, const VecX& s_)
+        : W(W_), alpha0(alpha0_), dims(dims_), s(s_), n(static_cast<int>(alpha0_.size())),
+          elements(static_cast<int>(dims_.size())), scale(n), y(dims_.size()) {
+        for (int e = 0, row = 0; e < elements; row += dims[e], ++e) {
+            at.push_back(row);
+            scale.segment(row, dims[e]).setConstant(s[e]);
+        }
+        size = alpha0.cwiseAbs().maxCoeff() + (W.cwiseAbs() * scale).maxCoeff();
+        V = W * scale.asDiagonal() / size;
+        r0 = alpha0 / size;
+        x = VecX::Zero(n);
+    }
+
+    Vector3d tail(const VecX& rows, int e) const {
+        Vector3d out = Vector3d::Zero();
+        out.head(dims[e]) = rows.segment(at[e], dims[e]);
+        return out;
+    }
+    Cone z(int e) const { return {1.0, tail(x, e)}; }
+
+    double gap() const {
+        double sum = 0.0;
+        for (int e = 0; e < elements; ++e) sum += s[e] * z(e).dot(y[e]);
+        return sum / s.sum();
+    }
+
+    bool inside() const {
+        for (int e = 0; e < elements; ++e)
+            if (!(z(e).determinant() > 0.0) || !(y[e].determinant() > 0.0)) return false;
+        return true;
+    }
+
+    bool factorize() {
+        K = scale.asDiagonal() * V;
+        scalings.clear();
+        for (int e = 0; e < elements; ++e) {
+            scalings.emplace_back(z(e), y[e]);
+            const Scaling& T = scalings.back();
+            const Matrix3d block =
+                s[e] / (T.root * T.root) * (2.0 * T.w.tail * T.w.tail.transpose() + Matrix3d::Identity());
+            K.block(at[e], at[e], dims[e], dims[e]) += block.topLeftCorner(dims[e], dims[e]);
+        }
+        factor.compute(K);
+        return factor.info() == Eigen::Success;
+    }
+
+    // Step to z o y = target, with the second-order terms of the step before.
+    void direction(double target, const std::vector<Cone>& second, VecX& dx, std::vector<Cone>& dy) const {
+        VecX rhs(n);
+        for (int e = 0; e < elements; ++e) {
+            const Scaling& T = scalings[e];
+            Cone d = product(T.scaled, T.scaled) * -1.0 - second[e];
+            d.head += target;
+            dy[e] = T.back(quotient(d, T.scaled));
+            rhs.segment(at[e], dims[e]) = s[e] * dy[e].tail.head(dims[e]);
+        }
+        dx = factor.solve(rhs);
+        for (int e = 0; e < elements; ++e) dy[e] = dy[e] - scalings[e].back(scalings[e].back({0.0, tail(dx, e)}));
+    }
+
+    double length(const VecX& dx, const std::vector<Cone>& dy) const {
+        double least = HUGE_VAL;
+        for (int e = 0; e < elements; ++e)
+            least = std::min({least, room(z(e), {0.0, tail(dx, e)}), room(y[e], dy[e])});
+        return least;
+    }
+
+    // y's tails are the accelerations of x; its heads keep what the step left them beyond the tails.
+    void advance(double step, const VecX& dx, const std::vector<Cone>& dy) {
+        x += step * dx;
+        const VecX alpha = V * x + r0;
+        for (int e = 0; e < elements; ++e) {
+            const Cone next = y[e] + dy[e] * step;
+            y[e].tail = tail(alpha, e);
+            y[e].head = y[e].tail.norm() + (next.head - next.tail.norm());
+        }
+    }
+
+    void follow_central_path() {
+        for (int e = 0; e < elements; ++e) {
+            y[e].tail = tail(r0, e);
+            y[e].head = y[e].tail.norm() + 1.0;
+        }
+        VecX dx(n);
+        std::vector<Cone> dy(elements), second(elements);
+        for (int it = 0; it < most_steps && gap() > gap_tolerance; ++it) {
+            if (!factorize()) return;
+            std::fill(second.begin(), second.end(), Cone());
+            direction(0.0, second, dx, dy);
+            const double left = 1.0 - std::min(1.0, length(dx, dy));
+            for (int e = 0; e < elements; ++e)
+                second[e] = product(scalings[e].back({0.0, tail(dx, e)}), scalings[e].forth(dy[e]));
+            direction(left * left * left * gap(), second, dx, dy);
+            const VecX x_before = x;
+            const std::vector<Cone> y_before = y;
+            advance(std::min(1.0, to_boundary * length(dx, dy)), dx, dy);
+            if (inside()) continue;
+            x = x_before;  // as near as rounding lets it come
+            y = y_before;
+            return;
+        }
+    }
+
+    // Newton's method for modes as equations: alpha = 0 for what sticks, alpha + m x = 0 and |x| = 1 for what slides.
+    bool solve_modes(const std::vector<char>& slides, VecX& there, VecX& m) const {
+        there = x;
+        m.setZero();
+        for (int e = 0; e < elements; ++e)
+            if (slides[e]) m[e] = y[e].tail.norm();
+        double last = HUGE_VAL;
+        for (int it = 0; it < most_newton; ++it) {
+            MatX J = MatX::Zero(n + elements, n + elements);
+            VecX miss = VecX::Zero(n + elements);
+            J.topLeftCorner(n, n) = V;
+            miss.head(n) = V * there + r0;
+            for (int e = 0; e < elements; ++e) {
+                const auto xe = there.segment(at[e], dims[e]);
+                if (!slides[e]) continue;
+                J.block(at[e], at[e], dims[e], dims[e]).diagonal().array() += m[e];
+                J.block(at[e], n + e, dims[e], 1) = xe;
+                J.block(n + e, at[e], 1, dims[e]) = xe.transpose();
+                miss.segment(at[e], dims[e]) += m[e] * xe;
+                miss[n + e] = 0.5 * (xe.squaredNorm() - 1.0);
+            }
+            const double error = miss.cwiseAbs().maxCoeff();
+            const bool settled = error <= newton_tolerance || (error < condition && error >= last);
+            last = error;
+            if (settled) break;
+            Eigen::CompleteOrthogonalDecomposition<MatX> cod(n + elements, n + elements);
+            cod.setThreshold(rank_threshold);
+            cod.compute(J);
+            const VecX step = cod.solve(miss);
+            there -= step.head(n);
+            m -= step.tail(elements);
+        }
+        return last < condition;
+    }
+
+    // The modes that the path leads to: what has more acceleration than room slides. Where both are small only the
+    // solution tells: modes that it contradicts are changed until none is. False if they do not come to rest.
+    bool settle_modes() {
+        std::vector<char> slides(elements);
+        for (int e = 0; e < elements; ++e) slides[e] = y[e].head > 1.0 - tail(x, e).norm();
+        VecX there(n), m(elements);
+        for (int round = 0; round < 2 * elements + 4; ++round) {
+            int changed = 0, nearest = -1;
+            if (solve_modes(slides, there, m)) {
+                for (int e = 0; e < elements; ++e) {
+                    const bool wrong = slides[e] ? m[e] < -condition : tail(there, e).norm() > 1.0 + condition;
+                    if (!wrong) continue;
+                    slides[e] = !slides[e];
+                    ++changed;
+                }
+                if (changed == 0) {
+                    x = there;
+                    return true;
+                }
+                continue;
+            }
+            for (int e = 0; e < elements; ++e)  // what sticks cannot: the one with the least room slides
+                if (!slides[e] && (nearest < 0 || tail(x, e).norm() > tail(x, nearest).norm())) nearest = e;
+            if (nearest < 0) return false;
+            slides[nearest] = 1;
+        }
+        return false;
+    }
+
+    VecX solve() {
+        follow_central_path();
+        const bool settled = settle_modes();
+        for (int e = 0; e < elements; ++e) {  // what slides is at its limit, to the last bit
+            const double length = tail(x, e).norm();
+            if (settled ? length > 1.0 - condition : y[e].head > 1.0 - length) x.segment(at[e], dims[e]) /= length;
+        }
+        return scale.cwiseProduct(x);
+    }
+};
+
+}  // namespace
+
+VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s) {
+    std::vector<int> rows, own_dims;
+    std::vector<double> limits;
+    for (int e = 0, row = 0; e < static_cast<int>(dims.size()); row += dims[e], ++e) {
+        if (!(s[e] > 0.0)) continue;
+        own_dims.push_back(dims[e]);
+        limits.push_back(s[e]);
+        for (int k = 0; k < dims[e]; ++k) rows.push_back(row + k);
+    }
+    const int n = static_cast<int>(rows.size());
+    MatX own_W(n, n);
+    VecX own_alpha(n), f = VecX::Zero(alpha0.size());
+    for (int i = 0; i < n; ++i) {
+        own_alpha[i] = alpha0[rows[i]];
+        for (int j = 0; j < n; ++j) own_W(i, j) = W(rows[i], rows[j]);
+    }
+    if (n == 0 || own_alpha.isZero(0.0)) return f;
+    const VecX own_f =
+        ConeProgram(own_W, own_alpha, own_dims, Eigen::Map<const VecX>(limits.data(), limits.size())).solve();
+    for (int i = 0; i < n; ++i) f[rows[i]] = own_f[i];
+    return f;
+}
+
+}  // namespace pn

@@ -1,0 +1,156 @@
+// Spatial quantities of rigid bodies, all in world axes about a reference point (one per kinematic tree).
+// A motion is (velocity of the body point at the reference, angular velocity); a force is (force, moment about it).
+//
+// Vectors of three components stand in four lanes, the last of them zero: one register in wide functions.
+#pragma once
+
+#include <cmath>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "math/lanes.hpp"
+
+namespace pn {
+
+using VecX = Eigen::VectorXd;
+using MatX = Eigen::MatrixXd;
+
+struct Vec3 {
+    alignas(32) Lanes x = {};  // the alignment of the wide registers, also where the compiler knows none
+
+    PN_INLINE Vec3() {}
+    PN_INLINE explicit Vec3(const Lanes& lanes) : x(lanes) {}
+    PN_INLINE Vec3(double a, double b, double c) : x{a, b, c, 0.0} {}
+    template <class Derived>
+    Vec3(const Eigen::MatrixBase<Derived>& v) : x{v[0], v[1], v[2], 0.0} {}
+    // By hand: a class that copies so is passed in memory, in both versions of a wide function.
+    PN_INLINE Vec3(const Vec3& o) : x(o.x) {}
+    PN_INLINE Vec3& operator=(const Vec3& o) { x = o.x; return *this; }
+
+    static PN_INLINE Vec3 Zero() { return {}; }
+    static PN_INLINE Vec3 UnitX() { return {1.0, 0.0, 0.0}; }
+    static PN_INLINE Vec3 UnitY() { return {0.0, 1.0, 0.0}; }
+    static PN_INLINE Vec3 UnitZ() { return {0.0, 0.0, 1.0}; }
+    Eigen::Vector3d eigen() const { return {x[0], x[1], x[2]}; }
+
+    PN_INLINE double operator[](int k) const { return x[k]; }
+    PN_INLINE double& operator[](int k) { return reinterpret_cast<double*>(&x)[k]; }
+    PN_INLINE Vec3& operator+=(const Vec3& o) { x += o.x; return *this; }
+    PN_INLINE Vec3& operator-=(const Vec3& o) { x -= o.x; return *this; }
+
+    inline double dot(const Vec3& o) const;
+    inline Vec3 cross(const Vec3& o) const;
+    inline double squaredNorm() const;
+    inline double norm() const;
+    Vec3 normalized() const;
+};
+
+PN_INLINE Vec3 operator+(const Vec3& a, const Vec3& b) { return Vec3(a.x + b.x); }
+PN_INLINE Vec3 operator-(const Vec3& a, const Vec3& b) { return Vec3(a.x - b.x); }
+PN_INLINE Vec3 operator-(const Vec3& a) { return Vec3(-a.x); }
+PN_INLINE Vec3 operator*(double s, const Vec3& a) { return Vec3(s * a.x); }
+PN_INLINE Vec3 operator*(const Vec3& a, double s) { return Vec3(a.x * s); }
+PN_INLINE Vec3 operator/(const Vec3& a, double s) { return Vec3(a.x / s); }
+
+// Components y, z, x.
+PN_INLINE Vec3 turned_round(const Vec3& a) {
+#if defined(__clang__)
+    return Vec3(__builtin_shufflevector(a.x, a.x, 1, 2, 0, 3));
+#else
+    // By halves: registers of two numbers shuffle these, and where there are four GCC sees one permutation.
+    using Indices = long long __attribute__((vector_size(16)));
+    const TwoLanes low = {a.x[0], a.x[1]}, high = {a.x[2], a.x[3]};
+    const TwoLanes yz = __builtin_shuffle(low, high, Indices{1, 2}), x0 = __builtin_shuffle(low, high, Indices{0, 3});
+    return Vec3(Lanes{yz[0], yz[1], x0[0], x0[1]});
+#endif
+}
+
+PN_INLINE double Vec3::dot(const Vec3& o) const { return sum(x * o.x); }
+PN_INLINE Vec3 Vec3::cross(const Vec3& o) const {
+    return turned_round(Vec3(x * turned_round(o).x - turned_round(*this).x * o.x));
+}
+PN_INLINE double Vec3::squaredNorm() const { return dot(*this); }
+PN_INLINE double Vec3::norm() const { return std::sqrt(squaredNorm()); }
+inline Vec3 Vec3::normalized() const { return *this / norm(); }
+
+struct Mat3 {
+    Vec3 c[3];  // columns
+
+    PN_INLINE Mat3() {}
+    PN_INLINE Mat3(const Vec3& a, const Vec3& b, const Vec3& d) : c{a, b, d} {}
+    template <class Derived>
+    Mat3(const Eigen::MatrixBase<Derived>& m) : c{m.col(0), m.col(1), m.col(2)} {}
+
+    static Mat3 Identity() { return {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}; }
+    Eigen::Matrix3d eigen() const {
+        Eigen::Matrix3d m;
+        m << c[0].eigen(), c[1].eigen(), c[2].eigen();
+        return m;
+    }
+
+    PN_INLINE const Vec3& col(int k) const { return c[k]; }
+    PN_INLINE Vec3& col(int k) { return c[k]; }
+    PN_INLINE double operator()(int row, int column) const { return c[column][row]; }
+    PN_INLINE Mat3& operator+=(const Mat3& o) {
+        for (int k = 0; k < 3; ++k) c[k] += o.c[k];
+        return *this;
+    }
+};
+
+PN_INLINE Vec3 operator*(const Mat3& m, const Vec3& v) { return v[0] * m.c[0] + v[1] * m.c[1] + v[2] * m.c[2]; }
+PN_INLINE Mat3 operator*(const Mat3& a, const Mat3& b) { return {a * b.c[0], a * b.c[1], a * b.c[2]}; }
+PN_INLINE Vec3 transpose_times(const Mat3& m, const Vec3& v) { return {m.c[0].dot(v), m.c[1].dot(v), m.c[2].dot(v)}; }
+// a^T b
+PN_INLINE Mat3 transpose_times(const Mat3& a, const Mat3& b) {
+    return {transpose_times(a, b.c[0]), transpose_times(a, b.c[1]), transpose_times(a, b.c[2])};
+}
+// a b^T
+PN_INLINE Mat3 times_transpose(const Mat3& a, const Mat3& b) {
+    Mat3 out;
+    for (int k = 0; k < 3; ++k) out.c[k] = b(k, 0) * a.c[0] + b(k, 1) * a.c[1] + b(k, 2) * a.c[2];
+    return out;
+}
+
+struct Motion {
+    Vec3 lin, ang;
+    PN_INLINE Motion& operator+=(const Motion& o) { lin += o.lin; ang += o.ang; return *this; }
+};
+
+struct Force {
+    Vec3 lin, ang;
+    PN_INLINE Force& operator+=(const Force& o) { lin += o.lin; ang += o.ang; return *this; }
+};
+
+PN_INLINE Motion operator*(double s, const Motion& m) { return {s * m.lin, s * m.ang}; }
+PN_INLINE Motion operator+(const Motion& a, const Motion& b) { return {a.lin + b.lin, a.ang + b.ang}; }
+
+// Power of a force on a motion.
+PN_INLINE double dot(const Motion& m, const Force& f) { return sum(m.lin.x * f.lin.x + m.ang.x * f.ang.x); }
+
+// Rate of change of a motion b carried by v, and of a force f carried by v.
+PN_INLINE Motion cross(const Motion& v, const Motion& b) {
+    return {v.ang.cross(b.lin) + v.lin.cross(b.ang), v.ang.cross(b.ang)};
+}
+PN_INLINE Force cross(const Motion& v, const Force& f) {
+    return {v.ang.cross(f.lin), v.ang.cross(f.ang) + v.lin.cross(f.lin)};
+}
+
+// Rigid-body inertia about the reference point: mass, first moment, second moment.
+struct Inertia {
+    double mass = 0.0;
+    Vec3 first;
+    Mat3 second;
+
+    PN_INLINE Inertia& operator+=(const Inertia& o) {
+        mass += o.mass;
+        first += o.first;
+        second += o.second;
+        return *this;
+    }
+    PN_INLINE Force operator*(const Motion& m) const {
+        return {mass * m.lin - first.cross(m.ang), second * m.ang + first.cross(m.lin)};
+    }
+};
+
+}  // namespace pn

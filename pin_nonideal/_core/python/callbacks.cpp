@@ -1,0 +1,131 @@
+#include "python/callbacks.hpp"
+
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+namespace pn {
+
+namespace {
+
+// What a user's law may ask about the reactions while it runs.
+struct ReactionView {
+    const Program* p;
+    Workspace* w;
+
+    nb::object lam() const {
+        VecX out = VecX::Zero(p->user_rows);
+        for (int i = 0; i < p->constraints; ++i) {
+            const Block& block = p->blocks[i];
+            for (size_t k = 0; k < block.kept.size(); ++k)
+                out[block.user_row + block.kept[k]] = w->lam_shared[block.row + k];
+        }
+        return to_numpy(out);
+    }
+    nb::object six(const Force& f, const Mat3& R) const {
+        VecX out(6);
+        out << transpose_times(R, f.lin).eigen(), transpose_times(R, f.ang).eigen();
+        return to_numpy(out);
+    }
+    nb::object of_joint(int joint) const { return six(joint_wrench(*p, *w, joint), w->terms.body[joint].R); }
+    nb::object of_block(int block) const {
+        const Frame& f = *frame2(p->blocks[block].kind);
+        return six(anchor_wrench(*p, *w, block), w->terms.body[f.joint].R * f.R);
+    }
+};
+
+}  // namespace
+
+TimeFunction time_function(const nb::object& f) {
+    if (nb::isinstance<nb::tuple>(f)) {
+        const nb::tuple parts = nb::cast<nb::tuple>(f);
+        const std::string kind = nb::cast<std::string>(parts[0]);
+        const auto numbers = nb::cast<std::vector<double>>(parts[1]);
+        if (kind == "polynomial") return Polynomial{numbers};
+        if (kind == "sinusoid") return Sinusoid{numbers[0], numbers[1], numbers[2], numbers[3]};
+        return Spline{numbers, nb::cast<std::vector<double>>(parts[2])};
+    }
+    return std::function<Jet(double)>([f](double t) {
+        nb::gil_scoped_acquire gil;
+        const auto [x, dx, ddx] = nb::cast<std::tuple<double, double, double>>(f(t));
+        return Jet{x, dx, ddx};
+    });
+}
+
+std::function<void(double, const VecX&, const VecX&, VecX&)> torque_function(nb::object f) {
+    return [f](double t, const VecX& q, const VecX& v, VecX& out) {
+        nb::gil_scoped_acquire gil;
+        read_into(f(t, to_numpy(q), to_numpy(v)), out);
+    };
+}
+
+std::function<void(double, double*)> wrench_function(nb::object f) {
+    return [f](double t, double* out) {
+        nb::gil_scoped_acquire gil;
+        const Array value = nb::cast<Array>(f(t));
+        std::copy(value.data(), value.data() + 6, out);
+    };
+}
+
+UserRows user_rows(nb::object rows, nb::object residual, nb::object rate) {
+    UserRows user;
+    user.rows = [rows](double t, const VecX& q, const VecX& v, MatX& A, VecX& rhs) {
+        nb::gil_scoped_acquire gil;
+        const auto [A_out, b_out] = nb::cast<std::pair<Array2, Array>>(rows(t, to_numpy(q), to_numpy(v)));
+        A = map(A_out);
+        rhs.head(A.rows()) = map(b_out);
+    };
+    if (!residual.is_none())
+        user.residual = [residual](double t, const VecX& q, VecX& phi) {
+            nb::gil_scoped_acquire gil;
+            const Array value = nb::cast<Array>(residual(t, to_numpy(q)));
+            phi.head(value.shape(0)) = map(value);
+        };
+    if (!rate.is_none())
+        user.rate = [rate](double t, const VecX& q, const VecX& v, VecX& out) {
+            nb::gil_scoped_acquire gil;
+            const Array value = nb::cast<Array>(rate(t, to_numpy(q), to_numpy(v)));
+            out.head(value.shape(0)) = map(value);
+        };
+    return user;
+}
+
+UserSlipRow slip_row(nb::object direction) {
+    return {[direction](double t, const VecX& q, VecX& row) {
+        nb::gil_scoped_acquire gil;
+        read_into(direction(t, to_numpy(q)), row);
+    }};
+}
+
+decltype(Friction::user_limit) limit_function(const Program* p, nb::object f) {
+    return [f, p](double t, const VecX& q, const VecX& v, Workspace& w) {
+        nb::gil_scoped_acquire gil;
+        return nb::cast<double>(f(t, to_numpy(q), to_numpy(v), ReactionView{p, &w}));
+    };
+}
+
+decltype(UserLaw::function) law_function(const Program* p, nb::object f, int states, bool reads_reactions) {
+    return [f, p, states, reads_reactions](double t, const VecX& q, const VecX& v, Workspace& w, VecX& C,
+                                           const double* z, double* dz) {
+        nb::gil_scoped_acquire gil;
+        nb::object view = reads_reactions ? nb::cast(ReactionView{p, &w}) : nb::none();
+        if (states == 0) {
+            read_into(f(t, to_numpy(q), to_numpy(v), view), C);
+            return;
+        }
+        const auto [force, rate] = nb::cast<std::pair<Array, Array>>(
+            f(t, to_numpy(q), to_numpy(v), view, to_numpy(z, states)));
+        C = map(force);
+        std::copy(rate.data(), rate.data() + states, dz);
+    };
+}
+
+void bind_reactions(nb::module_& m) {
+    nb::class_<ReactionView>(m, "ReactionView")
+        .def_prop_ro("lam", &ReactionView::lam)
+        .def("of_joint", &ReactionView::of_joint)
+        .def("of_block", &ReactionView::of_block);
+}
+
+}  // namespace pn

@@ -1,0 +1,31 @@
+// Python's door to the core: a Builder makes a program, a Runner evaluates and runs it.
+#include <string>
+
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "python/bindings.hpp"
+
+using namespace pn;
+
+NB_MODULE(_core, m) {
+    nb::set_leak_warnings(false);  // a user's function may hold the scene that holds it: a cycle, not a fault
+    m.attr("pinocchio_version") = PIN_NONIDEAL_PINOCCHIO_VERSION;
+    // Changes with the members of what a checkpoint holds.
+    m.attr("state_layout") = std::to_string(sizeof(Workspace)) + "." + std::to_string(sizeof(Simulation)) + "." +
+                             std::to_string(sizeof(long)) + " for Pinocchio " PIN_NONIDEAL_PINOCCHIO_VERSION;
+    nb::exception<Failure>(m, "CoreFailure");
+
+    bind_reactions(m);
+    bind_builder(m);
+    bind_runner(m);
+    m.def("nearest_states", &nearest_states);
+    nb::class_<Outcome>(m, "Outcome").def("hand_over", &Outcome::hand_over);
+    m.def("rollout", &rollout);
+
+    // The friction program on arrays, for tests against enumeration.
+    m.def("friction_program", [](const Array2& W, const Array& alpha0, const std::vector<int>& dims,
+                                 const Array& limits) {
+        return to_numpy(friction_program(map(W), map(alpha0), dims, map(limits)));
+    });
+}

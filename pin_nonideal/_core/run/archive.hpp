@@ -1,0 +1,110 @@
+// Bytes of a state, written and read back by one list of fields: what is read is bit by bit what was written.
+// A buffer keeps the size that it has, so that bytes of another scene, or damaged ones, are refused and not obeyed.
+#pragma once
+
+#include <cstring>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "math/spatial.hpp"
+
+namespace pn {
+
+class Archive {
+public:
+    Archive() = default;  // writes
+    explicit Archive(const std::string& state) : bytes(state), reads(true) {}
+
+    std::string bytes;
+
+    template <class... T>
+    void operator()(T&... items) { (item(items), ...); }
+    // A vector whose length changes over a run.
+    template <class T>
+    void list(std::vector<T>& x) { resized(x); }
+    // Numbers of things, below `limit`, each at most once.
+    void indices(std::vector<int>& x, int limit) {
+        resized(x);
+        require(static_cast<int>(x.size()) <= limit);
+        for (int i : x) require(0 <= i && i < limit);
+    }
+    void matrix(MatX& x) {
+        long rows = x.rows(), columns = x.cols();
+        (*this)(rows, columns);
+        if (reads) {
+            const long room = static_cast<long>((bytes.size() - at) / sizeof(double));
+            require(rows >= 0 && columns >= 0 && rows <= room && columns <= room && rows * columns <= room);
+            x.resize(rows, columns);
+        }
+        raw(x.data(), x.size() * sizeof(double));
+    }
+    void require(bool fits) const {
+        if (!fits) throw std::invalid_argument("the state does not fit the scene");
+    }
+    bool reading() const { return reads; }
+    void end() const { require(at == bytes.size()); }
+
+private:
+    bool reads = false;
+    size_t at = 0;
+
+    void raw(void* data, size_t n) {
+        if (n == 0) return;
+        if (!reads) {
+            bytes.append(static_cast<const char*>(data), n);
+            return;
+        }
+        require(n <= bytes.size() - at);
+        std::memcpy(data, bytes.data() + at, n);
+        at += n;
+    }
+    void same(size_t size) {
+        size_t written = size;
+        raw(&written, sizeof written);
+        require(written == size);
+    }
+    template <class T>
+    std::enable_if_t<std::is_arithmetic_v<T> || std::is_enum_v<T>> item(T& x) { raw(&x, sizeof x); }
+    void item(bool& x) {
+        char c = x;
+        raw(&c, 1);
+        x = c != 0;
+    }
+    template <int rows, int columns>
+    void item(Eigen::Matrix<double, rows, columns>& x) {
+        same(static_cast<size_t>(x.size()));
+        raw(x.data(), x.size() * sizeof(double));
+    }
+    void item(Vec3& x) { raw(&x[0], 3 * sizeof(double)); }
+    void item(Mat3& x) { (*this)(x.c[0], x.c[1], x.c[2]); }
+    void item(Motion& x) { (*this)(x.lin, x.ang); }
+    void item(Force& x) { (*this)(x.lin, x.ang); }
+    void item(Inertia& x) { (*this)(x.mass, x.first, x.second); }
+    template <class T>
+    void item(std::vector<T>& x) {
+        same(x.size());
+        items(x);
+    }
+    template <class T>
+    std::enable_if_t<std::is_class_v<T>> item(T& x) { fields(*this, x); }
+
+    template <class T>
+    void items(std::vector<T>& x) {
+        if constexpr (std::is_arithmetic_v<T>) raw(x.data(), x.size() * sizeof(T));
+        else for (T& each : x) item(each);
+    }
+    template <class T>
+    void resized(std::vector<T>& x) {
+        size_t n = x.size();
+        raw(&n, sizeof n);
+        if (reads) {
+            require(n <= bytes.size() - at);
+            x.resize(n);
+        }
+        items(x);
+    }
+};
+
+}  // namespace pn

@@ -1,0 +1,107 @@
+// What happens at an event of stick and slip: new modes for all elements at rest together, and clusters of events.
+#include <algorithm>
+#include <cmath>
+
+#include "run/simulation.hpp"
+
+namespace pn {
+
+void Simulation::remember_directions() {
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
+        const Friction& f = p.frictions[e];
+        if (f.dim == 1 || !slips(w.mode[e])) continue;
+        const Vec3 u = slip_velocity(w, f);
+        slip_at_start[e] = u.norm();
+        if (u.norm() > 1e-12) w.slip_direction[e] = w.last_direction[e] = u.normalized();
+    }
+}
+
+// A maintained contact that would have to pull, told once each time it begins.
+void Simulation::report_pulls(double at) {
+    for (size_t i = 0; i < p.contacts.size(); ++i) {
+        const bool pull = static_cast<int>(i) == parting || w.lam[p.blocks[p.contacts[i]].row] < 0.0;
+        if (pull && !pulls[i]) out.events.push_back({at, Event::Kind::pull, p.contacts[i]});
+        pulls[i] = pull;
+    }
+    parting = -1;
+}
+
+// New modes for all elements at rest, found together; `trigger` has just come to rest or reached its limit.
+void Simulation::switch_modes(double at, VecX& state, int trigger) {
+    q_ = state.head(system.nq);
+    v_ = state.segment(system.nq, system.nv);
+    if (system.nz > 0) w.z = state.segment(system.nq + system.nv, system.nz);
+    if (p.frictions.empty()) {
+        begin_step(p, w, at, q_, v_);
+        system.collect(at, state, derivative);
+        return;
+    }
+    const std::vector<signed char> before = w.mode;
+    const std::vector<Vec3> directions = w.slip_direction;
+    if (trigger < 0) {  // the start: every element by its velocity
+        std::fill(w.mode.begin(), w.mode.end(), 1);
+        kinematics(p.mechanism, w.terms, q_, v_);
+        evaluate_rows(p, w, at, v_);
+    }
+    std::vector<int> candidates;
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
+        if (e == trigger || at_rest(p, w, e, v_)) {
+            candidates.push_back(e);
+            continue;
+        }
+        follow_velocity(p, w, e);
+    }
+    const int breaking = released_together ? any_at_limit : trigger >= 0 && before[trigger] == sticking ? trigger : -1;
+    released_together = false;
+    for (;;) {
+        resolve_modes(p, w, at, q_, v_, candidates, breaking);
+        // What sticks from now on has no slip velocity at all, not one of rounding.
+        project(p, w, at, q_, v_);
+        begin_step(p, w, at, q_, v_);
+        // Nearly redundant elements that stuck together leave one that slips a velocity, which may oppose its mode.
+        const auto moving = std::stable_partition(candidates.begin(), candidates.end(), [&](int e) {
+            return at_rest(p, w, e, v_) || speed_along(e) >= 0.0;
+        });
+        if (moving == candidates.end()) break;
+        std::for_each(moving, candidates.end(), [&](int e) { follow_velocity(p, w, e); });
+        candidates.erase(moving, candidates.end());
+    }
+    state.head(system.nq) = q_;
+    state.segment(system.nq, system.nv) = v_;
+    if (p.needs_reactions) gather_reactions(p, w);
+    w.indeterminate = false;
+    for (int e : candidates)
+        if (w.mode[e] == sticking && ((e == trigger && before[e] == sticking) ||
+            friction_force(p, w, e).norm() > static_limit(p, w, e, at, q_, v_) * (1.0 + 1e-9)))
+            w.indeterminate = true;
+    system.collect(at, state, derivative);
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
+        const bool turned = e == trigger && before[e] == 1 && w.mode[e] == 1 && p.frictions[e].dim > 1 &&
+                            directions[e].dot(w.slip_direction[e]) < 0.0;
+        if (trigger < 0 || (before[e] == w.mode[e] && !turned)) continue;
+        const auto kind = w.mode[e] == sticking ? Event::Kind::stick
+                          : before[e] == sticking ? Event::Kind::slip : Event::Kind::reverse;
+        out.events.push_back({at, kind, e});
+        recent_events.push_back(at);
+    }
+    if (trigger < 0) return;
+    if (before == w.mode) recent_events.push_back(at);
+    bridge_cluster(at, state, trigger);
+}
+
+// Events that come too thick are bridged by time stepping, which needs none.
+void Simulation::bridge_cluster(double at, VecX& state, int element) {
+    if (recent_events.size() > chatter_events) recent_events.erase(recent_events.begin());
+    if (recent_events.size() < chatter_events || at - recent_events.front() > chatter_time) return;
+    recent_events.clear();
+    out.events.push_back({at, Event::Kind::chatter, element});
+    y = state;
+    t = at;
+    const double stop = std::min(t_end, at + chatter_time);
+    while (t < stop) step_in_time(stop, chatter_time / chatter_steps);
+    state = y;
+    switch_modes(t, state, -1);
+    y = state;
+}
+
+}  // namespace pn

@@ -1,0 +1,155 @@
+// Time stepping at velocity level (Moreau's midpoint rule): with u the slip velocities at the step's end and P the
+// percussions, M (v1 - v0) = h (F + C) + A^T P + N^T P_f, A v1 + phi_t = 0, and P_f opposes u within h times its limit.
+// First order, and no creep: what sticks has no velocity at all. All elements are solved together in every step.
+#include <algorithm>
+#include <cmath>
+
+#include "run/simulation.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr int load_passes = 60;  // of limits that depend on the load
+constexpr double load_tolerance = 1e-13;
+
+}  // namespace
+
+void Simulation::moreau_step(double step) {
+    const int nq = system.nq, nv = system.nv, n = static_cast<int>(p.frictions.size());
+    const Mechanism& m = p.mechanism;
+    const double mid = t + 0.5 * step;
+    VecX v0 = y.segment(nq, nv), qm(nq), move = 0.5 * step * v0;
+    retract(m, y.data(), move.data(), qm.data());
+    // The motion without friction of the elements, constraints met at the end of the step.
+    std::vector<int> dims;
+    int rows = 0;
+    for (int e = 0; e < n; ++e) {
+        w.mode[e] = unloaded;
+        dims.push_back(p.frictions[e].dim);
+        rows += dims.back();
+    }
+    want_rows(p, w);
+    begin_step(p, w, mid, qm, v0);
+    for (int i = 0; i < p.constraints; ++i) {
+        const Block& block = p.blocks[i];
+        for (size_t k = 0; k < block.kept.size(); ++k)
+            w.b[block.row + k] = -w.values[i].rate[block.kept[k]] / step;
+    }
+    const VecX force = w.F + (p.has_laws() ? w.C : VecX(VecX::Zero(nv)));
+    solve_motion(p, w, force);
+    const VecX a_free = w.a;
+    VecX alpha0(rows), f = VecX::Zero(rows), limits(n), met(n);  // met: limits that f was found for
+    MatX W(rows, rows), response(nv, rows), multipliers(p.layout.rows, rows);
+    const VecX lam_free = w.lam;
+    const auto slip = [&](const VecX& a, VecX& out_alpha) {
+        for (int e = 0, at = 0; e < n; ++e) {
+            const Block& block = p.blocks[p.frictions[e].block];
+            multiply(block, w.A, a, w.r);
+            for (size_t k = 0; k < block.kept.size(); ++k) out_alpha[at++] = w.r[block.row + k];
+        }
+    };
+    slip(a_free, alpha0);
+    for (int e = 0, at = 0; e < n; ++e)
+        for (int k = 0; k < dims[e]; ++k, ++at) alpha0[at] += w.values[p.frictions[e].block].rate[k] / step;
+    const VecX b = w.b;
+    w.b.setZero();
+    VecX unit = VecX::Zero(p.layout.rows), column(nv), alpha(rows);
+    for (int e = 0, at = 0; e < n; ++e) {
+        const Block& block = p.blocks[p.frictions[e].block];
+        for (size_t k = 0; k < block.kept.size(); ++k, ++at) {
+            column.setZero();
+            unit[block.row + k] = 1.0;
+            add_transpose(block, w.A, unit, column);
+            unit[block.row + k] = 0.0;
+            solve_motion(p, w, column);
+            response.col(at) = w.a;
+            multipliers.col(at) = w.lam;
+            slip(w.a, alpha);
+            W.col(at) = alpha;
+        }
+    }
+    w.b = b;
+    // Limits for the load of this very step.
+    for (int pass = 0; pass < load_passes; ++pass) {
+        w.a = a_free + response * f;
+        w.lam = lam_free + multipliers * f;
+        for (int e = 0, at = 0; e < n; ++e) {
+            w.slip_force[e] = Vec3::Zero();
+            for (int k = 0; k < dims[e]; ++k) w.slip_force[e][k] = f[at++];
+            w.mode[e] = 1;
+        }
+        if (p.needs_reactions) gather_reactions(p, w);
+        double change = 0.0, size = 0.0;
+        for (int e = 0; e < n; ++e) {
+            const Friction& friction = p.frictions[e];
+            const double speed = slip_velocity(w, friction).norm();
+            const double limit = load_limit(p, w, friction, mid, w.terms.q, v0) *
+                                 (speed == 0.0 ? friction.static_ratio : speed_factor(friction, speed));
+            change = std::max(change, std::abs(limit - limits[e]));
+            size = std::max(size, limit);
+            limits[e] = limit;
+        }
+        if (pass > 0 && (change <= load_tolerance * size || !p.needs_reactions)) break;
+        f = friction_program(W, alpha0, dims, limits);
+        met = limits;
+        if (pass + 1 == load_passes) throw Failure(Failure::Kind::paradox, t, {0}, change);
+    }
+    const VecX end = alpha0 + W * f;
+    VecX v1 = v0 + step * (a_free + response * f);
+    for (int e = 0, at = 0; e < n; at += dims[e], ++e) {
+        const bool held = f.segment(at, dims[e]).norm() < met[e] * (1.0 - 1e-12);
+        w.mode[e] = held ? sticking : dims[e] > 1 || end[at] > 0.0 ? 1 : -1;
+        if (w.mode[e] == sticking)
+            if (const auto* d = std::get_if<DofRows>(&p.blocks[p.frictions[e].block].kind))
+                for (int k = 0; k < d->count; ++k) v1[d->dof + k] = 0.0;
+    }
+    if (system.energy) {  // work over the step, by the mean velocity
+        const VecX mean = 0.5 * (v0 + v1);
+        probe_rate_.setZero();
+        w.lam = lam_free + multipliers * f;
+        powers(p, w, mean, probe_rate_.data() + nq + nv + system.nz);
+        const int at = nq + nv + system.nz;
+        // Where a slip turns inside the step its mean velocity may go with the friction that meets its end: that is
+        // work of the scheme, not of friction.
+        for (const Friction& friction : p.frictions) {
+            double& power = probe_rate_[at + 3 + friction.law];
+            if (!(power > 0.0)) continue;
+            recorder.moved_energy += step * power;
+            power = 0.0;
+        }
+        y.segment(at, system.nw) += step * probe_rate_.segment(at, system.nw);
+    }
+    if (system.nz > 0) y.segment(nq + nv, system.nz) += step * w.dz;
+    move = 0.5 * step * v1;
+    retract(m, qm.data(), move.data(), y.data());
+    y.segment(nq, nv) = v1;
+    ++out.steps;
+}
+
+void Simulation::step_in_time(double stop, double dt) {
+    sample_control(t);
+    double end = std::min({t + dt, stop, next_stop(t)});
+    if (o.output_dt > 0.0) end = std::min(end, std::max(next_sample, std::nextafter(t, stop)));
+    if (stop - end < 1e-9 * dt) end = stop;
+    const std::vector<signed char> before = w.mode;
+    moreau_step(end - t);
+    t = end;
+    want_rows(p, w);
+    q_ = y.head(system.nq);
+    v_ = y.segment(system.nq, system.nv);
+    begin_step(p, w, t, q_, v_);  // factors of the new modes: what sticks must not move as the rest is projected
+    settle(t, y, derivative);
+    remember_directions();
+    recorder.moved_energy += pending_energy;
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
+        if (before[e] != w.mode[e])
+            out.events.push_back({t, w.mode[e] == sticking ? Event::Kind::stick
+                                      : before[e] == sticking ? Event::Kind::slip : Event::Kind::reverse, e});
+    report_pulls(t);
+    const bool on_grid = o.output_dt > 0.0 && next_sample <= t + 1e-12 * std::max(1.0, std::abs(t));
+    if (on_grid) next_sample = o.t0 + ++samples * o.output_dt;
+    if (o.output_dt == 0.0 || on_grid || t >= t_end) emit(t, y, true);
+}
+
+}  // namespace pn

@@ -1,0 +1,1 @@
+"""From descriptions to the core's program: names become indices, user functions checked ones."""

@@ -1,0 +1,211 @@
+"""What is found once, before the first step: bad numbers in the model, idle rows, wrong derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pin_nonideal.checks import array
+from pin_nonideal.constraints import UserConstraint
+from pin_nonideal.errors import InconsistentConstraintsError, InputError, LoopClosureError
+from pin_nonideal.states.closure import CLOSURE_TOLERANCE
+
+from .program import Lowered
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.bool_]
+
+# Rows below this part of the largest entry of A at random states vanish structurally, and rows whose
+# directions differ by less are copies: rounding of the kinematics.
+STRUCTURAL = 1e-11
+# The derivatives of a user's constraint are compared with differences, which carry about this relative error.
+DERIVATIVE_TOLERANCE = 1e-4
+
+
+def check_model(model: Any) -> None:
+    """Every number of a model is finite, and no mass or armature is negative.
+
+    Args:
+        model: pinocchio.Model.
+
+    Raises:
+        InputError: one is not.
+    """
+    for i in range(1, model.njoints):
+        Y, name = model.inertias[i], model.names[i]
+        for what, value in (("mass", Y.mass), ("center of mass", Y.lever), ("inertia", Y.inertia)):
+            array(f'Scene: the {what} moved by joint "{name}"', value, np.shape(value))
+        if Y.mass < 0.0:
+            raise InputError(
+                f'Scene: the mass moved by joint "{name}" must not be negative; got {Y.mass:g} kg'
+            )
+        array(f'Scene: the place of joint "{name}"', model.jointPlacements[i].homogeneous, (4, 4))
+    for frame in model.frames:
+        array(f'Scene: the place of frame "{frame.name}"', frame.placement.homogeneous, (4, 4))
+    array("Scene: the gravity of the model", model.gravity.vector, (6,))
+    armature = array("Scene: the armature of the model", model.armature, (model.nv,))
+    if (armature < 0.0).any():
+        raise InputError(
+            f"Scene: the armature of the model must not be negative; got {armature.min():g} kg m^2"
+        )
+
+
+def drop_rows(model: Any, q0: Array, low: Lowered) -> list[tuple[str, int, str]]:
+    """Leaves out rows that vanish at every state and rows that are copies of others.
+
+    Args:
+        model: pinocchio.Model.
+        q0: configuration around which the rows are sampled, (nq,).
+        low: the program; its builder keeps the other rows.
+
+    Returns:
+        (name, row, reason) of each row left out.
+
+    Raises:
+        InconsistentConstraintsError: a row that vanishes asks for an acceleration.
+        LoopClosureError: a row that vanishes has a gap.
+    """
+    fixed = np.zeros(low.rows, dtype=bool)  # rows that may look special at a few states and times only
+    for name, block in low.blocks.items():
+        fixed[low.slices[name]] = block in low.opaque
+    if fixed.all():
+        return []
+    runner, generator, samples = low.builder.runner(), np.random.default_rng(1), []
+    for _ in range(3):
+        q = pin.integrate(model, q0, generator.standard_normal(model.nv))
+        samples.append(rows_at(runner, q, generator.standard_normal(model.nv), 0.37)[:3])
+    wide = np.hstack([A for A, _, _ in samples])
+    right = np.column_stack([b for _, b, _ in samples])
+    gaps = np.abs(np.column_stack([phi for _, _, phi in samples])).max(axis=1)
+    length = np.linalg.norm(wide, axis=1)
+    vanishing = (length <= STRUCTURAL * max(float(length.max()), 1e-300)) & ~fixed
+    owners = [(name, row - s.start) for name, s in low.slices.items() for row in range(s.start, s.stop)]
+    dropped = []
+    for row in map(int, np.flatnonzero(vanishing)):
+        _check_vanishing(*owners[row], np.abs(right[row]).max(), np.abs(right).max(), gaps[row])
+        dropped.append((*owners[row], "vanishes"))
+    keep = ~vanishing
+    for first, second in _copies(wide, right, length, keep & ~fixed):
+        keep[second] = False
+        dropped.append((*owners[second], f'copy of a row of "{owners[first][0]}"'))
+    for name, s in low.slices.items():
+        if not keep[s].all():
+            low.builder.keep_rows(low.blocks[name], np.flatnonzero(keep[s]).tolist())
+    low.builder.finish()
+    rows = {owner: row for row, owner in enumerate(owners)}
+    return sorted(dropped, key=lambda entry: rows[entry[:2]])
+
+
+def _check_vanishing(name: str, local: int, asked: float, largest: float, gap: float) -> None:
+    """A row that moves nothing must ask for nothing: no acceleration, and no gap to be closed."""
+    if asked > 1e-9 * max(1.0, largest):
+        raise InconsistentConstraintsError(
+            f'row {local} of constraint "{name}" moves nothing and asks for the acceleration {asked:.1e}; '
+            "the joints leave that direction no freedom: drop the row or free a joint"
+        )
+    if gap > CLOSURE_TOLERANCE:
+        raise LoopClosureError(
+            f'loop "{name}" does not close: gap {gap:.2g} in row {local}, a direction in which no joint '
+            "moves; mend the frames' placement",
+            gaps={name: float(gap)},
+        )
+
+
+def _copies(wide: Array, right: Array, length: Array, candidates: Rows) -> list[tuple[int, int]]:
+    """Pairs (row, copy of it) among the candidates, in the order in which they are found.
+
+    Args:
+        wide: rows of A at several states, side by side, (m, n).
+        right: their right-hand sides, (m, k).
+        length: of the rows, (m,).
+        candidates: rows to look at, (m,).
+    """
+    rows = np.flatnonzero(candidates & (length > 0.0))
+    unit = np.hstack([wide[rows], right[rows]]) / length[rows, None]
+    probe = unit @ np.random.default_rng(2).standard_normal(unit.shape[1])
+    unit *= np.sign(probe)[:, None]  # a copy may be turned around
+    order = np.argsort(np.abs(probe), kind="stable")
+    copy = np.zeros(len(rows), dtype=bool)
+    pairs = []
+    for place, i in enumerate(order):
+        if copy[i]:
+            continue
+        for j in order[place + 1 :]:
+            if abs(abs(probe[j]) - abs(probe[i])) > 1e-9 * (1.0 + abs(probe[i])):
+                break
+            close = STRUCTURAL * (1.0 + np.abs(unit[i]).max())
+            if not copy[j] and np.abs(unit[i] - unit[j]).max() <= close:
+                first, second = sorted((i, j))
+                copy[second] = True
+                pairs.append((int(rows[first]), int(rows[second])))
+    return pairs
+
+
+def check_user_constraints(
+    model: Any, q0: Array, v0: Array, constraints: Sequence[Any], low: Lowered
+) -> None:
+    """Compares once, by central differences: d residual/dt = rate and d rate/dt = A a - b.
+
+    Args:
+        model: pinocchio.Model.
+        q0: configuration near which they are compared, (nq,).
+        v0: velocity, (nv,).
+        constraints: descriptions of all constraints.
+        low: the program.
+
+    Raises:
+        InputError: they differ.
+    """
+    mine = [
+        (name, c)
+        for name, c in zip(low.slices, constraints, strict=False)
+        if isinstance(c, UserConstraint) and (c.residual is not None or c.rate is not None)
+    ]
+    if not mine:
+        return
+    runner, h, t = low.builder.runner(), 1e-5, 0.21
+    generator = np.random.default_rng(3)
+    n = model.nv
+    for name, c in mine:
+        rows = low.slices[name]
+        q = pin.integrate(model, q0, 0.1 * generator.standard_normal(n))
+        v, a = v0 + generator.standard_normal(n), generator.standard_normal(n)
+        A, b, _, rate = (x[rows] for x in rows_at(runner, q, v, t))
+        ends = []
+        for s in (h, -h):
+            ahead = pin.integrate(model, q, s * v + 0.5 * s * s * a)
+            ends.append(rows_at(runner, ahead, v + s * a, t + s))
+        size = float(np.abs(A).max()) * (1.0 + float(np.abs(v).max())) ** 2
+        scale = 1.0 + size + float(np.abs(b).max())
+        if c.residual is not None:
+            difference = (ends[0][2] - ends[1][2])[rows] / (2.0 * h)
+            _compare(name, "d residual/dt", difference, "rate", rate, scale)
+        difference = (ends[0][3] - ends[1][3])[rows] / (2.0 * h)
+        _compare(name, "d rate/dt", difference, "A a - b", A @ a - b, scale)
+
+
+def _compare(name: str, left: str, x: Array, right: str, y: Array, scale: float) -> None:
+    miss = np.abs(x - y)
+    if float(miss.max(initial=0.0)) > DERIVATIVE_TOLERANCE * scale:
+        k = int(np.argmax(miss))
+        raise InputError(
+            f'UserConstraint "{name}": {left} must equal {right}; row {k}: {x[k]:.6g} by differences against '
+            f"{y[k]:.6g}; mend the function, the residual or the rate"
+        )
+
+
+def rows_at(runner: Any, q: Array, v: Array, t: float) -> tuple[Array, Array, Array, Array]:
+    """A (m, nv), b (m,), residual (m,) and rate (m,) of all rows at one state.
+
+    Args:
+        runner: a workspace of the core.
+        q: configuration, (nq,).
+        v: velocity, (nv,).
+        t: time [s].
+    """
+    A, b, phi, rate = runner.rows(q, v, t)
+    return A.reshape(-1, len(v)), b, phi, rate

@@ -1,0 +1,187 @@
+"""Python functions of the user as the core calls them: results checked, errors that name the function."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pin_nonideal.errors import InputError, RunError, UnknownNameError, UserFunctionError, nearest
+from pin_nonideal.timefunctions import Constant, Polynomial, Sinusoid, Spline
+
+Array = NDArray[np.float64]
+
+# Where a user's function of time is compared with its differences [s]: at no round time, since it may have
+# corners there, and at several, since one may fall on a corner all the same.
+PROBES = (0.01371, 0.21317, 0.71753)
+PROBE_STEP = 1e-6
+COARSE = 0.1  # what is interpolated in tables of its own for each derivative stays below
+ROUNDING = 1e-7  # of a difference over two steps, and more
+
+
+def checked(function: Callable[..., Any], who: str, *shapes: tuple[int, ...]) -> Callable[..., Any]:
+    """The user's function with its result made contiguous, and errors that name it.
+
+    Args:
+        function: what the user passed.
+        who: words for messages.
+        shapes: shape of its result, or of each part of a tuple of results.
+    """
+
+    def call(*arguments: Any) -> Any:
+        try:
+            value = function(*arguments)
+        except RunError:
+            raise
+        except Exception as error:
+            raise UserFunctionError(f"{who} raised {type(error).__name__}: {error}") from error
+        parts = (value,) if len(shapes) == 1 else value
+        if not isinstance(parts, (tuple, list)) or len(parts) != len(shapes):
+            raise UserFunctionError(f"{who} must return {len(shapes)} values; got {type(value).__name__}")
+        results = [_numbers(part, shape, who) for part, shape in zip(parts, shapes, strict=True)]
+        return results[0] if len(shapes) == 1 else tuple(results)
+
+    return call
+
+
+def _numbers(part: Any, shape: tuple[int, ...], who: str) -> Array:
+    try:
+        if np.iscomplexobj(part):
+            raise TypeError
+        result = np.array(part, dtype=float, order="C")
+    except (TypeError, ValueError):
+        raise UserFunctionError(f"{who} must return numbers of shape {shape}; got {part!r}") from None
+    if result.shape != shape and result.size == math.prod(shape):
+        result = result.reshape(shape)
+    if result.shape != shape:
+        raise UserFunctionError(f"{who} must return shape {shape}; got shape {result.shape}")
+    if not np.isfinite(result).all():
+        raise UserFunctionError(f"{who} must return finite numbers; got {result}")
+    return result
+
+
+def time_function(function: Any, who: str) -> Any:
+    """A function of time as numbers for the core, or checked when it is the user's.
+
+    Args:
+        function: of `pin_nonideal.timefunctions`, or the user's t -> (value, rate, acceleration).
+        who: words for messages.
+
+    Raises:
+        InputError: a derivative is wrong.
+    """
+    if isinstance(function, Constant):
+        return ("polynomial", [function.value])
+    if isinstance(function, Polynomial):
+        return ("polynomial", list(function.coefficients))
+    if isinstance(function, Sinusoid):
+        return ("sinusoid", [function.amplitude, function.frequency, function.phase, function.offset])
+    if isinstance(function, Spline):
+        return ("spline", function.breaks.tolist(), function.coefficients.ravel().tolist())
+    jet = checked(function, f"{who}: function of time", (), (), ())
+    _check_derivatives(jet, who)
+    return lambda t: tuple(float(x) for x in jet(t))
+
+
+def _check_derivatives(jet: Callable[..., Any], who: str) -> None:
+    """Compares the rate and the acceleration of a user's function of time with central differences.
+
+    Args:
+        jet: t -> (value, rate, acceleration), checked.
+        who: words for messages.
+
+    Raises:
+        InputError: one of them is wrong at every probe.
+    """
+    ends = []
+    for t in PROBES:
+        with contextlib.suppress(UserFunctionError):  # it may be defined for a part of the time only
+            ends.append((t, jet(t - PROBE_STEP), jet(t), jet(t + PROBE_STEP)))
+    for k, (quantity, derivative) in enumerate((("value", "rate"), ("rate", "acceleration"))):
+        rows = [
+            (t, (after[k] - before[k]) / (2.0 * PROBE_STEP), at[k + 1], abs(at[k]))
+            for t, before, at, after in ends
+        ]
+        wrong = [
+            (t, difference, given)
+            for t, difference, given, size in rows
+            if abs(difference - given) > COARSE * max(abs(difference), abs(given)) + ROUNDING * (1.0 + size)
+        ]
+        if wrong and len(wrong) == len(rows):
+            t, difference, given = wrong[0]
+            raise InputError(
+                f"{who}: function of time: {derivative} must be the derivative of {quantity}; at t = {t:g} s "
+                f"it returns {given:.6g}, and differences give {difference:.6g}; mend it, or use sinusoid, "
+                "polynomial or spline"
+            )
+
+
+@dataclass
+class ReactionNames:
+    """Names that a law may ask reactions for.
+
+    Attributes:
+        slices: rows of each constraint and contact.
+        blocks: the core's block of each.
+        joints: index of each joint.
+    """
+
+    slices: dict[str, slice]
+    blocks: dict[str, int]
+    joints: dict[str, int]
+
+
+class Reactions:
+    """What the constraints exert at the instant of a law's call; valid during the call only.
+
+    Attributes:
+        lam: multipliers of all rows, in the order and scale of the descriptions, (m,).
+    """
+
+    def __init__(self, view: Any, names: ReactionNames) -> None:
+        self._view, self._names = view, names
+
+    @property
+    def lam(self) -> Array:
+        """Multipliers of all rows, (m,)."""
+        result: Array = self._view.lam
+        return result
+
+    def __getitem__(self, name: str) -> Array:
+        """Multipliers of one constraint or contact.
+
+        Args:
+            name: its name.
+
+        Raises:
+            UnknownNameError: no constraint has that name.
+        """
+        slices = self._names.slices
+        if name not in slices:
+            raise UnknownNameError(f'no constraint "{name}" in this scene{nearest(name, slices)}')
+        return self.lam[slices[name]]
+
+    def wrench(self, name: str) -> Array:
+        """[force; moment] that a joint or an anchor exerts, (6,) [N; N m].
+
+        A joint's is what it exerts on the body that it moves, in the joint frame's axes, about its origin; an
+        anchor's is what it exerts on the body of frame1, in the axes of frame2.
+
+        Args:
+            name: of a joint of the model, or of a constraint.
+
+        Raises:
+            UnknownNameError: there is no such joint or constraint.
+        """
+        known = self._names
+        if name in known.blocks:
+            return np.asarray(self._view.of_block(known.blocks[name]))
+        if name in known.joints:
+            return np.asarray(self._view.of_joint(known.joints[name]))
+        names = [*known.blocks, *known.joints]
+        raise UnknownNameError(f'no joint or constraint "{name}" in this scene{nearest(name, names)}')

@@ -1,0 +1,214 @@
+"""Constraints and contacts as blocks of rows in the core's program."""
+
+from __future__ import annotations
+
+import math
+import threading
+from fractions import Fraction
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pin_nonideal.checks import axis_triad, unit_axis
+from pin_nonideal.constraints import (
+    Distance,
+    FrameAnchor,
+    HingeAnchor,
+    JointCoupling,
+    KnifeEdge,
+    PointAnchor,
+    PrescribedMotion,
+    Rolling,
+    UserConstraint,
+)
+from pin_nonideal.contacts import PointContact
+from pin_nonideal.errors import InputError, UnknownNameError
+from pin_nonideal.timefunctions import Constant
+
+from .callbacks import checked, time_function
+from .names import Resolution, placed_on, words
+from .program import Lowered
+
+Array = NDArray[np.float64]
+
+# A rational gear ratio with a larger denominator than this leaves the angle of endless joints undetermined.
+LARGEST_GEAR = 64
+
+
+@singledispatch
+def lower_constraint(c: Any, name: str, out: Lowered, where: Resolution) -> None:
+    """Adds one constraint to the program; a constraint model of Pinocchio when it is no description of ours.
+
+    Args:
+        c: the description.
+        name: its unique name.
+        out: the program.
+        where: frames and joints by name.
+
+    Raises:
+        InputError, UnknownNameError: what it refers to does not exist or does not fit.
+    """
+    kind = type(c).__name__
+    known = ("RigidConstraintModel", "PointAnchorConstraintModel", "FrameAnchorConstraintModel")
+    if kind not in known:
+        raise InputError(
+            f"a constraint must be one of this package's or of Pinocchio's {', '.join(known)}; got {c!r}"
+        )
+    f1, f2 = placed_on(c.joint1_id, c.joint1_placement), placed_on(c.joint2_id, c.joint2_placement)
+    if kind == "PointAnchorConstraintModel" or (
+        kind == "RigidConstraintModel" and c.type == pin.ContactType.CONTACT_3D
+    ):
+        out.add_rows(name, out.builder.add_point(name, f1, f2, [0, 1, 2]), 3)
+    else:
+        out.add_rows(name, out.builder.add_frame(name, f1, f2), 6)
+
+
+def _add_anchor(c: Any, name: str, block: int, rows: int, out: Lowered, where: Resolution) -> None:
+    """Books the rows of what joins two frames, and the frames when both have an index."""
+    out.add_rows(name, block, rows)
+    try:
+        first = where.frame_id(c.frame1, "")
+        second = None if c.frame2 is None else where.frame_id(c.frame2, "")
+    except UnknownNameError:
+        return  # a joint without a frame of its own
+    out.anchors.append((name, first, second))
+
+
+@lower_constraint.register
+def _(c: PointAnchor, name: str, out: Lowered, where: Resolution) -> None:
+    f1, f2 = where.pair(c, words(c, name))
+    axes = ["xyz".index(a) for a in c.axes]
+    _add_anchor(c, name, out.builder.add_point(name, f1, f2, axes), len(axes), out, where)
+
+
+@lower_constraint.register
+def _(c: FrameAnchor, name: str, out: Lowered, where: Resolution) -> None:
+    f1, f2 = where.pair(c, words(c, name))
+    _add_anchor(c, name, out.builder.add_frame(name, f1, f2), 6, out, where)
+
+
+@lower_constraint.register
+def _(c: HingeAnchor, name: str, out: Lowered, where: Resolution) -> None:
+    who = words(c, name)
+    f1, f2 = where.pair(c, who)
+    t1, t2, u = axis_triad(where.hinge_axis(c, who))
+    normal1 = [-x for x in t2]
+    _add_anchor(c, name, out.builder.add_hinge(name, f1, f2, u, normal1, t1), 5, out, where)
+
+
+@lower_constraint.register
+def _(c: Distance, name: str, out: Lowered, where: Resolution) -> None:
+    who = words(c, name)
+    f1, f2 = where.pair(c, who)
+    length = c.length
+    if length is None:
+        gap = float(np.linalg.norm(where.in_world(f1).translation - where.in_world(f2).translation))
+        if gap == 0.0:
+            raise InputError(f"{who}: the frames start at the same place; a distance must be positive")
+        length = Constant(gap)
+    elif not callable(length):
+        length = Constant(length)
+    block = out.builder.add_distance(name, f1, f2, time_function(length, who))
+    if not isinstance(length, Constant):
+        out.opaque.add(block)
+    _add_anchor(c, name, block, 1, out, where)
+
+
+@lower_constraint.register
+def _(c: JointCoupling, name: str, out: Lowered, where: Resolution) -> None:
+    who = words(c, name)
+    j1, j2 = where.joint(c.joint1, who), where.joint(c.joint2, who)
+    endless = [where.model.joints[j].nq == 2 for j in (j1, j2)]
+    period, position = 0.0, True
+    turn = 2.0 * math.pi
+    if endless[0] and endless[1]:
+        gear = Fraction(c.ratio).limit_denominator(LARGEST_GEAR)
+        position = abs(float(gear) - c.ratio) < 1e-12
+        period = turn / gear.denominator
+    elif endless[0]:
+        period = turn
+    elif endless[1]:
+        period = turn * abs(c.ratio)
+    out.add_rows(name, out.builder.add_coupling(name, j1, j2, c.ratio, c.offset, period, position), 1)
+
+
+@lower_constraint.register
+def _(c: PrescribedMotion, name: str, out: Lowered, where: Resolution) -> None:
+    who = words(c, name)
+    joint = where.joint(c.joint, who)
+    period = 2.0 * math.pi if where.model.joints[joint].nq == 2 else 0.0
+    block = out.builder.add_motion(name, joint, time_function(c.function, who), period)
+    out.opaque.add(block)
+    out.add_rows(name, block, 1)
+
+
+@lower_constraint.register
+def _(c: KnifeEdge, name: str, out: Lowered, where: Resolution) -> None:
+    who = words(c, name)
+    frame = where.frame(c.frame, who)
+    out.add_rows(name, out.builder.add_knife(name, frame, list(unit_axis(who, c.axis))), 1)
+
+
+@lower_constraint.register
+def _(c: Rolling, name: str, out: Lowered, where: Resolution) -> None:
+    who = words(c, name)
+    plane = where.plane(c.plane, who)
+    frame = where.frame(c.frame, who)
+    t1, t2, n = axis_triad(unit_axis(who, c.normal))
+    sphere = c.axis is None
+    axle = [0.0, 0.0, 1.0] if c.axis is None else list(unit_axis(who, c.axis))
+    out.add_rows(name, out.builder.add_rolling(name, frame, plane, c.radius, sphere, axle, t1, t2, n), 3)
+
+
+@lower_constraint.register
+def _(c: UserConstraint, name: str, out: Lowered, where: Resolution) -> None:
+    model, size, who = where.model, c.size, words(c, name)
+    function = checked(c.function, f"{who}: function", (size, model.nv), (size,))
+    local = threading.local()
+
+    def rows(t: float, q: Array, v: Array) -> Any:
+        if not hasattr(local, "data"):
+            local.data = model.createData()
+        data = local.data
+        pin.forwardKinematics(model, data, q, v, np.zeros(model.nv))
+        pin.computeJointJacobians(model, data)
+        pin.updateFramePlacements(model, data)
+        return function(t, q, v, data)
+
+    residual = None if c.residual is None else checked(c.residual, f"{who}: residual", (size,))
+    rate = None if c.rate is None else checked(c.rate, f"{who}: rate", (size,))
+    if residual is not None and rate is None:
+        held = residual
+
+        def rate(t: float, q: Array, v: Array) -> Array:
+            step = 1e-6 * max(1.0, abs(t))
+            moving = (held(t + step, q) - held(t - step, q)) / (2.0 * step)
+            result: Array = rows(t, q, v)[0] @ v + moving
+            return result
+
+    if residual is None and rate is None:
+        out.unprojected.append(name)
+    block = out.builder.add_user(name, size, rows, residual, rate)
+    out.opaque.add(block)
+    out.add_rows(name, block, size)
+
+
+def lower_contact(c: Any, name: str, out: Lowered, where: Resolution) -> None:
+    """Adds the normal row of a contact; its friction follows all rows (`lower_contact_friction`).
+
+    Args:
+        c: the description.
+        name: its unique name.
+        out: the program.
+        where: frames and joints by name.
+
+    Raises:
+        InputError, UnknownNameError: what it refers to does not exist or does not fit.
+    """
+    if not isinstance(c, PointContact):
+        raise InputError(f"a contact must be a PointContact; got {c!r}")
+    f1, f2, (_, _, normal) = where.contact(c, words(c, name))
+    out.add_rows(name, out.builder.add_contact(name, f1, f2, list(normal), c.radius), 1)

@@ -1,0 +1,112 @@
+"""Given forces and actuation in the core's program."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pin_nonideal.actuation import HoldPosition, SampledControl, Table
+from pin_nonideal.checks import array
+from pin_nonideal.errors import InputError
+from pin_nonideal.forces import JointSpring, SpringDamper, UserForce, Wrench
+from pin_nonideal.states.configurations import configuration
+
+from .callbacks import checked
+from .names import Resolution, words
+from .program import Lowered
+
+Array = NDArray[np.float64]
+
+
+@singledispatch
+def lower_force(f: Any, out: Lowered, where: Resolution) -> None:
+    """Adds one given force to the program.
+
+    Args:
+        f: the description.
+        out: the program.
+        where: frames and joints by name.
+
+    Raises:
+        InputError, UnknownNameError: what it refers to does not exist or does not fit.
+    """
+    raise InputError(f"a force must be SpringDamper, JointSpring, Wrench or UserForce; got {f!r}")
+
+
+@lower_force.register
+def _(f: SpringDamper, out: Lowered, where: Resolution) -> None:
+    out.builder.add_spring_damper(*where.pair(f, words(f)), f.stiffness, f.damping, f.rest_length)
+
+
+@lower_force.register
+def _(f: JointSpring, out: Lowered, where: Resolution) -> None:
+    out.builder.add_joint_spring(where.joint(f.joint, words(f)), f.stiffness, f.rest, f.damping)
+
+
+@lower_force.register
+def _(f: Wrench, out: Lowered, where: Resolution) -> None:
+    frame = where.frame(f.frame, words(f))
+    if callable(f.value):
+        out.builder.add_wrench(frame, [0.0] * 6, checked(f.value, f"{words(f)}: value", (6,)))
+    else:
+        out.builder.add_wrench(frame, list(f.value), None)
+
+
+@lower_force.register
+def _(f: UserForce, out: Lowered, where: Resolution) -> None:
+    out.builder.add_user_force(checked(f.function, f"{words(f)}: function", (where.model.nv,)))
+
+
+def lower_actuation(u: Any, out: Lowered, where: Resolution) -> None:
+    """Sets the torques that drive the scene.
+
+    Args:
+        u: None, an array (nv,), a function, or a description.
+        out: the program.
+        where: frames and joints by name.
+
+    Raises:
+        InputError: shapes do not fit the model.
+    """
+    add, model = out.builder, where.model
+    nv = model.nv
+    if u is None:
+        return
+    if isinstance(u, SampledControl):
+        add.set_sampled_torque(checked(u.function, f"{words(u)}: function", (nv,)), u.period)
+    elif isinstance(u, HoldPosition):
+        q = where.q0 if u.q is None else configuration(model, u.q, f"{words(u)}: q")
+        add.set_hold_position(_gains(u, "kp", model), _gains(u, "kd", model), np.ascontiguousarray(q))
+    elif isinstance(u, Table):
+        times, values = np.asarray(u.times), np.asarray(u.values)
+        if values.shape[1] != nv:
+            raise InputError(f"{words(u)}: values must have {nv} columns (nv); got {values.shape[1]}")
+        add.set_torque_table(times.tolist(), np.ascontiguousarray(values))
+    elif callable(u):
+        add.set_torque_function(checked(u, "actuation", (nv,)))
+    else:
+        add.set_constant_torque(np.ascontiguousarray(array("actuation", u, (nv,))))
+
+
+def _gains(u: HoldPosition, key: str, model: Any) -> Array:
+    """A gain for every degree of freedom; a number acts on joints of one degree of freedom."""
+    gain, who = getattr(u, key), f"{words(u)}: {key}"
+    if np.ndim(gain) == 0:
+        single = np.zeros(model.nv)
+        for joint in list(model.joints)[1:]:
+            if joint.nv == 1:
+                single[joint.idx_v] = float(gain)
+        return single
+    full: Array = array(who, gain, (model.nv,)).copy()
+    if key == "kp":
+        for index, joint in list(enumerate(model.joints))[1:]:
+            part = full[joint.idx_v : joint.idx_v + joint.nv]
+            if joint.nq != joint.nv and joint.nv > 1 and (part != 0.0).any():
+                raise InputError(
+                    f'{who} must be zero on joint "{model.names[index]}", whose configuration is no '
+                    "vector; drive it by a function"
+                )
+    return full

@@ -1,0 +1,174 @@
+"""From names to numbers: which frame, joint and axis a description means, and what it is called itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pin_nonideal.checks import Vector3, axis_triad, unit_axis
+from pin_nonideal.constraints import HingeAnchor
+from pin_nonideal.contacts import PointContact
+from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.states.placements import frame_on_joint, joint_placements
+
+Array = NDArray[np.float64]
+# A frame as the core takes it: joint, orientation by rows, place.
+Frame = tuple[int, list[float], list[float]]
+
+WORLD: Frame = (0, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0])
+
+
+def placed_on(joint: int, placement: Any) -> Frame:
+    """A placement on a joint's body as the core takes it.
+
+    Args:
+        joint: index of the joint.
+        placement: pinocchio.SE3.
+    """
+    return (int(joint), placement.rotation.ravel().tolist(), placement.translation.tolist())
+
+
+class Resolution:
+    """Frames and joints of a model by their names.
+
+    Args:
+        model: pinocchio.Model.
+        q0: configuration at which `frame2=None` and lengths left out are read, (nq,).
+    """
+
+    def __init__(self, model: Any, q0: Array) -> None:
+        self.model, self.q0 = model, q0
+        self._placements = joint_placements(model, q0)
+
+    def frame_id(self, name: str, who: str) -> int:
+        """Index of a frame, or of the frame of a joint."""
+        if self.model.existFrame(name):
+            return int(self.model.getFrameId(name))
+        names = [f.name for f in self.model.frames]
+        raise UnknownNameError(f'{who}: no frame "{name}" in model "{self.model.name}"{nearest(name, names)}')
+
+    def frame(self, name: str, who: str) -> Frame:
+        """A frame, or a joint's own one, as the core takes it."""
+        if not self.model.existJointName(name):
+            self.frame_id(name, who)  # raises where there is neither
+        return placed_on(*frame_on_joint(self.model, name))
+
+    def plane(self, name: str | None, who: str) -> Frame:
+        """The frame that a plane belongs to: the world's when there is no name."""
+        return WORLD if name is None else self.frame(name, who)
+
+    def in_world(self, frame: Frame) -> Any:
+        """Where a frame is in the world at q0, pinocchio.SE3."""
+        joint, R, p = frame
+        return self._placements[joint] * pin.SE3(np.reshape(R, (3, 3)), np.array(p))
+
+    def joint(self, name: str, who: str, *, freedoms: tuple[int, ...] = (1,)) -> int:
+        """Index of a joint with an allowed number of degrees of freedom."""
+        model = self.model
+        if not model.existJointName(name) or name == "universe":
+            if model.existFrame(name, pin.FrameType.FIXED_JOINT):
+                raise InputError(
+                    f'{who}: joint "{name}" is fixed (locked) and cannot move; unlock it or leave it out'
+                )
+            raise UnknownNameError(
+                f'{who}: no joint "{name}" in model "{model.name}"{nearest(name, list(model.names)[1:])}'
+            )
+        index = int(model.getJointId(name))
+        if model.joints[index].nv not in freedoms:
+            degrees = "1 degree" if freedoms == (1,) else f"{' or '.join(map(str, freedoms))} degrees"
+            raise InputError(
+                f'{who}: joint "{name}" must have {degrees} of freedom; it has {model.joints[index].nv}'
+            )
+        return index
+
+    def pair(self, description: Any, who: str) -> tuple[Frame, Frame]:
+        """Both frames of an anchor.  The world stands in for a missing second frame, in world axes."""
+        first = self.frame(description.frame1, who)
+        if description.frame2 is not None:
+            return first, self.frame(description.frame2, who)
+        here = self.in_world(first)
+        joint, R, p = first
+        level = np.reshape(R, (3, 3)) @ here.rotation.T  # equals the world's axes at q0
+        return (joint, level.ravel().tolist(), p), (0, WORLD[1], here.translation.tolist())
+
+    def hinge_axis(self, hinge: HingeAnchor, who: str) -> Vector3:
+        """The hinge's axis in the axes of frame2 (of the world without one)."""
+        axis = unit_axis(who, hinge.axis)
+        if hinge.frame2 is not None:
+            return axis
+        x, y, z = (float(x) for x in self.in_world(self.frame(hinge.frame1, who)).rotation @ np.array(axis))
+        return (x, y, z)
+
+    def contact(self, c: PointContact, who: str) -> tuple[Frame, Frame, tuple[Vector3, Vector3, Vector3]]:
+        """Frame, plane, and right-handed directions (along, along, normal) in the axes of the plane."""
+        plane = self.plane(c.plane, who)
+        return self.frame(c.frame, who), plane, axis_triad(unit_axis(who, c.normal))
+
+    def bearing(self, joint: int) -> tuple[str | None, Array]:
+        """What a joint is to the friction in it, and its axis in the joint's frame, (3,).
+
+        Args:
+            joint: index.
+
+        Returns:
+            "revolute" (helical joints too), "prismatic", "spherical", or None for all others.
+        """
+        item = self.model.joints[joint]
+        data = item.createData()
+        item.calc(data, pin.neutral(self.model), np.zeros(self.model.nv))
+        S = np.asarray(data.S).reshape(6, -1)
+        if item.nv == 3:
+            spherical = "Spherical" in item.shortname() and "ZYX" not in item.shortname()
+            return ("spherical" if spherical else None), np.array([0.0, 0.0, 1.0])
+        if item.nv != 1 or "Composite" in item.shortname():
+            return None, np.array([0.0, 0.0, 1.0])
+        lin, ang = S[:3, 0], S[3:, 0]
+        if np.linalg.norm(ang) > 0.5:
+            return "revolute", ang / np.linalg.norm(ang)
+        return "prismatic", lin / np.linalg.norm(lin)
+
+
+def unique_names(descriptions: Sequence[Any], taken: set[str]) -> list[str]:
+    """A name for each description: its own, or its kind and what it acts on.
+
+    Args:
+        descriptions: constraints, laws or contacts.
+        taken: names in use; grows.
+
+    Raises:
+        InputError: two descriptions were given the same name.
+    """
+    names = []
+    for d in descriptions:
+        own = getattr(d, "name", None)
+        if own:
+            if own in taken:
+                raise InputError(f'names must be unique in a scene; "{own}" is used twice')
+            name = str(own)
+        else:
+            keys = ("frame1", "frame2", "joint1", "joint2", "joint", "frame")
+            parts = [str(getattr(d, k)) for k in keys if getattr(d, k, None) is not None]
+            base = name = type(d).__name__ + (f"({', '.join(parts)})" if parts else "")
+            count = 1
+            while name in taken:
+                count += 1
+                name = f"{base} #{count}"
+        taken.add(name)
+        names.append(name)
+    return names
+
+
+def words(description: Any, name: str | None = None) -> str:
+    """Words that name a description in a message: its class, and the name it has or was given.
+
+    Args:
+        description: of anything in a scene.
+        name: the unique name that the scene gave it.
+    """
+    own = getattr(description, "name", None) or name
+    kind = type(description).__name__
+    return f'{kind} "{own}"' if own and not str(own).startswith(kind) else str(own or kind)

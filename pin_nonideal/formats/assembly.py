@@ -1,0 +1,355 @@
+"""From a robot's file and a robot.yaml table to the arguments of a Scene.
+
+Every joint that the table names is looked up here; the Scene looks up the frames.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pin_nonideal.actuation import HoldPosition
+from pin_nonideal.checks import array, nonnegative, number
+from pin_nonideal.constraints import JointCoupling, PrescribedMotion
+from pin_nonideal.errors import InputError, LoadingError, nearest
+from pin_nonideal.laws import JointFriction
+from pin_nonideal.states.configurations import CIRCLES, unit_parts
+
+from .inertia import require_positive_mass
+from .model_edit import ball_chains, edit_joints
+from .robot_yaml import (
+    ACTUATION,
+    CONSTRAINTS,
+    CONTACTS,
+    FORCES,
+    LAWS,
+    Table,
+    build,
+    check_keys,
+    descriptions,
+    joint_types,
+    loops,
+    names_in,
+    one_entry,
+    optional_string,
+    pitches,
+    strings,
+)
+from .urdf import RobotFile
+
+# A quaternion this close to unit length is normalized; one farther away is a mistake.
+UNIT_TOLERANCE = 1e-3
+
+
+def scene_arguments(robot: RobotFile, table: Table, name: str, *, merge: bool = True) -> dict[str, Any]:
+    """Keyword arguments of Scene.
+
+    Args:
+        robot: what the robot's file holds; consumed.
+        table: content of robot.yaml, {} when there is none.
+        name: name of the scene, also used in messages.
+        merge: merge three revolutes with massless links between into ball joints.
+
+    Raises:
+        LoadingError: a name in the table does not exist, or a value is refused.
+        SingularMassError: M is not positive definite at the initial configuration.
+    """
+    where = f'robot.yaml of "{name}"'
+    notes = [*robot.notes, *strings(table, "notes", where)]
+    _change_joints(robot, table, where, notes, merge)
+    _place_base(robot, table, where)
+    if "gravity" in table:
+        robot.model.gravity = pin.Motion(
+            np.array(_vector(table["gravity"], 3, f"{where}: gravity")), np.zeros(3)
+        )
+    q0, v0 = _initial(robot, table.get("initial"), where)
+    q0, v0 = _lock(robot, table, q0, v0, where)
+    robot.constraints = [c for c in robot.constraints if _still_moves(robot.model, c, where)]
+    motors = strings(table, "name_mot", where) or [m for m in robot.motors if robot.model.existJointName(m)]
+    for motor in motors:
+        _joint(robot.model, motor, f"{where}: name_mot")
+    if motors:
+        notes.append("actuated joints: " + ", ".join(motors))
+    laws = descriptions(table.get("laws"), LAWS, f"{where}: laws")
+    require_positive_mass(robot.model, q0, name)
+    return {
+        "model": robot.model,
+        "constraints": [
+            *robot.constraints,
+            *loops(table, where),
+            *descriptions(table.get("constraints"), CONSTRAINTS, f"{where}: constraints"),
+        ],
+        "laws": [*laws, *dissipation(robot.model, laws, robot.constraints, notes)],
+        "contacts": descriptions(table.get("contacts"), CONTACTS, f"{where}: contacts"),
+        "forces": [*robot.forces, *descriptions(table.get("forces"), FORCES, f"{where}: forces")],
+        "actuation": _actuation(robot.model, table.get("actuation"), motors, f"{where}: actuation"),
+        "q0": q0,
+        "v0": v0,
+        "visual_model": robot.visual,
+        "collision_model": robot.collision,
+        "name": name,
+        "notes": tuple(notes),
+        "source": optional_string(table, "source", where),
+        "licence": optional_string(table, "licence", where),
+    }
+
+
+def dissipation(
+    model: Any, taken: Sequence[Any], couplings: Sequence[Any], notes: list[str]
+) -> list[JointFriction]:
+    """Joint friction that the robot's file states, as laws.
+
+    URDF has it in `<dynamics>`, MJCF in `damping` and `frictionloss`.  Pinocchio keeps these numbers in
+    `model.damping` and `model.upperDryFrictionLimit` and its forward dynamics ignores them.  A mimic joint
+    q = r q_leader + c hands its friction to its leader: dry friction times |r|, damping times r^2.
+
+    Args:
+        model: pinocchio.Model.
+        taken: laws already given; a JointFriction among them replaces the file's numbers for its joint.
+        couplings: constraints of the file; its mimic joints are `JointCoupling` or, when held,
+            `PrescribedMotion`.
+        notes: receives a note for each replacement, and for each joint that has no single velocity.
+    """
+    given = {law.joint for law in taken if isinstance(law, JointFriction)}
+    leaders = {c.joint1: (c.joint2, c.ratio) for c in couplings if isinstance(c, JointCoupling)}
+    held = {c.joint for c in couplings if isinstance(c, PrescribedMotion)}
+    dry: dict[str, float] = {}
+    viscous: dict[str, float] = {}
+    replaced: dict[str, None] = {}
+    for j in range(1, model.njoints):
+        dofs = slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])
+        name, damping, friction = model.names[j], model.damping[dofs], model.upperDryFrictionLimit[dofs]
+        if not (damping.any() or friction.any()):
+            continue
+        if model.nvs[j] != 1:
+            notes.append(
+                f'joint "{name}" has {model.nvs[j]} axes: damping and friction of the robot\'s file '
+                "are left out"
+            )
+            continue
+        ratio = 1.0
+        for _ in leaders:
+            if name in leaders:
+                ratio *= leaders[name][1]
+                name = leaders[name][0]
+        if name in given:
+            replaced[name] = None
+        elif name not in held:
+            dry[name] = dry.get(name, 0.0) + abs(ratio) * float(friction[0])
+            viscous[name] = viscous.get(name, 0.0) + ratio**2 * float(damping[0])
+    if replaced:
+        notes.append(
+            "laws given replace the damping and friction of the robot's file in " + ", ".join(replaced)
+        )
+    return [JointFriction(n, coulomb=dry[n], viscous=viscous[n], name=f"{n} dynamics") for n in dry]
+
+
+def _change_joints(robot: RobotFile, table: Table, where: str, notes: list[str], merge: bool) -> None:
+    """Exchanges joint types as the table asks, and merges revolutes that make a ball joint."""
+    types, screws = joint_types(table, where), pitches(table, where)
+    coupled = {n for c in robot.constraints for n in dataclasses.astuple(c) if isinstance(n, str)}
+    keep = names_in(table) | set(robot.motors) | coupled
+    chains = ball_chains(robot.model, keep) if merge else []
+    if not chains and not types and not screws:
+        return
+    if chains:
+        balls = ", ".join(f'"{chain.name}"' for chain in chains)
+        notes.append(
+            f"three revolute joints with massless links between are merged into a ball joint each: {balls}"
+        )
+    _exchange(robot, lambda geometries: edit_joints(robot.model, geometries, chains, types, screws))
+    robot.q0 = robot.v0 = None
+
+
+def _exchange(robot: RobotFile, edit: Callable[[list[Any]], tuple[Any, Iterable[Any]]]) -> None:
+    """Puts an edited model and its geometries in the place of the robot's own."""
+    given = [key for key in ("visual", "collision") if getattr(robot, key) is not None]
+    robot.model, edited = edit([getattr(robot, key) for key in given])
+    for key, geometry in zip(given, edited, strict=True):
+        setattr(robot, key, geometry)
+
+
+def _place_base(robot: RobotFile, table: Table, where: str) -> None:
+    """Mounts the robot where `model: {base: {xyz: ..., rpy: ...}}` says: on a wall, or from the ceiling."""
+    entry = (table.get("model") or {}).get("base")
+    if entry is None:
+        return
+    where = f"{where}: model: base"
+    if not isinstance(entry, dict):
+        raise LoadingError(f"{where} must be a table with the keys xyz, rpy; got {entry!r}")
+    check_keys(entry, ("xyz", "rpy"), where)
+    xyz, rpy = (np.array(_vector(entry.get(k, [0, 0, 0]), 3, f"{where}: {k}")) for k in ("xyz", "rpy"))
+    base, model = pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz), robot.model
+    for j in range(1, model.njoints):
+        if model.parents[j] == 0:
+            model.jointPlacements[j] = base * model.jointPlacements[j]
+    for frame in list(model.frames)[1:]:
+        if frame.parentJoint == 0:
+            frame.placement = base * frame.placement
+    for geometry in (robot.visual, robot.collision):
+        for shape in geometry.geometryObjects if geometry is not None else ():
+            if shape.parentJoint == 0:
+                shape.placement = base * shape.placement
+
+
+def _joint(model: Any, name: Any, where: str) -> int:
+    if not isinstance(name, str) or not model.existJointName(name):
+        raise LoadingError(f'{where}: no joint "{name}"{nearest(str(name), list(model.names)[1:])}')
+    return int(model.getJointId(name))
+
+
+def _vector(value: Any, size: int, where: str) -> list[float]:
+    try:
+        return [float(x) for x in array(where, value, (size,))]
+    except InputError as error:
+        raise LoadingError(str(error)) from None
+
+
+def _initial(robot: RobotFile, initial: Any, where: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Initial q and v: the file's own, changed joint by joint by the table."""
+    model = robot.model
+    q0 = pin.neutral(model) if robot.q0 is None else np.array(robot.q0, dtype=float)
+    v0 = np.zeros(model.nv) if robot.v0 is None else np.array(robot.v0, dtype=float)
+    if initial is None:
+        return q0, v0
+    where = f"{where}: initial"
+    if not isinstance(initial, dict):
+        raise LoadingError(f"{where} must be a table with the keys q, v, reference; got {initial!r}")
+    check_keys(initial, ("q", "v", "reference"), where)
+    if "reference" in initial:
+        known = [entry.key() for entry in model.referenceConfigurations]
+        if initial["reference"] not in known:
+            asked = str(initial["reference"])
+            raise LoadingError(f'{where}: no reference configuration "{asked}"{nearest(asked, known)}')
+        q0 = np.array(model.referenceConfigurations[initial["reference"]])
+    for key, state, first, size in (("q", q0, model.idx_qs, model.nqs), ("v", v0, model.idx_vs, model.nvs)):
+        given = initial.get(key) or {}
+        if isinstance(given, list):
+            state[:] = _vector(given, state.size, f"{where}: {key}")
+            given = {}
+        if not isinstance(given, dict):
+            raise LoadingError(f"{where}: {key} must be a table by joint name or a full list; got {given!r}")
+        for name, value in given.items():
+            j = _joint(model, name, f"{where}: {key}")
+            state[first[j] : first[j] + size[j]] = _joint_value(
+                model, j, key, value, f'{where}: {key} of "{name}"'
+            )
+    return _with_unit_quaternions(model, q0, where), v0
+
+
+def _joint_value(model: Any, j: int, key: str, value: Any, where: str) -> list[float]:
+    """Values of one joint; an angle may stand for its cosine and sine."""
+    size = model.nqs[j] if key == "q" else model.nvs[j]
+    values = list(value) if isinstance(value, (list, tuple)) else [value]
+    turns = key == "q" and model.joints[j].shortname().startswith(CIRCLES)
+    if turns and len(values) == model.nvs[j]:
+        try:
+            angle = number(where, values[-1])
+        except InputError as error:
+            raise LoadingError(str(error)) from None
+        values = [*values[:-1], float(np.cos(angle)), float(np.sin(angle))]
+    return _vector(values, size, where)
+
+
+def _with_unit_quaternions(model: Any, q: NDArray[np.float64], where: str) -> NDArray[np.float64]:
+    """Quaternions (and cosine-sine pairs) of unit length.
+
+    Raises:
+        LoadingError: one is far from unit length.
+    """
+    for joint, part in unit_parts(model):
+        length = math.hypot(*q[part])
+        if abs(length - 1.0) > UNIT_TOLERANCE:
+            what = "quaternion [x, y, z, w]" if part.stop - part.start == 4 else "cosine and sine"
+            raise LoadingError(f'{where}: {what} of joint "{joint}" must have length 1; got {length:g}')
+        q[part] /= length
+    return q
+
+
+def _lock(
+    robot: RobotFile, table: Table, q0: NDArray[np.float64], v0: NDArray[np.float64], where: str
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Fixes the joints that `model: {locked: ...}` names where the initial configuration has them."""
+    entry = table.get("model") or {}
+    locked = entry.get("locked") or []
+    if not isinstance(locked, list):
+        raise LoadingError(f"{where}: model: locked must be a list of joint names; got {locked!r}")
+    if not locked:
+        return q0, v0
+    model = robot.model
+    indices = [_joint(model, n, f"{where}: model: locked") for n in locked]
+    kept = [j for j in range(1, model.njoints) if j not in indices]
+    none = [np.zeros(0)]
+    q = np.concatenate([q0[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]] for j in kept] or none)
+    v = np.concatenate([v0[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] for j in kept] or none)
+    _exchange(robot, lambda geometries: pin.buildReducedModel(model, geometries, indices, q0))
+    return q, v
+
+
+def _still_moves(model: Any, constraint: Any, where: str) -> bool:
+    """Whether a constraint of the robot's file still has its joints; without them it is met already.
+
+    Raises:
+        LoadingError: one of two coupled joints is locked and the other is not.
+    """
+    keys = ("joint", "joint1", "joint2")
+    names = [getattr(constraint, key) for key in keys if hasattr(constraint, key)]
+    gone = [n for n in names if not model.existJointName(n)]
+    if gone and len(gone) < len(names):
+        left = next(n for n in names if n not in gone)
+        raise LoadingError(
+            f'{where}: joint "{left}" follows the locked joint "{gone[0]}"; lock both or neither'
+        )
+    return not gone
+
+
+def _actuation(model: Any, entry: Any, motors: Sequence[str], where: str) -> Any:
+    """Torques from the table: `torques` by joint name, HoldPosition or Table."""
+    if entry is None:
+        return None
+    kind, values = one_entry(entry, where)
+    if kind == "torques":
+        if not isinstance(values, dict):
+            raise LoadingError(f"{where}: torques must be a table by joint name; got {values!r}")
+        return _by_joint(model, values, f"{where}: torques", signed=True)
+    if kind in ("SampledControl", "function"):
+        raise LoadingError(
+            f"{where}: {kind} holds a Python function, which a file cannot; pass it to Scene in Python"
+        )
+    if kind not in ACTUATION:
+        raise LoadingError(f'{where}: unknown kind "{kind}"{nearest(kind, ("torques", *ACTUATION))}')
+    if ACTUATION[kind] is HoldPosition and isinstance(values, dict):
+        values = {
+            k: _gain(model, v, motors, f"{where}: {k}") if k in ("kp", "kd") else v for k, v in values.items()
+        }
+    return build(ACTUATION[kind], values, where)
+
+
+def _gain(model: Any, gain: Any, motors: Sequence[str], where: str) -> Any:
+    """A gain by joint name, or one number for the motors (for all joints when no motor is named)."""
+    if isinstance(gain, dict):
+        return _by_joint(model, gain, where, signed=False)
+    if motors and not isinstance(gain, list):
+        return _by_joint(model, dict.fromkeys(motors, gain), where, signed=False)
+    return gain
+
+
+def _by_joint(model: Any, table: Mapping[Any, Any], where: str, *, signed: bool) -> NDArray[np.float64]:
+    """An array of shape (nv,) from values by joint name."""
+    result = np.zeros(model.nv)
+    for name, value in table.items():
+        j = _joint(model, name, where)
+        what = f'{where} of "{name}"'
+        try:
+            result[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = (
+                number(what, value) if signed else nonnegative(what, value)
+            )
+        except InputError as error:
+            raise LoadingError(str(error)) from None
+    return result

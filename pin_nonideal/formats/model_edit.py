@@ -1,0 +1,297 @@
+"""Joints exchanged in a model that is already built: ball, universal, screw and fixed joints.
+
+URDF has no ball joint and no screw.  CAD exporters write a ball joint as three revolute joints in a row with
+massless links between; such a chain locks when its first and last axis become parallel (gimbal lock), where
+M is singular.  One ball joint does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import takewhile
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.errors import LoadingError
+
+# Links between the axes of a ball joint carry at most this part of the mass behind them.
+MASSLESS = 1e-6
+# Axes meet and are perpendicular to this accuracy [m, and cosine]: exporters print about ten digits.
+ALIGNED = 1e-7
+
+UNIVERSAL = {
+    "CARDAN": "XY",
+    "UJOINT_XY": "XY",
+    "UJOINT_YX": "YX",
+    "UJOINT_XZ": "XZ",
+    "UJOINT_ZX": "ZX",
+    "UJOINT_YZ": "YZ",
+}
+UNIVERSAL["UJOINT_ZY"] = "ZY"
+JOINT_TYPES = ("SPHERICAL", "FIXED", *UNIVERSAL)
+
+
+@dataclass(frozen=True)
+class BallChain:
+    """Three revolute joints that make one ball joint.
+
+    Attributes:
+        joints: indices of the three joints, from the root outwards.
+        name: name of the ball joint.
+        center: place of the ball in the frame of the last joint, shape (3,) [m].
+    """
+
+    joints: tuple[int, int, int]
+    name: str
+    center: Any
+
+
+def ball_chains(model: Any, keep: Collection[str] = ()) -> list[BallChain]:
+    """Finds the chains of three revolutes that are ball joints.
+
+    Their axes meet in one point, consecutive ones at right angles; the two links in between carry no mass and
+    no other joint; and none has a range, armature or friction.
+
+    Args:
+        model: pinocchio.Model.
+        keep: names of joints, frames and links that must stay (something refers to them).
+
+    Returns:
+        Chains that do not overlap, in the order of the joints.
+    """
+    children: dict[int, list[int]] = {}
+    for j in range(1, model.njoints):
+        children.setdefault(model.parents[j], []).append(j)
+    names_at: dict[int, set[str]] = {}
+    for frame in model.frames:
+        names_at.setdefault(frame.parentJoint, set()).add(frame.name)
+    chains: list[BallChain] = []
+    used: set[int] = set()
+    for a in range(1, model.njoints):
+        b = _only_child(children, a)
+        c = _only_child(children, b)
+        if a in used or b is None or c is None or not all(_plain_revolute(model, j) for j in (a, b, c)):
+            continue
+        if names_at[a] & set(keep) or names_at[b] & set(keep) or model.names[c] in keep:
+            continue
+        carried = sum(model.inertias[k].mass for k in model.subtrees[c])
+        if max(model.inertias[a].mass, model.inertias[b].mass) > MASSLESS * carried:
+            continue
+        center = _common_point(model, a, b, c)
+        if center is not None:
+            chains.append(BallChain((a, b, c), _ball_name(model, (a, b, c)), center))
+            used.update((a, b, c))
+    return chains
+
+
+def _only_child(children: Mapping[int, Sequence[int]], joint: int | None) -> int | None:
+    following = children.get(joint, ()) if joint is not None else ()
+    return following[0] if len(following) == 1 else None
+
+
+def revolute_axis(model: Any, joint: int) -> Any | None:
+    """Unit axis of a revolute joint in its own frame, shape (3,), or None for any other joint."""
+    j = model.joints[joint]
+    if (
+        not j.shortname().startswith("JointModelR")
+        or j.nv != 1
+        or j.shortname().startswith("JointModelRevoluteUnbounded")
+    ):
+        return None
+    data = j.createData()
+    j.calc(data, np.zeros(1), np.zeros(1))
+    return np.array(data.S).reshape(6)[3:]
+
+
+def _plain_revolute(model: Any, joint: int) -> bool:
+    """Whether a joint is a revolute without range, armature or friction: nothing a ball joint would lose."""
+    if revolute_axis(model, joint) is None:
+        return False
+    i, k = model.idx_vs[joint], model.idx_qs[joint]
+    if model.upperPositionLimit[k] > model.lowerPositionLimit[k]:
+        return False
+    return not any(
+        limit[i]
+        for limit in (model.armature, model.damping, model.lowerDryFrictionLimit, model.upperDryFrictionLimit)
+    )
+
+
+def _common_point(model: Any, a: int, b: int, c: int) -> Any | None:
+    """The point where three axes meet, in c's frame at zero angles; None when they make no ball joint."""
+    b_in_c = model.jointPlacements[c].inverse()
+    a_in_c = b_in_c * model.jointPlacements[b].inverse()
+    axes = np.array(
+        [
+            a_in_c.rotation @ revolute_axis(model, a),
+            b_in_c.rotation @ revolute_axis(model, b),
+            revolute_axis(model, c),
+        ]
+    )
+    if abs(axes[0] @ axes[1]) > ALIGNED or abs(axes[1] @ axes[2]) > ALIGNED:
+        return None
+    origins = np.array([a_in_c.translation, b_in_c.translation, np.zeros(3)])
+    across = [np.eye(3) - np.outer(u, u) for u in axes]
+    point = np.linalg.solve(sum(across), sum(p @ o for p, o in zip(across, origins, strict=True)))
+    gap = max(float(np.linalg.norm(p @ (point - o))) for p, o in zip(across, origins, strict=True))
+    return point if gap <= ALIGNED else None
+
+
+def _ball_name(model: Any, joints: tuple[int, int, int]) -> str:
+    """What the three names share, or the last name when that is nothing or taken."""
+    first, last = (f([model.names[j] for j in joints]) for f in (min, max))
+    shared = "".join(a for a, _ in takewhile(lambda pair: pair[0] == pair[1], zip(first, last, strict=False)))
+    shared = shared.rstrip("_- ").removesuffix("rev").rstrip("_- ")
+    return shared if len(shared) > 2 and not model.existFrame(shared) else str(model.names[joints[2]])
+
+
+def edit_joints(
+    model: Any,
+    geometries: Sequence[Any],
+    chains: Sequence[BallChain],
+    types: Mapping[str, str],
+    pitches: Mapping[str, float] | None = None,
+) -> tuple[Any, list[Any]]:
+    """Builds the model anew with other joints.
+
+    Args:
+        model: pinocchio.Model.
+        geometries: geometry models that belong to it.
+        chains: revolutes to merge into ball joints, from `ball_chains`.
+        types: joint name to one of `JOINT_TYPES`.  A universal joint named `j` becomes revolutes `j_X` and
+            `j` (axes as in the type), so that each has an angle.
+        pitches: revolute joints that become helical about their axis, with their rise per radian [m/rad].
+
+    Returns:
+        The new model and the new geometry models, in the given order.
+
+    Raises:
+        LoadingError: the type of a joint is unknown, a joint does not exist, or a screw has no axis.
+    """
+    screws = {name: _screw(model, name, pitch) for name, pitch in (pitches or {}).items()}
+    for name, kind in types.items():
+        if not model.existJointName(name):
+            raise LoadingError(f'joint_name: no joint "{name}" in the robot')
+        if kind not in JOINT_TYPES:
+            raise LoadingError(
+                f'joint_type: type of "{name}" must be one of {", ".join(JOINT_TYPES)}; got "{kind}"'
+            )
+    merged = {chain.joints[2]: chain for chain in chains}
+    dropped = {j for chain in chains for j in chain.joints[:2]}
+    new = pin.Model()
+    new.name, new.gravity = model.name, model.gravity
+    # For each old joint: its index in the new model and where its frame lies there (dropped: at zero angle).
+    place: dict[int, tuple[int, Any]] = {0: (0, pin.SE3.Identity())}
+    for j in range(1, model.njoints):
+        parent, offset = place[model.parents[j]]
+        placement = offset * model.jointPlacements[j]
+        shift = pin.SE3.Identity()
+        if j in dropped:
+            place[j] = (parent, placement)
+            continue
+        name, joint = model.names[j], model.joints[j]
+        if j in merged:
+            name, joint = merged[j].name, pin.JointModelSpherical()
+            ball = pin.SE3(np.eye(3), merged[j].center)
+            placement, shift = placement * ball, ball.inverse()
+        elif name in screws:
+            joint = screws[name]
+        elif types.get(name) == "SPHERICAL":
+            joint = pin.JointModelSpherical()
+        elif types.get(name) in UNIVERSAL:
+            first, second = tuple(UNIVERSAL[types[name]])
+            parent = new.addJoint(parent, _revolute(first), placement, f"{name}_{first}")
+            new.addJointFrame(parent)
+            joint, placement = _revolute(second), pin.SE3.Identity()
+        index = new.addJoint(parent, joint, placement, name)
+        _copy_limits(model, j, new, index)
+        new.inertias[index] = model.inertias[j].se3Action(shift)
+        place[j] = (index, shift)
+    renamed = {model.names[j]: chain.name for j, chain in merged.items()}
+    _copy_frames(model, new, place, dropped, renamed)
+    copies = [_move_geometry(model, new, geometry, place) for geometry in geometries]
+    fixed = [new.getJointId(n) for n, kind in types.items() if kind == "FIXED"]
+    if fixed:
+        new, copies = pin.buildReducedModel(new, copies, fixed, pin.neutral(new))
+    return new, list(copies)
+
+
+def _screw(model: Any, name: str, pitch: float) -> Any:
+    """A helical joint about the axis of a revolute joint."""
+    if not model.existJointName(name):
+        raise LoadingError(f'model: helical: no joint "{name}" in the robot')
+    axis = revolute_axis(model, model.getJointId(name))
+    if axis is None:
+        kind = model.joints[model.getJointId(name)].shortname()
+        raise LoadingError(
+            f'model: helical: joint "{name}" must be revolute in the robot\'s file; it is {kind}'
+        )
+    return pin.JointModelHelicalUnaligned(axis, pitch)
+
+
+def _revolute(axis: str) -> Any:
+    return {"X": pin.JointModelRX, "Y": pin.JointModelRY, "Z": pin.JointModelRZ}[axis]()
+
+
+def _copy_limits(model: Any, j: int, new: Any, index: int) -> None:
+    """Limits, armature and dissipation of a joint that keeps its size; a joint of another size keeps none."""
+    if model.nvs[j] != new.nvs[index] or model.nqs[j] != new.nqs[index]:
+        return
+    old_v, new_v = (slice(m.idx_vs[k], m.idx_vs[k] + m.nvs[k]) for m, k in ((model, j), (new, index)))
+    old_q, new_q = (slice(m.idx_qs[k], m.idx_qs[k] + m.nqs[k]) for m, k in ((model, j), (new, index)))
+    for key in (
+        "lowerEffortLimit",
+        "upperEffortLimit",
+        "lowerVelocityLimit",
+        "upperVelocityLimit",
+        "lowerDryFrictionLimit",
+        "upperDryFrictionLimit",
+        "damping",
+        "armature",
+        "rotorInertia",
+        "rotorGearRatio",
+    ):
+        getattr(new, key)[new_v] = getattr(model, key)[old_v]
+    for key in ("lowerPositionLimit", "upperPositionLimit"):
+        getattr(new, key)[new_q] = getattr(model, key)[old_q]
+
+
+def _copy_frames(
+    model: Any,
+    new: Any,
+    place: Mapping[int, tuple[int, Any]],
+    dropped: Collection[int],
+    renamed: Mapping[str, str],
+) -> None:
+    """All frames but those of links that are gone; a merged joint's frame takes the ball joint's name."""
+    index = {0: 0}
+    for i, frame in enumerate(model.frames):
+        if i == 0:
+            continue
+        parent, offset = place[frame.parentJoint]
+        if frame.parentJoint in dropped:
+            index[i] = index[frame.parentFrame]
+            continue
+        is_joint = frame.type == pin.FrameType.JOINT
+        name = renamed.get(frame.name, frame.name) if is_joint else frame.name
+        placement = pin.SE3.Identity() if is_joint else offset * frame.placement
+        copy = pin.Frame(name, parent, index[frame.parentFrame], placement, frame.type, frame.inertia)
+        index[i] = new.addFrame(copy, False)
+
+
+def _move_geometry(model: Any, new: Any, geometry: Any, place: Mapping[int, tuple[int, Any]]) -> Any:
+    """The same shapes on the new joints."""
+    result = pin.GeometryModel()
+    for shape in geometry.geometryObjects:
+        copy = shape.copy()
+        parent, offset = place[shape.parentJoint]
+        copy.placement = offset * shape.placement
+        copy.parentJoint = parent
+        name = model.frames[shape.parentFrame].name
+        copy.parentFrame = new.getFrameId(name) if new.existFrame(name) else 0
+        result.addGeometryObject(copy)
+    for pair in geometry.collisionPairs:
+        result.addCollisionPair(pair)
+    return result

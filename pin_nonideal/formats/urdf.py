@@ -1,0 +1,193 @@
+"""URDF files, read with care.
+
+What Pinocchio's reader passes over in silence is an error, a note, a law or a constraint here.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.constraints import Constraint, JointCoupling, PrescribedMotion
+from pin_nonideal.errors import LoadingError, nearest
+from pin_nonideal.timefunctions import Constant
+
+from .urdf_checks import check_urdf
+from .xml import numbers, parse_xml, read_text
+
+
+@dataclass
+class RobotFile:
+    """What a robot's file holds, before a scene is made of it.
+
+    Attributes:
+        model: pinocchio.Model.
+        visual: pinocchio.GeometryModel for display, or None.
+        collision: pinocchio.GeometryModel for collision, or None.
+        constraints: constraints that the file itself states (mimic joints, equalities).
+        forces: given forces that the file itself states (joint springs).
+        motors: joints with a transmission.
+        notes: what the user should know about the reading.
+        q0: initial configuration that the file states, shape (nq,), or None.
+        v0: initial velocity that the file states, shape (nv,), or None.
+    """
+
+    model: Any
+    visual: Any = None
+    collision: Any = None
+    constraints: list[Constraint] = field(default_factory=list)
+    forces: list[Any] = field(default_factory=list)
+    motors: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    q0: Any = None
+    v0: Any = None
+
+
+def read_urdf(path: Path, *, free_flyer: bool = False, package_dirs: Sequence[str | Path] = ()) -> RobotFile:
+    """Reads a URDF file.
+
+    Args:
+        path: the file.
+        free_flyer: give the root link a floating base, joint "root_joint".
+        package_dirs: folders that hold the packages of `package://` paths; the file's own folder and those
+            above it, and ROS_PACKAGE_PATH, are searched as well.
+
+    Raises:
+        LoadingError: the file is malformed, holds a loop, or a link or joint that cannot be.
+    """
+    text = read_text(path)
+    root = parse_xml(text, path, "robot")
+    name = root.get("name") or path.parent.name
+    root.set("name", name)
+    check_urdf(root, path)
+    notes = _resolve_meshes(root, path, package_dirs)
+    xml = ElementTree.tostring(root, encoding="unicode")
+    try:
+        model = (
+            pin.buildModelFromXML(xml, pin.JointModelFreeFlyer())
+            if free_flyer
+            else pin.buildModelFromXML(xml)
+        )
+    except (ValueError, RuntimeError) as error:
+        raise LoadingError(f'"{path}" cannot be read by Pinocchio: {error}') from None
+    visual, collision = (_geometry(model, root, path, kind, notes) for kind in ("visual", "collision"))
+    motors = [j.get("name", "") for j in root.findall("transmission/joint")]
+    return RobotFile(model, visual, collision, _mimics(root, path), [], motors, notes)
+
+
+def read_mimics(path: Path) -> list[Constraint]:
+    """The mimic joints of a URDF file as couplings.
+
+    Raises:
+        LoadingError: the file is malformed, or a mimic joint follows nothing.
+    """
+    return _mimics(parse_xml(read_text(path), path, "robot"), path)
+
+
+def _mimics(root: ElementTree.Element, path: Path) -> list[Constraint]:
+    """Mimic joints as couplings: q = multiplier q_leader + offset (Pinocchio's reader leaves them free)."""
+    kinds = {j.get("name", ""): j.get("type") for j in root.findall("joint")}
+    result: list[Constraint] = []
+    for joint in root.findall("joint"):
+        mimic = joint.find("mimic")
+        if mimic is None or joint.get("type") == "fixed":
+            continue
+        name = joint.get("name", "")
+        where = f'"{path}": joint "{name}"'
+        leader = mimic.get("joint", "")
+        if leader not in kinds:
+            raise LoadingError(
+                f'{where} mimics joint "{leader}", which does not exist{nearest(leader, kinds)}'
+            )
+        if leader == name:
+            raise LoadingError(f"{where} must mimic another joint; it mimics itself")
+        multiplier = float(numbers(mimic, "multiplier", 1, (1,), where)[0])
+        offset = float(numbers(mimic, "offset", 1, (0,), where)[0])
+        if multiplier == 0.0 or kinds[leader] == "fixed":
+            result.append(PrescribedMotion(name, Constant(offset), name=f"{name} mimic"))
+        else:
+            result.append(JointCoupling(name, leader, multiplier, offset, name=f"{name} mimic"))
+    return result
+
+
+def _resolve_meshes(root: ElementTree.Element, path: Path, package_dirs: Sequence[str | Path]) -> list[str]:
+    """Writes absolute mesh paths into the tree; a mesh that is nowhere loses its shape and leaves a note."""
+    missing: dict[str, None] = {}
+    for link in root.findall("link"):
+        for kind in ("visual", "collision"):
+            for shape in link.findall(kind):
+                mesh = shape.find("geometry/mesh")
+                if mesh is None:
+                    continue
+                filename = mesh.get("filename", "")
+                found = find_mesh(filename, path.parent, package_dirs)
+                if found is None:
+                    missing[filename] = None
+                    link.remove(shape)
+                else:
+                    mesh.set("filename", str(found))
+    return [f'mesh "{m}" was not found; its shape is left out' for m in missing]
+
+
+def find_mesh(filename: str, folder: Path, package_dirs: Sequence[str | Path] = ()) -> Path | None:
+    """Where a mesh lies, or None.
+
+    Args:
+        filename: a path, `file://...`, or `package://name/...` (`package:///...` is taken inside the folder).
+        folder: folder of the robot's file.
+        package_dirs: more folders that hold packages.
+    """
+    for scheme in ("package://", "model://"):
+        if filename.startswith(scheme):
+            inner = filename[len(scheme) :].lstrip("/")
+            without_package = inner.partition("/")[2] or inner
+            ros = [Path(p) for p in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if p]
+            parents = folder.resolve().parents
+            candidates = [folder / inner, folder / without_package]
+            candidates += [base / inner for base in (*map(Path, package_dirs), *ros, *parents)]
+            candidates += [base / without_package for base in (*map(Path, package_dirs), *parents[:2])]
+            break
+    else:
+        candidates = [folder / filename.removeprefix("file://")]
+    return next((c.resolve() for c in candidates if c.is_file()), None)
+
+
+def _geometry(model: Any, root: ElementTree.Element, path: Path, kind: str, notes: list[str]) -> Any:
+    """Geometry of one kind, without the meshes that the mesh reader refuses (each leaves a note)."""
+    geometry_type = pin.GeometryType.VISUAL if kind == "visual" else pin.GeometryType.COLLISION
+    try:
+        return pin.buildGeomFromUrdfString(
+            model, ElementTree.tostring(root, encoding="unicode"), geometry_type
+        )
+    except (ValueError, RuntimeError):
+        _drop_unreadable(root, kind, notes)
+    try:
+        return pin.buildGeomFromUrdfString(
+            model, ElementTree.tostring(root, encoding="unicode"), geometry_type
+        )
+    except (ValueError, RuntimeError) as error:
+        raise LoadingError(f'"{path}": the {kind} geometry cannot be read by Pinocchio: {error}') from None
+
+
+def _drop_unreadable(root: ElementTree.Element, kind: str, notes: list[str]) -> None:
+    """Removes the shapes whose mesh cannot be read."""
+    import coal
+
+    for link in root.findall("link"):
+        for shape in link.findall(kind):
+            mesh = shape.find("geometry/mesh")
+            if mesh is None:
+                continue
+            filename = mesh.get("filename", "")
+            try:
+                coal.MeshLoader().load(filename, np.ones(3))
+            except (ValueError, RuntimeError):
+                link.remove(shape)
+                notes.append(f'mesh "{filename}" cannot be read; its shape is left out')

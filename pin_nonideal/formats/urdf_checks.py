@@ -1,0 +1,179 @@
+"""What a URDF file must hold: a tree of named links, with inertias, joints and shapes that can be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from pin_nonideal.errors import LoadingError, nearest
+
+from .xml import numbers
+
+# Sizes of the shapes URDF knows, with how many numbers each holds.
+SHAPES: dict[str, dict[str, int]] = {
+    "box": {"size": 3},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+    "sphere": {"radius": 1},
+    "mesh": {"scale": 3},
+}
+MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
+
+
+def check_urdf(root: ElementTree.Element, path: Path) -> None:
+    """Raises on the first thing that Pinocchio's reader would misread.
+
+    Args:
+        root: the `<robot>` element.
+        path: the file, for messages.
+
+    Raises:
+        LoadingError: names the link or joint and says what must hold.
+    """
+    _check_tree(root, path)
+    for link in root.findall("link"):
+        _check_link(link, path)
+    for joint in root.findall("joint"):
+        _check_joint(joint, path)
+    for material in root.iter("material"):
+        for color in material.findall("color"):
+            numbers(color, "rgba", 4, None, f'"{path}": material "{material.get("name")}"')
+
+
+def _check_tree(root: ElementTree.Element, path: Path) -> None:
+    """Each link has one parent at most, names are unique, and there is one root."""
+    links = [_attribute(e, "name", "link", path) for e in root.findall("link")]
+    joints = [_attribute(e, "name", "joint", path) for e in root.findall("joint")]
+    for kind, names in (("link", links), ("joint", joints)):
+        for n in sorted(set(names)):
+            if names.count(n) > 1:
+                raise LoadingError(
+                    f'"{path}": {kind} names must be unique; "{n}" appears {names.count(n)} times'
+                )
+    if not links:
+        raise LoadingError(f'"{path}" must hold at least one <link>; got none')
+    parent_joint: dict[str, str] = {}
+    parent_link: dict[str, str] = {}
+    for joint in root.findall("joint"):
+        joint_name = joint.get("name", "")
+        ends = {}
+        for side in ("parent", "child"):
+            element = joint.find(side)
+            link = None if element is None else element.get("link")
+            if link is None:
+                raise LoadingError(f'"{path}": joint "{joint_name}" must name its {side} link')
+            if link not in links:
+                raise LoadingError(
+                    f'"{path}": no link "{link}", the {side} of joint "{joint_name}"{nearest(link, links)}'
+                )
+            ends[side] = link
+        child = ends["child"]
+        if child in parent_joint:
+            raise LoadingError(
+                f'"{path}": link "{child}" has two parents, joints "{parent_joint[child]}" and '
+                f'"{joint_name}", but URDF holds trees only.  Keep one of the two joints; where the other '
+                "was, give each side a link on a fixed joint to serve as a frame; and close the loop in a "
+                "robot.yaml beside the URDF:\n"
+                f"  closed_loop: [[frame_A, frame_B]]\n  type: [3d]"
+            )
+        parent_joint[child] = joint_name
+        parent_link[child] = ends["parent"]
+    roots = [link for link in links if link not in parent_link]
+    if not roots:
+        raise LoadingError(
+            f'"{path}" must have a root link; every link is the child of a joint, so the joints form a ring'
+        )
+    if len(roots) > 1:
+        shown = ", ".join(f'"{r}"' for r in roots[:6])
+        raise LoadingError(
+            f'"{path}" must have one root link; got {len(roots)}: {shown}; join them with fixed joints'
+        )
+    for link in links:
+        seen = {link}
+        while link in parent_link:
+            link = parent_link[link]
+            if link in seen:
+                raise LoadingError(f'"{path}": the joints around link "{link}" form a ring without a root')
+            seen.add(link)
+
+
+def _attribute(element: ElementTree.Element, key: str, kind: str, path: Path) -> str:
+    value = element.get(key)
+    if not value:
+        raise LoadingError(f'"{path}": every <{kind}> must have a {key}; one has none')
+    return value
+
+
+def _check_link(link: ElementTree.Element, path: Path) -> None:
+    """Shapes and inertia in full (urdfdom drops malformed ones, and links lose their mass without a word)."""
+    where = f'"{path}": link "{link.get("name")}"'
+    for origin in link.iter("origin"):
+        numbers(origin, "xyz", 3, (0, 0, 0), where)
+        numbers(origin, "rpy", 3, (0, 0, 0), where)
+    for shape in (*link.findall("visual"), *link.findall("collision")):
+        _check_shape(shape, where)
+    inertial = link.find("inertial")
+    if inertial is None:
+        return
+    mass_element, element = inertial.find("mass"), inertial.find("inertia")
+    if mass_element is None or element is None:
+        raise LoadingError(f"{where}: <inertial> must hold <mass> and <inertia>")
+    mass = float(numbers(mass_element, "value", 1, None, where)[0])
+    if mass < 0.0:
+        raise LoadingError(f"{where}: mass must not be negative; got {mass:g} kg")
+    xx, xy, xz, yy, yz, zz = (
+        float(numbers(element, k, 1, None, where)[0]) for k in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    )
+    principal = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    if principal[0] < -1e-9 * max(abs(principal[2]), abs(principal[0])):
+        raise LoadingError(
+            f"{where}: principal moments of inertia must not be negative; got {principal[0]:g} kg m^2"
+        )
+
+
+def _check_shape(shape: ElementTree.Element, where: str) -> None:
+    """One geometry, with positive sizes."""
+    geometry = shape.find("geometry")
+    inner = [] if geometry is None else list(geometry)
+    if len(inner) != 1 or inner[0].tag not in SHAPES:
+        found = ", ".join(f"<{e.tag}>" for e in inner) or "nothing"
+        raise LoadingError(f"{where}: <geometry> must hold one of {', '.join(SHAPES)}; got {found}")
+    for key, size in SHAPES[inner[0].tag].items():
+        values = numbers(inner[0], key, size, (1, 1, 1) if key == "scale" else None, where)
+        if key != "scale" and (values <= 0.0).any():
+            raise LoadingError(
+                f'{where}: {key} of <{inner[0].tag}> must be positive; got "{inner[0].get(key)}"'
+            )
+    if inner[0].tag == "mesh" and not inner[0].get("filename"):
+        raise LoadingError(f"{where}: filename is missing in <mesh>")
+    for material in shape.findall("material"):
+        if not material.get("name"):
+            raise LoadingError(f"{where}: every <material> must have a name; one has none")
+
+
+def _check_joint(joint: ElementTree.Element, path: Path) -> None:
+    """Known type, an axis with a direction, and dissipation that does not feed energy."""
+    where = f'"{path}": joint "{joint.get("name")}"'
+    kind = joint.get("type")
+    if kind not in (*MOVING, "fixed"):
+        raise LoadingError(f'{where}: type must be one of {", ".join(MOVING)}, fixed; got "{kind}"')
+    origin = joint.find("origin")
+    numbers(origin, "xyz", 3, (0, 0, 0), where)
+    numbers(origin, "rpy", 3, (0, 0, 0), where)
+    axis = numbers(joint.find("axis"), "xyz", 3, (1, 0, 0), where)
+    if kind in ("revolute", "continuous", "prismatic", "planar") and not axis.any():
+        raise LoadingError(f"{where}: axis must have a direction; got 0 0 0")
+    limit = joint.find("limit")
+    if kind in ("revolute", "prismatic") and limit is None:
+        raise LoadingError(f'{where}: a {kind} joint must have a <limit effort="..." velocity="..."/>')
+    if limit is not None:
+        for key in ("effort", "velocity"):
+            numbers(limit, key, 1, None, where)
+        for key in ("lower", "upper"):
+            numbers(limit, key, 1, (0,), where)
+    for key in ("damping", "friction"):
+        value = float(numbers(joint.find("dynamics"), key, 1, (0,), where)[0])
+        if value < 0.0:
+            raise LoadingError(f"{where}: {key} must not be negative; got {value:g}")

@@ -1,0 +1,77 @@
+"""XML files as text, elements and numbers; what is malformed is said with the place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from pin_nonideal.errors import LoadingError
+
+
+def read_text(path: Path) -> str:
+    """The text of a file.
+
+    Raises:
+        LoadingError: it cannot be read, or is no text.
+    """
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise LoadingError(
+            f'"{path}" must be a text file in UTF-8; {error.reason} at byte {error.start}'
+        ) from None
+    except OSError as error:
+        raise LoadingError(f'"{path}" cannot be read: {error.strerror}') from None
+
+
+def parse_xml(text: str, path: Path, root: str) -> ElementTree.Element:
+    """The root element of an XML file.
+
+    Raises:
+        LoadingError: it is truncated or malformed, declares entities, or has another root.
+    """
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise LoadingError(f'"{path}" must not declare a DOCTYPE or entities; remove them')
+    try:
+        element = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise LoadingError(f'"{path}" is truncated or not XML: {error}; export it again') from None
+    if element.tag != root:
+        raise LoadingError(f'"{path}" must have the root element <{root}>; got <{element.tag}>')
+    return element
+
+
+def numbers(
+    element: ElementTree.Element | None, key: str, size: int, default: Sequence[float] | None, where: str
+) -> Any:
+    """Finite numbers of an XML attribute.
+
+    Args:
+        element: the element, or None.
+        key: name of the attribute.
+        size: how many numbers it must hold.
+        default: what an absent element or attribute means; None when it must be there.
+        where: words for messages.
+
+    Raises:
+        LoadingError: absent where it must be there, not numbers, not finite, or another count.
+    """
+    text = None if element is None else element.get(key)
+    if text is None:
+        if default is None:
+            inside = "" if element is None else f" in <{element.tag}>"
+            raise LoadingError(f"{where}: {key} is missing{inside}")
+        return np.array(default, dtype=float)
+    try:
+        values = np.array([float(x) for x in text.split()])
+    except ValueError:
+        raise LoadingError(f'{where}: {key} must hold numbers; got "{text}"') from None
+    if values.size != size:
+        raise LoadingError(f'{where}: {key} must hold {size} number{"s" if size > 1 else ""}; got "{text}"')
+    if not np.isfinite(values).all():
+        raise LoadingError(f'{where}: {key} must be finite; got "{text}"')
+    return values

@@ -1,0 +1,1 @@
+"""What a replay page carries: motion, forces, geometry, signals."""

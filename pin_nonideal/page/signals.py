@@ -1,0 +1,295 @@
+"""Curves, events and modes of a run, as the replay and the figures show them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pin_nonideal.checks import sequence
+from pin_nonideal.errors import InputError, UnknownNameError, nearest
+
+from .geometry import joint_axis
+
+if TYPE_CHECKING:
+    from pin_nonideal.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+# Plots by name, or by a title "what [unit]" and curves by label, (nt,) each.
+Chosen = str | Sequence[str | tuple[str, Mapping[str, Array]]]
+
+# Curves of one plot when joints are not chosen: as many as can be told apart.
+MAX_CURVES = 8
+# A plot of the replay keeps the extremes of every curve in so many intervals of time.
+INTERVALS = 600
+STORED_ENERGY = ("kinetic", "potential", "total")
+MODES = {1: "slip +", -1: "slip -", 0: "stick"}
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Curves on one axis.
+
+    Attributes:
+        title: what is shown.
+        unit: unit of all curves.
+        t: times [s], (k,).
+        curves: values by label, (k,) each.
+        log: whether the axis is logarithmic.
+    """
+
+    title: str
+    unit: str
+    t: Array
+    curves: dict[str, Array]
+    log: bool = False
+
+    def thinned(self) -> Plot:
+        """The same plot with the extremes of each curve in `INTERVALS` intervals of time, ends included."""
+        count = len(self.t)
+        if count <= 2 * INTERVALS:
+            return self
+        starts = np.linspace(0, count, INTERVALS, endpoint=False).astype(int)
+        kept = {0, count - 1}
+        for values in self.curves.values():
+            for start, piece in zip(starts, np.split(values, starts[1:]), strict=True):
+                kept.update((int(start + np.argmin(piece)), int(start + np.argmax(piece))))
+        index = np.array(sorted(kept))
+        return Plot(
+            self.title, self.unit, self.t[index], {k: v[index] for k, v in self.curves.items()}, self.log
+        )
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One number of a configuration or velocity that can be plotted.
+
+    Attributes:
+        joint: name of its joint.
+        label: the joint's name, with the component when the joint has several.
+        unit: unit.
+        values: one a sample, (nt,).
+    """
+
+    joint: str
+    label: str
+    unit: str
+    values: Array
+
+
+def positions(model: pin.Model, q: Array) -> list[Coordinate]:
+    """Angles and displacements of all joints; of an orientation in space there is none.
+
+    Args:
+        model: the model.
+        q: configurations, (nt, nq).
+    """
+    found = []
+    for joint in range(1, model.njoints):
+        name, kind = str(model.names[joint]), model.joints[joint].shortname()
+        first, nq, nv = model.joints[joint].idx_q, model.joints[joint].nq, model.joints[joint].nv
+        part = q[:, first : first + nq]
+        if nv == 1:
+            unit = "rad" if joint_axis(model, joint)[1] else "m"
+            value = part[:, 0] if nq == 1 else np.unwrap(np.arctan2(part[:, 1], part[:, 0]))
+            found.append(Coordinate(name, name, unit, value))
+        elif kind in ("JointModelFreeFlyer", "JointModelTranslation", "JointModelPlanar"):
+            axes = "xy" if kind == "JointModelPlanar" else "xyz"
+            found += [Coordinate(name, f"{name} {a}", "m", part[:, i]) for i, a in enumerate(axes)]
+            if kind == "JointModelPlanar":
+                angle = np.unwrap(np.arctan2(part[:, 3], part[:, 2]))
+                found.append(Coordinate(name, f"{name} angle", "rad", angle))
+    return found
+
+
+def velocities(model: pin.Model, v: Array, per: str = "/s") -> list[Coordinate]:
+    """Components of a velocity or, with `per` "/s²", of an acceleration.
+
+    Args:
+        model: the model.
+        v: velocities, (nt, nv).
+        per: what is added to rad and m.
+    """
+    found = []
+    for joint in range(1, model.njoints):
+        name, kind = str(model.names[joint]), model.joints[joint].shortname()
+        first, nv = model.joints[joint].idx_v, model.joints[joint].nv
+        if nv == 1:
+            units, labels = ["rad" if joint_axis(model, joint)[1] else "m"], [name]
+        elif kind == "JointModelFreeFlyer":
+            units = ["m"] * 3 + ["rad"] * 3
+            labels = [f"{name} {c}" for c in ("vx", "vy", "vz", "wx", "wy", "wz")]
+        elif kind == "JointModelTranslation":
+            units, labels = ["m"] * 3, [f"{name} {c}" for c in ("vx", "vy", "vz")]
+        elif kind == "JointModelPlanar":
+            units, labels = ["m", "m", "rad"], [f"{name} {c}" for c in ("vx", "vy", "wz")]
+        elif kind in ("JointModelSpherical", "JointModelSphericalZYX"):
+            units, labels = ["rad"] * 3, [f"{name} {c}" for c in ("wx", "wy", "wz")]
+        else:
+            continue
+        for i, (unit, label) in enumerate(zip(units, labels, strict=True)):
+            found.append(Coordinate(name, label, unit + per, v[:, first + i]))
+    return found
+
+
+def wanted(what: str, chosen: Any) -> list[Any]:
+    """Plots asked for, as a list of names and of pairs of a title and curves by label.
+
+    Args:
+        what: words for messages.
+        chosen: one name, or a list.
+
+    Raises:
+        InputError: something else.
+    """
+    items = [chosen] if isinstance(chosen, str) else list(sequence(what, chosen))
+    for item in items:
+        pair = isinstance(item, (list, tuple)) and len(item) == 2
+        if not (
+            isinstance(item, str) or (pair and isinstance(item[0], str) and isinstance(item[1], Mapping))
+        ):
+            raise InputError(
+                f"{what} must hold names, and pairs of a title and curves by label; got {item!r}"
+            )
+    return items
+
+
+def plots_of(run: Trajectory, chosen: Chosen | None) -> list[Plot]:
+    """Plots by name.
+
+    Args:
+        run: the run.
+        chosen: "energy", "work", "violation", "reactions", "q", "v", "a", the name of a joint (its position
+            and its velocity), or a pair of a title "what [unit]" and curves by label, (nt,) each. None:
+            energy, violation, reactions and q, as far as the run has them.
+
+    Raises:
+        UnknownNameError: no plot and no joint has that name.
+        InputError: the run did not record what a plot shows, a curve has a wrong length, or `chosen` is
+            something else.
+    """
+    if chosen is None:
+        chosen = [name for name in ("energy", "violation", "reactions", "q") if _recorded(run, name)]
+    plots: list[Plot] = []
+    for item in wanted("plots", chosen):
+        plots += _plot(run, item) if isinstance(item, str) else [_given(run, *item)]
+    return plots
+
+
+def _recorded(run: Trajectory, name: str) -> bool:
+    if name in ("energy", "work"):
+        return bool(run.energy)
+    if name == "violation":
+        return bool(run.scene.constraint_slices)
+    if name == "reactions":
+        return run.lam is not None and bool(run.scene.constraint_slices)
+    if name == "a":
+        return run.a is not None
+    return True
+
+
+def _plot(run: Trajectory, name: str) -> list[Plot]:
+    """The plots of one name."""
+    model, t = run.scene.model, np.asarray(run.t)
+    names = ("energy", "work", "violation", "reactions", "q", "v", "a")
+    joints = [str(joint) for joint in model.names[1:]]
+    if name not in names and name not in joints:
+        raise UnknownNameError(f'no plot and no joint "{name}"{nearest(name, [*names, *joints])}')
+    if not _recorded(run, name):
+        if name in ("violation", "reactions") and not run.scene.constraint_slices:
+            raise InputError(f'plot "{name}" needs a constraint, and this scene has none')
+        record = {"a": "a", "reactions": "forces"}.get(name, "energy")
+        raise InputError(f'plot "{name}" must be recorded: pass record=("{record}",) to simulate')
+    energy = run.energy or {}
+    if name == "energy":
+        return [Plot("Energy", "J", t, {k: energy[k] for k in STORED_ENERGY})]
+    if name == "work":
+        return [Plot("Work", "J", t, {k: v for k, v in energy.items() if k not in STORED_ENERGY})]
+    if name == "violation":
+        return [Plot("Constraint violation", "m, rad", t, {"largest residual": run.violation}, log=True)]
+    if name == "reactions" and run.lam is not None:
+        size = {k: np.linalg.norm(run.lam[:, s], axis=1) for k, s in run.scene.constraint_slices.items()}
+        return [Plot("Reactions, |lam|", "N, N m", t, _largest(size))]
+    if name == "q":
+        return _by_unit("Position", t, positions(model, run.q))
+    if name == "v":
+        return _by_unit("Velocity", t, velocities(model, run.v))
+    if name == "a" and run.a is not None:
+        return _by_unit("Acceleration", t, velocities(model, run.a, "/s²"))
+    place = [c for c in positions(model, run.q) if c.joint == name]
+    rate = [c for c in velocities(model, run.v) if c.joint == name]
+    return _by_unit(name, t, place) + _by_unit(f"{name}, velocity", t, rate)
+
+
+def _given(run: Trajectory, title: str, curves: Mapping[str, Array]) -> Plot:
+    """A plot of the user's own curves."""
+    what, _, unit = title.partition("[")
+    values = {}
+    for label, curve in curves.items():
+        where = f'curve "{label}" of plot "{title}"'
+        try:
+            given = np.asarray(curve)
+        except ValueError:  # lists of unequal length
+            given = np.asarray(None)
+        if given.dtype.kind not in "fiub":
+            raise InputError(f"{where} must hold numbers; got {curve!r}")
+        values[str(label)] = given.astype(np.float64)
+        if given.shape != (len(run.t),):
+            raise InputError(
+                f"{where} must have shape ({len(run.t)},), one value a sample; got {given.shape}"
+            )
+    return Plot(what.strip(), unit.strip(" ]"), np.asarray(run.t), values)
+
+
+def _by_unit(title: str, t: Array, coordinates: list[Coordinate]) -> list[Plot]:
+    """One plot for each unit, with the curves that move most."""
+    plots = []
+    for unit in dict.fromkeys(c.unit for c in coordinates):
+        curves = _largest({c.label: c.values for c in coordinates if c.unit == unit})
+        plots.append(Plot(title, unit, t, curves))
+    return plots
+
+
+def _largest(curves: dict[str, Array]) -> dict[str, Array]:
+    """The curves with the largest range, in the given order."""
+    rank = sorted(curves, key=lambda label: -float(np.ptp(curves[label])))[:MAX_CURVES]
+    return {label: values for label, values in curves.items() if label in rank}
+
+
+def check_scene(run: Trajectory, what: str) -> None:
+    """Refuses what is no run, and a run without its scene.
+
+    Args:
+        run: the run.
+        what: what needs the scene, for the message.
+
+    Raises:
+        InputError: it is no run, or it has no scene.
+    """
+    if not all(hasattr(run, name) for name in ("t", "q", "v", "scene")):
+        raise InputError(f"{what} shows a Trajectory, what `simulate` returns; got {type(run).__name__}")
+    if run.scene is None:
+        raise InputError(
+            f"{what} needs the scene of the run, which a trajectory read from a file has not: "
+            "pass dataclasses.replace(run, scene=scene)"
+        )
+
+
+def mode_bands(t: Array, modes: NDArray[np.int8]) -> list[list[tuple[float, float, int]]]:
+    """Intervals of constant mode of each element, as (start [s], end [s], mode).
+
+    Args:
+        t: times [s], (nt,).
+        modes: +1 and -1 for slip, 0 for stick, (nt, n). A mode holds from its sample to the next.
+    """
+    bands = []
+    for column in np.asarray(modes).T:
+        starts = np.concatenate([[0], np.flatnonzero(np.diff(column)) + 1])
+        ends = np.append(starts[1:], len(t) - 1)
+        bands.append([(float(t[i]), float(t[j]), int(column[i])) for i, j in zip(starts, ends, strict=True)])
+    return bands

@@ -1,0 +1,133 @@
+"""What a run was asked for: method, tolerances, lengths of time and records, checked before it starts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pin_nonideal.actuation import SampledControl
+from pin_nonideal.checks import array, choice, label, nonnegative, number, positive, sequence
+from pin_nonideal.errors import InputError
+from pin_nonideal.scene import Scene
+
+ADAPTIVE = ("dop853", "dopri5")
+FIXED = ("rk4", "semi_implicit_euler", "moreau")
+SCIPY = ("Radau", "BDF", "LSODA")
+RECORDS = ("a", "forces", "energy", "power")
+FIELDS = {"F_ideal": "forces", "F_nonideal": "forces", "lam": "forces", "lam_ideal": "forces"}
+DEFAULT_RTOL, DEFAULT_ATOL = 1e-8, 1e-10
+# Times are floating-point numbers: a step of fewer of their spacings is off by more than a percent, and one
+# shorter than a spacing leads nowhere.
+LEAST_SPACINGS = 100.0
+MOST_SAMPLES = 1e8  # some gigabytes for a small robot
+# No step meets a tolerance below rounding; the square of what misses it must not overflow.
+LEAST_RTOL, LEAST_ATOL = 1e-14, 1e-100
+
+
+def run_options(
+    scene: Scene,
+    duration: Any,
+    t0: Any,
+    method: Any,
+    rtol: Any,
+    atol: Any,
+    dt: Any,
+    output_dt: Any,
+    record: Any,
+) -> dict[str, Any]:
+    """Options of a run as the core takes them.
+
+    Args:
+        scene: what to simulate.
+        duration: length of time [s].
+        t0: initial time [s].
+        method: of integration.
+        rtol: relative tolerance, or None.
+        atol: absolute tolerance, a number or an array (2 nv,), or None.
+        dt: step of the fixed-step methods [s], or None.
+        output_dt: time between samples [s], or None.
+        record: names of what to record.
+
+    Raises:
+        InputError: one is wrong, or they do not go together.
+    """
+    methods = (*ADAPTIVE, *FIXED, *SCIPY)
+    choice("simulate: method", method, methods)
+    if method in FIXED:
+        if dt is None:
+            raise InputError(f'simulate: method "{method}" needs a step dt')
+        unused = [name for name, value in (("rtol", rtol), ("atol", atol)) if value is not None]
+        if unused:
+            raise InputError(
+                f'simulate: method "{method}" takes steps of the length dt; leave {" and ".join(unused)} out'
+            )
+    elif dt is not None:
+        raise InputError(f'simulate: method "{method}" chooses its own steps; leave dt out, or set output_dt')
+    nv = scene.model.nv
+    if nv == 0:
+        raise InputError(f'simulate: "{scene.name}" has no joint that moves; there is nothing to simulate')
+    tolerance = np.full(2 * nv + scene.z0.size, DEFAULT_ATOL)
+    if atol is not None:
+        given = np.asarray(atol)
+        if given.ndim == 0:
+            tolerance[:] = nonnegative("simulate: atol", atol)
+        else:
+            tolerance[: 2 * nv] = array("simulate: atol", atol, (2 * nv,))
+            tolerance[2 * nv :] = tolerance[: 2 * nv].min()
+            if (tolerance < 0.0).any():
+                raise InputError(f"simulate: atol must not be negative; got {tolerance.min():g}")
+    relative = DEFAULT_RTOL if rtol is None else nonnegative("simulate: rtol", rtol)
+    if relative == 0.0 and not (tolerance > 0.0).all():
+        raise InputError("simulate: rtol and atol must not both be zero; set one of them")
+    begin, length = number("simulate: t0", t0), positive("simulate: duration", duration)
+    steps = {"dt": dt, "output_dt": output_dt}
+    lengths = {key: positive(f"simulate: {key}", value) for key, value in steps.items() if value is not None}
+    _check_clock(scene, begin, length, lengths)
+    wanted = {record} if isinstance(record, str) else set(sequence("simulate: record", record))
+    groups = set()
+    for name in wanted:
+        groups.add(FIELDS.get(name, name))
+        choice("simulate: record", FIELDS.get(name, name), RECORDS)
+    return {
+        "method": method,
+        "duration": length,
+        "t0": begin,
+        "rtol": max(relative, LEAST_RTOL) if relative else 0.0,
+        "atol": np.ascontiguousarray(np.maximum(tolerance, LEAST_ATOL)),
+        **{key: lengths.get(key, 0.0) for key in steps},
+        **{key: key in groups for key in RECORDS},
+        "tick": None,
+        "save": None,
+    }
+
+
+def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, float]) -> None:
+    """Refuses lengths of time that floating-point times near the end of the run cannot tell apart.
+
+    Args:
+        scene: what to simulate.
+        t0: initial time [s].
+        duration: length of time [s].
+        lengths: dt and output_dt, as far as given [s].
+
+    Raises:
+        InputError: a length is too short, or leaves more samples than a run can hold.
+    """
+    end = max(abs(t0), abs(t0 + duration))
+    spacing = float(np.spacing(end))
+    named = {f"simulate: {key}": value for key, value in {"duration": duration, **lengths}.items()}
+    if isinstance(scene.actuation, SampledControl):
+        named[f"{label(scene.actuation)}: period"] = scene.actuation.period
+    for what, value in named.items():
+        if not value >= LEAST_SPACINGS * spacing:  # also when the end is beyond all numbers
+            raise InputError(
+                f"{what} must be at least {LEAST_SPACINGS:g} times the spacing of floating-point times, "
+                f"which is {spacing:.2g} s at t = {end:g} s; got {value:g} s"
+            )
+    key = next((key for key in ("output_dt", "dt") if key in lengths), None)
+    if key is not None and duration / lengths[key] > MOST_SAMPLES:
+        raise InputError(
+            f"simulate: {key} must leave at most {MOST_SAMPLES:g} samples; {lengths[key]:g} s leaves "
+            f"{duration / lengths[key]:.2g}; set a longer {'output_dt' if key == 'dt' else key}"
+        )
