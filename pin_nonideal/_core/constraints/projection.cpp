@@ -9,44 +9,44 @@ namespace {
 
 // x := R^-T B^T (B B^T)^-1 r, the least move in the metric of M that changes A x by r.
 void least_move(const Program& p, Workspace& w, VecX& x) {
-    solve_rows(p.layout, w.rows, w.r, w.lam);
+    solve_rows(p.layout, w.now.rows, w.scratch.r, w.now.lam);
     x.setZero();
-    for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.B, w.lam, x);
-    solve_Rt(p.mechanism, w.terms, x);
+    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.now.lam, x);
+    solve_Rt(p.mechanism, w.now.terms, x);
 }
 
 // Takes a residual or rate of each kept row into r, negative; returns the largest of the rows in use.
 template <class Value>
 double gather(const Program& p, Workspace& w, Value value) {
     double largest = 0.0;
-    for (int i : w.rows.blocks) {
+    for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
         for (size_t k = 0; k < block.kept.size(); ++k) {
             const double x = value(i, static_cast<int>(k));
-            w.r[block.row + k] = -x;
-            if (w.rows.active[block.row + k]) largest = std::max(largest, std::abs(x));
+            w.scratch.r[block.row + k] = -x;
+            if (w.now.rows.active[block.row + k]) largest = std::max(largest, std::abs(x));
         }
     }
     return largest;
 }
 
 double gather_gaps(const Program& p, Workspace& w) {
-    return gather(p, w, [&](int i, int k) { return w.values[i].residual[p.blocks[i].kept[k]]; });
+    return gather(p, w, [&](int i, int k) { return w.now.values[i].residual[p.blocks[i].kept[k]]; });
 }
 
 // A v + phi_t by the rows in the workspace, which needs no look at the motion; a user's rate is his own function.
 double gather_rates(const Program& p, Workspace& w, double t, const VecX& v) {
-    const State state{p.mechanism, w.terms, t, w.terms.q, v};
-    for (int i : w.rows.blocks) {
+    const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
+    for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
-        if (std::holds_alternative<UserRows>(block.kind)) evaluate(block.kind, state, Part::motion, w.values[i]);
-        else multiply(block, w.A, v, w.miss);
+        if (std::holds_alternative<UserRows>(block.kind)) evaluate(block.kind, state, Part::motion, w.now.values[i]);
+        else multiply(block, w.now.A, v, w.scratch.miss);
     }
     return gather(p, w, [&](int i, int k) {
         const Block& block = p.blocks[i];
-        const RowValues& values = w.values[i];
+        const RowValues& values = w.now.values[i];
         if (std::holds_alternative<UserRows>(block.kind)) return values.rate[block.kept[k]];
-        return w.miss[block.row + k] + values.phi_t[block.kept[k]];
+        return w.scratch.miss[block.row + k] + values.phi_t[block.kept[k]];
     });
 }
 
@@ -59,7 +59,7 @@ double left_at_this_rate(double before, double now, double floor) {
 double product(const Workspace& w, const VecX& x, const VecX& y) {
     double sum = 0.0;
     for (int k = 0; k < x.size(); ++k)
-        if (w.rows.active[k]) sum += x[k] * y[k] / (w.rows.scale[k] * w.rows.scale[k]);
+        if (w.now.rows.active[k]) sum += x[k] * y[k] / (w.now.rows.scale[k] * w.now.rows.scale[k]);
     return sum;
 }
 
@@ -67,13 +67,13 @@ double product(const Workspace& w, const VecX& x, const VecX& y) {
 // the move started, and each step has shown what they miss. [Kelley, Solving Nonlinear Equations with Newton's Method,
 // 2003, sec. 4.3.]
 void broyden_step(const Program& p, Workspace& w, int count) {
-    VecX& step = w.shift_steps[count];
-    solve_rows(p.layout, w.rows, w.r, step);
+    VecX& step = w.scratch.shift_steps[count];
+    solve_rows(p.layout, w.now.rows, w.scratch.r, step);
     for (int j = 0; j < count; ++j) {
-        const VecX& known = w.shift_steps[j];
+        const VecX& known = w.scratch.shift_steps[j];
         const double part = product(w, known, step) / product(w, known, known);
         if (!(std::abs(part) < broyden_limit)) return;  // rounding, or far from where the factors serve
-        if (j + 1 < count) step += part * w.shift_steps[j + 1];
+        if (j + 1 < count) step += part * w.scratch.shift_steps[j + 1];
         else step /= 1.0 - part;
     }
 }
@@ -81,20 +81,20 @@ void broyden_step(const Program& p, Workspace& w, int count) {
 // q := shift_start moved by R^-T B^T shift, on the given dofs.
 template <class... Dofs>
 void shift_position(const Program& p, Workspace& w, VecX& q, const Dofs&... dofs) {
-    w.scaled.setZero();
-    for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.B, w.shift, w.scaled);
-    solve_Rt(p.mechanism, w.terms, dofs..., w.scaled);
-    retract(p.mechanism, w.shift_start.data(), w.scaled.data(), q.data());
+    w.scratch.scaled.setZero();
+    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.scratch.shift, w.scratch.scaled);
+    solve_Rt(p.mechanism, w.now.terms, dofs..., w.scratch.scaled);
+    retract(p.mechanism, w.scratch.shift_start.data(), w.scratch.scaled.data(), q.data());
 }
 
 // What is rounding: near a singular position it would come back magnified, there every bit counts.
-double rounding_part(const Workspace& w) { return w.rows.distance < near_singular ? 0.0 : projection_floor; }
+double rounding_part(const Workspace& w) { return w.now.rows.distance < near_singular ? 0.0 : projection_floor; }
 
 }  // namespace
 
 double scene_size(const Program& p, const Workspace& w) {
     double square = 1.0;
-    for (int i : p.touched_joints) square = std::max(square, (w.terms.body[i].ref + w.terms.body[i].p).squaredNorm());
+    for (int i : p.touched_joints) square = std::max(square, (w.now.terms.body[i].ref + w.now.terms.body[i].p).squaredNorm());
     return std::sqrt(square);
 }
 
@@ -105,7 +105,7 @@ static double row_size(const Workspace& w, const Block& block, int row) {
     for (size_t k = 0; k < n; ++k) {
         if (block.kept[k] != row) continue;
         for (size_t l = 0; l < block.support.size(); ++l)
-            size = std::max(size, std::abs(w.A[block.offset + l * n + k]));
+            size = std::max(size, std::abs(w.now.A[block.offset + l * n + k]));
     }
     return size;
 }
@@ -115,8 +115,8 @@ void require_closed(const Program& p, const Workspace& w, double t) {
     double largest = 0.0;
     int worst = -1;
     for (int i = 0; i < p.constraints; ++i)
-        for (int k = 0; k < w.values[i].rows; ++k) {
-            const double gap = std::abs(w.values[i].residual[k]);
+        for (int k = 0; k < w.now.values[i].rows; ++k) {
+            const double gap = std::abs(w.now.values[i].residual[k]);
             if (gap <= allowed || gap <= allowed * row_size(w, p.blocks[i], k) || gap < largest) continue;
             largest = gap;
             worst = i;
@@ -125,30 +125,30 @@ void require_closed(const Program& p, const Workspace& w, double t) {
 }
 
 void follow_constraints(const Program& p, Workspace& w, double h, VecX& move) {
-    if (w.rows.blocks.empty()) return;
-    w.r.setZero();
-    for (int i : w.rows.blocks) {
+    if (w.now.rows.blocks.empty()) return;
+    w.scratch.r.setZero();
+    for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
         for (size_t k = 0; k < block.kept.size(); ++k)
-            if (block.holonomic[k]) w.r[block.row + k] = -0.5 * h * h * w.b[block.row + k];
+            if (block.holonomic[k]) w.scratch.r[block.row + k] = -0.5 * h * h * w.now.b[block.row + k];
     }
-    solve_rows(p.layout, w.rows, w.r, w.shift);
+    solve_rows(p.layout, w.now.rows, w.scratch.r, w.scratch.shift);
     // Terms of a series that do not fall predict nothing: close to a singular position, at great speed.
-    const double cube = h * h * h, second = product(w, w.shift, w.shift);
-    if (cube * cube * product(w, w.shift_third, w.shift_third) < falling_square * second) w.shift += cube * w.shift_third;
-    else w.shift_third.setZero();
-    w.scaled.setZero();
-    for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.B, w.shift, w.scaled);
-    solve_Rt(p.mechanism, w.terms, w.scaled);
-    move += w.scaled;
+    const double cube = h * h * h, second = product(w, w.scratch.shift, w.scratch.shift);
+    if (cube * cube * product(w, w.state.shift_third, w.state.shift_third) < falling_square * second) w.scratch.shift += cube * w.state.shift_third;
+    else w.state.shift_third.setZero();
+    w.scratch.scaled.setZero();
+    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.scratch.shift, w.scratch.scaled);
+    solve_Rt(p.mechanism, w.now.terms, w.scratch.scaled);
+    move += w.scratch.scaled;
 }
 
-void learn_third_order(Workspace& w, double h) { w.shift_third += w.shift_sum / (h * h * h); }
+void learn_third_order(Workspace& w, double h) { w.state.shift_third += w.scratch.shift_sum / (h * h * h); }
 
 bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
-    w.shift_sum.setZero();
+    w.scratch.shift_sum.setZero();
     double gap = 0.0, floor = 0.0;
-    if (!w.rows.blocks.empty()) {
+    if (!w.now.rows.blocks.empty()) {
         gaps(p, w, t, q, v);
         gap = gather_gaps(p, w);
         floor = rounding_part(w) * scene_size(p, w);
@@ -159,12 +159,12 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
     double rate = 1.0;  // of the gap, by the last of them
     for (int it = 0; it < projection_limit && gap > floor; ++it) {
         if (count == 0) {
-            w.shift_start = q;
-            w.shift.setZero();
+            w.scratch.shift_start = q;
+            w.scratch.shift.setZero();
         }
         broyden_step(p, w, count);
-        w.shift += w.shift_steps[count];
-        w.shift_sum += w.shift_steps[count++];
+        w.scratch.shift += w.scratch.shift_steps[count];
+        w.scratch.shift_sum += w.scratch.shift_steps[count++];
         // A gap that goes on as it did, and so ends below rounding, is looked at where the step's end is configured.
         configured = count > 1 && gap * rate < trusted_part * floor;
         double now = gap;
@@ -192,14 +192,14 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
 
 // What sticks along a single dof has exactly no velocity there, like a joint that is locked, and not one of rounding.
 static void rest_alone(const Program& p, const Workspace& w, VecX& v) {
-    for (int i : w.rows.blocks) {
+    for (int i : w.now.rows.blocks) {
         if (i < p.constraints) continue;
         const Block& block = p.blocks[i];
         const size_t n = block.kept.size();
         for (size_t k = 0; k < n; ++k) {
             int entries = 0, dof = -1;
             for (size_t l = 0; l < block.support.size(); ++l)
-                if (w.A[block.offset + l * n + k] != 0.0) { ++entries; dof = block.support[l]; }
+                if (w.now.A[block.offset + l * n + k] != 0.0) { ++entries; dof = block.support[l]; }
             if (entries == 1 && std::abs(v[dof]) <= immobile_speed) v[dof] = 0.0;
         }
     }
@@ -207,14 +207,14 @@ static void rest_alone(const Program& p, const Workspace& w, VecX& v) {
 
 bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
     for (int dof = 0; dof < p.mechanism.nv; ++dof)
-        if (w.terms.locked[dof]) v[dof] = 0.0;  // what sticks has exactly no velocity
-    if (w.rows.blocks.empty()) return false;
+        if (w.now.terms.locked[dof]) v[dof] = 0.0;  // what sticks has exactly no velocity
+    if (w.now.rows.blocks.empty()) return false;
     const double floor = rounding_part(w) * std::max(1.0, v.cwiseAbs().maxCoeff());
     double last = gather_rates(p, w, t, v);
     bool moved = false;
     for (int it = 0; it < projection_limit && last > floor; ++it) {
-        least_move(p, w, w.scaled);
-        v += w.scaled;
+        least_move(p, w, w.scratch.scaled);
+        v += w.scratch.scaled;
         moved = true;
         configure_velocity(p, w, t, v);
         const double now = gather_rates(p, w, t, v);
@@ -232,13 +232,13 @@ bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
 }
 
 void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
-    std::fill(w.mode.begin(), w.mode.end(), static_cast<signed char>(1));
+    std::fill(w.state.mode.begin(), w.state.mode.end(), static_cast<signed char>(1));
     want_rows(p, w);
     configure(p, w, t, q, v);
-    if (w.rows.blocks.empty()) return;
-    if (w.rows.orthogonal) {  // their Cholesky factor does not show that they are independent
-        decide_rows(p.layout, p.blocks, w.B, w.rows);
-        factor_rows(p.layout, p.blocks, w.B, w.rows);
+    if (w.now.rows.blocks.empty()) return;
+    if (w.now.rows.orthogonal) {  // their Cholesky factor does not show that they are independent
+        decide_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+        factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
     }
     project(p, w, t, q, v);
 }

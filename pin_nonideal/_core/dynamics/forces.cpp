@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dynamics/program.hpp"
+#include "dynamics/evaluation.hpp"
 
 namespace pn {
 
@@ -21,16 +21,16 @@ struct Apply {
     // Force at a world point of a body, and couple.
     void push(int joint, const Vec3& point, const Vec3& force, const Vec3& couple) const {
         if (joint == 0) return;
-        w.body_force[joint] += Force{force, couple + (point - w.terms.body[joint].ref).cross(force)};
+        w.now.body_force[joint] += Force{force, couple + (point - w.now.terms.body[joint].ref).cross(force)};
     }
     Vec3 position(const Frame& f) const {
-        const Body& b = w.terms.body[f.joint];
+        const Body& b = w.now.terms.body[f.joint];
         return b.ref + b.p + b.R * f.p;
     }
 
     void operator()(const SpringDamper& s) const {
         const Vec3 x1 = position(s.frame1), x2 = position(s.frame2), d = x1 - x2;
-        const Vec3 u = velocity_at(w.terms.body[s.frame1.joint], x1) - velocity_at(w.terms.body[s.frame2.joint], x2);
+        const Vec3 u = velocity_at(w.now.terms.body[s.frame1.joint], x1) - velocity_at(w.now.terms.body[s.frame2.joint], x2);
         const double length = d.norm();
         Vec3 force = -s.stiffness * d;
         if (length > 0.0) {
@@ -42,7 +42,7 @@ struct Apply {
     }
     void operator()(const JointSpring& s) const {
         const Joint& j = p.mechanism.joints[s.joint];
-        w.external[j.iv] -= s.stiffness * (joint_position(j, q) - s.rest) + s.damping * v[j.iv];
+        w.now.external[j.iv] -= s.stiffness * (joint_position(j, q) - s.rest) + s.damping * v[j.iv];
     }
     void operator()(const FrameWrench& f) const {
         double six[6];
@@ -51,8 +51,8 @@ struct Apply {
         push(f.frame.joint, position(f.frame), Vec3(six[0], six[1], six[2]), Vec3(six[3], six[4], six[5]));
     }
     void operator()(const UserForce& f) const {
-        f.function(t, q, v, w.work);
-        w.external += w.work;
+        f.function(t, q, v, w.scratch.work);
+        w.now.external += w.scratch.work;
     }
 };
 
@@ -67,7 +67,7 @@ struct Torque {
     void operator()(const ConstantTorque& c) const { tau = c.tau; }
     void operator()(const TorqueFunction& f) const { f.function(t, q, v, tau); }
     void operator()(const SampledTorque& s) const {
-        if (w.has_held) tau = w.held_torque;
+        if (w.state.has_held) tau = w.state.held_torque;
         else s.function(t, q, v, tau);
     }
     void operator()(const HoldPosition& h) const {
@@ -100,24 +100,24 @@ struct Torque {
 }  // namespace
 
 void actuation_torque(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& tau) {
-    if (w.has_override) tau = w.override_torque;
+    if (w.now.has_override) tau = w.now.override_torque;
     else std::visit(Torque{p, w, t, q, v, tau}, p.actuation);
 }
 
 void given_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    actuation_torque(p, w, t, q, v, w.tau);
-    w.external.setZero();
+    actuation_torque(p, w, t, q, v, w.now.tau);
+    w.now.external.setZero();
     if (p.forces.empty()) return;
     const Apply apply{p, w, t, q, v};
-    if (p.has_body_forces) std::fill(w.body_force.begin(), w.body_force.end(), Force{Vec3::Zero(), Vec3::Zero()});
+    if (p.has_body_forces) std::fill(w.now.body_force.begin(), w.now.body_force.end(), Force{Vec3::Zero(), Vec3::Zero()});
     for (const GivenForce& f : p.forces) std::visit(apply, f);
     if (!p.has_body_forces) return;
     // From the leaves to the root: each joint feels the forces on its subtree.
-    std::copy(w.body_force.begin(), w.body_force.end(), w.reaction_body.begin());
+    std::copy(w.now.body_force.begin(), w.now.body_force.end(), w.now.reaction_body.begin());
     for (int i = static_cast<int>(p.mechanism.joints.size()) - 1; i > 0; --i) {
         const Joint& j = p.mechanism.joints[i];
-        for (int k = j.iv; k < j.iv + j.nv; ++k) w.external[k] += dot(w.terms.J[k], w.reaction_body[i]);
-        if (j.parent != 0) w.reaction_body[j.parent] += w.reaction_body[i];
+        for (int k = j.iv; k < j.iv + j.nv; ++k) w.now.external[k] += dot(w.now.terms.J[k], w.now.reaction_body[i]);
+        if (j.parent != 0) w.now.reaction_body[j.parent] += w.now.reaction_body[i];
     }
 }
 

@@ -3,13 +3,10 @@
 #include <cstdio>
 
 #include "dynamics/program.hpp"
-#include "constraints/projection.hpp"
 
 namespace pn {
 
 namespace {
-
-void zero(std::vector<Force>& f) { std::fill(f.begin(), f.end(), Force{Vec3::Zero(), Vec3::Zero()}); }
 
 // Support of a block: the dofs of its rows and all their ancestors, descending.
 void find_support(const Mechanism& m, const std::vector<int>& dofs, Block& block) {
@@ -124,49 +121,6 @@ void Program::finish() {
     for (const Friction& f : frictions) asks_functions |= f.user_limit != nullptr;
     for (const GivenForce& f : forces)
         has_body_forces |= std::holds_alternative<SpringDamper>(f) || std::holds_alternative<FrameWrench>(f);
-}
-
-Workspace::Workspace(const Program& p) {
-    const int nv = p.mechanism.nv, n = static_cast<int>(p.mechanism.joints.size());
-    terms.allocate(p.mechanism);
-    for (VecX* x : {&tau, &external, &F, &C, &C_smooth, &base_C, &a, &balance, &scaled, &scaled_free, &trial, &work,
-                    &held_torque, &override_torque})
-        *x = VecX::Zero(nv);
-    values.resize(p.blocks.size());
-    for (size_t i = 0; i < p.blocks.size(); ++i) {
-        values[i].resize(p.blocks[i].total, nv, is_geometric(p.blocks[i].kind));
-        values[i].constant_A = has_constant_rows(p.blocks[i].kind);
-    }
-    A.assign(p.entries, 0.0);
-    B.assign(p.entries, 0.0);
-    for (VecX* x : {&b, &r, &miss, &lam, &lam_step, &lam_shared}) *x = VecX::Zero(p.layout.rows);
-    rows.allocate(p.layout, static_cast<int>(p.blocks.size()), nv);
-    ideal_rows = rows;
-    ideal_locked.assign(nv, 0);
-    body_force.resize(n);
-    reaction_body.resize(n);
-    zero(body_force);
-    zero(reaction_body);
-    motion.assign(n, Motion{Vec3::Zero(), Vec3::Zero()});
-    momentum.assign(n, Force{Vec3::Zero(), Vec3::Zero()});
-    shift_start = VecX::Zero(p.mechanism.nq);
-    shift = VecX::Zero(p.layout.rows);
-    shift_sum = shift_third = shift;
-    shift_steps.assign(projection_limit, shift);
-    const size_t elements = p.frictions.size();
-    mode.assign(elements, 1);
-    limit.assign(elements, 0.0);
-    load.assign(elements, 0.0);
-    slip_direction.assign(elements, Vec3::UnitX());
-    last_direction = slip_direction;
-    slip_force.assign(elements, Vec3::Zero());
-    user_C.assign(p.user_laws.size(), VecX::Zero(nv));
-    z = VecX::Zero(p.states);
-    dz = VecX::Zero(p.states);
-    law_force.assign(p.law_names.size(), VecX::Zero(nv));
-    const size_t unknowns = elements + p.user_laws.size() * nv;
-    for (VecX* x : {&unknown, &image, &newton_step}) *x = VecX::Zero(unknowns);
-    want_rows(p, *this);
 }
 
 }  // namespace pn

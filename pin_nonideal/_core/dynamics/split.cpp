@@ -1,15 +1,15 @@
 // Eq. (39): what the constraints alone would exert, and what the nonideal forces add to it.
-#include "dynamics/program.hpp"
+#include "dynamics/evaluation.hpp"
 
 namespace pn {
 
 void share_multipliers(const Program& p, Workspace& w) {
-    w.lam_shared = w.lam;
-    if (!w.rows.redundant) return;
+    w.now.lam_shared = w.now.lam;
+    if (!w.now.rows.redundant) return;
     // A_dependent = W A_active; x + W^T y = lam with least |x|^2 + |y|^2 is y = (I + W W^T)^-1 W lam, x = lam - W^T y.
     std::vector<int> dependent;
     for (int r = 0; r < p.layout.rows; ++r)
-        if (w.rows.wanted[r] && !w.rows.active[r]) dependent.push_back(r);
+        if (w.now.rows.wanted[r] && !w.now.rows.active[r]) dependent.push_back(r);
     const int d = static_cast<int>(dependent.size());
     MatX W(d, p.layout.rows);
     VecX column(p.mechanism.nv), unit = VecX::Zero(p.layout.rows), products(p.layout.rows), weights(p.layout.rows);
@@ -17,45 +17,45 @@ void share_multipliers(const Program& p, Workspace& w) {
         column.setZero();
         products.setZero();
         unit[dependent[k]] = 1.0;
-        for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.B, unit, column);
+        for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, unit, column);
         unit[dependent[k]] = 0.0;
-        for (int i : w.rows.blocks) multiply(p.blocks[i], w.B, column, products);
-        solve_rows(p.layout, w.rows, products, weights);
+        for (int i : w.now.rows.blocks) multiply(p.blocks[i], w.now.B, column, products);
+        solve_rows(p.layout, w.now.rows, products, weights);
         W.row(k) = weights.transpose();
     }
     const MatX S = MatX::Identity(d, d) + W * W.transpose();
-    const VecX y = S.ldlt().solve(W * w.lam);
-    w.lam_shared -= W.transpose() * y;
-    for (int k = 0; k < d; ++k) w.lam_shared[dependent[k]] = y[k];
+    const VecX y = S.ldlt().solve(W * w.now.lam);
+    w.now.lam_shared -= W.transpose() * y;
+    for (int k = 0; k < d; ++k) w.now.lam_shared[dependent[k]] = y[k];
 }
 
 IdealMotion::IdealMotion(const Program& program, Workspace& workspace) : p(program), w(workspace) {
-    for (signed char mode : w.mode) sticks |= mode == sticking;
+    for (signed char mode : w.state.mode) sticks |= mode == sticking;
     if (sticks) {
-        w.terms.locked.swap(w.ideal_locked);
-        factorize(p.mechanism, w.terms);
-        std::swap(w.rows, w.ideal_rows);
-        const RowSystem& own = w.ideal_rows;
-        w.rows.refine = own.refine;
-        if (!w.ideal_decided) {
-            for (int r = 0; r < p.layout.rows; ++r) w.rows.wanted[r] = own.wanted[r] && r < p.constraint_rows();
-            w.rows.use_wanted(p.blocks);
+        w.now.terms.locked.swap(w.scratch.ideal_locked);
+        factorize(p.mechanism, w.now.terms);
+        std::swap(w.now.rows, w.scratch.ideal_rows);
+        const RowSystem& own = w.scratch.ideal_rows;
+        w.now.rows.refine = own.refine;
+        if (!w.state.ideal_decided) {
+            for (int r = 0; r < p.layout.rows; ++r) w.now.rows.wanted[r] = own.wanted[r] && r < p.constraint_rows();
+            w.now.rows.use_wanted(p.blocks);
         }
-        if (!w.rows.blocks.empty()) {
+        if (!w.now.rows.blocks.empty()) {
             scale_rows(p, w);
-            if (!w.ideal_decided) decide_rows(p.layout, p.blocks, w.B, w.rows);
-            factor_rows(p.layout, p.blocks, w.B, w.rows);
+            if (!w.state.ideal_decided) decide_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+            factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
         }
-        w.ideal_decided = true;
+        w.state.ideal_decided = true;
     }
-    solve_motion(p, w, w.F);
+    solve_motion(p, w, w.now.F);
 }
 
 IdealMotion::~IdealMotion() {
     if (!sticks) return;
-    w.terms.locked.swap(w.ideal_locked);
-    factorize(p.mechanism, w.terms);
-    std::swap(w.rows, w.ideal_rows);
+    w.now.terms.locked.swap(w.scratch.ideal_locked);
+    factorize(p.mechanism, w.now.terms);
+    std::swap(w.now.rows, w.scratch.ideal_rows);
     scale_rows(p, w);
 }
 
@@ -69,30 +69,30 @@ static void to_user_rows(const Program& p, const VecX& kept, VecX& out) {
 
 void split_forces(const Program& p, Workspace& w, Split& out) {
     const int nv = p.mechanism.nv;
-    const VecX a = w.a, lam = w.lam;
+    const VecX a = w.now.a, lam = w.now.lam;
     share_multipliers(p, w);
-    to_user_rows(p, w.lam_shared, out.lam);
-    out.C = p.has_laws() ? w.C : VecX(VecX::Zero(nv));
+    to_user_rows(p, w.now.lam_shared, out.lam);
+    out.C = p.has_laws() ? w.now.C : VecX(VecX::Zero(nv));
     VecX total = VecX::Zero(nv);
     for (size_t i = 0; i < p.blocks.size(); ++i) {
-        if (!w.rows.block_used[i]) continue;
+        if (!w.now.rows.block_used[i]) continue;
         const bool constraint = static_cast<int>(i) < p.constraints;
-        add_transpose(p.blocks[i], w.A, w.lam_shared, constraint ? total : out.C);  // C holds what sticks as well
+        add_transpose(p.blocks[i], w.now.A, w.now.lam_shared, constraint ? total : out.C);  // C holds what sticks as well
     }
     for (int dof = 0; dof < nv; ++dof)
-        if (w.terms.locked[dof]) out.C[dof] += holding_forces(p, w)[dof];
+        if (w.now.terms.locked[dof]) out.C[dof] += holding_forces(p, w)[dof];
     {
         const IdealMotion ideal(p, w);
         share_multipliers(p, w);
         out.F_ideal = VecX::Zero(nv);
-        for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.A, w.lam_shared, out.F_ideal);
-        if (w.rows.blocks.empty()) w.lam_shared.setZero();
-        to_user_rows(p, w.lam_shared, out.lam_ideal);
+        for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.A, w.now.lam_shared, out.F_ideal);
+        if (w.now.rows.blocks.empty()) w.now.lam_shared.setZero();
+        to_user_rows(p, w.now.lam_shared, out.lam_ideal);
     }
     out.F_nonideal = total - out.F_ideal + out.C;  // Eq. (39)
-    w.a = a;
-    w.lam = lam;
-    w.has_balance = false;
+    w.now.a = a;
+    w.now.lam = lam;
+    w.now.has_balance = false;
 }
 
 }  // namespace pn

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dynamics/program.hpp"
+#include "dynamics/evaluation.hpp"
 
 namespace pn {
 
@@ -12,14 +12,14 @@ namespace {
 // Adds to C, and to the law's own share when the ledger asks for it.
 void add(Workspace& w, VecX& C, int law, int dof, double force) {
     C[dof] += force;
-    if (w.want_laws) w.law_force[law][dof] += force;
+    if (w.now.want_laws) w.now.law_force[law][dof] += force;
 }
 
 // Force f along the directions of a block, as a generalized force: C += A^T f.
 void add_along(const Program& p, Workspace& w, VecX& C, int law, int block_index, const Vec3& f) {
     const Block& block = p.blocks[block_index];
     const int n = static_cast<int>(block.kept.size());
-    const double* A = w.A.data() + block.offset;
+    const double* A = w.now.A.data() + block.offset;
     for (size_t l = 0; l < block.support.size(); ++l) {
         double sum = 0.0;
         for (int k = 0; k < n; ++k) sum += A[l * n + k] * f[k];
@@ -33,13 +33,13 @@ constexpr double directed_speed = 1e-9;
 // Unit direction of the friction force of a slipping element.
 Vec3 force_direction(const Program& p, Workspace& w, size_t e, double scene_speed) {
     const Friction& f = p.frictions[e];
-    if (f.dim == 1) return Vec3(-w.mode[e], 0.0, 0.0);
+    if (f.dim == 1) return Vec3(-w.state.mode[e], 0.0, 0.0);
     const Vec3 u = slip_velocity(w, f);
     const double speed = u.norm();
     if (speed > directed_speed * (1.0 + scene_speed))
         // Past a reversal inside a step the direction goes on as it was, so that the step sees a smooth law.
-        w.last_direction[e] = u.dot(w.slip_direction[e]) >= 0.0 ? Vec3(u / speed) : Vec3(-u / speed);
-    return -w.last_direction[e];
+        w.state.last_direction[e] = u.dot(w.state.slip_direction[e]) >= 0.0 ? Vec3(u / speed) : Vec3(-u / speed);
+    return -w.state.last_direction[e];
 }
 
 bool load_dependent(const Friction& f) { return f.reaction != Reaction::none; }
@@ -47,32 +47,32 @@ bool load_dependent(const Friction& f) { return f.reaction != Reaction::none; }
 }  // namespace
 
 Vec3 slip_velocity(const Workspace& w, const Friction& f) {
-    const RowValues& values = w.values[f.block];
+    const RowValues& values = w.now.values[f.block];
     Vec3 u = Vec3::Zero();
     for (int k = 0; k < f.dim; ++k) u[k] = values.rate[k];
     return u;
 }
 
 Force joint_wrench(const Program& p, const Workspace& w, int joint) {
-    const Body& b = w.terms.body[joint];
+    const Body& b = w.now.terms.body[joint];
     const int parent = p.mechanism.joints[joint].parent;
     Force f = b.f;
-    f += w.momentum[joint];
-    if (parent != 0) f += b.Y * w.motion[parent];
-    f.lin -= w.reaction_body[joint].lin;
-    f.ang -= w.reaction_body[joint].ang;
+    f += w.now.momentum[joint];
+    if (parent != 0) f += b.Y * w.now.motion[parent];
+    f.lin -= w.now.reaction_body[joint].lin;
+    f.ang -= w.now.reaction_body[joint].ang;
     f.ang -= b.p.cross(f.lin);  // from the reference point to the joint's origin
     return f;
 }
 
 Force anchor_wrench(const Program& p, const Workspace& w, int index) {
     const Block& block = p.blocks[index];
-    const RowValues& values = w.values[index];
+    const RowValues& values = w.now.values[index];
     Force f{Vec3::Zero(), Vec3::Zero()};
     for (size_t k = 0; k < block.kept.size(); ++k) {
         if (!values.geometric) continue;
         const Wrench& unit = values.wrench[block.kept[k]];
-        const double lam = w.lam_shared[block.row + k];
+        const double lam = w.now.lam_shared[block.row + k];
         f.lin += lam * unit.force;
         f.ang += lam * unit.couple;
     }
@@ -89,18 +89,18 @@ double load_limit(const Program& p, Workspace& w, const Friction& f, double t, c
     switch (f.load) {
         case Friction::Load::none: return f.constant;
         case Friction::Load::user: return f.user_limit(t, q, v, w);
-        case Friction::Load::contact: return f.constant + f.mu * std::abs(w.lam_shared[p.blocks[f.anchor].row]);
+        case Friction::Load::contact: return f.constant + f.mu * std::abs(w.now.lam_shared[p.blocks[f.anchor].row]);
         default: break;
     }
     Force r;
     Vec3 axis;
     if (f.joint > 0) {
         r = joint_wrench(p, w, f.joint);
-        axis = w.terms.body[f.joint].R * f.axis;
+        axis = w.now.terms.body[f.joint].R * f.axis;
     } else {
         r = anchor_wrench(p, w, f.anchor);
         const Frame& frame = *frame1(p.blocks[f.anchor].kind);
-        axis = w.terms.body[frame.joint].R * (frame.R * f.axis);
+        axis = w.now.terms.body[frame.joint].R * (frame.R * f.axis);
     }
     if (f.load == Friction::Load::spherical) return f.constant + f.mu * f.radius * r.lin.norm();
     const double axial = r.lin.dot(axis);
@@ -113,7 +113,7 @@ double load_limit(const Program& p, Workspace& w, const Friction& f, double t, c
 
 // Force of a drag on its body, about the body's reference point.
 static Force drag_force(const Workspace& w, const Drag& d) {
-    const Body& body = w.terms.body[d.frame.joint];
+    const Body& body = w.now.terms.body[d.frame.joint];
     const Vec3 x = body.ref + body.p + body.R * d.frame.p, u = velocity_at(body, x);
     const double speed = u.norm();
     if (speed == 0.0 || d.frame.joint == 0) return {Vec3::Zero(), Vec3::Zero()};
@@ -127,7 +127,7 @@ static void state_laws(const Program& p, Workspace& w, const VecX& v, VecX& C) {
         if (x.dof >= 0) {
             for (int k = x.dof; k < x.dof + x.count; ++k) add(w, C, x.law, k, -x.coefficient * v[k]);
         } else {
-            const double u = w.values[x.block].rate[0];
+            const double u = w.now.values[x.block].rate[0];
             add_along(p, w, C, x.law, x.block, Vec3(-x.coefficient * u, 0.0, 0.0));
         }
     }
@@ -139,54 +139,54 @@ static void state_laws(const Program& p, Workspace& w, const VecX& v, VecX& C) {
     for (const Bristle& b : p.bristles) {
         const double speed = v[b.dof], x = speed / b.stribeck_velocity;
         const double g = b.coulomb + (b.stiction - b.coulomb) * std::exp(-x * x);
-        const double rate = speed - b.sigma0 * std::abs(speed) / g * w.z[b.state];
-        w.dz[b.state] = rate;
-        add(w, C, b.law, b.dof, -(b.sigma0 * w.z[b.state] + b.sigma1 * rate + b.sigma2 * speed));
+        const double rate = speed - b.sigma0 * std::abs(speed) / g * w.state.z[b.state];
+        w.now.dz[b.state] = rate;
+        add(w, C, b.law, b.dof, -(b.sigma0 * w.state.z[b.state] + b.sigma1 * rate + b.sigma2 * speed));
     }
     for (const Drag& d : p.drags) {
         const Force f = drag_force(w, d);
-        for (int dof : d.dofs) add(w, C, d.law, dof, dot(w.terms.J[dof], f));
+        for (int dof : d.dofs) add(w, C, d.law, dof, dot(w.now.terms.J[dof], f));
     }
 }
 
 void smooth_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    VecX& C = w.C_smooth;
+    VecX& C = w.now.C_smooth;
     C.setZero();
     state_laws(p, w, v, C);
     for (size_t i = 0; i < p.user_laws.size(); ++i) {
         const UserLaw& law = p.user_laws[i];
         if (law.reaction != Reaction::none) continue;
-        law.function(t, q, v, w, w.user_C[i], w.z.data() + law.state, w.dz.data() + law.state);
-        C += w.user_C[i];
+        law.function(t, q, v, w, w.now.user_C[i], w.state.z.data() + law.state, w.now.dz.data() + law.state);
+        C += w.now.user_C[i];
     }
     for (size_t e = 0; e < p.frictions.size(); ++e) {
         const Friction& f = p.frictions[e];
         if (load_dependent(f)) continue;
-        w.load[e] = load_limit(p, w, f, t, q, v);
-        w.limit[e] = w.load[e] * speed_factor(f, w.mode[e] == 0 ? 0.0 : slip_velocity(w, f).norm());
+        w.now.load[e] = load_limit(p, w, f, t, q, v);
+        w.now.limit[e] = w.now.load[e] * speed_factor(f, w.state.mode[e] == 0 ? 0.0 : slip_velocity(w, f).norm());
     }
     add_slip_forces(p, w, C, false);
 }
 
 void law_forces(const Program& p, Workspace& w, const VecX& v) {
-    for (VecX& f : w.law_force) f.setZero();
-    w.want_laws = true;
-    state_laws(p, w, v, w.work);
-    add_slip_forces(p, w, w.work, false);
-    add_slip_forces(p, w, w.work, true);
-    w.want_laws = false;
-    for (size_t i = 0; i < p.user_laws.size(); ++i) w.law_force[p.user_laws[i].law] += w.user_C[i];
+    for (VecX& f : w.now.law_force) f.setZero();
+    w.now.want_laws = true;
+    state_laws(p, w, v, w.scratch.work);
+    add_slip_forces(p, w, w.scratch.work, false);
+    add_slip_forces(p, w, w.scratch.work, true);
+    w.now.want_laws = false;
+    for (size_t i = 0; i < p.user_laws.size(); ++i) w.now.law_force[p.user_laws[i].law] += w.now.user_C[i];
 }
 
 void add_slip_forces(const Program& p, Workspace& w, VecX& C, bool dependent) {
     for (size_t e = 0; e < p.frictions.size(); ++e) {
         const Friction& f = p.frictions[e];
-        if (load_dependent(f) != dependent || !slips(w.mode[e])) continue;
-        w.slip_force[e] = w.limit[e] * force_direction(p, w, e, w.speed);
+        if (load_dependent(f) != dependent || !slips(w.state.mode[e])) continue;
+        w.now.slip_force[e] = w.now.limit[e] * force_direction(p, w, e, w.now.speed);
         if (const auto* d = std::get_if<DofRows>(&p.blocks[f.block].kind)) {
-            for (int k = 0; k < d->count; ++k) add(w, C, f.law, d->dof + k, w.slip_force[e][k]);
+            for (int k = 0; k < d->count; ++k) add(w, C, f.law, d->dof + k, w.now.slip_force[e][k]);
         } else {
-            add_along(p, w, C, f.law, f.block, w.slip_force[e]);
+            add_along(p, w, C, f.law, f.block, w.now.slip_force[e]);
         }
     }
 }
@@ -196,49 +196,49 @@ void gather_reactions(const Program& p, Workspace& w, bool nonideal) {
     if (!p.needs_joint_reactions) return;
     const Mechanism& m = p.mechanism;
     const int n = static_cast<int>(m.joints.size());
-    if (p.has_body_forces) std::copy(w.body_force.begin(), w.body_force.end(), w.reaction_body.begin());
-    else std::fill(w.reaction_body.begin(), w.reaction_body.end(), Force{Vec3::Zero(), Vec3::Zero()});
+    if (p.has_body_forces) std::copy(w.now.body_force.begin(), w.now.body_force.end(), w.now.reaction_body.begin());
+    else std::fill(w.now.reaction_body.begin(), w.now.reaction_body.end(), Force{Vec3::Zero(), Vec3::Zero()});
     const auto apply = [&](const Block& block, const Wrench& unit, double size) {
         for (int side = 0; side < 2; ++side) {
             const int joint = side == 0 ? block.joint1 : block.joint2;
             if (joint == 0) continue;
             const double s = side == 0 ? size : -size;
             const Vec3 force = s * unit.force;
-            w.reaction_body[joint] +=
-                Force{force, s * unit.couple + (unit.point - w.terms.body[joint].ref).cross(force)};
+            w.now.reaction_body[joint] +=
+                Force{force, s * unit.couple + (unit.point - w.now.terms.body[joint].ref).cross(force)};
         }
     };
-    for (int i : w.rows.blocks) {  // multipliers of constraints, and of what sticks at an anchor or contact
+    for (int i : w.now.rows.blocks) {  // multipliers of constraints, and of what sticks at an anchor or contact
         const Block& block = p.blocks[i];
-        if (!w.values[i].geometric) continue;
+        if (!w.now.values[i].geometric) continue;
         for (size_t k = 0; k < block.kept.size(); ++k)
-            apply(block, w.values[i].wrench[block.kept[k]], w.lam_shared[block.row + k]);
+            apply(block, w.now.values[i].wrench[block.kept[k]], w.now.lam_shared[block.row + k]);
     }
     if (nonideal) {
         for (size_t e = 0; e < p.frictions.size(); ++e) {  // what slips there, or is tried while modes are sought
             const Friction& f = p.frictions[e];
-            if (w.mode[e] == sticking || !w.values[f.block].geometric) continue;
-            for (int k = 0; k < f.dim; ++k) apply(p.blocks[f.block], w.values[f.block].wrench[k], w.slip_force[e][k]);
+            if (w.state.mode[e] == sticking || !w.now.values[f.block].geometric) continue;
+            for (int k = 0; k < f.dim; ++k) apply(p.blocks[f.block], w.now.values[f.block].wrench[k], w.now.slip_force[e][k]);
         }
         for (const Viscous& x : p.viscous)  // and the other laws that act on bodies
             if (x.block >= 0)
-                apply(p.blocks[x.block], w.values[x.block].wrench[0], -x.coefficient * w.values[x.block].rate[0]);
-        for (const Drag& d : p.drags) w.reaction_body[d.frame.joint] += drag_force(w, d);
+                apply(p.blocks[x.block], w.now.values[x.block].wrench[0], -x.coefficient * w.now.values[x.block].rate[0]);
+        for (const Drag& d : p.drags) w.now.reaction_body[d.frame.joint] += drag_force(w, d);
     }
-    for (int i = 0; i < n; ++i) w.momentum[i] = {Vec3::Zero(), Vec3::Zero()};
-    w.motion[0] = {Vec3::Zero(), Vec3::Zero()};
+    for (int i = 0; i < n; ++i) w.now.momentum[i] = {Vec3::Zero(), Vec3::Zero()};
+    w.now.motion[0] = {Vec3::Zero(), Vec3::Zero()};
     for (int i = 1; i < n; ++i) {
         const Joint& j = m.joints[i];
-        w.motion[i] = w.motion[j.parent];
-        for (int k = j.iv; k < j.iv + j.nv; ++k) w.motion[i] += w.a[k] * w.terms.J[k];
+        w.now.motion[i] = w.now.motion[j.parent];
+        for (int k = j.iv; k < j.iv + j.nv; ++k) w.now.motion[i] += w.now.a[k] * w.now.terms.J[k];
     }
     for (int i = n - 1; i > 0; --i) {
         const Joint& j = m.joints[i];
         for (int k = j.iv; k < j.iv + j.nv; ++k)
-            w.momentum[i] += Force{w.a[k] * w.terms.Ag[k].lin, w.a[k] * w.terms.Ag[k].ang};
+            w.now.momentum[i] += Force{w.now.a[k] * w.now.terms.Ag[k].lin, w.now.a[k] * w.now.terms.Ag[k].ang};
         if (j.parent == 0) continue;
-        w.momentum[j.parent] += w.momentum[i];
-        w.reaction_body[j.parent] += w.reaction_body[i];
+        w.now.momentum[j.parent] += w.now.momentum[i];
+        w.now.reaction_body[j.parent] += w.now.reaction_body[i];
     }
 }
 

@@ -84,7 +84,7 @@ double speed_factor(const Friction& f, double speed);
 
 // C of every law that does not read reactions, and the constant part of slipping friction.
 void smooth_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// C of each law at the evaluation in the workspace, into w.law_force.
+// C of each law at the evaluation in the workspace, into w.now.law_force.
 void law_forces(const Program& p, Workspace& w, const VecX& v);
 // Adds the friction forces of slipping elements to a generalized force, for the limits held in the workspace.
 void add_slip_forces(const Program& p, Workspace& w, VecX& C, bool load_dependent);

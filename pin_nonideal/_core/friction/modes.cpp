@@ -42,8 +42,8 @@ struct Candidates {
         int at = 0;
         for (int e : list) {
             const Block& b = block(e);
-            multiply(b, w.A, w.a, w.r);
-            for (size_t k = 0; k < b.kept.size(); ++k) alpha[at++] = w.r[b.row + k] - w.b[b.row + k];
+            multiply(b, w.now.A, w.now.a, w.scratch.r);
+            for (size_t k = 0; k < b.kept.size(); ++k) alpha[at++] = w.scratch.r[b.row + k] - w.now.b[b.row + k];
         }
         return alpha;
     }
@@ -53,23 +53,23 @@ struct Candidates {
     MatX responses() {
         MatX W(rows, rows);
         VecX force(p.mechanism.nv), unit = VecX::Zero(p.layout.rows), free(rows);
-        const VecX b = w.b;
-        w.b.setZero();
+        const VecX b = w.now.b;
+        w.now.b.setZero();
         int column = 0;
         for (int e : list) {
             const Block& from = block(e);
             for (size_t k = 0; k < from.kept.size(); ++k, ++column) {
                 force.setZero();
                 unit[from.row + k] = 1.0;
-                add_transpose(from, w.A, unit, force);
+                add_transpose(from, w.now.A, unit, force);
                 unit[from.row + k] = 0.0;
                 solve_motion(p, w, force);
                 W.col(column) = accelerations();
-                solve_R(p.mechanism, w.terms, force);
+                solve_R(p.mechanism, w.now.terms, force);
                 free[column] = force.squaredNorm();
             }
         }
-        w.b = b;
+        w.now.b = b;
         W = (0.5 * (W + W.transpose())).eval();
         for (int i = 0; i < rows; ++i) {
             if (W(i, i) > least_response * free[i]) continue;
@@ -80,9 +80,9 @@ struct Candidates {
     }
 
     void apply_modes(const std::vector<signed char>& modes) {
-        for (size_t i = 0; i < list.size(); ++i) w.mode[list[i]] = modes[i];
+        for (size_t i = 0; i < list.size(); ++i) w.state.mode[list[i]] = modes[i];
         want_rows(p, w);
-        w.warm = false;
+        w.state.warm = false;
         begin_step(p, w, t, q, v);
     }
 
@@ -90,7 +90,7 @@ struct Candidates {
     // ends evaluated there.
     bool hold(const std::vector<signed char>& modes, int breaking) {
         try {
-            for (int e : list) w.slip_force[e] = Vec3::Zero();
+            for (int e : list) w.now.slip_force[e] = Vec3::Zero();
             apply_modes(modes);
         } catch (const Failure& failure) {
             if (failure.kind != Failure::Kind::paradox) throw;
@@ -99,7 +99,7 @@ struct Candidates {
         }
         if (p.needs_reactions) gather_reactions(p, w);
         const VecX alpha = accelerations();
-        const double size = w.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
+        const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
         for (size_t i = 0, at = 0; i < list.size(); at += dims[i], ++i) {
             if (modes[i] == sticking) {
                 const double limit = static_limit(p, w, list[i], t, q, v);
@@ -141,10 +141,10 @@ struct Candidates {
             const VecX direction = slides ? VecX(ae.normalized()) : VecX(-fe.normalized());
             modes[i] = dims[i] > 1 || direction[0] > 0.0 ? 1 : -1;
             if (dims[i] == 1) continue;
-            Vec3& slip = w.slip_direction[list[i]];
+            Vec3& slip = w.state.slip_direction[list[i]];
             slip = Vec3::Zero();
             for (int k = 0; k < dims[i]; ++k) slip[k] = direction[k];
-            w.last_direction[list[i]] = slip;
+            w.state.last_direction[list[i]] = slip;
         }
         return modes;
     }
@@ -154,34 +154,34 @@ struct Candidates {
 
 Vec3 friction_force(const Program& p, Workspace& w, int e) {
     const Friction& f = p.frictions[e];
-    if (w.mode[e] != sticking) return w.slip_force[e];
+    if (w.state.mode[e] != sticking) return w.now.slip_force[e];
     Vec3 force = Vec3::Zero();
     const Block& block = p.blocks[f.block];
     if (const auto* d = std::get_if<DofRows>(&block.kind))
         for (int k = 0; k < f.dim; ++k) force[k] = holding_forces(p, w)[d->dof + k];
     else
-        for (int k = 0; k < f.dim; ++k) force[k] = w.lam[block.row + k];
+        for (int k = 0; k < f.dim; ++k) force[k] = w.now.lam[block.row + k];
     return force;
 }
 
 double static_limit(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
     const Friction& f = p.frictions[e];
-    if (f.reaction == Reaction::total) w.load[e] = load_limit(p, w, f, t, q, v);
-    return w.load[e] * f.static_ratio;
+    if (f.reaction == Reaction::total) w.now.load[e] = load_limit(p, w, f, t, q, v);
+    return w.now.load[e] * f.static_ratio;
 }
 
 void follow_velocity(const Program& p, Workspace& w, int e) {
     const Vec3 u = slip_velocity(w, p.frictions[e]);
     if (p.frictions[e].dim == 1) {
-        w.mode[e] = u[0] > 0.0 ? 1 : -1;
+        w.state.mode[e] = u[0] > 0.0 ? 1 : -1;
     } else {
-        w.mode[e] = 1;
-        w.slip_direction[e] = w.last_direction[e] = u.normalized();
+        w.state.mode[e] = 1;
+        w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
     }
 }
 
 bool at_rest(const Program& p, const Workspace& w, int e, const VecX& v) {
-    if (w.mode[e] == sticking) return true;
+    if (w.state.mode[e] == sticking) return true;
     return slip_velocity(w, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
 }
 
@@ -194,14 +194,14 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
         return;
     }
     // Without any friction of the candidates: alpha0, W, and first limits from the load there.
-    for (int e : candidates) w.slip_force[e] = Vec3::Zero();
+    for (int e : candidates) w.now.slip_force[e] = Vec3::Zero();
     const std::vector<signed char> unloaded_modes(candidates.size(), unloaded);
     c.apply_modes(unloaded_modes);
-    const VecX C_smooth = w.C_smooth;
+    const VecX C_smooth = w.now.C_smooth;
     VecX alpha0 = c.accelerations(), limits(candidates.size()), f, push(p.mechanism.nv);
     for (size_t i = 0; i < candidates.size(); ++i) limits[i] = static_limit(p, w, candidates[i], t, q, v);
     const MatX W = c.responses();
-    const double noise = 1e-12 * (w.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+    const double noise = 1e-12 * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     for (int i = 0; i < c.rows; ++i)  // what the constraints hold still has no slip acceleration
         if (W(i, i) == 0.0 && std::abs(alpha0[i]) <= noise) alpha0[i] = 0.0;
     const VecX driven = alpha0;
@@ -222,23 +222,23 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
         }
         if (it + 1 == outer_limit) {
             if (c.enumerate(released)) return;
-            throw Failure(Failure::Kind::paradox, t, candidates, std::min(c.determinant, w.determinant));
+            throw Failure(Failure::Kind::paradox, t, candidates, std::min(c.determinant, w.now.determinant));
         }
         // The motion under these forces, and the limits that its loads give: the kinetic one for what slips.
         push.setZero();
         VecX unit = VecX::Zero(p.layout.rows);
         for (size_t i = 0, at = 0; i < candidates.size(); at += c.dims[i], ++i) {
             const Block& from = c.block(candidates[i]);
-            for (int k = 0; k < c.dims[i]; ++k) unit[from.row + k] = w.slip_force[candidates[i]][k] = f[at + k];
-            add_transpose(from, w.A, unit, push);
+            for (int k = 0; k < c.dims[i]; ++k) unit[from.row + k] = w.now.slip_force[candidates[i]][k] = f[at + k];
+            add_transpose(from, w.now.A, unit, push);
         }
-        w.C_smooth = C_smooth + push;
+        w.now.C_smooth = C_smooth + push;
         if (p.needs_reactions) {
-            solve_reactions(p, w, t, w.terms.q, v);
+            solve_reactions(p, w, t, w.now.terms.q, v);
         } else {
-            w.C = w.C_smooth;
-            w.trial = w.F + w.C;
-            solve_motion(p, w, w.trial);
+            w.now.C = w.now.C_smooth;
+            w.scratch.trial = w.now.F + w.now.C;
+            solve_motion(p, w, w.scratch.trial);
         }
         alpha0 = c.accelerations() - W * f;
         for (int i = 0; i < c.rows; ++i)
@@ -252,7 +252,7 @@ void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, cons
             limits[i] = limit;
         }
     }
-    for (int e : candidates) w.slip_force[e] = Vec3::Zero();
+    for (int e : candidates) w.now.slip_force[e] = Vec3::Zero();
     c.apply_modes(modes);
 }
 

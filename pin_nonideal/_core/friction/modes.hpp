@@ -5,7 +5,7 @@
 // load wrap it in an outer iteration.
 #pragma once
 
-#include "dynamics/program.hpp"
+#include "dynamics/evaluation.hpp"
 
 namespace pn {
 

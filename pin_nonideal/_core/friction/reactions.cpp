@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "dynamics/program.hpp"
+#include "dynamics/evaluation.hpp"
 
 namespace pn {
 
@@ -29,7 +29,7 @@ struct Implicit {
 
     int nv() const { return p.mechanism.nv; }
 
-    bool is_unknown(size_t e) const { return p.frictions[e].reaction == Reaction::total && slips(w.mode[e]); }
+    bool is_unknown(size_t e) const { return p.frictions[e].reaction == Reaction::total && slips(w.state.mode[e]); }
 
     // Number of unknowns in their order: slipping elements, then user laws.
     int count() const {
@@ -41,47 +41,47 @@ struct Implicit {
 
     double slip_factor(size_t e) const {
         const Friction& f = p.frictions[e];
-        return speed_factor(f, w.mode[e] == sticking ? 0.0 : slip_velocity(w, f).norm());
+        return speed_factor(f, w.state.mode[e] == sticking ? 0.0 : slip_velocity(w, f).norm());
     }
 
     void set(const VecX& y) {
         int k = 0;
         for (size_t e = 0; e < p.frictions.size(); ++e)
-            if (is_unknown(e)) w.limit[e] = y[k++];
+            if (is_unknown(e)) w.now.limit[e] = y[k++];
         for (size_t i = 0; i < p.user_laws.size(); ++i)
             if (p.user_laws[i].reaction == Reaction::total) {
-                w.user_C[i] = y.segment(k, nv());
+                w.now.user_C[i] = y.segment(k, nv());
                 k += nv();
             }
     }
 
     // The motion for the limits and user forces in the workspace.
     void motion() {
-        w.C = *base_C;
-        add_slip_forces(p, w, w.C, true);
+        w.now.C = *base_C;
+        add_slip_forces(p, w, w.now.C, true);
         for (size_t i = 0; i < p.user_laws.size(); ++i)
-            if (p.user_laws[i].reaction == Reaction::total) w.C += w.user_C[i];
-        w.trial = w.F + w.C;
-        solve_motion(p, w, w.trial);
+            if (p.user_laws[i].reaction == Reaction::total) w.now.C += w.now.user_C[i];
+        w.scratch.trial = w.now.F + w.now.C;
+        solve_motion(p, w, w.scratch.trial);
     }
 
     void image(const VecX& y, VecX& g) {
         set(y);
         motion();
         // A stage that has run away is no case for the laws, a user's above all.
-        if (!std::isfinite(w.a.squaredNorm())) throw Failure(Failure::Kind::not_finite, t);
+        if (!std::isfinite(w.now.a.squaredNorm())) throw Failure(Failure::Kind::not_finite, t);
         gather_reactions(p, w);
         int k = 0;
         for (size_t e = 0; e < p.frictions.size(); ++e)
             if (is_unknown(e)) {
-                w.load[e] = load_limit(p, w, p.frictions[e], t, q, v);
-                g[k++] = w.load[e] * slip_factor(e);
+                w.now.load[e] = load_limit(p, w, p.frictions[e], t, q, v);
+                g[k++] = w.now.load[e] * slip_factor(e);
             }
         for (size_t i = 0; i < p.user_laws.size(); ++i) {
             const UserLaw& law = p.user_laws[i];
             if (law.reaction != Reaction::total) continue;
-            law.function(t, q, v, w, w.user_C[i], w.z.data() + law.state, w.dz.data() + law.state);
-            g.segment(k, nv()) = w.user_C[i];
+            law.function(t, q, v, w, w.now.user_C[i], w.state.z.data() + law.state, w.now.dz.data() + law.state);
+            g.segment(k, nv()) = w.now.user_C[i];
             k += nv();
         }
         ++w.counters.iterations;
@@ -100,13 +100,13 @@ struct Implicit {
 
     // dg/dy by differences, scaled by the unknowns' size.
     void differentiate(const VecX& y, const VecX& g, double size) {
-        w.jacobian.resize(n, n);
+        w.scratch.jacobian.resize(n, n);
         VecX shifted = y, image_there(n);
         const double h = 1e-7 * std::max(size, 1e-300);
         for (int k = 0; k < n; ++k) {
             shifted[k] = y[k] + h;
             image(shifted, image_there);
-            w.jacobian.col(k) = (image_there - g) / h;
+            w.scratch.jacobian.col(k) = (image_there - g) / h;
             shifted[k] = y[k];
         }
     }
@@ -165,9 +165,9 @@ struct Implicit {
     // y is the only solution when every mixture of branches contracts, which |dg/dy| tells; else another one is looked
     // for in each mixture that turns the equation over.
     void check_uniqueness(const VecX& y, double size) {
-        const MatX I = MatX::Identity(n, n), J = w.jacobian;
+        const MatX I = MatX::Identity(n, n), J = w.scratch.jacobian;
         const double here = (I - J).determinant();
-        w.determinant = here;
+        w.now.determinant = here;
         if (!(here > 0.0)) paradox(here);
         const VecX bound = (I - J.cwiseAbs()).partialPivLu().solve(VecX::Ones(n));
         if ((bound.array() > 0.0).all()) return;
@@ -179,8 +179,8 @@ struct Implicit {
             if (there == 0.0 || leads_elsewhere(y, y + (I - other).partialPivLu().solve(beyond), size)) paradox(there);
             return false;
         });
-        w.jacobian = J;
-        w.determinant = here;
+        w.scratch.jacobian = J;
+        w.now.determinant = here;
     }
 
     // Whether Newton's method from `start` finds a solution that is not y.
@@ -194,7 +194,7 @@ struct Implicit {
                 if (miss.cwiseAbs().maxCoeff() <= same_solution * scale)
                     return (start - y).cwiseAbs().maxCoeff() > 1e3 * same_solution * scale;
                 differentiate(start, g, scale);
-                start += (MatX::Identity(n, n) - w.jacobian).partialPivLu().solve(miss);
+                start += (MatX::Identity(n, n) - w.scratch.jacobian).partialPivLu().solve(miss);
             }
         } catch (const Failure& failure) {
             if (failure.kind != Failure::Kind::not_finite) throw;
@@ -218,20 +218,20 @@ struct Implicit {
             }
             last = error;
             differentiate(y, g, size);
-            y += (MatX::Identity(n, n) - w.jacobian).partialPivLu().solve(miss);
+            y += (MatX::Identity(n, n) - w.scratch.jacobian).partialPivLu().solve(miss);
         }
-        w.determinant = least_determinant(w.jacobian);
-        paradox(w.determinant);
+        w.now.determinant = least_determinant(w.scratch.jacobian);
+        paradox(w.now.determinant);
     }
 
     void solve() {
-        VecX &y = w.unknown, &g = w.image;
-        if (!w.warm) y.head(n).setZero();
-        w.warm = false;  // what a failure leaves in y is no start for the next evaluation
+        VecX &y = w.state.unknown, &g = w.scratch.image;
+        if (!w.state.warm) y.head(n).setZero();
+        w.state.warm = false;  // what a failure leaves in y is no start for the next evaluation
         auto yn = y.head(n);
         double last = 0.0;
         for (int it = 0; it < fixed_point_limit; ++it) {
-            VecX& at = w.newton_step;
+            VecX& at = w.scratch.newton_step;
             at = y;
             image(at, g);
             double size = 0.0, change = 0.0;
@@ -268,23 +268,23 @@ void solve_reactions(const Program& p, Workspace& w, double t, const VecX& q, co
     bool ideal = false;
     for (size_t e = 0; e < p.frictions.size(); ++e) ideal |= p.frictions[e].reaction == Reaction::ideal;
     for (const UserLaw& law : p.user_laws) ideal |= law.reaction == Reaction::ideal;
-    w.base_C = w.C_smooth;  // C that does not change while the reactions are sought
+    w.now.base_C = w.now.C_smooth;  // C that does not change while the reactions are sought
     if (ideal) {
         const IdealMotion motion(p, w);
         gather_reactions(p, w, false);
         for (size_t e = 0; e < p.frictions.size(); ++e) {
             if (p.frictions[e].reaction != Reaction::ideal) continue;
-            w.load[e] = load_limit(p, w, p.frictions[e], t, q, v);
-            w.limit[e] = w.load[e] * implicit.slip_factor(e);
+            w.now.load[e] = load_limit(p, w, p.frictions[e], t, q, v);
+            w.now.limit[e] = w.now.load[e] * implicit.slip_factor(e);
         }
         for (size_t i = 0; i < p.user_laws.size(); ++i) {
             const UserLaw& law = p.user_laws[i];
             if (law.reaction != Reaction::ideal) continue;
-            law.function(t, q, v, w, w.user_C[i], w.z.data() + law.state, w.dz.data() + law.state);
-            w.base_C += w.user_C[i];
+            law.function(t, q, v, w, w.now.user_C[i], w.state.z.data() + law.state, w.now.dz.data() + law.state);
+            w.now.base_C += w.now.user_C[i];
         }
     }
-    implicit.base_C = &w.base_C;
+    implicit.base_C = &w.now.base_C;
     implicit.n = implicit.count();
     if (implicit.n == 0) {
         implicit.motion();
@@ -292,7 +292,7 @@ void solve_reactions(const Program& p, Workspace& w, double t, const VecX& q, co
     } else {
         implicit.solve();
     }
-    w.warm = true;
+    w.state.warm = true;
 }
 
 }  // namespace pn

@@ -19,7 +19,7 @@ struct ReactionView {
         for (int i = 0; i < p->constraints; ++i) {
             const Block& block = p->blocks[i];
             for (size_t k = 0; k < block.kept.size(); ++k)
-                out[block.user_row + block.kept[k]] = w->lam_shared[block.row + k];
+                out[block.user_row + block.kept[k]] = w->now.lam_shared[block.row + k];
         }
         return to_numpy(out);
     }
@@ -28,10 +28,10 @@ struct ReactionView {
         out << transpose_times(R, f.lin).eigen(), transpose_times(R, f.ang).eigen();
         return to_numpy(out);
     }
-    nb::object of_joint(int joint) const { return six(joint_wrench(*p, *w, joint), w->terms.body[joint].R); }
+    nb::object of_joint(int joint) const { return six(joint_wrench(*p, *w, joint), w->now.terms.body[joint].R); }
     nb::object of_block(int block) const {
         const Frame& f = *frame2(p->blocks[block].kind);
-        return six(anchor_wrench(*p, *w, block), w->terms.body[f.joint].R * f.R);
+        return six(anchor_wrench(*p, *w, block), w->now.terms.body[f.joint].R * f.R);
     }
 };
 

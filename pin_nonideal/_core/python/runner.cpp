@@ -54,31 +54,31 @@ void Runner::set(const Array& q_in, const Array& v_in, const nb::object& tau) {
         throw std::invalid_argument("q or v does not fit the model");
     q = map(q_in);
     v = map(v_in);
-    w->has_override = !tau.is_none();
-    if (!w->has_override) return;
+    w->now.has_override = !tau.is_none();
+    if (!w->now.has_override) return;
     const Array torque = nb::cast<Array>(tau);
     if (!holds(torque, m.nv)) throw std::invalid_argument("tau does not fit the model");
-    w->override_torque = map(torque);
+    w->now.override_torque = map(torque);
 }
 
 void Runner::choose_modes(double t, const nb::object& modes) {
     const int n = static_cast<int>(p->frictions.size());
     if (!modes.is_none()) {
         const auto given = nb::cast<std::vector<int>>(modes);
-        for (int e = 0; e < n; ++e) w->mode[e] = static_cast<signed char>(given[e]);
-        w->warm = false;
+        for (int e = 0; e < n; ++e) w->state.mode[e] = static_cast<signed char>(given[e]);
+        w->state.warm = false;
         want_rows(*p, *w);
         begin_step(*p, *w, t, q, v);
         return;
     }
     std::vector<int> candidates;
     if (n > 0) {
-        kinematics(p->mechanism, w->terms, q, v);
+        kinematics(p->mechanism, w->now.terms, q, v);
         evaluate_rows(*p, *w, t, v);
-        w->warm = false;
+        w->state.warm = false;
     }
     for (int e = 0; e < n; ++e) {
-        w->mode[e] = 1;
+        w->state.mode[e] = 1;
         if (at_rest(*p, *w, e, v)) {
             candidates.push_back(e);
         } else {
@@ -94,13 +94,13 @@ void Runner::acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle
         throw std::invalid_argument("q holds a part that is not of unit length");
     read_buffer(v_in, v);
     if (!std::isfinite(t)) throw std::invalid_argument("expected a finite time");
-    w->has_override = !tau.is_none();
-    if (w->has_override) read_buffer(tau, w->override_torque);
+    w->now.has_override = !tau.is_none();
+    if (w->now.has_override) read_buffer(tau, w->now.override_torque);
     if (p->frictions.empty()) begin_step(*p, *w, t, q, v);
     else choose_modes(t, nb::none());
     const Buffer target(out, PyBUF_WRITABLE);
-    target.check(w->a.size());
-    std::copy(w->a.data(), w->a.data() + w->a.size(), target.data());
+    target.check(w->now.a.size());
+    std::copy(w->now.a.data(), w->now.a.data() + w->now.a.size(), target.data());
 }
 
 nb::dict Runner::solve(const Array& q_in, const Array& v_in, double t, nb::object tau, nb::object modes) {
@@ -112,16 +112,16 @@ nb::dict Runner::solve(const Array& q_in, const Array& v_in, double t, nb::objec
     for (size_t e = 0; e < p->frictions.size(); ++e) {
         Vec3 f = friction_force(*p, *w, static_cast<int>(e));
         forces.append(to_numpy(&f[0], p->frictions[e].dim));
-        limits.append(w->mode[e] == sticking ? static_limit(*p, *w, static_cast<int>(e), t, q, v) : w->limit[e]);
-        used.append(static_cast<int>(w->mode[e]));
+        limits.append(w->state.mode[e] == sticking ? static_limit(*p, *w, static_cast<int>(e), t, q, v) : w->now.limit[e]);
+        used.append(static_cast<int>(w->state.mode[e]));
     }
     Split split;
     split_forces(*p, *w, split);
-    out["a"] = to_numpy(w->a);
+    out["a"] = to_numpy(w->now.a);
     out["F_ideal"] = to_numpy(split.F_ideal);
     out["F_nonideal"] = to_numpy(split.F_nonideal);
     out["C"] = to_numpy(split.C);
-    out["F"] = to_numpy(w->F);
+    out["F"] = to_numpy(w->now.F);
     out["lam"] = to_numpy(split.lam);
     out["lam_ideal"] = to_numpy(split.lam_ideal);
     out["rank"] = constraint_rank();
@@ -134,13 +134,13 @@ nb::dict Runner::solve(const Array& q_in, const Array& v_in, double t, nb::objec
 int Runner::constraint_rank() const {
     int rank = 0;
     for (int i = 0; i < p->constraints; ++i)
-        for (size_t k = 0; k < p->blocks[i].kept.size(); ++k) rank += w->rows.active[p->blocks[i].row + k];
+        for (size_t k = 0; k < p->blocks[i].kept.size(); ++k) rank += w->now.rows.active[p->blocks[i].row + k];
     return rank;
 }
 
 nb::tuple Runner::rows(const Array& q_in, const Array& v_in, double t) {
     set(q_in, v_in, nb::none());
-    kinematics(p->mechanism, w->terms, q, v);
+    kinematics(p->mechanism, w->now.terms, q, v);
     evaluate_rows(*p, *w, t, v);
     const int nv = p->mechanism.nv;
     std::vector<double> A(static_cast<size_t>(p->user_rows) * nv, 0.0), b, phi, rate;
@@ -148,9 +148,9 @@ nb::tuple Runner::rows(const Array& q_in, const Array& v_in, double t) {
         Block all = p->blocks[i];
         all.kept.clear();
         for (int k = 0; k < all.total; ++k) all.kept.push_back(k);
-        const RowValues& values = w->values[i];
+        const RowValues& values = w->now.values[i];
         std::vector<double> local(all.support.size() * all.total);
-        fill_A(all, w->terms, values, local.data());
+        fill_A(all, w->now.terms, values, local.data());
         for (int k = 0; k < all.total; ++k) {
             for (size_t l = 0; l < all.support.size(); ++l)
                 A[static_cast<size_t>(all.user_row + k) * nv + all.support[l]] = local[l * all.total + k];
@@ -165,14 +165,14 @@ nb::tuple Runner::rows(const Array& q_in, const Array& v_in, double t) {
 
 nb::tuple Runner::terms(const Array& q_in, const Array& v_in) {
     set(q_in, v_in, nb::none());
-    kinematics(p->mechanism, w->terms, q, v);
-    inertia(p->mechanism, w->terms);
+    kinematics(p->mechanism, w->now.terms, q, v);
+    inertia(p->mechanism, w->now.terms);
     const Mechanism& m = p->mechanism;
     std::vector<double> M(static_cast<size_t>(m.nv) * m.nv, 0.0);
     for (int k = 0; k < m.nv; ++k)
         for (int i = k, s = 0; i >= 0; i = m.dof_parent[i], ++s)
-            M[k * m.nv + i] = M[i * m.nv + k] = w->terms.M[m.row_offset[k] + s];
-    return nb::make_tuple(to_numpy(std::move(M)), to_numpy(w->terms.nle));
+            M[k * m.nv + i] = M[i * m.nv + k] = w->now.terms.M[m.row_offset[k] + s];
+    return nb::make_tuple(to_numpy(std::move(M)), to_numpy(w->now.terms.nle));
 }
 
 nb::tuple Runner::project_state(const Array& q_in, const Array& v_in, double t, double far) {
@@ -222,15 +222,15 @@ VecX Runner::read_state(const System& system, const VecX& outside) {
     y.head(outside.size()) = outside;
     q = y.head(system.nq);
     v = y.segment(system.nq, system.nv);
-    if (system.nz > 0) w->z = y.segment(system.nq + system.nv, system.nz);
-    w->has_override = false;
+    if (system.nz > 0) w->state.z = y.segment(system.nq + system.nv, system.nz);
+    w->now.has_override = false;
     return y;
 }
 
 double Runner::energy() {
-    kinematics(p->mechanism, w->terms, q, v);
-    inertia(p->mechanism, w->terms);
-    return kinetic_energy(p->mechanism, w->terms, v) + potential_energy(p->mechanism, w->terms);
+    kinematics(p->mechanism, w->now.terms, q, v);
+    inertia(p->mechanism, w->now.terms);
+    return kinetic_energy(p->mechanism, w->now.terms, v) + potential_energy(p->mechanism, w->now.terms);
 }
 
 double Runner::time_evaluations(const Array& q_in, const Array& v_in, double t, int count) {
@@ -256,7 +256,7 @@ void bind_runner(nb::module_& m) {
         .def_prop_ro("rank", &Runner::constraint_rank)
         // How the rows were factored last: smallest pivot, orthogonal road taken, redundant, refined.
         .def_prop_ro("factorization", [](Runner& r) {
-            const RowSystem& s = r.w->rows;
+            const RowSystem& s = r.w->now.rows;
             return nb::make_tuple(s.min_pivot, s.orthogonal, s.redundant, s.refine);
         })
         .def("simulate", &Runner::simulate)

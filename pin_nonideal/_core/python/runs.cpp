@@ -87,8 +87,8 @@ nb::dict Outcome::hand_over() {
 nb::dict Runner::simulate(const Array& q_in, const Array& v_in, const Array& z, const nb::dict& options) {
     const Options o = read_options(options);
     const VecX q0 = map(q_in), v0 = map(v_in);
-    w->z = map(z);
-    w->has_override = false;
+    w->state.z = map(z);
+    w->now.has_override = false;
     Recording recording;
     {
         nb::gil_scoped_release release;
@@ -219,7 +219,7 @@ nb::list rollout(const Builder& b, const Array2& q, const Array2& v, const Array
     try {
         share_out(count, threads, stopped, [&](size_t i, int k) {
             Workspace space(*b.p);
-            space.z = z0;
+            space.state.z = z0;
             Recording mine;  // neighbors in one array would share lines of cache between the threads
             simulate(*b.p, space, q_all.row(i), v_all.row(i), k == 0 ? own : others, mine);
             if (is_interrupt(mine.error)) stopped = true;

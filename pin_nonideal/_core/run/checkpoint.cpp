@@ -40,23 +40,32 @@ static void fields(Archive& a, RowSystem& x) {
 
 static void fields(Archive& a, Counters& x) { a(x.evaluations, x.factorizations, x.projections, x.iterations); }
 
-static void fields(Archive& a, Workspace& x) {
-    auto& [terms, tau, external, F, C, C_smooth, base_C, acceleration, scaled, scaled_free, trial, work, values, A, B,
-           b, r, miss, lam, lam_step, lam_shared, rows, ideal_rows, ideal_locked, ideal_decided, body_force,
-           reaction_body, motion, momentum, shift_start, shift, shift_sum, shift_third, shift_steps, mode, limit, load,
-           indeterminate, slip_direction, last_direction, speed, balance, has_balance, slip_force, user_C, z, dz,
-           law_force, want_laws, held_torque, override_torque, has_held,
-           has_override, unknown, image, newton_step, jacobian, warm, determinant, counters] = x;
-    a(terms, tau, external, F, C, C_smooth, base_C, acceleration, scaled, scaled_free, trial, work, values, A, B, b,
-      r, miss, lam, lam_step, lam_shared, rows, ideal_rows, ideal_locked, ideal_decided, body_force, reaction_body,
-      motion, momentum, shift_start, shift, shift_sum, shift_third, shift_steps, mode, limit, load, indeterminate,
-      slip_direction, last_direction, speed, balance, has_balance, slip_force, user_C, z, dz, law_force, want_laws,
-      held_torque, override_torque, has_held, has_override, unknown, image,
-      newton_step);
-    a.matrix(jacobian);
-    a(warm, determinant, counters);
+static void fields(Archive& a, RunState& x) {
+    auto& [mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm, shift_third,
+           ideal_decided] = x;
+    a(mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm, shift_third,
+      ideal_decided);
     for (signed char m : mode) a.require(slips(m) || m == sticking || m == unloaded);
 }
+
+static void fields(Archive& a, Evaluation& x) {
+    auto& [terms, values, A, B, rows, b, lam, lam_shared, tau, external, F, C, C_smooth, base_C, acceleration, balance,
+           has_balance, limit, load, slip_force, user_C, dz, speed, determinant, body_force, reaction_body, motion,
+           momentum, law_force, want_laws, override_torque, has_override] = x;
+    a(terms, values, A, B, rows, b, lam, lam_shared, tau, external, F, C, C_smooth, base_C, acceleration, balance,
+      has_balance, limit, load, slip_force, user_C, dz, speed, determinant, body_force, reaction_body, motion, momentum,
+      law_force, want_laws, override_torque, has_override);
+}
+
+static void fields(Archive& a, Scratch& x) {
+    auto& [scaled, scaled_free, trial, work, r, miss, lam_step, ideal_rows, ideal_locked, shift_start, shift, shift_sum,
+           shift_steps, image, newton_step, jacobian] = x;
+    a(scaled, scaled_free, trial, work, r, miss, lam_step, ideal_rows, ideal_locked, shift_start, shift, shift_sum,
+      shift_steps, image, newton_step);
+    a.matrix(jacobian);
+}
+
+static void fields(Archive& a, Workspace& x) { a(x.state, x.now, x.scratch, x.counters); }
 
 static void fields(Archive& a, Event& x) { a(x.time, x.kind, x.element); }
 

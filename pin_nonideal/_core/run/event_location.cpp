@@ -22,12 +22,12 @@ constexpr double beyond = 2.0;     // part of a step: none of it
 double Simulation::speed_along(int e) const {
     const Friction& f = p.frictions[e];
     const Vec3 u = slip_velocity(w, f);
-    return f.dim == 1 ? w.mode[e] * u[0] : u.dot(w.slip_direction[e]);
+    return f.dim == 1 ? w.state.mode[e] * u[0] : u.dot(w.state.slip_direction[e]);
 }
 
 // Positive before the event, zero at it. The workspace must be evaluated at the state.
 double Simulation::margin(const Watch& watch, double at, const VecX& state) {
-    if (watch.contact >= 0) return w.lam[p.blocks[p.contacts[watch.contact]].row];
+    if (watch.contact >= 0) return w.now.lam[p.blocks[p.contacts[watch.contact]].row];
     if (watch.slip) return speed_along(watch.element);
     q_ = state.head(system.nq);
     v_ = state.segment(system.nq, system.nv);
@@ -38,15 +38,15 @@ double Simulation::margin(const Watch& watch, double at, const VecX& state) {
 double Simulation::toward_rest(double size) {
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
         const Friction& f = p.frictions[e];
-        if (f.dim == 1 || !slips(w.mode[e])) continue;
+        if (f.dim == 1 || !slips(w.state.mode[e])) continue;
         const Block& block = p.blocks[f.block];
         q_ = y.head(system.nq);
         v_ = derivative.segment(system.nq, system.nv);
-        multiply(block, w.A, v_, w.r);
+        multiply(block, w.now.A, v_, w.scratch.r);
         const double slip = slip_velocity(w, f).squaredNorm();
         double change = 0.0;
         for (int k = 0; k < f.dim; ++k) {
-            const double rate = w.r[block.row + k] - w.b[block.row + k];
+            const double rate = w.scratch.r[block.row + k] - w.now.b[block.row + k];
             change += rate * rate;
         }
         if (slip < change * size * size) size = std::min(size, std::max(0.5 * std::sqrt(slip / change), 1e-3 * size));
@@ -59,14 +59,14 @@ std::vector<Simulation::Watch> Simulation::crossed() {
     std::vector<Watch> list;
     if (stepper.method.order > 1)
         for (int i = 0; i < static_cast<int>(p.contacts.size()); ++i)
-            if (!pulls[i] && w.lam[p.blocks[p.contacts[i]].row] < 0.0) list.push_back({-1, false, i});
+            if (!pulls[i] && w.now.lam[p.blocks[p.contacts[i]].row] < 0.0) list.push_back({-1, false, i});
     if (p.frictions.empty()) return list;
     const double t1 = stepper.t0 + stepper.h;
     bool gathered = false;
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
-        const Watch watch{e, w.mode[e] != sticking};
+        const Watch watch{e, w.state.mode[e] != sticking};
         if (!watch.slip) {
-            if (w.indeterminate) continue;
+            if (w.state.indeterminate) continue;
             if (!gathered && p.needs_reactions) gather_reactions(p, w);
             gathered = true;
             bool past = margin(watch, t1, stepper.y1) < 0.0;
@@ -95,7 +95,7 @@ std::vector<Simulation::Watch> Simulation::crossed() {
         const auto* d = std::get_if<DofRows>(&p.blocks[p.frictions[e].block].kind);
         if (!d || d->count != 1 || stepper.method.order < 2) continue;
         const int i = system.nq + d->dof;
-        const double s = w.mode[e], u0 = s * stepper.y0[i], u1 = s * stepper.y1[i];
+        const double s = w.state.mode[e], u0 = s * stepper.y0[i], u1 = s * stepper.y1[i];
         const double a0 = s * stepper.h * stepper.K[0][i], a1 = s * stepper.h * stepper.f1[i];
         for (double x : {0.2, 0.4, 0.6, 0.8}) {
             const double z = 1.0 - x;
@@ -190,8 +190,8 @@ void Simulation::step_onto(const Watch& found, double part) {
         double slope = 0.0;
         if (found.slip && p.frictions[found.element].dim == 1) {
             const Block& block = p.blocks[p.frictions[found.element].block];
-            multiply(block, w.A, w.a, w.r);
-            slope = w.mode[found.element] * (w.r[block.row] - w.b[block.row]);
+            multiply(block, w.now.A, w.now.a, w.scratch.r);
+            slope = w.state.mode[found.element] * (w.scratch.r[block.row] - w.now.b[block.row]);
         } else if (it == 0) {
             const double d = std::max(1e-6 * full, 1e-12);
             slope = 0.0;
@@ -240,7 +240,7 @@ bool Simulation::locate_event() {
     if (first == beyond) {  // what may have crossed did not
         q_ = stepper.y1.head(system.nq);
         v_ = stepper.y1.segment(system.nq, system.nv);
-        if (system.nz > 0) w.z = stepper.y1.segment(system.nq + system.nv, system.nz);
+        if (system.nz > 0) w.state.z = stepper.y1.segment(system.nq + system.nv, system.nz);
         evaluate(p, w, stepper.t0 + stepper.h, q_, v_);
         return false;
     }
@@ -266,9 +266,9 @@ bool Simulation::locate_event() {
 // all limits do, those of elements included that slip but do not move. Halves the step down to the instant at which
 // none do.
 bool Simulation::release_indeterminate() {
-    if (!w.indeterminate) return false;
+    if (!w.state.indeterminate) return false;
     const double full = stepper.h, begin = stepper.t0;
-    const std::vector<signed char> modes = w.mode;
+    const std::vector<signed char> modes = w.state.mode;
     std::vector<int> resting;
     const auto holds = [&](double at) {
         q_ = stepper.y1.head(system.nq);
@@ -278,9 +278,9 @@ bool Simulation::release_indeterminate() {
             if (at_rest(p, w, e, v_)) resting.push_back(e);
         resolve_modes(p, w, at, q_, v_, resting);
         const bool all_stick = std::all_of(resting.begin(), resting.end(), [&](int e) {
-            return w.mode[e] == sticking || modes[e] != sticking;
+            return w.state.mode[e] == sticking || modes[e] != sticking;
         });
-        w.mode = modes;
+        w.state.mode = modes;
         want_rows(p, w);
         begin_step(p, w, at, q_, v_);
         return all_stick;

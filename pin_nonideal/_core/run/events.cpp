@@ -9,17 +9,17 @@ namespace pn {
 void Simulation::remember_directions() {
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
         const Friction& f = p.frictions[e];
-        if (f.dim == 1 || !slips(w.mode[e])) continue;
+        if (f.dim == 1 || !slips(w.state.mode[e])) continue;
         const Vec3 u = slip_velocity(w, f);
         slip_at_start[e] = u.norm();
-        if (u.norm() > 1e-12) w.slip_direction[e] = w.last_direction[e] = u.normalized();
+        if (u.norm() > 1e-12) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
     }
 }
 
 // A maintained contact that would have to pull, told once each time it begins.
 void Simulation::report_pulls(double at) {
     for (size_t i = 0; i < p.contacts.size(); ++i) {
-        const bool pull = static_cast<int>(i) == parting || w.lam[p.blocks[p.contacts[i]].row] < 0.0;
+        const bool pull = static_cast<int>(i) == parting || w.now.lam[p.blocks[p.contacts[i]].row] < 0.0;
         if (pull && !pulls[i]) out.events.push_back({at, Event::Kind::pull, p.contacts[i]});
         pulls[i] = pull;
     }
@@ -30,17 +30,17 @@ void Simulation::report_pulls(double at) {
 void Simulation::switch_modes(double at, VecX& state, int trigger) {
     q_ = state.head(system.nq);
     v_ = state.segment(system.nq, system.nv);
-    if (system.nz > 0) w.z = state.segment(system.nq + system.nv, system.nz);
+    if (system.nz > 0) w.state.z = state.segment(system.nq + system.nv, system.nz);
     if (p.frictions.empty()) {
         begin_step(p, w, at, q_, v_);
         system.collect(at, state, derivative);
         return;
     }
-    const std::vector<signed char> before = w.mode;
-    const std::vector<Vec3> directions = w.slip_direction;
+    const std::vector<signed char> before = w.state.mode;
+    const std::vector<Vec3> directions = w.state.slip_direction;
     if (trigger < 0) {  // the start: every element by its velocity
-        std::fill(w.mode.begin(), w.mode.end(), 1);
-        kinematics(p.mechanism, w.terms, q_, v_);
+        std::fill(w.state.mode.begin(), w.state.mode.end(), 1);
+        kinematics(p.mechanism, w.now.terms, q_, v_);
         evaluate_rows(p, w, at, v_);
     }
     std::vector<int> candidates;
@@ -69,23 +69,23 @@ void Simulation::switch_modes(double at, VecX& state, int trigger) {
     state.head(system.nq) = q_;
     state.segment(system.nq, system.nv) = v_;
     if (p.needs_reactions) gather_reactions(p, w);
-    w.indeterminate = false;
+    w.state.indeterminate = false;
     for (int e : candidates)
-        if (w.mode[e] == sticking && ((e == trigger && before[e] == sticking) ||
+        if (w.state.mode[e] == sticking && ((e == trigger && before[e] == sticking) ||
             friction_force(p, w, e).norm() > static_limit(p, w, e, at, q_, v_) * (1.0 + 1e-9)))
-            w.indeterminate = true;
+            w.state.indeterminate = true;
     system.collect(at, state, derivative);
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
-        const bool turned = e == trigger && before[e] == 1 && w.mode[e] == 1 && p.frictions[e].dim > 1 &&
-                            directions[e].dot(w.slip_direction[e]) < 0.0;
-        if (trigger < 0 || (before[e] == w.mode[e] && !turned)) continue;
-        const auto kind = w.mode[e] == sticking ? Event::Kind::stick
+        const bool turned = e == trigger && before[e] == 1 && w.state.mode[e] == 1 && p.frictions[e].dim > 1 &&
+                            directions[e].dot(w.state.slip_direction[e]) < 0.0;
+        if (trigger < 0 || (before[e] == w.state.mode[e] && !turned)) continue;
+        const auto kind = w.state.mode[e] == sticking ? Event::Kind::stick
                           : before[e] == sticking ? Event::Kind::slip : Event::Kind::reverse;
         out.events.push_back({at, kind, e});
         recent_events.push_back(at);
     }
     if (trigger < 0) return;
-    if (before == w.mode) recent_events.push_back(at);
+    if (before == w.state.mode) recent_events.push_back(at);
     bridge_cluster(at, state, trigger);
 }
 

@@ -40,15 +40,15 @@ System::System(const Program& program, Workspace& workspace, bool with_energy)
 void System::derivative(double t, const VecX& y, VecX& dy) {
     q_buffer = y.head(nq);
     v_buffer = y.segment(nq, nv);
-    if (nz > 0) w.z = y.segment(nq + nv, nz);
+    if (nz > 0) w.state.z = y.segment(nq + nv, nz);
     if (!on_constraints) {
         evaluate(p, w, t, q_buffer, v_buffer);
-        if (!w.rows.blocks.empty()) smallest_pivot = std::min(smallest_pivot, w.rows.distance);
+        if (!w.now.rows.blocks.empty()) smallest_pivot = std::min(smallest_pivot, w.now.rows.distance);
         collect(t, y, dy);
         return;
     }
     evaluate_on_constraints(p, w, t, q_buffer, v_buffer);
-    smallest_pivot = std::min(smallest_pivot, w.rows.distance);
+    smallest_pivot = std::min(smallest_pivot, w.now.rows.distance);
     projected = y;
     projected.head(nq) = q_buffer;
     projected.segment(nq, nv) = v_buffer;
@@ -57,8 +57,8 @@ void System::derivative(double t, const VecX& y, VecX& dy) {
 
 void System::collect(double t, const VecX& y, VecX& dy) {
     configuration_rate(p.mechanism, y.data(), y.data() + nq, dy.data());
-    dy.segment(nq, nv) = w.a;
-    if (nz > 0) dy.segment(nq + nv, nz) = w.dz;
+    dy.segment(nq, nv) = w.now.a;
+    if (nz > 0) dy.segment(nq + nv, nz) = w.now.dz;
     if (energy) {
         v_buffer = y.segment(nq, nv);
         powers(p, w, v_buffer, dy.data() + nq + nv + nz);
@@ -67,7 +67,7 @@ void System::collect(double t, const VecX& y, VecX& dy) {
     for (int e = 0; e < ne; ++e) {
         double& share = dy[ny - ne + e];
         share = 0.0;
-        if (w.mode[e] != sticking || w.indeterminate) continue;
+        if (w.state.mode[e] != sticking || w.state.indeterminate) continue;
         if (!gathered) gather_reactions(p, w);
         gathered = true;
         q_buffer = y.head(nq);
@@ -79,17 +79,17 @@ void System::collect(double t, const VecX& y, VecX& dy) {
 }
 
 void powers(const Program& p, Workspace& w, const VecX& v, double* out) {
-    out[0] = p.driven ? v.dot(w.tau) : 0.0;
-    out[1] = p.driven ? v.dot(w.external) : 0.0;
+    out[0] = p.driven ? v.dot(w.now.tau) : 0.0;
+    out[1] = p.driven ? v.dot(w.now.external) : 0.0;
     out[2] = 0.0;
-    if (!w.rows.blocks.empty()) {
-        w.work.setZero();
-        for (int i : w.rows.blocks) add_transpose(p.blocks[i], w.A, w.lam, w.work);
-        out[2] = v.dot(w.work);
+    if (!w.now.rows.blocks.empty()) {
+        w.scratch.work.setZero();
+        for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.A, w.now.lam, w.scratch.work);
+        out[2] = v.dot(w.scratch.work);
     }
     if (!p.has_laws()) return;
     law_forces(p, w, v);
-    for (size_t l = 0; l < p.law_names.size(); ++l) out[3 + l] = v.dot(w.law_force[l]);
+    for (size_t l = 0; l < p.law_names.size(); ++l) out[3 + l] = v.dot(w.now.law_force[l]);
 }
 
 // out = y + (part_0 K_0 + ... + part_{n-1} K_{n-1}) for as many numbers from i as `Several` holds.
@@ -200,7 +200,7 @@ double Stepper::norm(const VecX& dy, const VecX& scale, const VecX& y) {
         sum += x * x;
     }
     for (int e = 0; e < system.ne; ++e) {
-        if (system.w.mode[e] != sticking) continue;
+        if (system.w.state.mode[e] != sticking) continue;
         const double x = dy[system.ny - system.ne + e] / watch_scale_;
         sum += x * x;
         ++n;
@@ -213,13 +213,13 @@ double Stepper::norm(const VecX& dy, const VecX& scale, const VecX& y) {
 void Stepper::remove_normal_part(int start) {
     Workspace& w = system.w;
     auto part = tangent.segment(start, system.nv);
-    w.work = part;
-    for (int i : w.rows.blocks) multiply(system.p.blocks[i], w.A, w.work, w.r);
-    solve_rows(system.p.layout, w.rows, w.r, w.lam);
-    w.work.setZero();
-    for (int i : w.rows.blocks) add_transpose(system.p.blocks[i], w.B, w.lam, w.work);
-    solve_Rt(system.p.mechanism, w.terms, w.work);
-    part -= w.work;
+    w.scratch.work = part;
+    for (int i : w.now.rows.blocks) multiply(system.p.blocks[i], w.now.A, w.scratch.work, w.scratch.r);
+    solve_rows(system.p.layout, w.now.rows, w.scratch.r, w.now.lam);
+    w.scratch.work.setZero();
+    for (int i : w.now.rows.blocks) add_transpose(system.p.blocks[i], w.now.B, w.now.lam, w.scratch.work);
+    solve_Rt(system.p.mechanism, w.now.terms, w.scratch.work);
+    part -= w.scratch.work;
 }
 
 double Stepper::error_norm(double rtol, const VecX& atol) {

@@ -8,7 +8,7 @@
 
 #include <string>
 
-#include "dynamics/program.hpp"
+#include "dynamics/evaluation.hpp"
 
 namespace pn {
 

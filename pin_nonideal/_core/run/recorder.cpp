@@ -14,7 +14,7 @@ void Recorder::sample(double t, const VecX& y, bool evaluated) {
     q_ = y.head(system.nq);
     v_ = y.segment(system.nq, system.nv);
     if (!evaluated && options.evaluates()) {
-        if (system.nz > 0) w.z = y.segment(system.nq + system.nv, system.nz);
+        if (system.nz > 0) w.state.z = y.segment(system.nq + system.nv, system.nz);
         evaluate(p, w, t, q_, v_);
     } else if (!evaluated && p.constraints > 0) {
         look_at(p, w, t, q_, v_);
@@ -27,8 +27,8 @@ void Recorder::sample(double t, const VecX& y, bool evaluated) {
     out.violation.push_back(position);
     out.violation_rate.push_back(velocity);
     if (system.nz > 0) append(out.z, y.segment(system.nq + system.nv, system.nz));
-    for (size_t e = 0; e < p.frictions.size(); ++e) out.modes.push_back(w.mode[e]);
-    if (options.a) append(out.a, w.a);
+    for (size_t e = 0; e < p.frictions.size(); ++e) out.modes.push_back(w.state.mode[e]);
+    if (options.a) append(out.a, w.now.a);
     if (options.power) {
         power_.resize(3 + p.law_names.size());
         power_.setZero();
@@ -36,8 +36,8 @@ void Recorder::sample(double t, const VecX& y, bool evaluated) {
         append(out.power, power_);
     }
     if (options.energy) {
-        out.energy.push_back(kinetic_energy(p.mechanism, w.terms, v_));
-        out.energy.push_back(potential_energy(p.mechanism, w.terms));
+        out.energy.push_back(kinetic_energy(p.mechanism, w.now.terms, v_));
+        out.energy.push_back(potential_energy(p.mechanism, w.now.terms));
         append(out.energy, y.segment(system.nq + system.nv + system.nz, system.nw));
         out.energy.push_back(moved_energy);
     }

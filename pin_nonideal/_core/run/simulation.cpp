@@ -60,12 +60,12 @@ void Simulation::between_steps() {
 
 void Simulation::sample_control(double now) {
     const auto* sampled = std::get_if<SampledTorque>(&p.actuation);
-    if (!sampled || w.has_override) return;
-    if (w.has_held && now < o.t0 + next_period * sampled->period) return;
+    if (!sampled || w.now.has_override) return;
+    if (w.state.has_held && now < o.t0 + next_period * sampled->period) return;
     q_ = y.head(system.nq);
     v_ = y.segment(system.nq, system.nv);
-    sampled->function(now, q_, v_, w.held_torque);
-    w.has_held = true;
+    sampled->function(now, q_, v_, w.state.held_torque);
+    w.state.has_held = true;
     next_period = static_cast<long>(std::floor((now - o.t0) / sampled->period * (1.0 + 1e-14) + 1e-9)) + 1;
     // The torque jumps here: the derivative is taken anew.
     begin_step(p, w, now, q_, v_);
@@ -97,7 +97,7 @@ void Simulation::emit_between(double t_now) {
         stepper.interpolate((next_sample - stepper.t0) / stepper.h, probe_);
         q_ = probe_.head(system.nq);
         v_ = probe_.segment(system.nq, system.nv);
-        if (!w.rows.blocks.empty()) {
+        if (!w.now.rows.blocks.empty()) {
             project(p, w, next_sample, q_, v_);
             probe_.head(system.nq) = q_;
             probe_.segment(system.nq, system.nv) = v_;
@@ -112,17 +112,17 @@ void Simulation::emit_between(double t_now) {
 double Simulation::energy_at(const VecX& state) {
     q_ = state.head(system.nq);
     v_ = state.segment(system.nq, system.nv);
-    place_bodies(p.mechanism, w.terms, q_);
-    mass_matrix(p.mechanism, w.terms);
-    return kinetic_energy(p.mechanism, w.terms, v_) + potential_energy(p.mechanism, w.terms);
+    place_bodies(p.mechanism, w.now.terms, q_);
+    mass_matrix(p.mechanism, w.now.terms);
+    return kinetic_energy(p.mechanism, w.now.terms, v_) + potential_energy(p.mechanism, w.now.terms);
 }
 
 void Simulation::settle(double at, VecX& state, VecX& rate) {
     double before = 0.0;
-    if (o.record.energy && !w.rows.blocks.empty()) before = energy_at(state);
+    if (o.record.energy && !w.now.rows.blocks.empty()) before = energy_at(state);
     q_ = state.head(system.nq);
     v_ = state.segment(system.nq, system.nv);
-    if (system.nz > 0) w.z = state.segment(system.nq + system.nv, system.nz);
+    if (system.nz > 0) w.state.z = state.segment(system.nq + system.nv, system.nz);
     bool moved = project_position(p, w, at, q_, v_);
     require_closed(p, w, at);
     moved |= begin_step_on_rates(p, w, at, v_);
@@ -130,7 +130,7 @@ void Simulation::settle(double at, VecX& state, VecX& rate) {
     state.segment(system.nq, system.nv) = v_;
     system.collect(at, state, rate);
     if (moved && o.record.energy)
-        pending_energy = kinetic_energy(p.mechanism, w.terms, v_) + potential_energy(p.mechanism, w.terms) - before;
+        pending_energy = kinetic_energy(p.mechanism, w.now.terms, v_) + potential_energy(p.mechanism, w.now.terms) - before;
     else pending_energy = 0.0;
 }
 
@@ -139,13 +139,13 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
     y.setZero();
     y.head(system.nq) = q0;
     y.segment(system.nq, system.nv) = v0;
-    if (system.nz > 0) y.segment(system.nq + system.nv, system.nz) = w.z;
+    if (system.nz > 0) y.segment(system.nq + system.nv, system.nz) = w.state.z;
     next_sample = o.t0 + o.output_dt;
     samples = 1;
     const double apart = o.output_dt > 0.0 ? o.output_dt : o.dt;  // the steps of adaptive methods are not known before
     if (apart > 0.0) recorder.reserve(static_cast<size_t>(std::min(o.duration / apart + 2.0, most_reserved)));
-    w.has_held = false;
-    w.warm = false;
+    w.state.has_held = false;
+    w.state.warm = false;
     next_period = 0;
     sample_control(t);
     switch_modes(t, y, -1);
@@ -202,8 +202,8 @@ void Simulation::advance_to(double stop) {
     stepper.K[0] = derivative;
     double error = 0.0;
     try {
-        const double start_pivot = w.rows.distance;
-        system.on_constraints = start_pivot < near_singular && !w.rows.blocks.empty();
+        const double start_pivot = w.now.rows.distance;
+        system.on_constraints = start_pivot < near_singular && !w.now.rows.blocks.empty();
         system.smallest_pivot = 1.0;
         stepper.step(t, size);
         if (system.smallest_pivot < near_singular && !system.on_constraints) {
@@ -211,7 +211,7 @@ void Simulation::advance_to(double stop) {
             stepper.step(t, size);
         }
         if (!stepper.y1.allFinite()) throw Failure(Failure::Kind::not_finite, t + size);
-        const double way = std::sqrt(start_pivot) + std::sqrt(w.rows.distance);
+        const double way = std::sqrt(start_pivot) + std::sqrt(w.now.rows.distance);
         if (o.method.adaptive && std::sqrt(system.smallest_pivot) < clearance * way &&
             rounding_at(system.smallest_pivot) > o.rtol && detours++ < detour_limit) {
             h = detour * size;

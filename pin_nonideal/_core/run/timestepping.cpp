@@ -25,7 +25,7 @@ void Simulation::moreau_step(double step) {
     std::vector<int> dims;
     int rows = 0;
     for (int e = 0; e < n; ++e) {
-        w.mode[e] = unloaded;
+        w.state.mode[e] = unloaded;
         dims.push_back(p.frictions[e].dim);
         rows += dims.back();
     }
@@ -34,57 +34,57 @@ void Simulation::moreau_step(double step) {
     for (int i = 0; i < p.constraints; ++i) {
         const Block& block = p.blocks[i];
         for (size_t k = 0; k < block.kept.size(); ++k)
-            w.b[block.row + k] = -w.values[i].rate[block.kept[k]] / step;
+            w.now.b[block.row + k] = -w.now.values[i].rate[block.kept[k]] / step;
     }
-    const VecX force = w.F + (p.has_laws() ? w.C : VecX(VecX::Zero(nv)));
+    const VecX force = w.now.F + (p.has_laws() ? w.now.C : VecX(VecX::Zero(nv)));
     solve_motion(p, w, force);
-    const VecX a_free = w.a;
+    const VecX a_free = w.now.a;
     VecX alpha0(rows), f = VecX::Zero(rows), limits(n), met(n);  // met: limits that f was found for
     MatX W(rows, rows), response(nv, rows), multipliers(p.layout.rows, rows);
-    const VecX lam_free = w.lam;
+    const VecX lam_free = w.now.lam;
     const auto slip = [&](const VecX& a, VecX& out_alpha) {
         for (int e = 0, at = 0; e < n; ++e) {
             const Block& block = p.blocks[p.frictions[e].block];
-            multiply(block, w.A, a, w.r);
-            for (size_t k = 0; k < block.kept.size(); ++k) out_alpha[at++] = w.r[block.row + k];
+            multiply(block, w.now.A, a, w.scratch.r);
+            for (size_t k = 0; k < block.kept.size(); ++k) out_alpha[at++] = w.scratch.r[block.row + k];
         }
     };
     slip(a_free, alpha0);
     for (int e = 0, at = 0; e < n; ++e)
-        for (int k = 0; k < dims[e]; ++k, ++at) alpha0[at] += w.values[p.frictions[e].block].rate[k] / step;
-    const VecX b = w.b;
-    w.b.setZero();
+        for (int k = 0; k < dims[e]; ++k, ++at) alpha0[at] += w.now.values[p.frictions[e].block].rate[k] / step;
+    const VecX b = w.now.b;
+    w.now.b.setZero();
     VecX unit = VecX::Zero(p.layout.rows), column(nv), alpha(rows);
     for (int e = 0, at = 0; e < n; ++e) {
         const Block& block = p.blocks[p.frictions[e].block];
         for (size_t k = 0; k < block.kept.size(); ++k, ++at) {
             column.setZero();
             unit[block.row + k] = 1.0;
-            add_transpose(block, w.A, unit, column);
+            add_transpose(block, w.now.A, unit, column);
             unit[block.row + k] = 0.0;
             solve_motion(p, w, column);
-            response.col(at) = w.a;
-            multipliers.col(at) = w.lam;
-            slip(w.a, alpha);
+            response.col(at) = w.now.a;
+            multipliers.col(at) = w.now.lam;
+            slip(w.now.a, alpha);
             W.col(at) = alpha;
         }
     }
-    w.b = b;
+    w.now.b = b;
     // Limits for the load of this very step.
     for (int pass = 0; pass < load_passes; ++pass) {
-        w.a = a_free + response * f;
-        w.lam = lam_free + multipliers * f;
+        w.now.a = a_free + response * f;
+        w.now.lam = lam_free + multipliers * f;
         for (int e = 0, at = 0; e < n; ++e) {
-            w.slip_force[e] = Vec3::Zero();
-            for (int k = 0; k < dims[e]; ++k) w.slip_force[e][k] = f[at++];
-            w.mode[e] = 1;
+            w.now.slip_force[e] = Vec3::Zero();
+            for (int k = 0; k < dims[e]; ++k) w.now.slip_force[e][k] = f[at++];
+            w.state.mode[e] = 1;
         }
         if (p.needs_reactions) gather_reactions(p, w);
         double change = 0.0, size = 0.0;
         for (int e = 0; e < n; ++e) {
             const Friction& friction = p.frictions[e];
             const double speed = slip_velocity(w, friction).norm();
-            const double limit = load_limit(p, w, friction, mid, w.terms.q, v0) *
+            const double limit = load_limit(p, w, friction, mid, w.now.terms.q, v0) *
                                  (speed == 0.0 ? friction.static_ratio : speed_factor(friction, speed));
             change = std::max(change, std::abs(limit - limits[e]));
             size = std::max(size, limit);
@@ -99,15 +99,15 @@ void Simulation::moreau_step(double step) {
     VecX v1 = v0 + step * (a_free + response * f);
     for (int e = 0, at = 0; e < n; at += dims[e], ++e) {
         const bool held = f.segment(at, dims[e]).norm() < met[e] * (1.0 - 1e-12);
-        w.mode[e] = held ? sticking : dims[e] > 1 || end[at] > 0.0 ? 1 : -1;
-        if (w.mode[e] == sticking)
+        w.state.mode[e] = held ? sticking : dims[e] > 1 || end[at] > 0.0 ? 1 : -1;
+        if (w.state.mode[e] == sticking)
             if (const auto* d = std::get_if<DofRows>(&p.blocks[p.frictions[e].block].kind))
                 for (int k = 0; k < d->count; ++k) v1[d->dof + k] = 0.0;
     }
     if (system.energy) {  // work over the step, by the mean velocity
         const VecX mean = 0.5 * (v0 + v1);
         probe_rate_.setZero();
-        w.lam = lam_free + multipliers * f;
+        w.now.lam = lam_free + multipliers * f;
         powers(p, w, mean, probe_rate_.data() + nq + nv + system.nz);
         const int at = nq + nv + system.nz;
         // Where a slip turns inside the step its mean velocity may go with the friction that meets its end: that is
@@ -120,7 +120,7 @@ void Simulation::moreau_step(double step) {
         }
         y.segment(at, system.nw) += step * probe_rate_.segment(at, system.nw);
     }
-    if (system.nz > 0) y.segment(nq + nv, system.nz) += step * w.dz;
+    if (system.nz > 0) y.segment(nq + nv, system.nz) += step * w.now.dz;
     move = 0.5 * step * v1;
     retract(m, qm.data(), move.data(), y.data());
     y.segment(nq, nv) = v1;
@@ -132,7 +132,7 @@ void Simulation::step_in_time(double stop, double dt) {
     double end = std::min({t + dt, stop, next_stop(t)});
     if (o.output_dt > 0.0) end = std::min(end, std::max(next_sample, std::nextafter(t, stop)));
     if (stop - end < 1e-9 * dt) end = stop;
-    const std::vector<signed char> before = w.mode;
+    const std::vector<signed char> before = w.state.mode;
     moreau_step(end - t);
     t = end;
     want_rows(p, w);
@@ -143,8 +143,8 @@ void Simulation::step_in_time(double stop, double dt) {
     remember_directions();
     recorder.moved_energy += pending_energy;
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
-        if (before[e] != w.mode[e])
-            out.events.push_back({t, w.mode[e] == sticking ? Event::Kind::stick
+        if (before[e] != w.state.mode[e])
+            out.events.push_back({t, w.state.mode[e] == sticking ? Event::Kind::stick
                                       : before[e] == sticking ? Event::Kind::slip : Event::Kind::reverse, e});
     report_pulls(t);
     const bool on_grid = o.output_dt > 0.0 && next_sample <= t + 1e-12 * std::max(1.0, std::abs(t));

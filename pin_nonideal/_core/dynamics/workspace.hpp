@@ -1,0 +1,75 @@
+// What a thread owns of a scene, split by who may rely on it: RunState lasts from step to step, Evaluation is what the
+// last evaluation found, Scratch means nothing after the call that wrote it.
+#pragma once
+
+#include "dynamics/program.hpp"
+
+namespace pn {
+
+struct Counters {
+    long evaluations = 0, factorizations = 0, projections = 0, iterations = 0;
+};
+
+// What the next step needs of those before it, beside the state (q, v) itself.
+struct RunState {
+    std::vector<signed char> mode;  // +1, -1 slip, 0 stick
+    // For elements of two or three directions: of the step's start, and where slip last had a clear direction.
+    std::vector<Vec3> slip_direction, last_direction;
+    bool indeterminate = false;   // what sticks shares its load in several ways: one multiplier says little
+    VecX z;                       // states of laws
+    VecX held_torque;             // of sampled control
+    bool has_held = false;
+    VecX unknown;                 // of the implicit reaction equation: where its next solution starts
+    bool warm = false;
+    VecX shift_third;             // multipliers of third order in the step, over its cube
+    bool ideal_decided = false;   // which rows are independent without what sticks, over this step
+};
+
+// What one evaluation at (t, q, v) yields.
+struct Evaluation {
+    Terms terms;
+    std::vector<RowValues> values;  // of each block
+    std::vector<double> A, B;
+    RowSystem rows;
+    VecX b, lam, lam_shared;  // by kept row; shared: least norm among redundant rows
+    VecX tau, external, F, C, C_smooth, base_C, a;  // generalized forces and acceleration
+    VecX balance;                     // M a - F - C - A^T lam: what holds the locked dofs
+    bool has_balance = false;
+    std::vector<double> limit;        // kinetic, at the present load and slip speed
+    std::vector<double> load;         // limit at rest before the static ratio
+    std::vector<Vec3> slip_force;     // of each slipping element, along its directions
+    std::vector<VecX> user_C;
+    VecX dz;
+    double speed = 0.0;               // largest velocity
+    double determinant = 1.0;         // of the implicit reaction equation
+    std::vector<Force> body_force, reaction_body;  // given forces; all external forces, then their subtree sums
+    std::vector<Motion> motion;
+    std::vector<Force> momentum;
+    std::vector<VecX> law_force;      // C of each law, when asked for
+    bool want_laws = false;
+    VecX override_torque;
+    bool has_override = false;
+};
+
+struct Scratch {
+    VecX scaled, scaled_free, trial, work, r, miss, lam_step;
+    RowSystem ideal_rows;  // of the constraints without what sticks; IdealMotion swaps them in
+    std::vector<char> ideal_locked;
+    // Of the projection of a position: where its factors were taken, the multipliers from there and in all, and the
+    // steps that they took.
+    VecX shift_start, shift, shift_sum;
+    std::vector<VecX> shift_steps;
+    VecX image, newton_step;  // of the implicit reaction equation
+    MatX jacobian;
+};
+
+struct Workspace {
+    RunState state;
+    Evaluation now;
+    Scratch scratch;
+    Counters counters;
+
+    explicit Workspace(const Program& p);
+};
+
+}  // namespace pn
