@@ -4,7 +4,9 @@
 
 #include <memory>
 #include <string>
+#include <tuple>
 #include <utility>
+#include <vector>
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -41,6 +43,15 @@ inline nb::object to_numpy(std::vector<double>&& x) {  // its numbers stay where
 inline void read_into(const nb::object& from, VecX& to) {
     const Array a = nb::cast<Array>(from);
     to = map(a);
+}
+
+using FrameTuple = std::tuple<int, std::vector<double>, std::vector<double>>;  // joint, R by rows, p
+
+inline Vec3 vec3(const std::vector<double>& x) { return Vec3(x[0], x[1], x[2]); }
+
+inline Frame frame_of(const FrameTuple& f) {
+    return {std::get<0>(f), Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(std::get<1>(f).data()),
+            vec3(std::get<2>(f))};
 }
 
 // A scene on its way into the core: Python adds constraints, laws and forces, and finishes the program.
@@ -113,6 +124,8 @@ RecordOptions read_record(const nb::dict& options);
 
 void bind_reactions(nb::module_& m);
 void bind_builder(nb::module_& m);
+void bind_constraints(nb::class_<Builder>& builder);
+void bind_slip_directions(nb::class_<Builder>& builder);
 void bind_runner(nb::module_& m);
 
 }  // namespace pn
