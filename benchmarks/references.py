@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .dense import DenseTree
+from oracles.dense import DenseTree
 
 Array = NDArray[np.float64]
 
@@ -247,7 +247,7 @@ def andrews(problem: Any) -> Reference:
 
 
 def dense_friction(problem: Any) -> Reference:
-    from .dense_friction import friction_motion
+    from oracles.dense_friction import friction_motion
 
     tree = dense_tree(problem)
     rough = friction_motion(tree, problem, 0.01)

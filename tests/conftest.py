@@ -1,8 +1,25 @@
-"""Ctrl-C as in a terminal: shells let what they start in the background, and its children, ignore it."""
+"""The oracles of the checkout, importable by name; and Ctrl-C as in a terminal."""
 
 from __future__ import annotations
 
+import importlib.util
 import signal
+import sys
+from pathlib import Path
 
+# Shells let what they start in the background, and its children, ignore Ctrl-C.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _import_oracles() -> None:
+    """`oracles` from its folder: the checkout on sys.path would hide the installed package and its core."""
+    file = Path(__file__).resolve().parent.parent / "oracles" / "__init__.py"
+    spec = importlib.util.spec_from_file_location("oracles", file)
+    assert spec is not None
+    assert spec.loader is not None
+    sys.modules["oracles"] = module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+
+
+_import_oracles()

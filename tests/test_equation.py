@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pin_nonideal.equation import RANK_TOLERANCE, solve
-
-from .paper_road import (
+from oracles.paper_road import (
     exact_road,
     generalized_inverse_road,
     kkt_road,
@@ -15,6 +13,7 @@ from .paper_road import (
     paper_road,
     stacked_road,
 )
+from pin_nonideal.equation import RANK_TOLERANCE, solve
 
 # Relative agreement of roads: the random problems have condition below 100, the literal road squares it, and
 # 1e4 roundings of 1e-16 leave 1e-12.

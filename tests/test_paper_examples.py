@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from oracles.paper_road import letters, paper_road
 from pin_nonideal.equation import solve
 
 from .paper_examples import example
-from .paper_road import letters, paper_road
 
 # Closed expressions of a dozen operations in numbers of size one, against a condition below 1e3: 1e-12 is 1e4
 # roundings.

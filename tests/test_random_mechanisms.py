@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import pin_nonideal as pn
+from oracles.friction_conditions import Conditions
 
-from .friction_conditions import Conditions
 from .random_mechanisms import mechanism
 
 DURATION = 0.5  # s: several events each
