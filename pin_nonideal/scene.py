@@ -189,7 +189,7 @@ class Scene:
         try:
             return nearest_state(self.model, self._lowered, self._nonholonomic(), q, v, t)
         except core.CoreFailure as failure:
-            raise self.failure(str(failure)) from None
+            raise self.failure(failure) from None
 
     def nearest_states(self, q: Array, v: Array, t: float, threads: int) -> tuple[Array, Array]:
         """What `project` gives for each of many states.
@@ -213,7 +213,7 @@ class Scene:
         try:
             return nearest_states(self.model, self._lowered, self._nonholonomic(), q, v, t, threads)
         except core.CoreFailure as failure:
-            raise self.failure(str(failure)) from None
+            raise self.failure(failure) from None
 
     def _nonholonomic(self) -> Rows:
         return nonholonomic_rows(self.constraints, self._lowered)
@@ -293,7 +293,7 @@ class Scene:
         try:
             return function(q_in, v_in, number("t", t), torque, *rest)
         except core.CoreFailure as failure:
-            raise self.failure(str(failure)) from None
+            raise self.failure(failure) from None
 
     def new_runner(self) -> Any:
         """A workspace of the core for one run."""
@@ -314,13 +314,13 @@ class Scene:
 
     # --- words ----------------------------------------------------------------------------------------------
 
-    def failure(self, text: str) -> RunError:
+    def failure(self, failure: Any) -> RunError:
         """The core's failure as the exception that names what is to blame.
 
         Args:
-            text: kind, time, value and indices, as the core wrote them.
+            failure: the core's CoreFailure.
         """
-        return named_failure(text, self.model, self._lowered)
+        return named_failure(failure, self.model, self._lowered)
 
     def report(self) -> str:
         """What the scene is made of: joints, constraints, rows, rank, mobility, and what was left out."""

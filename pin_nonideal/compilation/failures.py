@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from pin_nonideal.core import load_core
 from pin_nonideal.errors import (
     FrictionParadoxError,
     InconsistentConstraintsError,
@@ -22,8 +23,7 @@ from pin_nonideal.errors import (
 from .analysis import rows_at
 from .program import Lowered
 
-# Kinds of failure, as the core numbers them.
-SINGULAR, INCONSISTENT, NOT_FINITE, PARADOX, CLOSURE, STEP_SIZE, INTERRUPTED = range(7)
+core = load_core()
 
 # A sample with a larger gap than this [m or rad] has left the constraints: after every step projection comes
 # down to rounding, and in singular positions to the square root of it.
@@ -64,49 +64,54 @@ def _opened(name: str, gaps: dict[str, float], t: float, after: str = "") -> Loo
     )
 
 
-def named_failure(text: str, model: Any, low: Lowered) -> RunError:
+def named_failure(failure: Any, model: Any, low: Lowered) -> RunError:
     """The exception that says in names what the core says in numbers.
 
     Args:
-        text: kind, time, value and indices, as the core wrote them.
+        failure: the core's CoreFailure.
         model: pinocchio.Model.
         low: the program with its names.
     """
-    kind_text, time_text, value_text, *rest = text.split()
-    kind, t, value, items = int(kind_text), float(time_text), float(value_text), [int(x) for x in rest]
-    if kind == SINGULAR:
-        return _singular(model, items[0], t)
-    if kind == INCONSISTENT:
-        return _inconsistent([*low.blocks, *low.friction_names], items, value, t)
-    if kind == NOT_FINITE:
+    kinds, kind, t, value = core.FailureKind, failure.kind, failure.time, failure.value
+    if kind is kinds.singular_mass:
+        return _singular(model, failure.elements[0], t)
+    if kind is kinds.inconsistent:
+        return _inconsistent([*low.blocks, *low.friction_names], failure.elements, value, t)
+    if kind is kinds.not_finite:
         return NonFiniteError(f"acceleration is not finite at t = {t:.4g} s", time=t)
-    if kind == PARADOX:
-        element = ", ".join(low.friction_names[i] for i in items) or ", ".join(low.law_names)
-        return FrictionParadoxError(
-            f'friction of "{element}" has no solution or several at t = {t:.4g} s: '
-            f'det(I - d lam\'/d lam) = {value:.3g}; reduce mu, or use reaction="ideal"',
-            element=element,
-            determinant=value,
-            time=t,
-        )
-    if kind == CLOSURE:
-        name = list(low.blocks)[items[0]]
+    if kind is kinds.paradox:
+        names = (low.friction_names[i] for i in failure.elements)
+        return _paradox(", ".join(names) or ", ".join(low.law_names), value, t)
+    if kind is kinds.closure:
+        name = list(low.blocks)[failure.elements[0]]
         return _opened(name, {name: value}, t)
-    if kind == INTERRUPTED:
+    if kind is kinds.interrupted:
         return RunInterrupted(f"the run was interrupted at t = {t:.4g} s", time=t)
-    if kind == STEP_SIZE and value:
+    return _stuck(value, t)
+
+
+def _paradox(element: str, determinant: float, t: float) -> RunError:
+    return FrictionParadoxError(
+        f'friction of "{element}" has no solution or several at t = {t:.4g} s: '
+        f'det(I - d lam\'/d lam) = {determinant:.3g}; reduce mu, or use reaction="ideal"',
+        element=element,
+        determinant=determinant,
+        time=t,
+    )
+
+
+def _stuck(steps: float, t: float) -> RunError:
+    if steps:
         return StepSizeError(
-            f"the run would never end: after {value:.0f} steps it has come to t = {t:.4g} s; "
+            f"the run would never end: after {steps:.0f} steps it has come to t = {t:.4g} s; "
             'simulate a shorter duration, loosen rtol and atol, or use "Radau"',
             time=t,
         )
-    if kind == STEP_SIZE:
-        return StepSizeError(
-            f"the step size fell below rounding at t = {t:.6g} s: the motion is singular there, or stiff; "
-            'look at the last samples, loosen rtol and atol, or use "Radau"',
-            time=t,
-        )
-    return RunError(f"the run failed at t = {t:.6g} s", time=t)
+    return StepSizeError(
+        f"the step size fell below rounding at t = {t:.6g} s: the motion is singular there, or stiff; "
+        'look at the last samples, loosen rtol and atol, or use "Radau"',
+        time=t,
+    )
 
 
 def _inconsistent(names: Sequence[str], items: list[int], residual: float, t: float) -> RunError:

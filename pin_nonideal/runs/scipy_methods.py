@@ -160,5 +160,5 @@ def simulate_stiff(scene: Scene, q0: Array, v0: Array, options: dict[str, Any]) 
     except (KeyboardInterrupt, RunError) as error:
         stopped = {"error": error}
     except core.CoreFailure as failure:
-        stopped = {"failure": str(failure)}
+        stopped = {"failure": failure}
     return run.recorded() | stopped

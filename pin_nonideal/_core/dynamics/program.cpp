@@ -1,6 +1,5 @@
 // What a scene consists of, laid out for the evaluation, and the room that it works in.
 #include <algorithm>
-#include <cstdio>
 
 #include "dynamics/program.hpp"
 
@@ -49,17 +48,6 @@ std::vector<int> moved_dofs(const Mechanism& m, const Block& block) {
 }
 
 }  // namespace
-
-std::string Failure::encode(Kind k, double t, const std::vector<int>& e, double x) {
-    std::string text = std::to_string(static_cast<int>(k));
-    char number[40];
-    for (double value : {t, x}) {
-        std::snprintf(number, sizeof number, " %.17g", value);
-        text += number;
-    }
-    for (int element : e) text += " " + std::to_string(element);
-    return text;
-}
 
 void Program::finish() {
     int row = 0;

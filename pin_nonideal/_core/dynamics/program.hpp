@@ -2,27 +2,15 @@
 #pragma once
 
 #include <functional>
-#include <stdexcept>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "constraints/equation.hpp"
+#include "dynamics/failure.hpp"
 #include "friction/laws.hpp"
 
 namespace pn {
-
-// Why an evaluation or a run cannot go on; turned into the package's exceptions at the door.
-struct Failure : std::runtime_error {
-    enum class Kind { singular_mass, inconsistent, not_finite, paradox, closure, step_size, interrupted };
-    Kind kind;
-    double time = 0.0;
-    std::vector<int> elements;  // dofs, blocks or frictions, as the kind says
-    double value = 0.0;         // residual, gap or determinant
-    Failure(Kind k, double t, std::vector<int> e = {}, double x = 0.0)
-        : std::runtime_error(encode(k, t, e, x)), kind(k), time(t), elements(std::move(e)), value(x) {}
-    static std::string encode(Kind k, double t, const std::vector<int>& e, double x);
-};
 
 struct SpringDamper {
     Frame frame1, frame2;

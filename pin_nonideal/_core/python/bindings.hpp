@@ -122,6 +122,10 @@ nb::list rollout(const Builder& b, const Array2& q, const Array2& v, const Array
 
 RecordOptions read_record(const nb::dict& options);
 
+// What Python sees of a failure: an exception with its kind, time, elements and value.
+nb::object failure_object(const Failure& failure);
+
+void bind_failures(nb::module_& m);
 void bind_reactions(nb::module_& m);
 void bind_builder(nb::module_& m);
 void bind_constraints(nb::class_<Builder>& builder);

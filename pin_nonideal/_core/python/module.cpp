@@ -14,8 +14,8 @@ NB_MODULE(_core, m) {
     // Changes with the members of what a checkpoint holds.
     m.attr("state_layout") = std::to_string(sizeof(Workspace)) + "." + std::to_string(sizeof(Simulation)) + "." +
                              std::to_string(sizeof(long)) + " for Pinocchio " PIN_NONIDEAL_PINOCCHIO_VERSION;
-    nb::exception<Failure>(m, "CoreFailure");
 
+    bind_failures(m);
     bind_reactions(m);
     bind_builder(m);
     bind_runner(m);

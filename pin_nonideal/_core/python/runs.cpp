@@ -70,7 +70,7 @@ nb::dict Outcome::hand_over() {
     out["largest_violation"] = largest_violation;
     out["counters"] = nb::make_tuple(r.steps, r.rejected, counters.evaluations, counters.factorizations,
                                      counters.projections, counters.iterations);
-    out["failure"] = r.failure ? nb::cast(std::string(r.failure->what())) : nb::none();
+    out["failure"] = r.failure ? failure_object(*r.failure) : nb::none();
     out["error"] = nb::none();
     if (r.error) {
         try {

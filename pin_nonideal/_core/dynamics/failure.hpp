@@ -1,0 +1,20 @@
+// Why an evaluation or a run cannot go on: a value at the door, where the package's exceptions are made of it.
+#pragma once
+
+#include <exception>
+#include <utility>
+#include <vector>
+
+namespace pn {
+
+struct Failure : std::exception {
+    enum class Kind { singular_mass, inconsistent, not_finite, paradox, closure, step_size, interrupted };
+    Kind kind;
+    double time = 0.0;
+    std::vector<int> elements;  // dofs, blocks or frictions, as the kind says
+    double value = 0.0;         // residual, gap or determinant
+    Failure(Kind k, double t, std::vector<int> e = {}, double x = 0.0)
+        : kind(k), time(t), elements(std::move(e)), value(x) {}
+};
+
+}  // namespace pn

@@ -1,0 +1,40 @@
+// A failure of the core as the exception that Python sees: `CoreFailure` with kind, time, elements and value.
+#include <nanobind/stl/vector.h>
+
+#include "python/bindings.hpp"
+
+namespace pn {
+
+static PyObject* core_failure = nullptr;  // the exception's type, alive as long as the module
+
+nb::object failure_object(const Failure& failure) {
+    nb::object error = nb::handle(core_failure)();
+    error.attr("kind") = failure.kind;
+    error.attr("time") = failure.time;
+    error.attr("elements") = failure.elements;
+    error.attr("value") = failure.value;
+    return error;
+}
+
+void bind_failures(nb::module_& m) {
+    using Kind = Failure::Kind;
+    nb::enum_<Kind>(m, "FailureKind", "Why an evaluation or a run could not go on.")
+        .value("singular_mass", Kind::singular_mass, "elements: the degree of freedom")
+        .value("inconsistent", Kind::inconsistent, "elements: blocks of rows; value: residual")
+        .value("not_finite", Kind::not_finite)
+        .value("paradox", Kind::paradox, "elements: frictional elements; value: determinant")
+        .value("closure", Kind::closure, "elements: the block of rows; value: gap")
+        .value("step_size", Kind::step_size, "value: number of steps so far, when it would never end")
+        .value("interrupted", Kind::interrupted);
+    core_failure = PyErr_NewException("pin_nonideal._core.CoreFailure", nullptr, nullptr);
+    m.attr("CoreFailure") = nb::steal(core_failure).inc_ref();
+    nb::register_exception_translator([](const std::exception_ptr& thrown, void*) {
+        try {
+            std::rethrow_exception(thrown);
+        } catch (const Failure& failure) {
+            PyErr_SetObject(core_failure, failure_object(failure).ptr());
+        }
+    });
+}
+
+}  // namespace pn
