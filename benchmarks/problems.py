@@ -12,6 +12,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import pin_nonideal as pn
+from oracles.rods import rods
 
 from . import reference_store, references
 from .references import Reference
@@ -111,27 +112,16 @@ def bare(scene: pn.Scene) -> dict[str, Any]:
     return {"model": scene.model, "anchors": scene.constraints, "q0": q0, "v0": v0}
 
 
-def rods(lengths: list[float], masses: list[float], radius: float = 0.0) -> Any:
-    """A chain of uniform rods hinged about y that hangs along -z at zero angles."""
-    model = pin.Model()
-    model.name = "rods"
-    parent, place = 0, pin.SE3.Identity()
-    for k, (length, mass) in enumerate(zip(lengths, masses, strict=True)):
-        parent = model.addJoint(parent, pin.JointModelRY(), place, f"hinge{k + 1}")
-        across = mass * (length**2 / 12.0 + radius**2 / 4.0)
-        inertia = np.diag([across, across, max(0.5 * mass * radius**2, 1e-3 * across)])
-        model.appendBodyToJoint(
-            parent, pin.Inertia(mass, np.array([0.0, 0.0, -0.5 * length]), inertia), pin.SE3.Identity()
-        )
-        place = pin.SE3(np.eye(3), np.array([0.0, 0.0, -length]))
-    return model
+def hanging(lengths: list[float], masses: list[float]) -> Any:
+    """A chain of rods that hangs along -z at zero angles."""
+    return rods(lengths, masses, along=(0.0, 0.0, -1.0), name="hinge")
 
 
 def double_pendulum() -> Problem:
     return Problem(
         name="double_pendulum",
         title="double pendulum, 2 s",
-        model=rods([0.5, 0.4], [1.0, 0.7]),
+        model=hanging([0.5, 0.4], [1.0, 0.7]),
         q0=np.array([1.2, 0.8]),
         v0=np.zeros(2),
         duration=2.0,
@@ -212,7 +202,7 @@ def coulomb_pendulum() -> Problem:
     return Problem(
         name="coulomb_pendulum",
         title="pendulum with Coulomb friction, 2 s",
-        model=rods([1.0], [1.0]),
+        model=hanging([1.0], [1.0]),
         q0=np.array([1.2]),
         v0=np.zeros(1),
         duration=2.0,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from .dense import DenseTree
+from .modes import combinations
 
 Array = NDArray[np.float64]
 
@@ -35,13 +35,12 @@ class Friction:
 
     def choose(self, t: float, q: Array, v: Array) -> None:
         """Modes of the joints at rest that contradict neither their limits nor their accelerations."""
-        self.mode = np.where(np.abs(v) < AT_REST, 0.0, np.sign(v))
-        resting = self.held()
-        for guess in itertools.product((0.0, 1.0, -1.0), repeat=len(resting)):
-            self.mode[resting] = guess
+        resting = np.abs(v) <= AT_REST
+        for modes in combinations(v, AT_REST):
+            self.mode = np.array(modes, dtype=float)
             a, force = self.solve(t, q, v)
             holds = all(abs(f) <= self.coulomb[j] for f, j in zip(force, self.held(), strict=True))
-            if holds and all(a[j] * s > 0.0 for j, s in zip(resting, guess, strict=True) if s):
+            if holds and (self.mode * a > 0.0)[resting & (self.mode != 0.0)].all():
                 return
         raise RuntimeError(f"no modes fit at t = {t}")
 

@@ -7,17 +7,14 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
+from oracles.rods import rods
 
 from .mechanisms import GRAVITY, TIGHT, assert_close, at_events, body, dof, empty, frame, hinge, point_mass
 
 
 def arm(laws, angles=(0.5,), actuation=None, forces=()):
     """A chain of rods of 1 kg and 1 m that hang from the first pin; joints "pin0", "pin1", ..."""
-    model, parent = empty(), 0
-    for i in range(len(angles)):
-        place = pin.SE3(np.eye(3), np.array([0.0, 0.0, -1.0 if i else 0.0]))
-        options = {"place": place, "lever": (0.0, 0.0, -0.5), "inertia": np.diag([0.1, 0.1, 0.01])}
-        parent = body(model, parent, hinge(0.0, -1.0, 0.0), f"pin{i}", 1.0, **options)
+    model = rods(np.ones(len(angles)), along=(0.0, 0.0, -1.0), joint=hinge(0.0, -1.0, 0.0), name="pin")
     return pn.Scene(model, laws=laws, q0=angles, actuation=actuation, forces=forces)
 
 

@@ -6,8 +6,9 @@ import numpy as np
 import pinocchio as pin
 
 import pin_nonideal as pn
+from oracles.rods import rods
 
-from ..mechanisms import body, empty, frame
+from ..mechanisms import frame
 
 
 def at_most(what, value, bound):
@@ -25,22 +26,6 @@ def ledger(run):
 def finite(run):
     """Nothing that is no number came out."""
     assert all(np.isfinite(x).all() for x in (run.t, run.q, run.v, run.violation, run.violation_rate))
-
-
-def rods(lengths, masses=None, *, prefix="j", model=None, start=(0.0, 0.0, 0.0)):
-    """A chain of uniform rods along x, hinged about y, with a frame "<prefix>tip" at its end."""
-    model = empty() if model is None else model
-    masses = np.ones(len(lengths)) if masses is None else masses
-    joint, place = 0, pin.SE3(np.eye(3), np.array(start, dtype=float))
-    for k, (length, mass) in enumerate(zip(lengths, masses, strict=True)):
-        about = mass * length**2 / 12.0 * np.eye(3)
-        lever = (0.5 * length, 0.0, 0.0)
-        joint = body(
-            model, joint, pin.JointModelRY(), f"{prefix}{k}", mass, place=place, lever=lever, inertia=about
-        )
-        place = pin.SE3(np.eye(3), np.array([length, 0.0, 0.0]))
-    frame(model, f"{prefix}tip", joint, place)
-    return model
 
 
 def linkage(lengths, q0, v0, masses=None, **more):

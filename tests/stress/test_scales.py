@@ -9,9 +9,10 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
+from oracles.rods import rods
 
 from ..mechanisms import empty
-from .measure import at_most, finite, ledger, linkage, rods
+from .measure import at_most, finite, ledger, linkage
 
 TIGHT = {"rtol": 1e-12, "atol": 1e-13}
 # What is left of the energy at these tolerances after a few hundred steps.
@@ -58,7 +59,7 @@ def windows(lengths):
     """Four-bars of several sizes in one scene."""
     model, constraints = empty(), []
     for k, size in enumerate(lengths):
-        rods(np.array([0.4, 1.0, 0.8]) * size, prefix=f"w{k} ", model=model)
+        rods(np.array([0.4, 1.0, 0.8]) * size, name=f"w{k} ", model=model)
         constraints.append(pn.PointAnchor(f"w{k} tip", axes="xz", name=f"window {k}"))
     return pn.Scene(model, constraints=constraints, q0=np.tile([-1.2, 1.3, 1.5], len(lengths)))
 

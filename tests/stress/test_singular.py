@@ -7,10 +7,11 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
+from oracles.rods import rods
 from pin_nonideal.errors import LoopClosureError, StepSizeError
 
 from ..mechanisms import body, empty, frame
-from .measure import at_most, ledger, linkage, rods
+from .measure import at_most, ledger, linkage
 
 CLOSED = 1e-8
 # Residuals of a chain of meters after projection: a few hundred roundings.
@@ -53,8 +54,8 @@ def test_four_bars_that_fold_flat(case):
 
 def parallel_robot(*motions, v0=(0.0, 0.0, 0.0, 0.0), q0=(-2.0, 0.8, -1.14, -0.8)):
     """Two arms of two rods that share their tip: singular where the outer rods are in line."""
-    model = rods([0.5, 0.5], prefix="a", start=(-0.3, 0.0, 0.0))
-    rods([0.5, 0.5], prefix="b", start=(0.3, 0.0, 0.0), model=model)
+    model = rods([0.5, 0.5], name="a", start=(-0.3, 0.0, 0.0))
+    rods([0.5, 0.5], name="b", start=(0.3, 0.0, 0.0), model=model)
     tip = pn.PointAnchor("atip", "btip", axes="xz", name="tip")
     return pn.Scene(model, constraints=[tip, *motions], q0=q0, v0=v0)
 
