@@ -7,13 +7,8 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from oracles.core_oracles import (
-    MET,
-    assert_rows_match_differences,
-    assert_solves_its_rows,
-    consistent,
-    rows_at,
-)
+from oracles.differences import MET, assert_rows_match_differences, consistent, rows_at
+from oracles.solutions import assert_solves_its_rows
 
 from .random_trees import AXIS, attach, place_of, state, three_trees
 from .row_cases import ROBOTS, TREES

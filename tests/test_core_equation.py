@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import pin_nonideal as pn
-from oracles.core_oracles import KKT, assert_solves_its_rows, consistent, rows_at
+from oracles.differences import consistent, rows_at
+from oracles.solutions import KKT, assert_solves_its_rows
 
 from .random_trees import attach, place_of, three_trees
 from .row_cases import TREES, parallel_cranks

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import pin_nonideal as pn
-from oracles.core_oracles import rows_at
+from oracles.differences import rows_at
 
 from .random_trees import state, tree
 from .row_cases import TREES, parallel_cranks

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from oracles.core_oracles import consistent, rows_at
+from oracles.differences import consistent, rows_at
 
 from .random_trees import state, tree
 from .row_cases import ROBOTS

@@ -1,0 +1,57 @@
+"""The core's rows against differences: A against d residual, b against d(A v)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+# Central differences of fourth order at this step: truncation 1e-14, rounding 1e-16 / 1e-3; with a margin for
+# the curvature of short levers.
+STEP = 1e-3
+DIFFERENCES = 1e-6
+# Rows of a state that was projected are met to rounding.
+MET = 1e-12
+
+
+def fourth_order(f):
+    """Derivative of f at 0."""
+    return (8.0 * (f(STEP) - f(-STEP)) - (f(2 * STEP) - f(-2 * STEP))) / (12.0 * STEP)
+
+
+def consistent(scene, rng, t, speed=1.0):
+    """A random state of the scene on its constraints."""
+    q = pin.integrate(scene.model, scene.initial_state()[0], 0.1 * rng.standard_normal(scene.model.nv))
+    return scene.project(q, speed * rng.standard_normal(scene.model.nv), t)
+
+
+def rows_at(scene, runner, q, v, t):
+    A, b, phi, rate = runner.rows(np.asarray(q), np.asarray(v), float(t))
+    return A.reshape(-1, scene.model.nv), b, phi, rate
+
+
+def assert_rows_match_differences(scene, q, v, t, a):
+    model, runner = scene.model, scene.new_runner()
+    A, b, phi, rate = rows_at(scene, runner, q, v, t)
+    size = 1.0 + np.abs(A).max(initial=0.0)
+    np.testing.assert_allclose(phi, 0.0, atol=MET * size)
+    np.testing.assert_allclose(rate, 0.0, atol=10 * MET * size)
+
+    def moved(s, w, c=0.0):
+        return pin.integrate(model, q, s * w + 0.5 * s * s * c)
+
+    # A: every row's rate is linear in v with A as its matrix.
+    for k, e in enumerate(np.eye(model.nv)):
+        column = rows_at(scene, runner, q, v + e, t)[3] - rows_at(scene, runner, q, v, t)[3]
+        np.testing.assert_allclose(column, A[:, k], atol=DIFFERENCES * size)
+    # Residual: it changes at the rate, along any motion; rows without a residual stay at zero.
+    w = np.linspace(-1.0, 1.0, model.nv)
+    there = rows_at(scene, runner, q, w, t)[3]
+    change = fourth_order(lambda s: rows_at(scene, runner, moved(s, w), w, t + s)[2])
+    position = ~np.asarray(scene._nonholonomic())
+    scale = size + np.abs(there).max(initial=0.0)
+    np.testing.assert_allclose(change[position], there[position], atol=DIFFERENCES * scale)
+    np.testing.assert_array_equal(change[~position], 0.0)
+    # b: d rate/dt = A a - b along a motion with velocity v and acceleration a.
+    change = fourth_order(lambda s: rows_at(scene, runner, moved(s, v, a), v + s * a, t + s)[3])
+    scale = size * (1.0 + np.abs(a).max()) + np.abs(b).max(initial=0.0)
+    np.testing.assert_allclose(change, A @ a - b, atol=DIFFERENCES * scale)

@@ -1,0 +1,90 @@
+"""M and F of a scene: Pinocchio's mass matrix and bias forces, and given forces by frame Jacobians."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+
+import numpy as np
+import pinocchio as pin
+
+import pin_nonideal as pn
+
+from .frames import Frames
+
+
+def mass_matrix(model, q):
+    M = pin.crba(model, model.createData(), q, pin.Convention.WORLD)
+    return np.triu(M) + np.triu(M, 1).T
+
+
+def given_force(scene, q, v, t):
+    """F = tau + sum J^T f - nle(q, v), (nv,)."""
+    model, frames = scene.model, Frames(scene.model, q, v)
+    F = torque(scene.actuation, scene, q, v, t) - pin.nonLinearEffects(model, model.createData(), q, v)
+    for force in scene.forces:
+        F = F + generalized(force, frames, t, scene)
+    return F
+
+
+def torque(actuation, scene, q, v, t):
+    """What drives the joints, (nv,)."""
+    model = scene.model
+    if actuation is None:
+        return np.zeros(model.nv)
+    if isinstance(actuation, pn.HoldPosition):
+        kp, kd = (_gain(model, k) for k in (actuation.kp, actuation.kd))
+        goal = scene.q0 if actuation.q is None else np.asarray(actuation.q)
+        return kp * pin.difference(model, q, goal) - kd * v
+    if isinstance(actuation, pn.Table):
+        return np.array([np.interp(t, actuation.times, column) for column in np.transpose(actuation.values)])
+    if isinstance(actuation, pn.SampledControl):
+        return np.asarray(actuation.function(t, q, v), dtype=float)
+    return np.asarray(actuation(t, q, v) if callable(actuation) else actuation, dtype=float)
+
+
+def _gain(model, gain):
+    """A number acts on joints of one degree of freedom."""
+    if np.ndim(gain):
+        return np.asarray(gain, dtype=float)
+    return np.concatenate([np.full(j.nv, gain if j.nv == 1 else 0.0) for j in list(model.joints)[1:]])
+
+
+@singledispatch
+def generalized(force, frames, t, scene):
+    """Generalized force of one given force, (nv,)."""
+    raise TypeError(f"no generalized force is known for {force!r}")
+
+
+@generalized.register
+def _(force: pn.SpringDamper, frames, t, scene):
+    one, two = frames(force.frame1), frames(force.frame2)
+    if force.frame2 is None:  # the world, where frame1 starts
+        two.p = Frames(scene.model, scene.q0, np.zeros(scene.model.nv))(force.frame1).p
+    gap = one.p - two.p
+    length = np.linalg.norm(gap)
+    rate = gap @ (one.u - two.u) / length
+    size = force.stiffness * (length - force.rest_length) + force.damping * rate
+    return -(one.J - two.J).T @ (size * gap / length)
+
+
+@generalized.register
+def _(force: pn.JointSpring, frames, t, scene):
+    joint = scene.model.joints[scene.model.getJointId(force.joint)]
+    # An endless joint keeps (cos, sin) of its angle; springs of the tests turn less than half a turn.
+    angle = frames.q[joint.idx_q]
+    if joint.nq == 2:
+        angle = np.arctan2(frames.q[joint.idx_q + 1], angle)
+    size = force.stiffness * (angle - force.rest) + force.damping * frames.v[joint.idx_v]
+    return -size * np.eye(scene.model.nv)[joint.idx_v]
+
+
+@generalized.register
+def _(force: pn.Wrench, frames, t, scene):
+    frame = frames(force.frame)
+    wrench = np.asarray(force.value(t) if callable(force.value) else force.value, dtype=float)
+    return frame.J.T @ wrench[:3] + frame.Jw.T @ wrench[3:]
+
+
+@generalized.register
+def _(force: pn.UserForce, frames, t, scene):
+    return np.asarray(force.function(t, frames.q, frames.v), dtype=float)
