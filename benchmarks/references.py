@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oracles.dense import DenseTree
+from oracles.dense import DenseScene
 
 Array = NDArray[np.float64]
 
@@ -191,46 +191,9 @@ ANDREWS_END = {
 # --- dense mechanics --------------------------------------------------------------------------------------
 
 
-def dense_tree(problem: Any) -> DenseTree:
-    """The problem's mechanics in `dense`, without its friction."""
-    model = problem.model
-    probe = DenseTree(model)
-    probe.update(problem.q0, problem.v0)
-
-    def place(name: str) -> tuple[int, Array]:
-        frame = model.frames[model.getFrameId(name)]
-        return frame.parentJoint, frame.placement.translation.copy()
-
-    def ends(item: Any) -> tuple[int, Array, int, Array]:
-        joint, point = place(item.frame1)
-        if item.frame2 is None:
-            return joint, point, 0, probe.point(joint, point)[0]
-        return joint, point, *place(item.frame2)
-
-    anchors = [(*ends(a), ["xyz".index(axis) for axis in a.axes]) for a in problem.anchors]
-    springs = [(ends(s), s) for s in problem.springs]
-    torque = np.zeros(model.nv) if problem.torque is None else problem.torque
-
-    def forces(t: float, tree: DenseTree) -> Array:
-        force = torque.copy()
-        if problem.hold is not None:
-            kp, kd = problem.hold
-            force[6:] += kp[6:] * (problem.q0[7:] - tree.q[7:]) - kd[6:] * tree.v[6:]
-        for (joint1, point1, joint2, point2), spring in springs:
-            one, two = tree.point(joint1, point1), tree.point(joint2, point2)
-            gap = one[0] - two[0]
-            length = float(np.linalg.norm(gap))
-            pull = spring.stiffness * (length - spring.rest_length)
-            pull += spring.damping * float(gap @ (one[1] - two[1])) / length
-            force -= (one[3] - two[3]).T @ (pull * gap / length)
-        return force
-
-    return DenseTree(model, anchors, forces)
-
-
 def dense_motion(problem: Any) -> Reference:
-    tree = dense_tree(problem)
-    tight, loose = (tree.motion(problem.q0, problem.v0, problem.times, rtol) for rtol in (1e-13, 1e-12))
+    dense = DenseScene(problem.scene())
+    tight, loose = (dense.motion(problem.q0, problem.v0, problem.times, rtol) for rtol in (1e-13, 1e-12))
     miss = float(np.abs(tight - loose).max())
     return Reference(tight, max(miss, ROUNDING), "SciPy DOP853 at 1e-13 on a dense KKT system")
 
@@ -249,9 +212,9 @@ def andrews(problem: Any) -> Reference:
 def dense_friction(problem: Any) -> Reference:
     from oracles.dense_friction import friction_motion
 
-    tree = dense_tree(problem)
-    rough = friction_motion(tree, problem, 0.01)
-    fine = friction_motion(tree, problem, 0.004)
+    dense = DenseScene(problem.scene())
+    rough = friction_motion(dense, problem, 0.01)
+    fine = friction_motion(dense, problem, 0.004)
     miss = float(np.abs(rough - fine).max())
     return Reference(
         fine, max(miss, ROUNDING), "SciPy DOP853 at 1e-13 between events, dense, modes by enumeration"

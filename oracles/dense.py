@@ -6,18 +6,21 @@ The constrained acceleration solves [M A^T; A 0] [a; -lam] = [F; b] as one dense
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from scipy.linalg import qr
+
+from .frames import Frame
+from .given import applied_force
+from .rows import rows_of_frames, skew
 
 Array = NDArray[np.float64]
 
-
-def skew(w: Array) -> Array:
-    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+REDUNDANT = 1e-9  # part of a row that the others leave, when it depends on them
 
 
 def turned(axis: Array, angle: float) -> Array:
@@ -33,68 +36,82 @@ def of_quaternion(x: Array) -> Array:
     return np.eye(3) + 2.0 * w * K + 2.0 * K @ K
 
 
+def quaternion_rate(x: Array, w: Array) -> Array:
+    """d/dt of the quaternion (x, y, z, w) that turns at w in its own axes."""
+    return 0.5 * np.append(x[3] * w + np.cross(x[:3], w), -x[:3] @ w)
+
+
 class DenseTree:
-    """A tree of revolute joints, on the ground or on one floating base.
+    """A tree of joints about or along one axis, balls, and floating bases on the ground.
+
+    Called with a name, after `update`, it gives a `Frame`; None is the world.
 
     Args:
         model: pinocchio.Model; only its numbers are read.
-        anchors: (joint 1, point in it, joint 2 or 0 for the world, point in it, axes as indices).
-        forces: (t, tree) -> generalized force, (nv,), after `update`.
     """
 
-    def __init__(
-        self, model: Any, anchors: Sequence[tuple[int, Array, int, Array, list[int]]] = (), forces: Any = None
-    ):
-        self.n, self.nv, self.nq = model.njoints, model.nv, model.nq
-        self.anchors, self.forces = list(anchors), forces
+    def __init__(self, model: Any) -> None:
+        self.model, self.n, self.nv, self.nq = model, model.njoints, model.nv, model.nq
         self.gravity = np.array(model.gravity.linear)
         self.armature = np.array(model.armature)
         self.parents = list(model.parents)
         self.places = [(M.rotation.copy(), M.translation.copy()) for M in model.jointPlacements]
         self.bodies = [(Y.mass, Y.lever.copy(), Y.inertia.copy()) for Y in model.inertias]
+        frames = (
+            (f.name, (f.parentJoint, f.placement.rotation, f.placement.translation)) for f in model.frames
+        )
+        self.frames = dict(frames)
+        self.joints = {name: i for i, name in enumerate(model.names)}
         self.iq, self.iv = [j.idx_q for j in model.joints], [j.idx_v for j in model.joints]
-        self.free, self.axes = [False] * self.n, [np.zeros(3)] * self.n
-        for i in range(1, self.n):
-            kind = model.joints[i].shortname()
-            if kind == "JointModelFreeFlyer":
-                self.free[i] = True
-            elif kind in ("JointModelRX", "JointModelRY", "JointModelRZ"):
-                self.axes[i] = np.eye(3)["XYZ".index(kind[-1])]
+        self.kinds, self.axes = ["world"], [np.zeros(6)]  # axes: rate of place and of turning for v = 1
+        for joint in list(model.joints)[1:]:
+            kind, axis = joint.shortname(), np.zeros(6)
+            if kind in ("JointModelFreeFlyer", "JointModelSpherical"):
+                self.kinds.append("base" if kind.endswith("Flyer") else "ball")
+            elif joint.nq == joint.nv == 1 and "Composite" not in kind:
+                self.kinds.append("axis")
+                numbers = joint.createData()
+                joint.calc(numbers, np.zeros(model.nq))
+                axis = np.array(numbers.S).ravel()
             else:
-                raise ValueError(
-                    f"the reference knows revolute joints about x, y, z and free flyers; got {kind}"
-                )
+                raise ValueError(f"the reference knows joints of one axis, balls and free flyers; got {kind}")
+            self.axes.append(axis)
 
     def update(self, q: Array, v: Array) -> None:
         """Placements, velocities, Jacobians and accelerations at zero joint acceleration."""
         n, nv = self.n, self.nv
         self.q, self.v = q, v
         self.R, self.p = [np.eye(3)] * n, [np.zeros(3)] * n
-        self.w, self.u, self.dw, self.du = (
-            [np.zeros(3)] * n for _ in range(4)
-        )  # rates of turning, of the origin
+        self.w, self.u, self.dw, self.du = ([np.zeros(3)] * n for _ in range(4))  # turning, moving; rates
         self.Jw, self.Jp = [np.zeros((3, nv))] * n, [np.zeros((3, nv))] * n
         for i in range(1, n):
             k, j, j0 = self.parents[i], self.iv[i], self.iq[i]
             R0, p0 = self.places[i]
+            R, W = self.R[k] @ R0, skew(self.w[k])
+            slide, spin = R @ self.axes[i][:3], R @ self.axes[i][3:]  # zero but for joints of one axis
             arm = self.R[k] @ p0
-            W = skew(self.w[k])
-            R, p = self.R[k] @ R0, self.p[k] + arm
-            u = self.u[k] + W @ arm
-            du = self.du[k] + skew(self.dw[k]) @ arm + W @ W @ arm
+            if self.kinds[i] == "axis":
+                arm = arm + slide * q[j0]
+            p = self.p[k] + arm
+            u = self.u[k] + W @ arm + slide * v[j]
+            du = self.du[k] + skew(self.dw[k]) @ arm + W @ W @ arm + 2.0 * W @ slide * v[j]
             Jw, Jp = self.Jw[k].copy(), self.Jp[k] - skew(arm) @ self.Jw[k]
-            if self.free[i]:  # on the ground only: q = (place, quaternion), v in the moving axes
+            if self.kinds[i] == "axis":
+                R = R @ turned(self.axes[i][3:], q[j0])
+                w = self.w[k] + spin * v[j]
+                dw = self.dw[k] + W @ spin * v[j]
+                Jw[:, j], Jp[:, j] = spin, slide
+            elif self.kinds[i] == "ball":  # v in the moving axes
+                R = R @ of_quaternion(q[j0 : j0 + 4])
+                spin = R @ v[j : j + 3]
+                w, dw = self.w[k] + spin, self.dw[k] + W @ spin
+                Jw[:, j : j + 3] = R
+            else:  # on the ground only: q = (place, quaternion), v in the moving axes
                 p = p + R @ q[j0 : j0 + 3]
                 R = R @ of_quaternion(q[j0 + 3 : j0 + 7])
                 u, w = R @ v[j : j + 3], R @ v[j + 3 : j + 6]
                 du, dw = np.cross(w, u), np.zeros(3)
                 Jp[:, j : j + 3], Jw[:, j + 3 : j + 6] = R, R
-            else:
-                axis = R @ self.axes[i]
-                R = R @ turned(self.axes[i], q[j0])
-                w = self.w[k] + axis * v[j]
-                dw = self.dw[k] + np.cross(self.w[k], axis) * v[j]
-                Jw[:, j] = axis
             self.R[i], self.p[i], self.u[i], self.w[i], self.du[i], self.dw[i] = R, p, u, w, du, dw
             self.Jw[i], self.Jp[i] = Jw, Jp
 
@@ -112,25 +129,65 @@ class DenseTree:
             h += mass * J.T @ acceleration + self.Jw[i].T @ (turn @ self.dw[i] + W @ turn @ self.w[i])
         return M, h
 
-    def point(self, joint: int, place: Array) -> tuple[Array, Array, Array, Array]:
-        """Position, velocity, acceleration at rest and Jacobian of a point of a body."""
-        arm = self.R[joint] @ place
-        W = skew(self.w[joint])
-        return (
-            self.p[joint] + arm,
-            self.u[joint] + W @ arm,
-            self.du[joint] + skew(self.dw[joint]) @ arm + W @ W @ arm,
-            self.Jp[joint] - skew(arm) @ self.Jw[joint],
+    def __call__(self, name: str | None) -> Frame:
+        """The frame of a name; None is the world."""
+        i, R, p = (0, np.eye(3), np.zeros(3)) if name is None else self.frames[name]
+        arm, W = self.R[i] @ p, skew(self.w[i])
+        return Frame(
+            p=self.p[i] + arm,
+            R=self.R[i] @ R,
+            J=self.Jp[i] - skew(arm) @ self.Jw[i],
+            Jw=self.Jw[i],
+            u=self.u[i] + W @ arm,
+            w=self.w[i],
+            du=self.du[i] + skew(self.dw[i]) @ arm + W @ W @ arm,
+            dw=self.dw[i],
         )
 
-    def rows(self) -> tuple[Array, Array]:
-        """A and b of the anchors; a joint 2 other than the world must share the plane or all axes."""
-        A, b = [], []
-        for joint1, place1, joint2, place2, axes in self.anchors:
-            one, two = self.point(joint1, place1), self.point(joint2, place2)
-            A.append((one[3] - two[3])[axes])
-            b.append((two[2] - one[2])[axes])
-        return np.vstack(A), np.concatenate(b)
+    def at(self, q: Array) -> DenseTree:
+        """The same tree elsewhere, at rest."""
+        other = DenseTree(self.model)
+        other.update(q, np.zeros(self.nv))
+        return other
+
+    def dof(self, joint: str) -> int:
+        """Place of a joint's first velocity in v."""
+        return self.iv[self.joints[joint]]
+
+    def moving(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """q with its quaternions at unit length, and dq/dt."""
+        q, dq = q.copy(), np.zeros(self.nq)
+        for i in range(1, self.n):
+            j, j0 = self.iv[i], self.iq[i]
+            if self.kinds[i] == "axis":
+                dq[j0] = v[j]
+                continue
+            if self.kinds[i] == "base":
+                place, j0, j = slice(j0, j0 + 3), j0 + 3, j + 3
+                dq[place] = of_quaternion(q[j0 : j0 + 4] / np.linalg.norm(q[j0 : j0 + 4])) @ v[j - 3 : j]
+            q[j0 : j0 + 4] /= np.linalg.norm(q[j0 : j0 + 4])
+            dq[j0 : j0 + 4] = quaternion_rate(q[j0 : j0 + 4], v[j : j + 3])
+        return q, dq
+
+
+class DenseScene:
+    """The motion of a scene's tree, constraints, forces and actuation; its laws are the caller's.
+
+    Args:
+        scene: pn.Scene; its descriptions are read.
+        laws: (t, q, v) -> nonideal force C, (nv,); None for none.
+    """
+
+    def __init__(self, scene: Any, laws: Callable[[float, Array, Array], Array] | None = None) -> None:
+        self.scene, self.laws, self.tree = scene, laws, DenseTree(scene.model)
+        self.nv, self.nq = self.tree.nv, self.tree.nq
+        self.independent: list[int] | None = None  # rows, decided at the first state
+
+    def terms(self, t: float, q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
+        """M, F, A and b."""
+        self.tree.update(q, v)
+        M, h = self.tree.mass_and_bias()
+        return M, applied_force(self.scene, self.tree, t) - h, *rows_of_frames(self.scene, self.tree, t)
 
     def acceleration(self, t: float, q: Array, v: Array, held: Sequence[int] = ()) -> tuple[Array, Array]:
         """Acceleration, and the force that every held degree of freedom needs to stay at rest.
@@ -141,10 +198,12 @@ class DenseTree:
             v: velocity.
             held: degrees of freedom without acceleration.
         """
-        self.update(q, v)
-        M, h = self.mass_and_bias()
-        force = -h if self.forces is None else self.forces(t, self) - h
-        A, b = self.rows() if self.anchors else (np.zeros((0, self.nv)), np.zeros(0))
+        M, force, A, b = self.terms(t, q, v)
+        if self.laws is not None:
+            force = force + self.laws(t, q, v)
+        if self.independent is None:
+            self.independent = _independent(A / np.sqrt(np.diag(M)))
+        A, b = A[self.independent], b[self.independent]
         A, b = np.vstack([A, np.eye(self.nv)[list(held)]]), np.concatenate([b, np.zeros(len(held))])
         m = len(b)
         x = np.linalg.solve(np.block([[M, A.T], [A, np.zeros((m, m))]]), np.concatenate([force, b]))
@@ -152,20 +211,8 @@ class DenseTree:
 
     def rate(self, t: float, y: Array) -> Array:
         """dy/dt of y = (q, v)."""
-        q, v = y[: self.nq].copy(), y[self.nq :]
-        dq = np.zeros(self.nq)
-        for i in range(1, self.n):
-            j, j0 = self.iv[i], self.iq[i]
-            if self.free[i]:
-                x = q[j0 + 3 : j0 + 7] / np.linalg.norm(q[j0 + 3 : j0 + 7])
-                q[j0 + 3 : j0 + 7] = x
-                w = v[j + 3 : j + 6]
-                dq[j0 : j0 + 3] = of_quaternion(x) @ v[j : j + 3]
-                dq[j0 + 3 : j0 + 6] = 0.5 * (x[3] * w + np.cross(x[:3], w))
-                dq[j0 + 6] = -0.5 * x[:3] @ w
-            else:
-                dq[j0] = v[j]
-        return np.concatenate([dq, self.acceleration(t, q, v)[0]])
+        q, dq = self.tree.moving(y[: self.nq], y[self.nq :])
+        return np.concatenate([dq, self.acceleration(t, q, y[self.nq :])[0]])
 
     def motion(self, q: Array, v: Array, times: Array, rtol: float = 1e-13) -> Array:
         """Configurations at some times, by SciPy's DOP853, started anew at each of them.
@@ -185,5 +232,15 @@ class DenseTree:
             if not out.success:
                 raise RuntimeError(f"the reference did not reach its end: {out.message}")
             t, y = float(end), out.y[:, -1]
-            found.append(y[: self.nq])
+            found.append(self.tree.moving(y[: self.nq], y[self.nq :])[0])
         return np.array(found)
+
+
+def _independent(A: Array) -> list[int]:
+    """Rows that span all rows, each of unit length."""
+    length = np.linalg.norm(A, axis=1)
+    long = np.flatnonzero(length > REDUNDANT * length.max(initial=0.0))
+    if not len(long):
+        return []
+    _, R, order = qr((A[long] / length[long, None]).T, mode="economic", pivoting=True)
+    return sorted(long[order[: np.count_nonzero(np.abs(np.diag(R)) > REDUNDANT)]].tolist())

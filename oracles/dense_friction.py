@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from .dense import DenseTree
+from .dense import DenseScene
 from .modes import combinations
 
 Array = NDArray[np.float64]
@@ -20,10 +20,10 @@ MOST_EVENTS = 500
 class Friction:
     """A tree of joints with one freedom each, some sliding (+1, -1), some held (0)."""
 
-    def __init__(self, tree: DenseTree, coulomb: Array, viscous: Array) -> None:
-        self.tree, self.coulomb, self.viscous = tree, coulomb, viscous
-        self.mode = np.zeros(tree.nv)
-        tree.forces = lambda t, tree: -coulomb * self.mode - viscous * tree.v
+    def __init__(self, dense: DenseScene, coulomb: Array, viscous: Array) -> None:
+        self.dense, self.coulomb, self.viscous = dense, coulomb, viscous
+        self.mode = np.zeros(dense.nv)
+        dense.laws = lambda t, q, v: -coulomb * self.mode - viscous * v
 
     def held(self) -> list[int]:
         """Joints at rest."""
@@ -31,7 +31,7 @@ class Friction:
 
     def solve(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
         """Acceleration, and friction force of every joint that is held."""
-        return self.tree.acceleration(t, q, v, self.held())
+        return self.dense.acceleration(t, q, v, self.held())
 
     def choose(self, t: float, q: Array, v: Array) -> None:
         """Modes of the joints at rest that contradict neither their limits nor their accelerations."""
@@ -45,17 +45,17 @@ class Friction:
         raise RuntimeError(f"no modes fit at t = {t}")
 
 
-def friction_motion(tree: DenseTree, problem: Any, max_step: float) -> Array:
+def friction_motion(dense: DenseScene, problem: Any, max_step: float) -> Array:
     """Configurations at the problem's sample times, (k, nq).
 
     Args:
-        tree: its mechanics.
+        dense: its mechanics, without friction.
         problem: gives the initial state, the friction and the times.
         max_step: of the integrator [s]; the interpolant that locates events is as good as this is short.
     """
-    friction = Friction(tree, problem.coulomb, problem.viscous)
+    friction = Friction(dense, problem.coulomb, problem.viscous)
     t, q, v = 0.0, problem.q0.copy(), problem.v0.copy()
-    nv = tree.nv
+    nv = dense.nv
     friction.choose(t, q, v)
     found: list[Array] = []
     times = problem.times

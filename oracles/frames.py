@@ -53,6 +53,10 @@ class Frames:
         u, du = pin.getFrameVelocity(*at), pin.getFrameClassicalAcceleration(*at)
         return Frame(p, R, J[:3], J[3:], u.linear, u.angular, du.linear, du.angular)
 
+    def at(self, q):
+        """The frames of the same model elsewhere, at rest."""
+        return Frames(self.model, q, np.zeros(self.model.nv))
+
     def dof(self, joint):
         """Place of a joint's first velocity in v."""
         return self.model.joints[self.model.getJointId(joint)].idx_v

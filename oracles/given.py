@@ -19,11 +19,14 @@ def mass_matrix(model, q):
 
 def given_force(scene, q, v, t):
     """F = tau + sum J^T f - nle(q, v), (nv,)."""
-    model, frames = scene.model, Frames(scene.model, q, v)
-    F = torque(scene.actuation, scene, q, v, t) - pin.nonLinearEffects(model, model.createData(), q, v)
-    for force in scene.forces:
-        F = F + generalized(force, frames, t, scene)
-    return F
+    bias = pin.nonLinearEffects(scene.model, scene.model.createData(), q, v)
+    return applied_force(scene, Frames(scene.model, q, v), t) - bias
+
+
+def applied_force(scene, frames, t):
+    """tau + sum J^T f from the frames of any kinematics, (nv,)."""
+    force = torque(scene.actuation, scene, frames.q, frames.v, t)
+    return sum((generalized(f, frames, t, scene) for f in scene.forces), start=force)
 
 
 def torque(actuation, scene, q, v, t):
@@ -34,7 +37,7 @@ def torque(actuation, scene, q, v, t):
     if isinstance(actuation, pn.HoldPosition):
         kp, kd = (_gain(model, k) for k in (actuation.kp, actuation.kd))
         goal = scene.q0 if actuation.q is None else np.asarray(actuation.q)
-        return kp * pin.difference(model, q, goal) - kd * v
+        return kp * _difference(model, q, goal, kp) - kd * v
     if isinstance(actuation, pn.Table):
         return np.array([np.interp(t, actuation.times, column) for column in np.transpose(actuation.values)])
     if isinstance(actuation, pn.SampledControl):
@@ -49,6 +52,20 @@ def _gain(model, gain):
     return np.concatenate([np.full(j.nv, gain if j.nv == 1 else 0.0) for j in list(model.joints)[1:]])
 
 
+def _difference(model, q, goal, gain):
+    """goal - q in the tangent space, of the joints that have a gain."""
+    found = np.zeros(model.nv)
+    for joint in list(model.joints)[1:]:
+        dofs = slice(joint.idx_v, joint.idx_v + joint.nv)
+        if not gain[dofs].any():
+            continue
+        if joint.nq == joint.nv == 1:
+            found[dofs] = goal[joint.idx_q] - q[joint.idx_q]
+        else:
+            found[dofs] = pin.difference(model, q, goal)[dofs]
+    return found
+
+
 @singledispatch
 def generalized(force, frames, t, scene):
     """Generalized force of one given force, (nv,)."""
@@ -59,7 +76,7 @@ def generalized(force, frames, t, scene):
 def _(force: pn.SpringDamper, frames, t, scene):
     one, two = frames(force.frame1), frames(force.frame2)
     if force.frame2 is None:  # the world, where frame1 starts
-        two.p = Frames(scene.model, scene.q0, np.zeros(scene.model.nv))(force.frame1).p
+        two.p = frames.at(scene.q0)(force.frame1).p
     gap = one.p - two.p
     length = np.linalg.norm(gap)
     rate = gap @ (one.u - two.u) / length

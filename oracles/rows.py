@@ -24,7 +24,11 @@ def skew(x):
 
 def rows(scene, q, v, t):
     """A, (m, nv), and b, (m,), of all constraints and contacts in the order of `lam`."""
-    frames = Frames(scene.model, q, v)
+    return rows_of_frames(scene, Frames(scene.model, q, v), t)
+
+
+def rows_of_frames(scene, frames, t):
+    """The same from the frames of any kinematics."""
     found = [of_kind(c, frames, t, scene) for c in (*scene.constraints, *scene.contacts)]
     A, b = [np.zeros((0, scene.model.nv))], [np.zeros(0)]
     for part, right in found:
@@ -73,7 +77,7 @@ def _(c: pn.HingeAnchor, frames, t, scene):
     (J, drift), (Jw, turning) = _relative(one, two), _turning(one, two)
     axis = np.asarray(c.axis)
     if c.frame2 is None:
-        axis = Frames(scene.model, scene.q0, np.zeros(scene.model.nv))(c.frame1).R @ axis
+        axis = frames.at(scene.q0)(c.frame1).R @ axis
     across = np.array(axis_triad(tuple(axis))[:2])
     return np.vstack([J, across @ Jw]), -np.concatenate([drift, across @ turning])
 
@@ -82,7 +86,7 @@ def _(c: pn.HingeAnchor, frames, t, scene):
 def _(c: pn.Distance, frames, t, scene):
     one, two = frames(c.frame1), frames(c.frame2)
     if c.frame2 is None:  # the world, where frame1 starts
-        two.p = Frames(scene.model, scene.q0, np.zeros(scene.model.nv))(c.frame1).p
+        two.p = frames.at(scene.q0)(c.frame1).p
     d, u = one.p - two.p, one.u - two.u
     length = np.linalg.norm(d)
     n = d / length
