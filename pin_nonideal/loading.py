@@ -22,7 +22,7 @@ from .scene import Scene
 FILE_PARAMETERS = ("free_flyer", "package_dirs", "merge_ball_joints")
 
 
-def load(name: str | os.PathLike[str], **parameters: Any) -> Scene:
+def load(name: str | os.PathLike[str], *, terms: str = "core", **parameters: Any) -> Scene:
     """Loads a robot as a scene.
 
     `name` is one of
@@ -38,6 +38,7 @@ def load(name: str | os.PathLike[str], **parameters: Any) -> Scene:
 
     Args:
         name: see above.
+        terms: who computes M(q) and the bias forces, see `Scene`.
         **parameters: of a generated robot, such as N for "n_four_bar"; of URDF files and folders:
             `free_flyer` (bool, a floating base), `package_dirs` (folders for package:// paths),
             `merge_ball_joints` (bool, True).
@@ -54,8 +55,8 @@ def load(name: str | os.PathLike[str], **parameters: Any) -> Scene:
     text = os.fspath(name) if isinstance(name, (str, os.PathLike)) else None
     if not isinstance(text, str) or not text or "\0" in text:
         raise InputError(f"name must be the name of a robot or a path; got {name!r}")
-    scene = _load(name, text, parameters)
-    scene.origin = _origin(text, parameters)
+    scene = Scene(**_load(name, text, parameters), terms=terms)
+    scene.origin = _origin(text, parameters if terms == "core" else {**parameters, "terms": terms})
     return scene
 
 
@@ -75,7 +76,7 @@ def _origin(text: str, parameters: dict[str, Any]) -> dict[str, Any] | None:
         return None
 
 
-def _load(name: str | os.PathLike[str], text: str, parameters: dict[str, Any]) -> Scene:
+def _load(name: str | os.PathLike[str], text: str, parameters: dict[str, Any]) -> dict[str, Any]:
     path = Path(text).expanduser()
     folders = robot_folders()
     if text in folders:
@@ -90,7 +91,7 @@ def _load(name: str | os.PathLike[str], text: str, parameters: dict[str, Any]) -
     ):
         return _load_file(path, parameters)
     check_parameters(parameters, (), text)
-    return Scene(**scene_arguments(_example_robot(text, list(folders)), {}, text, merge=False))
+    return scene_arguments(_example_robot(text, list(folders)), {}, text, merge=False)
 
 
 def robots() -> list[tuple[str, str]]:
@@ -135,21 +136,21 @@ def _file_options(parameters: dict[str, Any], name: str) -> tuple[dict[str, Any]
     return options, parameters.get("merge_ball_joints", True)
 
 
-def _load_file(path: Path, parameters: dict[str, Any]) -> Scene:
+def _load_file(path: Path, parameters: dict[str, Any]) -> dict[str, Any]:
     if not path.is_file():
         raise LoadingError(f'no file or folder "{path}"; give a path that exists, or the name of a robot')
     if path.suffix == ".urdf":
         options, merge = _file_options(parameters, path.name)
-        return Scene(**scene_arguments(read_urdf(path, **options), {}, path.stem, merge=merge))
+        return scene_arguments(read_urdf(path, **options), {}, path.stem, merge=merge)
     if path.suffix in (".xml", ".mjcf"):
         check_parameters(parameters, (), path.name)
-        return Scene(**scene_arguments(read_mjcf(path), {}, path.stem, merge=False))
+        return scene_arguments(read_mjcf(path), {}, path.stem, merge=False)
     raise LoadingError(
         f'"{path}" must be a folder, a .urdf file or a .xml file (MJCF); got "{path.suffix or path.name}"'
     )
 
 
-def _load_folder(folder: Path, parameters: dict[str, Any]) -> Scene:
+def _load_folder(folder: Path, parameters: dict[str, Any]) -> dict[str, Any]:
     """A folder with robot.yaml, robot.urdf, or both."""
     name = folder.resolve().name
     yaml_path = folder / "robot.yaml"
@@ -173,11 +174,13 @@ def _load_folder(folder: Path, parameters: dict[str, Any]) -> Scene:
     if "example_robot_data" in entry:
         check_parameters(parameters, (), name)
         robot = _example_robot(entry["example_robot_data"], [])
-        return Scene(**scene_arguments(robot, table, name, merge=False))
+        return scene_arguments(robot, table, name, merge=False)
     return _from_urdf(folder, entry, table, parameters, name)
 
 
-def _from_urdf(folder: Path, entry: Table, table: Table, parameters: dict[str, Any], name: str) -> Scene:
+def _from_urdf(
+    folder: Path, entry: Table, table: Table, parameters: dict[str, Any], name: str
+) -> dict[str, Any]:
     urdf = folder / entry.get("urdf", "robot.urdf")
     if not urdf.resolve().is_relative_to(folder.resolve()):
         raise LoadingError(f'model: urdf must lie in the folder "{folder}"; got "{entry["urdf"]}"')
@@ -187,7 +190,7 @@ def _from_urdf(folder: Path, entry: Table, table: Table, parameters: dict[str, A
         raise LoadingError(f'"{folder}" must hold a {urdf.name}; there is none{hint}')
     options, merge = _file_options(parameters, name)
     options.setdefault("free_flyer", _flag(entry, "free_flyer", name))
-    return Scene(**scene_arguments(read_urdf(urdf, **options), table, name, merge=merge))
+    return scene_arguments(read_urdf(urdf, **options), table, name, merge=merge)
 
 
 def _flag(entry: Table, key: str, name: str) -> bool:
@@ -197,7 +200,9 @@ def _flag(entry: Table, key: str, name: str) -> bool:
     return value
 
 
-def _generated(entry: Table, table: Table, parameters: dict[str, Any], name: str, path: Path) -> Scene:
+def _generated(
+    entry: Table, table: Table, parameters: dict[str, Any], name: str, path: Path
+) -> dict[str, Any]:
     """A robot that a function of this package builds from parameters."""
     key = entry["generator"]
     if key not in GENERATORS:
@@ -209,7 +214,7 @@ def _generated(entry: Table, table: Table, parameters: dict[str, Any], name: str
     known = tuple(generator.__kwdefaults__ or ())
     check_keys(defaults, known, f'"{path}": model: parameters')
     check_parameters(parameters, known, name)
-    return Scene(**scene_arguments(generator(**{**defaults, **parameters}), table, name))
+    return scene_arguments(generator(**{**defaults, **parameters}), table, name)
 
 
 def _example_robot(name: str, others: list[str]) -> RobotFile:

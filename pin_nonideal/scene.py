@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from .actuation import Actuation
-from .checks import array, number, optional_text, sequence
+from .checks import array, choice, number, optional_text, sequence
 from .compilation.analysis import check_model, check_user_constraints, drop_rows
 from .compilation.failures import named_failure
 from .compilation.report import report
@@ -24,6 +24,8 @@ from .states.configurations import configuration, require_resolved, unit_parts
 from .states.projection import Rows, nearest_state, nearest_states, nonholonomic_rows
 
 Array = NDArray[np.float64]
+
+TERMS = ("core", "pinocchio")
 
 
 class Scene:
@@ -49,6 +51,8 @@ class Scene:
         notes: remarks of the loader, shown by `report`.
         source: where the robot comes from.
         licence: its licence.
+        terms: who computes M(q), the bias forces and the kinematics: "core", its own pass over the tree, or
+            "pinocchio", Pinocchio's crba, nonLinearEffects and computeJointJacobians.
 
     Raises:
         InputError, UnknownNameError: something does not fit the model.
@@ -80,6 +84,7 @@ class Scene:
         notes: Sequence[str] = (),
         source: str | None = None,
         licence: str | None = None,
+        terms: str = "core",
     ) -> None:
         if not isinstance(model, pin.Model):
             raise InputError(f"Scene: model must be a pinocchio.Model; got {type(model).__name__}")
@@ -92,7 +97,7 @@ class Scene:
         self.name = optional_text("Scene: name", name) or model.name or "scene"
         self.constraints, self.laws = sequence("constraints", constraints), sequence("laws", laws)
         self.contacts, self.forces = sequence("contacts", contacts), sequence("forces", forces)
-        self.actuation = actuation
+        self.actuation, self.terms = actuation, choice("Scene: terms", terms, TERMS)
         self.visual_model, self.collision_model = visual_model, collision_model
         self.notes = list(sequence("notes", notes))
         self.source, self.licence = (
@@ -111,6 +116,7 @@ class Scene:
             laws=self.laws,
             forces=self.forces,
             actuation=actuation,
+            terms=terms,
         )
         self._builder = low.builder
         self.constraint_slices, self.anchor_frames = low.slices, low.anchors

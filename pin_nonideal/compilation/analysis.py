@@ -27,7 +27,7 @@ DERIVATIVE_TOLERANCE = 1e-4
 
 
 def check_model(model: Any) -> None:
-    """Every number of a model is finite, and no mass or armature is negative.
+    """Every number of a model is finite, no mass or armature is negative, and gravity has no angular part.
 
     Args:
         model: pinocchio.Model.
@@ -46,7 +46,12 @@ def check_model(model: Any) -> None:
         array(f'Scene: the place of joint "{name}"', model.jointPlacements[i].homogeneous, (4, 4))
     for frame in model.frames:
         array(f'Scene: the place of frame "{frame.name}"', frame.placement.homogeneous, (4, 4))
-    array("Scene: the gravity of the model", model.gravity.vector, (6,))
+    gravity = array("Scene: the gravity of the model", model.gravity.vector, (6,))
+    if gravity[3:].any():
+        raise InputError(
+            "Scene: the gravity of the model must have no angular part, which has no potential energy; got "
+            f"{gravity[3:]} rad/s^2: set it to zero, and turn the ground by a joint instead"
+        )
     armature = array("Scene: the armature of the model", model.armature, (model.nv,))
     if (armature < 0.0).any():
         raise InputError(

@@ -30,6 +30,7 @@ def lower(
     laws: Sequence[Any],
     forces: Sequence[Any],
     actuation: Any,
+    terms: str = "core",
     builder: Any = None,
 ) -> Lowered:
     """Writes one scene into the core's builder: rows first, then the laws that read them, then given forces.
@@ -42,6 +43,7 @@ def lower(
         laws: descriptions.
         forces: descriptions.
         actuation: None, an array (nv,), a function, or a description.
+        terms: who computes M and the bias forces, "core" or "pinocchio".
         builder: what the scene is written into; a new program of the core when None.
 
     Returns:
@@ -52,7 +54,7 @@ def lower(
     """
     where = Resolution(model, q0)
     try:
-        out = Lowered(core.Builder(model) if builder is None else builder)
+        out = Lowered(core.Builder(model, terms == "pinocchio") if builder is None else builder)
     except ValueError as error:
         raise InputError(str(error)) from None
     taken: set[str] = set()

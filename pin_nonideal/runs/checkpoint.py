@@ -167,7 +167,7 @@ def fingerprint(scene: Scene) -> str:
     Args:
         scene: the scene.
     """
-    digest = hashlib.sha256(scene.model.saveToString().encode())
+    digest = hashlib.sha256((scene.model.saveToString() + scene.terms).encode())
     lower(
         scene.model,
         scene.q0,

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "math/unrolled.hpp"
+#include "tree/liegroup.hpp"
 
 namespace pn {
 

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tree/factor.hpp"
+#include "tree/liegroup.hpp"
+
 namespace pn {
 
 namespace {

@@ -4,6 +4,7 @@
 
 #include "dynamics/evaluation.hpp"
 #include "constraints/projection.hpp"
+#include "tree/factor.hpp"
 
 namespace pn {
 

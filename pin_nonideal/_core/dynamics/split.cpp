@@ -1,5 +1,6 @@
 // Eq. (39): what the constraints alone would exert, and what the nonideal forces add to it.
 #include "dynamics/evaluation.hpp"
+#include "tree/factor.hpp"
 
 namespace pn {
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tree/factor.hpp"
+
 namespace pn {
 
 namespace {

@@ -58,7 +58,8 @@ inline Frame frame_of(const FrameTuple& f) {
 struct Builder {
     std::shared_ptr<Program> p = std::make_shared<Program>();
 
-    explicit Builder(nb::object model);
+    // M and the bias forces by Pinocchio's algorithms, or by the core's own pass.
+    Builder(nb::object model, bool pinocchio_terms);
     // Return the index of the new block or law.
     int add(const std::string& name, Kind kind, bool constraint, int user_size = 0);
     int add_law(const std::string& name);

@@ -10,7 +10,9 @@ using namespace nanobind::literals;
 
 namespace pn {
 
-Builder::Builder(nb::object model) { p->mechanism = read_mechanism(model_pointer(model.ptr())); }
+Builder::Builder(nb::object model, bool pinocchio_terms) {
+    p->mechanism = read_mechanism(model_pointer(model.ptr()), pinocchio_terms ? Provider::pinocchio : Provider::core);
+}
 
 int Builder::add(const std::string& name, Kind kind, bool constraint, int user_size) {
     Block block;
@@ -144,7 +146,7 @@ void bind_actuation(nb::class_<Builder>& builder) {
 
 void bind_builder(nb::module_& m) {
     nb::class_<Builder> builder(m, "Builder");
-    builder.def(nb::init<nb::object>())
+    builder.def(nb::init<nb::object, bool>(), "model"_a, "pinocchio_terms"_a = false)
         .def("add_law", &Builder::add_law)
         .def("keep_rows", [](Builder& b, int block, std::vector<int> rows) {
             b.p->blocks[block].kept = std::move(rows);

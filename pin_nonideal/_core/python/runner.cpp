@@ -5,6 +5,8 @@
 
 #include <nanobind/stl/vector.h>
 
+#include "tree/liegroup.hpp"
+
 using namespace nanobind::literals;
 
 namespace pn {

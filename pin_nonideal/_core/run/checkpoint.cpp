@@ -21,9 +21,9 @@ static void fields(Archive& a, Body& x) {
 }
 
 static void fields(Archive& a, Terms& x) {
-    // Cosines and sines, and what Pinocchio evaluates for foreign joints, are evaluated anew each time.
-    auto& [body, turn, J, Ag, nle, L, M, D, inv_sqrt_D, locked, q, foreign, foreign_motion, rest] = x;
-    a(body, J, Ag, nle, L, M, D, inv_sqrt_D, locked, q);
+    // What the pass over the tree holds is found anew in each evaluation.
+    auto& [body, J, Ag, nle, M, L, D, inv_sqrt_D, locked, q, pass] = x;
+    a(body, J, Ag, nle, M, L, D, inv_sqrt_D, locked, q);
 }
 
 static void fields(Archive& a, RowSystem& x) {

@@ -9,6 +9,8 @@
 #include "friction/modes.hpp"
 #include "constraints/projection.hpp"
 #include "run/tableaux.hpp"
+#include "tree/factor.hpp"
+#include "tree/liegroup.hpp"
 
 namespace pn {
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "run/simulation.hpp"
+#include "tree/liegroup.hpp"
 
 namespace pn {
 

@@ -1,8 +1,6 @@
-// Configurations that are not vectors: unit quaternions (x, y, z, w) and (cos, sin) pairs, kept as plain numbers
-// between steps and brought back to unit length at each step's end.
-#include <cmath>
+#include "tree/liegroup.hpp"
 
-#include "tree/mechanism.hpp"
+#include <cmath>
 
 namespace pn {
 

@@ -12,27 +12,7 @@ namespace {
 
 using Model = pinocchio::Model;
 using JointData = Model::JointData;
-
-struct PinocchioJoints final : ForeignJoints {
-    std::shared_ptr<const Model> model;
-    std::vector<JointData> data;
-
-    explicit PinocchioJoints(std::shared_ptr<const Model> m) : model(std::move(m)) {
-        for (const auto& joint : model->joints) data.push_back(joint.createData());
-    }
-
-    void evaluate(int i, const VecX& q, const VecX& v, JointMotion& out) override {
-        const auto& joint = model->joints[i];
-        pinocchio::calc_first_order(joint, data[i], q, v);
-        const auto M = pinocchio::joint_transform(data[i]);
-        out.R = M.rotation();
-        out.p = M.translation();
-        out.nv = joint.nv();
-        out.S.leftCols(out.nv) = pinocchio::joint_motin_subspace_xd(data[i]).matrix();
-        const auto c = pinocchio::bias(data[i]);
-        out.bias = {c.linear(), c.angular()};
-    }
-};
+using Composite = pinocchio::JointModelComposite;
 
 int unit_axis(const Vec3& a) {
     for (int k = 0; k < 3; ++k)
@@ -69,25 +49,27 @@ void classify(const Model::JointModel& joint, const JointData& data, Joint& out)
 
 bool slides(const Joint& j) { return j.kind == JointKind::prismatic || j.kind == JointKind::translation; }
 
-void add_charts(const Model::JointModel& joint, std::vector<Chart>& charts);
+const Composite* composite(const Model::JointModel& joint) { return boost::get<Composite>(&joint.toVariant()); }
 
-struct ChartsOfComposite : boost::static_visitor<bool> {
-    std::vector<Chart>& charts;
-    explicit ChartsOfComposite(std::vector<Chart>& c) : charts(c) {}
-    template <class J>
-    bool operator()(const J&) const { return false; }
-    bool operator()(const pinocchio::JointModelComposite& composite) const {
-        for (const auto& part : composite.joints) add_charts(part, charts);
-        return true;
-    }
-};
+// Throws for joints whose motion no provider can give, composites that hold such ones included.
+void require_motion(const Model::JointModel& joint, const std::string& name) {
+    if (joint.shortname().find("Mimic") != std::string::npos)
+        throw std::invalid_argument("joint \"" + name + "\" is a mimic joint of Pinocchio; build the " +
+                                    "model with mimic=False and add a JointCoupling instead");
+    const Composite* parts = composite(joint);
+    if (!parts) return;
+    if (parts->joints.empty())
+        throw std::invalid_argument("joint \"" + name + "\" is a composite without joints; add joints to it, or append " +
+                                    "its body to the parent's joint");
+    for (const auto& part : parts->joints) require_motion(part, name);
+}
 
 void add_charts(const Model::JointModel& joint, std::vector<Chart>& charts) {
     const std::string name = joint.shortname();
     auto has = [&](const char* part) { return name.find(part) != std::string::npos; };
     const int iq = joint.idx_q(), iv = joint.idx_v(), nq = joint.nq(), nv = joint.nv();
-    if (has("Composite")) {
-        boost::apply_visitor(ChartsOfComposite(charts), joint.toVariant());
+    if (const Composite* parts = composite(joint)) {
+        for (const auto& part : parts->joints) add_charts(part, charts);
     } else if (nq == nv) {
         Chart* last = charts.empty() ? nullptr : &charts.back();
         if (last && last->kind == Chart::Kind::vector && last->iq + last->n == iq && last->iv + last->n == iv)
@@ -107,11 +89,81 @@ void add_charts(const Model::JointModel& joint, std::vector<Chart>& charts) {
     }
 }
 
+// Numbers of a joint and of its body; `neutral` is any configuration that the joint can have.
+Joint read_joint(const Model& model, int i, const VecX& neutral) {
+    const auto& joint = model.joints[i];
+    auto data = joint.createData();
+    pinocchio::calc_first_order(joint, data, neutral, VecX::Zero(model.nv).eval());
+    Joint j;
+    j.name = model.names[i];
+    j.parent = static_cast<int>(model.parents[i]);
+    j.iq = joint.idx_q();
+    j.iv = joint.idx_v();
+    j.nv = joint.nv();
+    j.R0 = model.jointPlacements[i].rotation();
+    j.aligned = model.jointPlacements[i].rotation() == Eigen::Matrix3d::Identity();
+    j.p0 = model.jointPlacements[i].translation();
+    classify(joint, data, j);
+    const auto& Y = model.inertias[i];
+    j.mass = Y.mass();
+    j.com = Y.lever();
+    j.inertia = Y.inertia().matrix();
+    return j;
+}
+
+// Root of joint i's tree, and whether the tree's reference point moves to it: it does where the joints before slide.
+void find_reference(std::vector<Joint>& joints, int i) {
+    Joint& j = joints[i];
+    j.root = j.parent == 0 ? i : joints[j.parent].root;
+    j.reference = joints[j.root].reference;
+    if (j.root == i) j.reference = i;
+    j.recenters = j.root != i && !slides(j);
+    for (int k = j.root; k < i && j.recenters; ++k) j.recenters = joints[k].root != j.root || slides(joints[k]);
+    if (!j.recenters) return;
+    for (int k = j.root; k <= i; ++k)
+        if (joints[k].root == j.root) joints[k].reference = i;
+}
+
+// The dof before each on the way to the root, and the rows of M.
+void lay_out_rows(Mechanism& m) {
+    m.dof_parent.resize(m.nv);
+    m.depth.resize(m.nv);
+    for (const Joint& j : m.joints)
+        for (int dof = j.iv; dof < j.iv + j.nv; ++dof) {
+            // The first dof of a joint hangs on the last one of the joint before.
+            const Joint& before = m.joints[j.parent];
+            const int parent = dof > j.iv ? dof - 1 : j.parent == 0 ? -1 : before.iv + before.nv - 1;
+            m.dof_parent[dof] = parent;
+            m.depth[dof] = parent < 0 ? 0 : m.depth[parent] + 1;
+        }
+    for (int dof = 0; dof < m.nv; ++dof) {
+        m.row_offset.push_back(m.row_entries);
+        m.row_entries += m.depth[dof] + 1;
+        for (int k = dof; k >= 0; k = m.dof_parent[k]) m.ancestors.push_back(k);
+    }
+}
+
+// Pinocchio's crba reads a subtree as one stretch of dofs: each joint must hang on the one before it or on one of its
+// ancestors.
+void require_branches(const Mechanism& m) {
+    for (int i = 2; i < static_cast<int>(m.joints.size()); ++i) {
+        const int parent = m.joints[i].parent;
+        int before = i - 1;
+        while (before > parent) before = m.joints[before].parent;
+        if (before != parent)
+            throw std::invalid_argument("terms=\"pinocchio\" needs joints numbered branch by branch, as Pinocchio's crba " +
+                                        std::string("does; joint \"") + m.joints[i].name + "\" hangs on \"" +
+                                        m.joints[parent].name + "\", which joint \"" + m.joints[i - 1].name +
+                                        "\" does not move with; number them so, or take terms=\"core\"");
+    }
+}
+
 }  // namespace
 
-Mechanism read_mechanism(const void* opaque) {
+Mechanism read_mechanism(const void* opaque, Provider provider) {
     auto model = std::make_shared<const Model>(*static_cast<const Model*>(opaque));
     Mechanism m;
+    m.provider = provider;
     m.model = model;
     m.nq = model->nq;
     m.nv = model->nv;
@@ -119,77 +171,26 @@ Mechanism read_mechanism(const void* opaque) {
     m.armature = model->armature;
     m.joints.resize(model->njoints);
     m.joints[0].name = "universe";
-    m.dof_joint.resize(m.nv);
-    m.dof_parent.resize(m.nv);
-    m.depth.resize(m.nv);
+    for (int i = 1; i < model->njoints; ++i) require_motion(model->joints[i], model->names[i]);
+    const VecX neutral = pinocchio::neutral(*model);
     for (int i = 1; i < model->njoints; ++i) {
-        const auto& joint = model->joints[i];
-        if (joint.shortname().find("Mimic") != std::string::npos)
-            throw std::invalid_argument("joint \"" + model->names[i] + "\" is a mimic joint of Pinocchio; build the " +
-                                        "model with mimic=False and add a JointCoupling instead");
-        auto data = joint.createData();
-        const VecX q = pinocchio::neutral(*model), v = VecX::Zero(m.nv);
-        pinocchio::calc_first_order(joint, data, q, v);
-        Joint& j = m.joints[i];
-        j.name = model->names[i];
-        j.parent = static_cast<int>(model->parents[i]);
-        j.root = j.parent == 0 ? i : m.joints[j.parent].root;
-        j.iq = joint.idx_q();
-        j.iv = joint.idx_v();
-        j.nq = joint.nq();
-        j.nv = joint.nv();
-        j.R0 = model->jointPlacements[i].rotation();
-        j.aligned = model->jointPlacements[i].rotation() == Eigen::Matrix3d::Identity();
-        j.p0 = model->jointPlacements[i].translation();
-        classify(joint, data, j);
-        if ((j.kind == JointKind::revolute || j.kind == JointKind::helical) && !j.unbounded) m.angles.push_back({i, j.iq});
-        m.has_foreign |= j.kind == JointKind::other;
-        j.recenters = j.root != i && !slides(j);
-        for (int k = j.root; k < i && j.recenters; ++k)
-            j.recenters = m.joints[k].root != j.root || slides(m.joints[k]);
-        const auto& Y = model->inertias[i];
-        j.mass = Y.mass();
-        j.com = Y.lever();
-        j.inertia = Y.inertia().matrix();
-        add_charts(joint, m.charts);
-        for (int k = 0; k < j.nv; ++k) {
-            const int dof = j.iv + k;
-            m.dof_joint[dof] = i;
-            int parent = dof - 1;
-            if (k == 0) {  // last dof of the nearest ancestor that moves
-                int p = j.parent;
-                while (p != 0 && m.joints[p].nv == 0) p = m.joints[p].parent;
-                parent = p == 0 ? -1 : m.joints[p].iv + m.joints[p].nv - 1;
-            }
-            m.dof_parent[dof] = parent;
-            m.depth[dof] = parent < 0 ? 0 : m.depth[parent] + 1;
-        }
+        m.joints[i] = read_joint(*model, i, neutral);
+        find_reference(m.joints, i);
+        const Joint& j = m.joints[i];
+        if ((j.kind == JointKind::revolute || j.kind == JointKind::helical) && !j.unbounded)
+            m.angles.push_back({i, j.iq});
+        add_charts(model->joints[i], m.charts);
     }
-    for (int dof = 0; dof < m.nv; ++dof) {
-        m.row_offset.push_back(m.row_entries);
-        m.row_entries += m.depth[dof] + 1;
-        for (int k = dof; k >= 0; k = m.dof_parent[k]) m.ancestors.push_back(k);
-        m.max_depth = std::max(m.max_depth, m.depth[dof] + 1);
-    }
+    lay_out_rows(m);
+    if (provider == Provider::pinocchio) require_branches(m);
     return m;
 }
 
-std::unique_ptr<ForeignJoints> Mechanism::make_foreign() const {
-    if (!has_foreign) return nullptr;
-    return std::make_unique<PinocchioJoints>(std::static_pointer_cast<const Model>(model));
-}
-
 std::vector<int> Mechanism::dofs_of(int joint) const {
-    while (joint != 0 && joints[joint].nv == 0) joint = joints[joint].parent;
     std::vector<int> dofs;
     if (joint == 0) return dofs;
     for (int d = joints[joint].iv + joints[joint].nv - 1; d >= 0; d = dof_parent[d]) dofs.push_back(d);
     return dofs;
-}
-
-bool Mechanism::is_ancestor(int joint, int descendant) const {
-    while (descendant > joint) descendant = joints[descendant].parent;
-    return descendant == joint;
 }
 
 }  // namespace pn

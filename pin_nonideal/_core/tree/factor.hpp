@@ -1,0 +1,21 @@
+// The factor M = L^T D L along the tree, so R = L^T D^1/2 in M = R R^T, and what is solved with it.
+#pragma once
+
+#include <vector>
+
+#include "tree/terms.hpp"
+
+namespace pn {
+
+// M = L^T D L. Returns -1, or the dof whose pivot is not positive.
+int factorize(const Mechanism& m, Terms& terms);
+
+// x := R^-1 x = D^-1/2 L^-T x, and x := R^-T x = L^-1 D^-1/2 x.
+void solve_R(const Mechanism& m, const Terms& terms, VecX& x);
+void solve_Rt(const Mechanism& m, const Terms& terms, VecX& x);
+// The latter for the dofs listed, after their ancestors, of an x that is zero elsewhere before.
+void solve_Rt(const Mechanism& m, const Terms& terms, const std::vector<int>& dofs, VecX& x);
+// y := M x.
+void multiply_M(const Mechanism& m, const Terms& terms, const VecX& x, VecX& y);
+
+}  // namespace pn

@@ -1,0 +1,137 @@
+#include "tree/pinocchio_pass.hpp"
+
+#include <pinocchio/multibody.hpp>
+#include <pinocchio/algorithm/crba.hpp>
+#include <pinocchio/algorithm/jacobian.hpp>
+#include <pinocchio/algorithm/kinematics.hpp>
+#include <pinocchio/algorithm/rnea.hpp>
+
+#include "tree/terms.hpp"
+
+namespace pn {
+
+namespace {
+
+using Model = pinocchio::Model;
+using Vector = Eigen::Ref<const VecX>;  // what the wheel's libraries are compiled for
+
+const Model& model_of(const Mechanism& m) { return *static_cast<const Model*>(m.model.get()); }
+
+Motion motion(const pinocchio::Motion& x) { return {x.linear(), x.angular()}; }
+
+// Placement of a body from Pinocchio's, which is about the world's origin.
+void place(const Mechanism& m, const pinocchio::Data& data, int i, Body& b) {
+    b.R = data.oMi[i].rotation();
+    b.ref = data.oMi[m.joints[i].reference].translation();
+    b.p = Vec3(data.oMi[i].translation()) - b.ref;
+}
+
+}  // namespace
+
+struct PinocchioJoints::Data {
+    std::shared_ptr<const void> owner;
+    const Model& model;
+    std::vector<Model::JointData> joints;  // by joint; empty ones where the core has a formula
+};
+
+PinocchioJoints::PinocchioJoints() = default;
+PinocchioJoints::PinocchioJoints(PinocchioJoints&&) noexcept = default;
+PinocchioJoints::~PinocchioJoints() = default;
+
+PinocchioJoints::PinocchioJoints(const Mechanism& m) : data_(new Data{m.model, model_of(m), {}}) {
+    data_->joints.resize(m.joints.size());
+    for (size_t i = 1; i < m.joints.size(); ++i)
+        if (m.joints[i].kind == JointKind::other) data_->joints[i] = data_->model.joints[i].createData();
+}
+
+void PinocchioJoints::evaluate(int i, const VecX& q, const VecX& v, JointMotion& out) {
+    Model::JointData& data = data_->joints[i];
+    pinocchio::calc_first_order(data_->model.joints[i], data, q, v);
+    const auto placement = pinocchio::joint_transform(data);
+    out.R = placement.rotation();
+    out.p = placement.translation();
+    boost::apply_visitor([&](const auto& kind) {  // the matrix where it lies: no copy on the heap
+        const auto& S = kind.S_accessor().matrix();
+        for (int k = 0; k < S.cols(); ++k)
+            out.S[k] = Motion{S.col(k).template head<3>(), S.col(k).template tail<3>()};
+    }, data.toVariant());
+    out.bias = motion(pinocchio::bias(data));
+}
+
+struct PinocchioPass::Data {
+    std::shared_ptr<const void> owner;
+    const Model& model;
+    pinocchio::Data data;
+};
+
+PinocchioPass::PinocchioPass(PinocchioPass&&) noexcept = default;
+PinocchioPass::~PinocchioPass() = default;
+
+PinocchioPass::PinocchioPass(const Mechanism& m)
+    : data_(new Data{m.model, model_of(m), pinocchio::Data(model_of(m))}) {
+    // Second derivatives, with the cube of nv: nothing here asks for them.
+    pinocchio::Data& d = data_->data;
+    for (auto* tensor : {&d.kinematic_hessians, &d.d2tau_dqdq, &d.d2tau_dvdv, &d.d2tau_dqdv, &d.d2tau_dadq})
+        tensor->resize(0, 0, 0);
+}
+
+void place_bodies(const Mechanism& m, PinocchioPass& pass, Terms& terms, const std::vector<int>& joints,
+                  const std::vector<Angle>&) {
+    auto& [owner, model, data] = pass.data();
+    pinocchio::forwardKinematics(model, data, Vector(terms.q));  // oMi
+    for (int i : joints) place(m, data, i, terms.body[i]);
+}
+
+void place_bodies(const Mechanism& m, PinocchioPass& pass, Terms& terms) {
+    auto& [owner, model, data] = pass.data();
+    pinocchio::computeJointJacobians(model, data, Vector(terms.q));  // oMi, J
+    for (size_t i = 1; i < m.joints.size(); ++i) {
+        const Joint& j = m.joints[i];
+        Body& b = terms.body[i];
+        place(m, data, static_cast<int>(i), b);
+        for (int dof = j.iv; dof < j.iv + j.nv; ++dof) {
+            const Vec3 lin = data.J.col(dof).head<3>(), ang = data.J.col(dof).tail<3>();
+            terms.J[dof] = {lin + ang.cross(b.ref), ang};
+        }
+    }
+}
+
+void move_bodies(const Mechanism& m, PinocchioPass& pass, Terms& terms, const VecX& v) {
+    auto& [owner, model, data] = pass.data();
+    pinocchio::nonLinearEffects(model, data, Vector(terms.q), Vector(v));  // v, a_gf, f, nle
+    for (size_t i = 1; i < m.joints.size(); ++i) {
+        Body& b = terms.body[i];
+        b.v = in_world(b, motion(data.v[i]));
+        b.a = in_world(b, motion(data.a_gf[i]));
+    }
+}
+
+void mass_matrix(const Mechanism& m, PinocchioPass& pass, Terms& terms) {
+    auto& [owner, model, data] = pass.data();
+    // In local axes: about the world's origin a robot that has walked far would lose digits.
+    pinocchio::crba(model, data, Vector(terms.q), pinocchio::Convention::LOCAL);  // M, Ycrb
+    for (size_t i = 1; i < m.joints.size(); ++i) {
+        const Joint& j = m.joints[i];
+        Body& b = terms.body[i];
+        const auto& Y = data.Ycrb[i];
+        b.Y = in_world(b, Y.mass(), Y.lever(), Y.inertia().matrix());
+        for (int dof = j.iv; dof < j.iv + j.nv; ++dof) {
+            terms.Ag[dof] = b.Y * terms.J[dof];
+            double* row = terms.M.data() + m.row_offset[dof];
+            const int* up = m.ancestors.data() + m.row_offset[dof];
+            for (int s = 0; s <= m.depth[dof]; ++s) row[s] = data.M(up[s], dof);  // M of Eq. (1)
+        }
+    }
+}
+
+void bias_forces(const Mechanism& m, PinocchioPass& pass, Terms& terms) {
+    const pinocchio::Data& data = pass.data().data;
+    terms.nle = data.nle;  // in F of Eq. (1)
+    for (size_t i = 1; i < m.joints.size(); ++i) {
+        Body& b = terms.body[i];
+        b.f.lin = b.R * Vec3(data.f[i].linear());
+        b.f.ang = b.R * Vec3(data.f[i].angular()) + b.p.cross(b.f.lin);
+    }
+}
+
+}  // namespace pn
