@@ -207,7 +207,9 @@ class TestMessages:
         A = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
         for size in (1e-6, 1.0, 1e9):
             solve(EYE, size * ONES, A, size * np.array([1.0, 1.0 + 1e-13]))
-            with pytest.raises(InconsistentConstraintsError):
+            with pytest.raises(
+                InconsistentConstraintsError, match=r"^constraint rows 0 and 1 contradict each other"
+            ):
                 solve(EYE, size * ONES, A, size * np.array([1.0, 1.0 + 100.0 * RESIDUAL_TOLERANCE]))
 
     def test_overflow(self):

@@ -6,6 +6,7 @@ import io
 import json
 import os
 import pickle
+import re
 import zipfile
 
 import numpy as np
@@ -175,6 +176,13 @@ def cannot_read(path, reason):
     return refuses(f'cannot read a trajectory from "{path}": {reason}', LoadingError)
 
 
+def cannot_read_because(path, kinds):
+    """The whole message, with an error of these kinds, whose own words are Python's, as the reason."""
+    advice = re.escape("; it must be an .npz file written by Trajectory.save")
+    start = re.escape(f'cannot read a trajectory from "{path}": ')
+    return pytest.raises(LoadingError, match=f"^{start}({kinds}): .+{advice}$")
+
+
 def test_a_missing_file(tmp_path):
     path = tmp_path / "no.npz"
     with cannot_read(path, f"FileNotFoundError: [Errno 2] No such file or directory: '{path}'; it must be"):
@@ -186,10 +194,8 @@ def test_a_truncated_file(run, tmp_path, part):
     path = run.save(tmp_path / "run.npz")
     whole = path.read_bytes()
     path.write_bytes(whole[: int(part * len(whole))])
-    with pytest.raises(LoadingError) as caught:
+    with cannot_read_because(path, "BadZipFile|EOFError"):
         pn.Trajectory.load(path)
-    assert str(caught.value).startswith(f'cannot read a trajectory from "{path}": ')
-    assert str(caught.value).endswith("; it must be an .npz file written by Trajectory.save")
 
 
 def test_a_damaged_file(run, tmp_path):
@@ -197,7 +203,7 @@ def test_a_damaged_file(run, tmp_path):
     data = bytearray(path.read_bytes())
     data[len(data) // 3 : len(data) // 3 + 40] = bytes(40)
     path.write_bytes(bytes(data))
-    with cannot_read(path, ""):
+    with cannot_read_because(path, "BadZipFile|error"):
         pn.Trajectory.load(path)
 
 
@@ -258,5 +264,5 @@ def test_other_archives(tmp_path):
     buffer = io.BytesIO()
     np.save(buffer, np.zeros(3))
     path.write_bytes(buffer.getvalue())
-    with cannot_read(path, ""):
+    with cannot_read_because(path, "TypeError|AttributeError"):
         pn.Trajectory.load(path)
