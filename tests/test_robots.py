@@ -11,7 +11,14 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.constraints import PointAnchor, PrescribedMotion, Rolling
+from pin_nonideal.constraints import (
+    HingeAnchor,
+    JointCoupling,
+    KnifeEdge,
+    PointAnchor,
+    PrescribedMotion,
+    Rolling,
+)
 from pin_nonideal.errors import InputError
 
 from .refusals import refuses
@@ -63,21 +70,41 @@ def place(scene, data, name):
     return data.oMf[scene.model.getFrameId(name)]
 
 
+def coordinate(scene, joint):
+    return scene.q0[scene.model.idx_qs[scene.model.getJointId(joint)]]
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_each_starts_closed(name):
     scene = pn.load(name)
     data = scene.model.createData()
     pin.framesForwardKinematics(scene.model, data, scene.q0)
-    for constraint in scene.constraints:
-        if isinstance(constraint, PointAnchor) and constraint.frame2 is not None:
-            one, two = (place(scene, data, f) for f in (constraint.frame1, constraint.frame2))
-            gap = two.actInv(one).translation[["xyz".index(a) for a in constraint.axes]]
+    for c in scene.constraints:
+        if isinstance(c, PointAnchor) and c.frame2 is not None:
+            one, two = (place(scene, data, f) for f in (c.frame1, c.frame2))
+            gap = two.actInv(one).translation[["xyz".index(a) for a in c.axes]]
             np.testing.assert_allclose(gap, 0.0, atol=CLOSED)
-        elif isinstance(constraint, PrescribedMotion):
-            joint = scene.model.getJointId(constraint.joint)
-            start = constraint.function(0.0)
-            assert scene.q0[scene.model.idx_qs[joint]] == pytest.approx(start[0], abs=ROUNDING)
+        elif isinstance(c, HingeAnchor):  # its file leaves the closing of the loop to the projection
+            pin.framesForwardKinematics(scene.model, data, scene.initial_state()[0])
+            between = place(scene, data, c.frame2).actInv(place(scene, data, c.frame1))
+            np.testing.assert_allclose(between.translation, 0.0, atol=CLOSED)
+            np.testing.assert_allclose(between.rotation @ c.axis, c.axis, atol=CLOSED)
+        elif isinstance(c, PrescribedMotion):
+            start = c.function(0.0)
+            assert coordinate(scene, c.joint) == pytest.approx(start[0], abs=ROUNDING)
+            joint = scene.model.getJointId(c.joint)
             assert scene.v0[scene.model.idx_vs[joint]] == pytest.approx(start[1], abs=ROUNDING)
+        elif isinstance(c, JointCoupling):
+            gap = coordinate(scene, c.joint1) - c.ratio * coordinate(scene, c.joint2) - c.offset
+            assert gap == pytest.approx(0.0, abs=ROUNDING)
+        elif isinstance(c, Rolling):  # a disk: its center over the ground
+            disk = place(scene, data, c.frame)
+            lean = (disk.rotation @ c.axis)[2]
+            height = c.radius * np.sqrt(1.0 - lean**2)
+            assert disk.translation[2] == pytest.approx(height, abs=CLOSED)
+        else:
+            held = isinstance(c, KnifeEdge) or c.frame2 is None  # no residual, or zero by definition
+            assert held, f"how does a {type(c).__name__} start closed?"
 
 
 @pytest.mark.parametrize("name", ["four_bar", "slider_crank", "n_four_bar"])

@@ -13,7 +13,11 @@ few_and_many = pytest.mark.parametrize("examples", [25, pytest.param(3000, marks
 
 
 def for_all(check, *strategies, examples):
-    """Calls `check` on examples of the strategies: the same each time; the smallest that fails is shown."""
+    """Calls `check` on examples of the strategies: the same each time; the smallest that fails is shown.
+
+    What the check returns tells whether the example was taken (anything but None) or refused by name.
+    Where all are refused, or all taken, nothing was tried.
+    """
     quiet = settings(
         max_examples=examples,
         derandomize=True,
@@ -21,19 +25,23 @@ def for_all(check, *strategies, examples):
         database=None,
         suppress_health_check=list(HealthCheck),
     )
+    outcomes = set()
 
     def call(drawn):
-        check(*drawn)
+        outcomes.add(check(*drawn) is not None)
 
     given(st.tuples(*strategies))(quiet(call))()
+    assert outcomes == {True, False}, "all were taken" if outcomes == {True} else "all were refused"
 
 
 def result_or_named_error(call):
     """What the call returns, or None when it ends in an error of this package; any other error goes on."""
     try:
         return call()
-    except PinNonidealError:
-        return None
+    except PinNonidealError as error:
+        message = str(error)
+    assert len(message.split()) > 3  # what must hold, what came, what to do
+    return None
 
 
 class Odd:

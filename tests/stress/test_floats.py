@@ -16,6 +16,7 @@ from .measure import finite
 
 FEW = ["rolling_disk", "belt_oscillator", "loaded_joint"]
 MANY = ["four_bar", "five_bar", "knife_edge_sleigh", "slider_crank", "worm_drive", "delta"]
+ORDINARY = 1e10  # numbers no larger are taken by every call
 EDGES = [5e-324, -5e-324, 2.2e-308, 1e-200, -0.0, 1e20, 1e100, -1e154, 1e200, 1e300, -1.7e308]
 
 
@@ -27,12 +28,13 @@ def no_warnings():
         yield
 
 
-def ends_well(call):
-    """What came of a call: a run, an array, or the name of the error."""
+def ends_well(call, size):
+    """What came of a call with numbers of this size: a run or an array, or None after an error by name."""
     try:
         result = call()
     except PinNonidealError as error:
         print(f"{type(error).__name__}: {error}")
+        assert abs(size) > ORDINARY
         trajectory = getattr(error, "trajectory", None)
         if trajectory is not None:
             finite(trajectory)
@@ -50,15 +52,15 @@ def test_states_and_torques(robot, edge):
     scene = pn.load(robot)
     q, v = scene.initial_state()
     fast = np.full_like(v, edge)
-    ends_well(lambda: scene.acceleration(q, fast))
-    ends_well(lambda: scene.acceleration(q, v, tau=fast))
-    ends_well(lambda: scene.solve(q, v, tau=fast).F_nonideal)
+    ends_well(lambda: scene.acceleration(q, fast), edge)
+    ends_well(lambda: scene.acceleration(q, v, tau=fast), edge)
+    ends_well(lambda: scene.solve(q, v, tau=fast).F_nonideal, edge)
     duration = 1e-3 / max(1.0, abs(edge))  # a run of some steps at any speed
-    ends_well(lambda: pn.simulate(scene, duration, v=fast))
+    ends_well(lambda: pn.simulate(scene, duration, v=fast), edge)
     moved = q.copy()
     for k in range(scene.model.nq):
         moved[k] = edge
-        ends_well(lambda: pn.simulate(scene, 1e-3, q=moved))
+        ends_well(lambda: pn.simulate(scene, 1e-3, q=moved), edge)
         moved[k] = q[k]
 
 
@@ -79,7 +81,7 @@ def test_bodies_of_any_mass(scale):
     for k, place in enumerate((pin.SE3.Identity(), pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0])))):
         about = 0.1 * scale * np.eye(3)
         body(model, k, pin.JointModelRY(), f"j{k}", scale, place=place, lever=(0.5, 0.0, 0.0), inertia=about)
-    run = ends_well(lambda: pn.simulate(pn.Scene(model), 0.5, output_dt=0.1))
+    run = ends_well(lambda: pn.simulate(pn.Scene(model), 0.5, output_dt=0.1), np.inf)
     assert run is not None or not 1e-100 <= scale <= 1e100
 
 
@@ -94,7 +96,10 @@ def test_laws_and_forces_of_any_size(coulomb, stiffness):
         forces=[pn.JointSpring("j", stiffness, rest=0.1)] if stiffness else [],
     )
     for method, options in (("dop853", {}), ("rk4", {"dt": 1e-3}), ("moreau", {"dt": 1e-3})):
-        ends_well(lambda method=method, options=options: pn.simulate(scene, 0.01, method=method, **options))
+        ends_well(
+            lambda method=method, options=options: pn.simulate(scene, 0.01, method=method, **options),
+            max(coulomb, stiffness),
+        )
 
 
 @pytest.mark.parametrize("call", ["solve", "project"])
@@ -102,15 +107,16 @@ def test_laws_and_forces_of_any_size(coulomb, stiffness):
 def test_plain_arrays(call, edge):
     """Eq. (40) on arrays, and projection, at the ends of the range."""
     M, F, A = np.eye(2), np.array([edge, 1.0]), np.array([[1.0, 1.0]])
+    least = max(abs(edge), 5e-324)  # dividing by it may overflow
     if call == "solve":
-        ends_well(lambda: pn.solve(M, F, A, np.array([0.0])).a)
-        ends_well(lambda: pn.solve(M, np.ones(2), A * edge, np.array([1.0])).a)
-        ends_well(lambda: pn.solve(M * max(abs(edge), 5e-324), F, A, np.array([0.0])).a)
+        ends_well(lambda: pn.solve(M, F, A, np.array([0.0])).a, edge)
+        ends_well(lambda: pn.solve(M, np.ones(2), A * edge, np.array([1.0])).a, max(least, 1 / least))
+        ends_well(lambda: pn.solve(M * least, F, A, np.array([0.0])).a, max(least, 1 / least))
     else:
         scene = pn.load("slider_crank")
         q, v = scene.initial_state()
-        ends_well(lambda: np.concatenate(scene.project(q + edge, v)))
-        ends_well(lambda: np.concatenate(scene.project(q, v + edge)))
+        ends_well(lambda: np.concatenate(scene.project(q + edge, v)), edge)
+        ends_well(lambda: np.concatenate(scene.project(q, v + edge)), edge)
 
 
 def test_a_load_that_overflows_is_no_paradox():

@@ -35,17 +35,18 @@ def scene():
     return pn.load("four_bar")
 
 
-def drawn(data, function, good=None):
-    """Arguments of a function: good ones where there are some, else what comes."""
-    good = good or {}
+def drawn(data, function, good):
+    """Arguments of a function: good ones and defaults where there are some, but for a few that just come."""
     arguments = {}
-    for key, parameter in inspect.signature(function).parameters.items():
-        if parameter.kind is parameter.VAR_KEYWORD or key == "self":
-            continue
+    parameters = inspect.signature(function).parameters
+    keys = [k for k, p in parameters.items() if p.kind is not p.VAR_KEYWORD and k != "self"]
+    spoiled = data.draw(st.sets(st.sampled_from(keys), max_size=2), label="spoiled")
+    for key in keys:
         choices = [st.sampled_from(good[key])] if key in good else []
-        if parameter.default is not parameter.empty:
-            choices.append(st.just(parameter.default))
-        arguments[key] = data.draw(st.one_of(*choices, junk), label=key)
+        if parameters[key].default is not inspect.Parameter.empty:
+            choices.append(st.just(parameters[key].default))
+        take = junk if key in spoiled or not choices else st.one_of(*choices)
+        arguments[key] = data.draw(take, label=key)
     return arguments
 
 
@@ -56,7 +57,13 @@ GOOD = {
     "function": [pn.constant(0.1), lambda *_: np.zeros(3), lambda *_: (np.zeros((1, 3)), [0.0])],
     "radius": [0.1], "coulomb": [0.1], "coefficient": [1.0], "exponent": [1.0], "stiffness": [10.0],
     "period": [0.01], "kp": [1.0], "kd": [0.1], "times": [[0.0, 1.0]], "values": [np.zeros((2, 3))],
-    "direction": [lambda t, q: [1.0, 0.0, 0.0]], "limit": [lambda t, q, v, r: 0.1],
+    "direction": [lambda t, q: [1.0, 0.0, 0.0]], "limit": [lambda t, q, v, r: 0.1], "length": [0.5],
+    "damping": [0.1], "phi1": [0.2], "phi2": [5.0],
+}  # fmt: skip
+ROW = {"function": [lambda *_: (np.zeros((1, 3)), [0.0])], "size": [1]}
+GOOD_TIMES = {
+    "value": [0.1], "coefficients": [[1.0, 2.0]], "amplitude": [0.1], "frequency": [2.0],
+    "times": [[0.0, 1.0, 2.0]], "values": [[0.0, 1.0, 0.5]],
 }  # fmt: skip
 
 
@@ -64,17 +71,19 @@ GOOD = {
 @pytest.mark.parametrize("kind", DESCRIPTIONS, ids=lambda kind: kind.__name__)
 def test_descriptions(kind, scene, examples):
     """A description is refused when it is made, or by the scene, or by the run."""
+    good = GOOD | (ROW if kind is pn.UserConstraint else {})
 
     def check(data):
-        made = result_or_named_error(lambda: kind(**drawn(data, kind, GOOD)))
+        made = result_or_named_error(lambda: kind(**drawn(data, kind, good)))
         if made is None:
-            return
+            return None
         place = next((key for key, names in PLACES.items() if kind.__name__ in names), "actuation")
         parts = {place: made if place == "actuation" else [made]}
         q0 = scene.q0
         whole = result_or_named_error(lambda: pn.Scene(scene.model, q0=q0, **parts))
         if whole is not None:
-            result_or_named_error(lambda: pn.simulate(whole, 1e-4, method="rk4", dt=5e-5))
+            return result_or_named_error(lambda: pn.simulate(whole, 1e-4, method="rk4", dt=5e-5))
+        return None
 
     for_all(check, st.data(), examples=max(4, examples // 4))
 
@@ -83,10 +92,11 @@ def test_descriptions(kind, scene, examples):
 @pytest.mark.parametrize("kind", TIMES, ids=lambda kind: kind.__name__)
 def test_functions_of_time(kind, examples):
     def check(data):
-        made = result_or_named_error(lambda: kind(**drawn(data, kind)))
+        made = result_or_named_error(lambda: kind(**drawn(data, kind, GOOD_TIMES)))
         if made is not None:
             for t in (0.0, -1.0, 1e300):
                 assert len(made(t)) == 3
+        return made
 
     for_all(check, st.data(), examples=examples)
 
@@ -115,7 +125,7 @@ def test_simulate(scene, examples, tmp_path):
         arguments["duration"] = data.draw(st.one_of(st.just(1e-3), without(junk)), label="duration")
         if arguments["checkpoint"] is not None:
             arguments["checkpoint"] = tmp_path / "run"  # not to any file that comes
-        result_or_named_error(lambda: pn.simulate(**arguments))
+        return result_or_named_error(lambda: pn.simulate(**arguments))
 
     for_all(check, st.data(), examples=2 * examples)
 
@@ -124,12 +134,12 @@ def test_simulate(scene, examples, tmp_path):
 def test_rollout(scene, examples):
     q, v = scene.initial_state()
     pair = (np.array([q, q]), np.array([v, v]))
-    good = {"scene": [scene], "states": [pair], "method": ["dop853", "rk4"], "dt": [1e-3], "threads": [1, 2]}
+    good = {"scene": [scene], "q": [pair], "method": ["dop853", "dopri5"], "threads": [1, 2]}
 
     def check(data):
         arguments = drawn(data, pn.rollout, good)
         arguments["duration"] = data.draw(st.one_of(st.just(1e-3), without(junk)), label="duration")
-        result_or_named_error(lambda: pn.rollout(**arguments))
+        return result_or_named_error(lambda: pn.rollout(**arguments))
 
     for_all(check, st.data(), examples=examples)
 
@@ -188,7 +198,7 @@ def test_load(examples):
     )
 
     def check(name, given):
-        result_or_named_error(lambda: pn.load(name, **given))
+        return result_or_named_error(lambda: pn.load(name, **given))
 
     for_all(check, names, parameters, examples=examples)
 
@@ -204,7 +214,12 @@ def test_the_other_functions(function, scene, examples, tmp_path, monkeypatch):
         "path": [str(tmp_path / "file.html")],
         "duration": [1e-3],
         "make": [pn.load],
+        "parameters": [[{"name": "loaded_joint"}]],
+        "jobs": [1],
     }
+    if function is pn.resume:
+        pn.simulate(scene, 1e-3, checkpoint=tmp_path / "run")
+        good["path"] = [str(tmp_path / "run")]
     for_all(
         lambda data: result_or_named_error(lambda: function(**drawn(data, function, good))),
         st.data(),

@@ -94,10 +94,12 @@ def damaged(text, place, length, filling):
 def loads_and_runs(folder):
     """Loads a folder; what loads also runs, or stops by name."""
     scene = result_or_named_error(lambda: pn.load(folder))
-    if scene is not None:
-        run = result_or_named_error(lambda: pn.simulate(scene, 1e-3))
-        if run is not None:
-            finite(run)
+    if scene is None:
+        return None
+    run = result_or_named_error(lambda: pn.simulate(scene, 1e-3))
+    if run is not None:
+        finite(run)
+    return scene
 
 
 @pytest.fixture
@@ -127,7 +129,7 @@ def test_tables_of_robot_yaml(robot, examples):
         tree = yaml.safe_load(table)
         paths = list(places(tree))
         other = changed(tree, paths[int(place * len(paths))], action, value)
-        loads_and_runs(robot(yaml.safe_dump(other, allow_unicode=True), urdf))
+        return loads_and_runs(robot(yaml.safe_dump(other, allow_unicode=True), urdf))
 
     actions = st.sampled_from(["leave out", "rename", "double", "exchange", "exchange", "exchange"])
     for_all(check, st.sampled_from(SMALL), st.floats(0.0, 0.999), actions, values, examples=examples)
@@ -137,7 +139,7 @@ def test_tables_of_robot_yaml(robot, examples):
 def test_text_of_robot_yaml(robot, examples):
     def check(name, place, length, filling):
         table, urdf = TABLES[name]
-        loads_and_runs(robot(damaged(table.encode(), place, length, filling), urdf))
+        return loads_and_runs(robot(damaged(table.encode(), place, length, filling), urdf))
 
     for_all(
         check,
@@ -159,7 +161,7 @@ def test_attributes_of_urdf(robot, examples):
         found = list(re.finditer(r'\w+="([^"]*)"', urdf))
         hit = found[int(place * len(found))]
         start, end = hit.span() if leave_out else hit.span(1)
-        loads_and_runs(robot(table, urdf[:start] + ("" if leave_out else value) + urdf[end:]))
+        return loads_and_runs(robot(table, urdf[:start] + ("" if leave_out else value) + urdf[end:]))
 
     for_all(
         check,
@@ -175,7 +177,7 @@ def test_attributes_of_urdf(robot, examples):
 def test_text_of_urdf(robot, examples):
     def check(name, place, length, filling):
         table, urdf = TABLES[name]
-        loads_and_runs(robot(table, damaged(urdf.encode(), place, length, filling)))
+        return loads_and_runs(robot(table, damaged(urdf.encode(), place, length, filling)))
 
     for_all(
         check,
@@ -202,7 +204,7 @@ def test_bytes_of_a_trajectory(trajectory, tmp_path, examples):
 
     def check(place, length, filling):
         path.write_bytes(damaged(trajectory, place, length, filling))
-        result_or_named_error(lambda: str(pn.Trajectory.load(path)))
+        return result_or_named_error(lambda: str(pn.Trajectory.load(path)))
 
     for_all(check, st.floats(0.0, 0.999), st.integers(0, 30), st.binary(max_size=8), examples=examples)
 
@@ -227,7 +229,7 @@ def test_arrays_of_a_trajectory(trajectory, tmp_path, examples):
             np.savez(file, **{k: x for k, x in spoiled.items() if x is not None})
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            result_or_named_error(lambda: str(pn.Trajectory.load(path)))
+            return result_or_named_error(lambda: str(pn.Trajectory.load(path)))
 
     for_all(
         check,
