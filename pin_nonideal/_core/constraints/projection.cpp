@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/evaluation.hpp"
+#include "dynamics/solution.hpp"
+#include "friction/modes.hpp"
 #include "tree/factor.hpp"
 #include "tree/liegroup.hpp"
 
@@ -152,7 +155,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
     w.scratch.shift_sum.setZero();
     double gap = 0.0, floor = 0.0;
     if (!w.now.rows.blocks.empty()) {
-        gaps(p, w, t, q, v);
+        evaluate_residuals(p, w, t, q, v);
         gap = gather_gaps(p, w);
         floor = rounding_part(w) * scene_size(p, w);
     }
@@ -173,7 +176,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
         double now = gap;
         if (!configured) {
             shift_position(p, w, q, p.touched_dofs);  // the others move no gap
-            gaps(p, w, t, q, v);
+            evaluate_residuals(p, w, t, q, v);
             now = gather_gaps(p, w);
             configured = now > floor && left_at_this_rate(gap, now, floor) > 3.0;
         }
@@ -235,8 +238,7 @@ bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
 }
 
 void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
-    std::fill(w.state.mode.begin(), w.state.mode.end(), static_cast<signed char>(1));
-    want_rows(p, w);
+    set_modes(p, w, std::vector<signed char>(p.frictions.size(), 1));
     configure(p, w, t, q, v);
     if (w.now.rows.blocks.empty()) return;
     if (w.now.rows.orthogonal) {  // their Cholesky factor does not show that they are independent
@@ -248,12 +250,12 @@ void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
 
 Closure close(const Program& p, Workspace& w, double t, VecX& q, VecX& v, double far) {
     Closure found;
-    look_at(p, w, t, q, v);
+    update_kinematics(p, w, t, q, v);
     violations(p, w, found.before, found.rate);
     found.after = found.before;
     if (!(found.before <= far)) return found;
     project_anew(p, w, t, q, v);
-    look_at(p, w, t, q, v);
+    update_kinematics(p, w, t, q, v);
     violations(p, w, found.after, found.rate);
     return found;
 }

@@ -2,7 +2,7 @@
 // step's last evaluation, and there A v + phi_t = 0 by one solve with the factors that the next step needs anyway.
 #pragma once
 
-#include "dynamics/evaluation.hpp"
+#include "dynamics/workspace.hpp"
 
 namespace pn {
 

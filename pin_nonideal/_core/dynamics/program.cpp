@@ -79,12 +79,14 @@ void Program::finish() {
         needs_reactions |= f.reaction != Reaction::none;
         needs_joint_reactions |= f.reaction != Reaction::none && f.joint > 0;
     }
-    for (const UserLaw& law : user_laws) {
+    // Kinds stand together, so that the order of their descriptions decides no sum.
+    std::stable_sort(laws.begin(), laws.end(), [](const Law& a, const Law& b) { return a.index() < b.index(); });
+    each_law<UserLaw>(laws, [&](const UserLaw& law) {
         needs_reactions |= law.reaction != Reaction::none;
         needs_joint_reactions |= law.reaction != Reaction::none;
-    }
-    for (const Friction& f : frictions)
-        needs_joint_reactions |= f.load == Friction::Load::user;
+    });
+    each_law<Drag>(laws, [&](Drag& drag) { drag.dofs = mechanism.dofs_of(drag.frame.joint); });
+    for (const Friction& f : frictions) needs_joint_reactions |= f.load == Friction::Load::user;
     for (int i = 0; i < constraints; ++i) {
         moves_in_time |= pn::moves_in_time(blocks[i].kind);
         affine_rates &= !std::holds_alternative<UserRows>(blocks[i].kind);
@@ -99,16 +101,14 @@ void Program::finish() {
     touched_angles.clear();
     for (const Angle& angle : mechanism.angles)
         if (touched[angle.joint]) touched_angles.push_back(angle);
-    for (Drag& d : drags) d.dofs = mechanism.dofs_of(d.frame.joint);
     driven = !forces.empty() || !std::holds_alternative<NoActuation>(actuation);
-    asks_functions = std::holds_alternative<TorqueFunction>(actuation) || !user_laws.empty() || moves_in_time;
-    for (const GivenForce& f : forces) {
-        const auto* wrench = std::get_if<FrameWrench>(&f);
-        asks_functions |= std::holds_alternative<UserForce>(f) || (wrench && wrench->function);
-    }
+    asks_functions = std::holds_alternative<TorqueFunction>(actuation) || user_laws > 0 || moves_in_time;
     for (const Friction& f : frictions) asks_functions |= f.user_limit != nullptr;
-    for (const GivenForce& f : forces)
-        has_body_forces |= std::holds_alternative<SpringDamper>(f) || std::holds_alternative<FrameWrench>(f);
+    for (const GivenForce& each : forces)
+        std::visit([&](const auto& f) {
+            asks_functions |= f.asks_function();
+            has_body_forces |= f.acts_on_bodies;
+        }, each);
 }
 
 }  // namespace pn

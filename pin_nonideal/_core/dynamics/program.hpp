@@ -8,38 +8,10 @@
 
 #include "constraints/equation.hpp"
 #include "dynamics/failure.hpp"
-#include "friction/laws.hpp"
+#include "dynamics/given_forces.hpp"
+#include "friction/friction.hpp"
 
 namespace pn {
-
-struct SpringDamper {
-    Frame frame1, frame2;
-    double stiffness = 0.0, damping = 0.0, rest_length = 0.0;
-};
-struct JointSpring {
-    int joint = 0;
-    double stiffness = 0.0, rest = 0.0, damping = 0.0;
-};
-struct FrameWrench {
-    Frame frame;
-    std::function<void(double t, double* six)> function;  // empty: constant
-    double value[6] = {};
-};
-struct UserForce {
-    std::function<void(double t, const VecX& q, const VecX& v, VecX& force)> function;
-};
-using GivenForce = std::variant<SpringDamper, JointSpring, FrameWrench, UserForce>;
-
-struct NoActuation {};
-struct ConstantTorque { VecX tau; };
-struct TorqueFunction { std::function<void(double t, const VecX& q, const VecX& v, VecX& tau)> function; };
-struct SampledTorque {
-    std::function<void(double t, const VecX& q, const VecX& v, VecX& tau)> function;
-    double period;
-};
-struct HoldPosition { VecX kp, kd, q; };
-struct TorqueTable { std::vector<double> times; MatX values; };  // one column a time
-using Actuation = std::variant<NoActuation, ConstantTorque, TorqueFunction, SampledTorque, HoldPosition, TorqueTable>;
 
 struct Program {
     Mechanism mechanism;
@@ -52,21 +24,15 @@ struct Program {
 
     std::vector<std::string> law_names;
     std::vector<Friction> frictions;
-    std::vector<Viscous> viscous;
-    std::vector<Drag> drags;
-    std::vector<Sigmoid> sigmoids;
-    std::vector<Bristle> bristles;
-    std::vector<UserLaw> user_laws;
+    std::vector<Law> laws;
+    int user_laws = 0;
     int states = 0;  // of all laws
 
     std::vector<GivenForce> forces;
     Actuation actuation;
 
     // What the scene does not need is not computed.
-    bool has_laws() const {
-        return !frictions.empty() || !viscous.empty() || !drags.empty() || !sigmoids.empty() || !bristles.empty() ||
-               !user_laws.empty();
-    }
+    bool has_laws() const { return !frictions.empty() || !laws.empty(); }
     bool needs_reactions = false;        // some law reads them
     bool needs_joint_reactions = false;  // of tree joints
     bool driven = false;                 // forces or actuation
@@ -78,6 +44,8 @@ struct Program {
     std::vector<Angle> touched_angles;   // of these joints
     std::vector<int> touched_dofs;       // in the supports of the rows, ascending
 
+    // Of the implicit reaction equation at most: a limit for each element, a force for each of the user's laws.
+    size_t unknowns() const { return frictions.size() + static_cast<size_t>(user_laws) * mechanism.nv; }
     // Rows of constraints come first, rows of friction's directions after them.
     int constraint_rows() const {
         return constraints < static_cast<int>(blocks.size()) ? blocks[constraints].row : layout.rows;

@@ -1,11 +1,14 @@
-// Eq. (39): what the constraints alone would exert, and what the nonideal forces add to it.
+#include "dynamics/split.hpp"
+
 #include "dynamics/evaluation.hpp"
+#include "dynamics/solution.hpp"
+#include "friction/friction.hpp"
 #include "tree/factor.hpp"
 
 namespace pn {
 
-void share_multipliers(const Program& p, Workspace& w) {
-    w.now.lam_shared = w.now.lam;
+void share_multipliers(const Program& p, Workspace& w, const VecX& lam, VecX& shared) {
+    shared = lam;
     if (!w.now.rows.redundant) return;
     // A_dependent = W A_active; x + W^T y = lam with least |x|^2 + |y|^2 is y = (I + W W^T)^-1 W lam, x = lam - W^T y.
     std::vector<int> dependent;
@@ -25,9 +28,9 @@ void share_multipliers(const Program& p, Workspace& w) {
         W.row(k) = weights.transpose();
     }
     const MatX S = MatX::Identity(d, d) + W * W.transpose();
-    const VecX y = S.ldlt().solve(W * w.now.lam);
-    w.now.lam_shared -= W.transpose() * y;
-    for (int k = 0; k < d; ++k) w.now.lam_shared[dependent[k]] = y[k];
+    const VecX y = S.ldlt().solve(W * lam);
+    shared -= W.transpose() * y;
+    for (int k = 0; k < d; ++k) shared[dependent[k]] = y[k];
 }
 
 IdealMotion::IdealMotion(const Program& program, Workspace& workspace) : p(program), w(workspace) {
@@ -49,10 +52,13 @@ IdealMotion::IdealMotion(const Program& program, Workspace& workspace) : p(progr
         }
         w.state.ideal_decided = true;
     }
-    solve_motion(p, w, w.now.F);
+    solve_acceleration(p, w, w.now.F);
+    w.now.ideal = true;
 }
 
 IdealMotion::~IdealMotion() {
+    w.now.ideal = false;
+    w.now.renew();
     if (!sticks) return;
     w.now.terms.locked.swap(w.scratch.ideal_locked);
     factorize(p.mechanism, w.now.terms);
@@ -71,29 +77,30 @@ static void to_user_rows(const Program& p, const VecX& kept, VecX& out) {
 void split_forces(const Program& p, Workspace& w, Split& out) {
     const int nv = p.mechanism.nv;
     const VecX a = w.now.a, lam = w.now.lam;
-    share_multipliers(p, w);
-    to_user_rows(p, w.now.lam_shared, out.lam);
+    VecX shared;
+    share_multipliers(p, w, lam, shared);
+    to_user_rows(p, shared, out.lam);
     out.C = p.has_laws() ? w.now.C : VecX(VecX::Zero(nv));
     VecX total = VecX::Zero(nv);
     for (size_t i = 0; i < p.blocks.size(); ++i) {
         if (!w.now.rows.block_used[i]) continue;
         const bool constraint = static_cast<int>(i) < p.constraints;
-        add_transpose(p.blocks[i], w.now.A, w.now.lam_shared, constraint ? total : out.C);  // C holds what sticks as well
+        add_transpose(p.blocks[i], w.now.A, shared, constraint ? total : out.C);  // C holds what sticks as well
     }
     for (int dof = 0; dof < nv; ++dof)
         if (w.now.terms.locked[dof]) out.C[dof] += holding_forces(p, w)[dof];
     {
         const IdealMotion ideal(p, w);
-        share_multipliers(p, w);
+        share_multipliers(p, w, w.now.lam, shared);
         out.F_ideal = VecX::Zero(nv);
-        for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.A, w.now.lam_shared, out.F_ideal);
-        if (w.now.rows.blocks.empty()) w.now.lam_shared.setZero();
-        to_user_rows(p, w.now.lam_shared, out.lam_ideal);
+        for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.A, shared, out.F_ideal);
+        if (w.now.rows.blocks.empty()) shared.setZero();
+        to_user_rows(p, shared, out.lam_ideal);
     }
     out.F_nonideal = total - out.F_ideal + out.C;  // Eq. (39)
     w.now.a = a;
     w.now.lam = lam;
-    w.now.has_balance = false;
+    w.now.renew();
 }
 
 }  // namespace pn

@@ -12,7 +12,7 @@ struct Counters {
 
 // What the next step needs of those before it, beside the state (q, v) itself.
 struct RunState {
-    std::vector<signed char> mode;  // +1, -1 slip, 0 stick
+    Modes mode;
     // For elements of two or three directions: of the step's start, and where slip last had a clear direction.
     std::vector<Vec3> slip_direction, last_direction;
     bool indeterminate = false;   // what sticks shares its load in several ways: one multiplier says little
@@ -25,30 +25,41 @@ struct RunState {
     bool ideal_decided = false;   // which rows are independent without what sticks, over this step
 };
 
+// What joints, anchors and contacts carry in the motion at hand (friction/reactions.hpp).
+struct Reactions {
+    bool current = false;  // made of that motion
+    VecX lam;              // by kept row; least norm among redundant rows
+    std::vector<Force> body;  // external forces on each body, then their subtree sums
+    std::vector<Motion> motion;
+    std::vector<Force> momentum;
+};
+
 // What one evaluation at (t, q, v) yields.
 struct Evaluation {
     Terms terms;
     std::vector<RowValues> values;  // of each block
     std::vector<double> A, B;
     RowSystem rows;
-    VecX b, lam, lam_shared;  // by kept row; shared: least norm among redundant rows
+    VecX b, lam;  // by kept row
     VecX tau, external, F, C, C_smooth, base_C, a;  // generalized forces and acceleration
-    VecX balance;                     // M a - F - C - A^T lam: what holds the locked dofs
-    bool has_balance = false;
+    Reactions reactions;
+    VecX holding;                     // M a - F - C - A^T lam: what holds the locked dofs
+    bool has_holding = false;
+    bool ideal = false;               // the motion is that of the ideal constraints alone
     std::vector<double> limit;        // kinetic, at the present load and slip speed
     std::vector<double> load;         // limit at rest before the static ratio
     std::vector<Vec3> slip_force;     // of each slipping element, along its directions
     std::vector<VecX> user_C;
     VecX dz;
-    double speed = 0.0;               // largest velocity
+    VecX v;                           // velocity, where laws act
+    double speed = 0.0;               // largest of it
     double determinant = 1.0;         // of the implicit reaction equation
-    std::vector<Force> body_force, reaction_body;  // given forces; all external forces, then their subtree sums
-    std::vector<Motion> motion;
-    std::vector<Force> momentum;
-    std::vector<VecX> law_force;      // C of each law, when asked for
-    bool want_laws = false;
+    std::vector<Force> body_force;    // given forces on bodies
     VecX override_torque;
     bool has_override = false;
+
+    // What was derived from a motion no longer holds.
+    void renew() { reactions.current = has_holding = false; }
 };
 
 struct Scratch {
@@ -61,6 +72,8 @@ struct Scratch {
     std::vector<VecX> shift_steps;
     VecX image, newton_step;  // of the implicit reaction equation
     MatX jacobian;
+    std::vector<Force> subtree_force;
+    std::vector<VecX> law_force;  // of each law, for its power
 };
 
 struct Workspace {

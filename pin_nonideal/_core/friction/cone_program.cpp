@@ -1,21 +1,20 @@
-// Friction forces in disks and balls: min f^T W f / 2 + alpha0^T f with |f_e| <= s_e, a second-order cone program.
-//
+#include "friction/cone_program.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+
+namespace pn {
+
+namespace {
+
 // With f = s x and slip accelerations alpha, the pairs z_e = (1, x_e) and y_e = (u_e, alpha_e) lie in the cone
 // |tail| <= head, and are complementary at the solution: x_e = -alpha_e / |alpha_e| or alpha_e = 0. A primal-dual
 // interior-point method in Nesterov and Todd's scaling (Vandenberghe, "The CVXOPT linear and quadratic cone program
 // solvers", 2010) needs some fifteen steps however singular W is, and ends at the most even shares of a load that
 // nothing tells apart. Newton's method then solves the equations of the modes that it found to rounding.
-#include <cmath>
-#include <vector>
-
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
-
-#include "friction/modes.hpp"
-
-namespace pn {
-
-namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
@@ -297,6 +296,12 @@ VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dim
         ConeProgram(own_W, own_alpha, own_dims, Eigen::Map<const VecX>(limits.data(), limits.size())).solve();
     for (int i = 0; i < n; ++i) f[rows[i]] = own_f[i];
     return f;
+}
+
+VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s) {
+    if (alpha0.size() == 0) return VecX::Zero(0);
+    if (std::all_of(dims.begin(), dims.end(), [](int d) { return d == 1; })) return box_program(W, alpha0, s);
+    return ball_program(W, alpha0, dims, s);
 }
 
 }  // namespace pn

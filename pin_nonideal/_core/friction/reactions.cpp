@@ -1,298 +1,90 @@
-// The implicit equation of load-dependent laws: C depends on the reactions, which depend on C.
-//
-// Unknown y: the limits of slipping frictions and the forces of user laws. Given y the motion follows from the
-// factors at hand, the motion gives the loads, and the loads give an image g(y). A fixed point is iterated while it
-// contracts well; else Newton's method solves y = g(y). det(I - dg/dy) tells whether the solution is the only one.
-#include <algorithm>
-#include <cmath>
-#include <limits>
+#include "friction/reactions.hpp"
 
-#include "dynamics/evaluation.hpp"
+#include <algorithm>
+
+#include "dynamics/split.hpp"
+#include "friction/friction.hpp"
 
 namespace pn {
 
-namespace {
-
-constexpr double reaction_tolerance = 4e-15;  // relative change of y that counts as rounding
-constexpr double good_contraction = 0.25;     // slower fixed points go to Newton's method
-constexpr int fixed_point_limit = 30, newton_limit = 30;
-constexpr int most_mixed = 6;                 // laws whose mixtures of branches are all looked at; else one by one
-constexpr double same_solution = 1e-9;        // relative distance below which two solutions are the same
-
-struct Implicit {
-    const Program& p;
-    Workspace& w;
-    double t;
-    const VecX &q, &v;
-    int n = 0;
-    const VecX* base_C = nullptr;
-
-    int nv() const { return p.mechanism.nv; }
-
-    bool is_unknown(size_t e) const { return p.frictions[e].reaction == Reaction::total && slips(w.state.mode[e]); }
-
-    // Number of unknowns in their order: slipping elements, then user laws.
-    int count() const {
-        int k = 0;
-        for (size_t e = 0; e < p.frictions.size(); ++e) k += is_unknown(e);
-        for (const UserLaw& law : p.user_laws) k += law.reaction == Reaction::total ? nv() : 0;
-        return k;
+// External forces on each body: given ones, multipliers, friction and the other laws that act on bodies.
+static void gather_body_forces(const Program& p, Workspace& w, std::vector<Force>& body) {
+    const Evaluation& now = w.now;
+    if (p.has_body_forces) std::copy(now.body_force.begin(), now.body_force.end(), body.begin());
+    else std::fill(body.begin(), body.end(), Force{Vec3::Zero(), Vec3::Zero()});
+    for (int i : now.rows.blocks) {  // multipliers of constraints, and of what sticks at an anchor or contact
+        const Block& block = p.blocks[i];
+        if (!now.values[i].geometric) continue;
+        for (size_t k = 0; k < block.kept.size(); ++k)
+            add_wrench(block, now.terms, now.values[i].wrench[block.kept[k]], now.reactions.lam[block.row + k], body);
     }
-
-    double slip_factor(size_t e) const {
+    if (now.ideal) return;
+    for (size_t e = 0; e < p.frictions.size(); ++e) {  // what slips there, or is tried while modes are sought
         const Friction& f = p.frictions[e];
-        return speed_factor(f, w.state.mode[e] == sticking ? 0.0 : slip_velocity(w, f).norm());
+        if (w.state.mode[e] == sticking || !now.values[f.block].geometric) continue;
+        for (int k = 0; k < f.dim; ++k)
+            add_wrench(p.blocks[f.block], now.terms, now.values[f.block].wrench[k], now.slip_force[e][k], body);
     }
+    add_body_forces(p, w, body);
+}
 
-    void set(const VecX& y) {
-        int k = 0;
-        for (size_t e = 0; e < p.frictions.size(); ++e)
-            if (is_unknown(e)) w.now.limit[e] = y[k++];
-        for (size_t i = 0; i < p.user_laws.size(); ++i)
-            if (p.user_laws[i].reaction == Reaction::total) {
-                w.now.user_C[i] = y.segment(k, nv());
-                k += nv();
-            }
+// Recursive Newton-Euler: motion of the bodies out from the roots, momentum and external forces of the subtrees back.
+static void sweep_tree(const Mechanism& m, const Evaluation& now, Reactions& r) {
+    const int n = static_cast<int>(m.joints.size());
+    for (int i = 0; i < n; ++i) r.momentum[i] = {Vec3::Zero(), Vec3::Zero()};
+    r.motion[0] = {Vec3::Zero(), Vec3::Zero()};
+    for (int i = 1; i < n; ++i) {
+        const Joint& j = m.joints[i];
+        r.motion[i] = r.motion[j.parent];
+        for (int k = j.iv; k < j.iv + j.nv; ++k) r.motion[i] += now.a[k] * now.terms.J[k];
     }
+    for (int i = n - 1; i > 0; --i) {
+        const Joint& j = m.joints[i];
+        for (int k = j.iv; k < j.iv + j.nv; ++k)
+            r.momentum[i] += Force{now.a[k] * now.terms.Ag[k].lin, now.a[k] * now.terms.Ag[k].ang};
+        if (j.parent == 0) continue;
+        r.momentum[j.parent] += r.momentum[i];
+        r.body[j.parent] += r.body[i];
+    }
+}
 
-    // The motion for the limits and user forces in the workspace.
-    void motion() {
-        w.now.C = *base_C;
-        add_slip_forces(p, w, w.now.C, true);
-        for (size_t i = 0; i < p.user_laws.size(); ++i)
-            if (p.user_laws[i].reaction == Reaction::total) w.now.C += w.now.user_C[i];
-        w.scratch.trial = w.now.F + w.now.C;
-        solve_motion(p, w, w.scratch.trial);
-    }
+const Reactions& reactions(const Program& p, Workspace& w) {
+    Reactions& r = w.now.reactions;
+    if (r.current) return r;
+    r.current = true;
+    share_multipliers(p, w, w.now.lam, r.lam);
+    if (!p.needs_joint_reactions) return r;
+    gather_body_forces(p, w, r.body);
+    sweep_tree(p.mechanism, w.now, r);
+    return r;
+}
 
-    void image(const VecX& y, VecX& g) {
-        set(y);
-        motion();
-        // A stage that has run away is no case for the laws, a user's above all.
-        if (!std::isfinite(w.now.a.squaredNorm())) throw Failure(Failure::Kind::not_finite, t);
-        gather_reactions(p, w);
-        int k = 0;
-        for (size_t e = 0; e < p.frictions.size(); ++e)
-            if (is_unknown(e)) {
-                w.now.load[e] = load_limit(p, w, p.frictions[e], t, q, v);
-                g[k++] = w.now.load[e] * slip_factor(e);
-            }
-        for (size_t i = 0; i < p.user_laws.size(); ++i) {
-            const UserLaw& law = p.user_laws[i];
-            if (law.reaction != Reaction::total) continue;
-            law.function(t, q, v, w, w.now.user_C[i], w.state.z.data() + law.state, w.now.dz.data() + law.state);
-            g.segment(k, nv()) = w.now.user_C[i];
-            k += nv();
-        }
-        ++w.counters.iterations;
-    }
+Force joint_wrench(const Program& p, Workspace& w, int joint) {
+    const Reactions& r = reactions(p, w);
+    const Body& b = w.now.terms.body[joint];
+    const int parent = p.mechanism.joints[joint].parent;
+    Force f = b.f;
+    f += r.momentum[joint];
+    if (parent != 0) f += b.Y * r.motion[parent];
+    f.lin -= r.body[joint].lin;
+    f.ang -= r.body[joint].ang;
+    f.ang -= b.p.cross(f.lin);  // from the reference point to the joint's origin
+    return f;
+}
 
-    std::vector<int> unknown_elements() const {
-        std::vector<int> list;
-        for (size_t e = 0; e < p.frictions.size(); ++e)
-            if (is_unknown(e)) list.push_back(static_cast<int>(e));
-        return list;
+Force anchor_wrench(const Program& p, Workspace& w, int index) {
+    const Reactions& r = reactions(p, w);
+    const Block& block = p.blocks[index];
+    const RowValues& values = w.now.values[index];
+    Force f{Vec3::Zero(), Vec3::Zero()};
+    for (size_t k = 0; k < block.kept.size(); ++k) {
+        if (!values.geometric) continue;
+        const Wrench& unit = values.wrench[block.kept[k]];
+        const double lam = r.lam[block.row + k];
+        f.lin += lam * unit.force;
+        f.ang += lam * unit.couple;
     }
-
-    [[noreturn]] void paradox(double determinant) const {
-        throw Failure(Failure::Kind::paradox, t, unknown_elements(), determinant);
-    }
-
-    // dg/dy by differences, scaled by the unknowns' size.
-    void differentiate(const VecX& y, const VecX& g, double size) {
-        w.scratch.jacobian.resize(n, n);
-        VecX shifted = y, image_there(n);
-        const double h = 1e-7 * std::max(size, 1e-300);
-        for (int k = 0; k < n; ++k) {
-            shifted[k] = y[k] + h;
-            image(shifted, image_there);
-            w.scratch.jacobian.col(k) = (image_there - g) / h;
-            shifted[k] = y[k];
-        }
-    }
-
-    // Unknowns of one law, [first, last): a friction's limit or a user law's force.
-    std::vector<std::pair<int, int>> groups() const {
-        std::vector<std::pair<int, int>> list;
-        int k = 0;
-        for (size_t e = 0; e < p.frictions.size(); ++e)
-            if (is_unknown(e)) { list.emplace_back(k, k + 1); ++k; }
-        for (const UserLaw& law : p.user_laws)
-            if (law.reaction == Reaction::total) { list.emplace_back(k, k + nv()); k += nv(); }
-        return list;
-    }
-
-    // What a friction's limit is without any load.
-    VecX constants() const {
-        VecX c = VecX::Zero(n);
-        int k = 0;
-        for (size_t e = 0; e < p.frictions.size(); ++e)
-            if (is_unknown(e)) c[k++] = p.frictions[e].constant * slip_factor(e);
-        return c;
-    }
-
-    // Laws grow with |load|, which has two branches: beyond the kink a law's rows of dg/dy change their sign. Calls
-    // `look` with dg/dy of each mixture of branches, and the rows that it mirrors, until it returns true.
-    template <class Look>
-    void each_mixture(const MatX& J, const Look& look) const {
-        const auto laws = groups();
-        const int m = static_cast<int>(laws.size());
-        const bool all = m <= most_mixed;
-        for (int mixture = 1; mixture < (all ? 1 << m : m + 1); ++mixture) {
-            MatX other = J;
-            VecX mirrored = VecX::Zero(n);
-            for (int i = 0; i < m; ++i) {
-                if (all ? !(mixture >> i & 1) : i + 1 != mixture) continue;
-                const int first = laws[i].first, count = laws[i].second - first;
-                other.middleRows(first, count) *= -1.0;
-                mirrored.segment(first, count).setOnes();
-            }
-            if (look(other, mirrored)) return;
-        }
-    }
-
-    // Least det(I - dg/dy) over the mixtures of branches.
-    double least_determinant(const MatX& J) const {
-        const MatX I = MatX::Identity(n, n);
-        double least = (I - J).determinant();
-        each_mixture(J, [&](const MatX& other, const VecX&) {
-            least = std::min(least, (I - other).determinant());
-            return false;
-        });
-        return least;
-    }
-
-    // y is the only solution when every mixture of branches contracts, which |dg/dy| tells; else another one is looked
-    // for in each mixture that turns the equation over.
-    void check_uniqueness(const VecX& y, double size) {
-        const MatX I = MatX::Identity(n, n), J = w.scratch.jacobian;
-        const double here = (I - J).determinant();
-        w.now.determinant = here;
-        if (!(here > 0.0)) paradox(here);
-        const VecX bound = (I - J.cwiseAbs()).partialPivLu().solve(VecX::Ones(n));
-        if ((bound.array() > 0.0).all()) return;
-        const VecX c = constants();
-        each_mixture(J, [&](const MatX& other, const VecX& mirrored) {
-            const double there = (I - other).determinant();
-            if (there > 0.0) return false;
-            const VecX beyond = 2.0 * mirrored.cwiseProduct(c - y);
-            if (there == 0.0 || leads_elsewhere(y, y + (I - other).partialPivLu().solve(beyond), size)) paradox(there);
-            return false;
-        });
-        w.scratch.jacobian = J;
-        w.now.determinant = here;
-    }
-
-    // Whether Newton's method from `start` finds a solution that is not y.
-    bool leads_elsewhere(const VecX& y, VecX start, double size) {
-        VecX g(n);
-        try {
-            for (int it = 0; it < newton_limit; ++it) {
-                image(start, g);
-                const VecX miss = g - start;
-                const double scale = std::max({size, start.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});
-                if (miss.cwiseAbs().maxCoeff() <= same_solution * scale)
-                    return (start - y).cwiseAbs().maxCoeff() > 1e3 * same_solution * scale;
-                differentiate(start, g, scale);
-                start += (MatX::Identity(n, n) - w.scratch.jacobian).partialPivLu().solve(miss);
-            }
-        } catch (const Failure& failure) {
-            if (failure.kind != Failure::Kind::not_finite) throw;
-        }
-        return false;
-    }
-
-    void newton(VecX& y, VecX& g, double size) {
-        double last = std::numeric_limits<double>::infinity();
-        for (int it = 0; it < newton_limit; ++it) {
-            image(y, g);
-            const VecX miss = g - y;
-            size = std::max({size, y.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});
-            const double error = miss.cwiseAbs().maxCoeff();
-            if (!g.allFinite()) throw Failure(Failure::Kind::not_finite, t);
-            if (error <= 8.0 * reaction_tolerance * size || (it > 3 && error <= 1e-12 * size && error >= last)) {
-                differentiate(y, g, size);
-                check_uniqueness(y, size);
-                image(y, g);
-                return;
-            }
-            last = error;
-            differentiate(y, g, size);
-            y += (MatX::Identity(n, n) - w.scratch.jacobian).partialPivLu().solve(miss);
-        }
-        w.now.determinant = least_determinant(w.scratch.jacobian);
-        paradox(w.now.determinant);
-    }
-
-    void solve() {
-        VecX &y = w.state.unknown, &g = w.scratch.image;
-        if (!w.state.warm) y.head(n).setZero();
-        w.state.warm = false;  // what a failure leaves in y is no start for the next evaluation
-        auto yn = y.head(n);
-        double last = 0.0;
-        for (int it = 0; it < fixed_point_limit; ++it) {
-            VecX& at = w.scratch.newton_step;
-            at = y;
-            image(at, g);
-            double size = 0.0, change = 0.0;
-            for (int k = 0; k < n; ++k) {
-                size = std::max(size, std::abs(g[k]));
-                change = std::max(change, std::abs(g[k] - y[k]));
-            }
-            if (!g.head(n).allFinite()) throw Failure(Failure::Kind::not_finite, t);
-            yn = g.head(n);
-            if (change <= reaction_tolerance * size) return;
-            if (it > 1 && change > good_contraction * last && change > 1e-13 * size) break;
-            if (it > 1 && change >= last) return;  // rounding
-            // The next change would be below rounding: the motion just found needs one more pass and no check.
-            if (it > 0 && change * (change / last) <= reaction_tolerance * size) {
-                set(g);
-                motion();
-                return;
-            }
-            last = change;
-        }
-        VecX start = yn, value(n);
-        newton(start, value, 0.0);
-        yn = start;
-        set(start);
-        motion();
-        gather_reactions(p, w);
-    }
-};
-
-}  // namespace
-
-void solve_reactions(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    Implicit implicit{p, w, t, q, v};
-    bool ideal = false;
-    for (size_t e = 0; e < p.frictions.size(); ++e) ideal |= p.frictions[e].reaction == Reaction::ideal;
-    for (const UserLaw& law : p.user_laws) ideal |= law.reaction == Reaction::ideal;
-    w.now.base_C = w.now.C_smooth;  // C that does not change while the reactions are sought
-    if (ideal) {
-        const IdealMotion motion(p, w);
-        gather_reactions(p, w, false);
-        for (size_t e = 0; e < p.frictions.size(); ++e) {
-            if (p.frictions[e].reaction != Reaction::ideal) continue;
-            w.now.load[e] = load_limit(p, w, p.frictions[e], t, q, v);
-            w.now.limit[e] = w.now.load[e] * implicit.slip_factor(e);
-        }
-        for (size_t i = 0; i < p.user_laws.size(); ++i) {
-            const UserLaw& law = p.user_laws[i];
-            if (law.reaction != Reaction::ideal) continue;
-            law.function(t, q, v, w, w.now.user_C[i], w.state.z.data() + law.state, w.now.dz.data() + law.state);
-            w.now.base_C += w.now.user_C[i];
-        }
-    }
-    implicit.base_C = &w.now.base_C;
-    implicit.n = implicit.count();
-    if (implicit.n == 0) {
-        implicit.motion();
-        gather_reactions(p, w);
-    } else {
-        implicit.solve();
-    }
-    w.state.warm = true;
+    return f;
 }
 
 }  // namespace pn

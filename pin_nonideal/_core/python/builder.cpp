@@ -49,7 +49,6 @@ void bind_friction(nb::class_<Builder>& builder) {
                                 const std::string& reaction, int joint, int anchor, const std::vector<double>& axis,
                                 const nb::dict& x, nb::object user_limit) {
             Friction f;
-            f.name = name;
             f.law = law;
             f.block = block;
             f.dim = b.p->blocks[block].total;
@@ -78,29 +77,30 @@ void bind_friction(nb::class_<Builder>& builder) {
 void bind_laws(nb::class_<Builder>& builder) {
     builder
         .def("add_viscous", [](Builder& b, int law, int dof, int count, int block, double coefficient) {
-            b.p->viscous.push_back({law, dof, count, block, coefficient});
+            b.p->laws.push_back(Viscous{law, dof, count, block, coefficient});
         })
         .def("add_drag", [](Builder& b, int law, const FrameTuple& frame, double coefficient, double exponent) {
-            b.p->drags.push_back({law, frame_of(frame), coefficient, exponent, {}});
+            b.p->laws.push_back(Drag{law, frame_of(frame), coefficient, exponent, {}});
         })
         .def("add_sigmoid", [](Builder& b, int law, int dof, double phi1, double phi2, double phi3) {
-            b.p->sigmoids.push_back({law, dof, phi1, phi2, phi3});
+            b.p->laws.push_back(Sigmoid{law, dof, phi1, phi2, phi3});
         })
         .def("add_bristle", [](Builder& b, int law, int dof, double sigma0, double sigma1, double sigma2,
                                double coulomb, double stiction, double stribeck_velocity) {
-            b.p->bristles.push_back({law, dof, b.p->states, sigma0, sigma1, sigma2, coulomb, stiction,
-                                     stribeck_velocity});
+            b.p->laws.push_back(LuGre{law, dof, b.p->states, sigma0, sigma1, sigma2, coulomb, stiction,
+                                      stribeck_velocity});
             ++b.p->states;
         })
         .def("add_user_law", [](Builder& b, int law, int states, const std::string& reaction, nb::object function) {
             UserLaw u;
             u.law = law;
+            u.index = b.p->user_laws++;
             u.state = b.p->states;
             u.states = states;
             b.p->states += states;
             u.reaction = reaction_named(reaction);
             u.function = law_function(b.p.get(), function, states, u.reaction != Reaction::none);
-            b.p->user_laws.push_back(std::move(u));
+            b.p->laws.push_back(std::move(u));
         });
 }
 

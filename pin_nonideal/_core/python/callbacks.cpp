@@ -1,5 +1,7 @@
 #include "python/callbacks.hpp"
 
+#include "friction/reactions.hpp"
+
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
@@ -19,7 +21,7 @@ struct ReactionView {
         for (int i = 0; i < p->constraints; ++i) {
             const Block& block = p->blocks[i];
             for (size_t k = 0; k < block.kept.size(); ++k)
-                out[block.user_row + block.kept[k]] = w->now.lam_shared[block.row + k];
+                out[block.user_row + block.kept[k]] = reactions(*p, *w).lam[block.row + k];
         }
         return to_numpy(out);
     }

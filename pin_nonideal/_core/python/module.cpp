@@ -4,6 +4,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "friction/cone_program.hpp"
 #include "python/bindings.hpp"
 
 using namespace pn;

@@ -64,30 +64,11 @@ void Runner::set(const Array& q_in, const Array& v_in, const nb::object& tau) {
 }
 
 void Runner::choose_modes(double t, const nb::object& modes) {
-    const int n = static_cast<int>(p->frictions.size());
-    if (!modes.is_none()) {
-        const auto given = nb::cast<std::vector<int>>(modes);
-        for (int e = 0; e < n; ++e) w->state.mode[e] = static_cast<signed char>(given[e]);
-        w->state.warm = false;
-        want_rows(*p, *w);
-        begin_step(*p, *w, t, q, v);
-        return;
-    }
-    std::vector<int> candidates;
-    if (n > 0) {
-        kinematics(p->mechanism, w->now.terms, q, v);
-        evaluate_rows(*p, *w, t, v);
-        w->state.warm = false;
-    }
-    for (int e = 0; e < n; ++e) {
-        w->state.mode[e] = 1;
-        if (at_rest(*p, *w, e, v)) {
-            candidates.push_back(e);
-        } else {
-            follow_velocity(*p, *w, e);
-        }
-    }
-    resolve_modes(*p, *w, t, q, v, candidates);
+    if (modes.is_none()) return resolve_modes(*p, *w, t, q, v, first_question(*p, *w, t, q, v));
+    const auto given = nb::cast<std::vector<int>>(modes);
+    set_modes(*p, *w, std::vector<signed char>(given.begin(), given.end()));
+    w->state.warm = false;
+    begin_step(*p, *w, t, q, v);
 }
 
 void Runner::acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle tau, nb::handle out) {
@@ -108,7 +89,6 @@ void Runner::acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle
 nb::dict Runner::solve(const Array& q_in, const Array& v_in, double t, nb::object tau, nb::object modes) {
     set(q_in, v_in, tau);
     choose_modes(t, modes);
-    if (p->needs_reactions) gather_reactions(*p, *w);
     nb::dict out;
     nb::list forces, limits, used;
     for (size_t e = 0; e < p->frictions.size(); ++e) {

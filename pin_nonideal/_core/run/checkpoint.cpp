@@ -40,28 +40,37 @@ static void fields(Archive& a, RowSystem& x) {
 
 static void fields(Archive& a, Counters& x) { a(x.evaluations, x.factorizations, x.projections, x.iterations); }
 
+void fields(Archive& a, Modes& x) {
+    a(x.values_);
+    for (signed char mode : x) a.require(slips(mode) || mode == sticking || mode == unloaded);
+}
+
 static void fields(Archive& a, RunState& x) {
     auto& [mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm, shift_third,
            ideal_decided] = x;
     a(mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm, shift_third,
       ideal_decided);
-    for (signed char m : mode) a.require(slips(m) || m == sticking || m == unloaded);
+}
+
+static void fields(Archive& a, Reactions& x) {
+    auto& [current, lam, body, motion, momentum] = x;
+    a(current, lam, body, motion, momentum);
 }
 
 static void fields(Archive& a, Evaluation& x) {
-    auto& [terms, values, A, B, rows, b, lam, lam_shared, tau, external, F, C, C_smooth, base_C, acceleration, balance,
-           has_balance, limit, load, slip_force, user_C, dz, speed, determinant, body_force, reaction_body, motion,
-           momentum, law_force, want_laws, override_torque, has_override] = x;
-    a(terms, values, A, B, rows, b, lam, lam_shared, tau, external, F, C, C_smooth, base_C, acceleration, balance,
-      has_balance, limit, load, slip_force, user_C, dz, speed, determinant, body_force, reaction_body, motion, momentum,
-      law_force, want_laws, override_torque, has_override);
+    auto& [terms, values, A, B, rows, b, lam, tau, external, F, C, C_smooth, base_C, acceleration, reactions, holding,
+           has_holding, ideal, limit, load, slip_force, user_C, dz, v, speed, determinant, body_force, override_torque,
+           has_override] = x;
+    a(terms, values, A, B, rows, b, lam, tau, external, F, C, C_smooth, base_C, acceleration, reactions, holding,
+      has_holding, ideal, limit, load, slip_force, user_C, dz, v, speed, determinant, body_force, override_torque,
+      has_override);
 }
 
 static void fields(Archive& a, Scratch& x) {
     auto& [scaled, scaled_free, trial, work, r, miss, lam_step, ideal_rows, ideal_locked, shift_start, shift, shift_sum,
-           shift_steps, image, newton_step, jacobian] = x;
+           shift_steps, image, newton_step, jacobian, subtree_force, law_force] = x;
     a(scaled, scaled_free, trial, work, r, miss, lam_step, ideal_rows, ideal_locked, shift_start, shift, shift_sum,
-      shift_steps, image, newton_step);
+      shift_steps, image, newton_step, subtree_force, law_force);
     a.matrix(jacobian);
 }
 

@@ -21,7 +21,7 @@ constexpr double beyond = 2.0;     // part of a step: none of it
 // Slip speed the way that the mode says.
 double Simulation::speed_along(int e) const {
     const Friction& f = p.frictions[e];
-    const Vec3 u = slip_velocity(w, f);
+    const Vec3 u = slip_velocity(w.now, f);
     return f.dim == 1 ? w.state.mode[e] * u[0] : u.dot(w.state.slip_direction[e]);
 }
 
@@ -43,7 +43,7 @@ double Simulation::toward_rest(double size) {
         q_ = y.head(system.nq);
         v_ = derivative.segment(system.nq, system.nv);
         multiply(block, w.now.A, v_, w.scratch.r);
-        const double slip = slip_velocity(w, f).squaredNorm();
+        const double slip = slip_velocity(w.now, f).squaredNorm();
         double change = 0.0;
         for (int k = 0; k < f.dim; ++k) {
             const double rate = w.scratch.r[block.row + k] - w.now.b[block.row + k];
@@ -62,13 +62,10 @@ std::vector<Simulation::Watch> Simulation::crossed() {
             if (!pulls[i] && w.now.lam[p.blocks[p.contacts[i]].row] < 0.0) list.push_back({-1, false, i});
     if (p.frictions.empty()) return list;
     const double t1 = stepper.t0 + stepper.h;
-    bool gathered = false;
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
         const Watch watch{e, w.state.mode[e] != sticking};
         if (!watch.slip) {
             if (w.state.indeterminate) continue;
-            if (!gathered && p.needs_reactions) gather_reactions(p, w);
-            gathered = true;
             bool past = margin(watch, t1, stepper.y1) < 0.0;
             double least = HUGE_VAL, most = -HUGE_VAL;  // or may have been past it inside, between two stages
             for (int i = 0; i < stepper.method.stages; ++i) {
@@ -84,7 +81,7 @@ std::vector<Simulation::Watch> Simulation::crossed() {
         const double speed = stepper.y1.segment(system.nq, system.nv).cwiseAbs().maxCoeff();
         const double noise = 1e-3 * rest_speed * (1.0 + speed);  // of an element that has just begun to slip
         if (p.frictions[e].dim > 1 && !stepper.method.adaptive) {
-            const double now = slip_velocity(w, p.frictions[e]).norm();
+            const double now = slip_velocity(w.now, p.frictions[e]).norm();
             if (now < slip_at_start[e] && now <= arrived_speed * (1.0 + speed)) arrived = e;
         }
         if (margin(watch, t1, stepper.y1) < -noise) {
@@ -159,7 +156,6 @@ double Simulation::first_crossing(const Watch& watch) {
         const double at = stepper.t0 + s * stepper.h;
         stepper.interpolate(s, probe_);
         system.derivative(at, probe_, probe_rate_);
-        if (!watch.slip && p.needs_reactions) gather_reactions(p, w);
         return margin(watch, at, probe_);
     };
     double g[location_grid + 1];
@@ -185,7 +181,6 @@ void Simulation::step_onto(const Watch& found, double part) {
     for (int it = 0; it < 12; ++it) {
         stepper.step(begin, size);
         settle(begin + size, stepper.y1, stepper.f1);
-        if (!found.slip && p.needs_reactions) gather_reactions(p, w);
         const double g = margin(found, begin + size, stepper.y1);
         double slope = 0.0;
         if (found.slip && p.frictions[found.element].dim == 1) {
@@ -201,7 +196,6 @@ void Simulation::step_onto(const Watch& found, double part) {
             if (other < size) {
                 stepper.step(begin, other);
                 settle(begin + other, stepper.y1, stepper.f1);
-                if (!found.slip && p.needs_reactions) gather_reactions(p, w);
                 slope = (g - margin(found, begin + other, stepper.y1)) / (size - other);
             }
         } else if (size != before) {
@@ -254,7 +248,7 @@ bool Simulation::locate_event() {
     const Friction& f = p.frictions[found.element];
     if (found.slip && f.dim > 1) {
         const double speed = stepper.y1.segment(system.nq, system.nv).cwiseAbs().maxCoeff();
-        const double now = slip_velocity(w, f).norm();
+        const double now = slip_velocity(w.now, f).norm();
         const bool passing = now > rest_part * slip_at_start[found.element] && now > 1e-6 * (1.0 + speed);
         if (passing) trigger_element = no_trigger;
     }
@@ -269,19 +263,18 @@ bool Simulation::release_indeterminate() {
     if (!w.state.indeterminate) return false;
     const double full = stepper.h, begin = stepper.t0;
     const std::vector<signed char> modes = w.state.mode;
-    std::vector<int> resting;
+    ModeQuestion asked;
     const auto holds = [&](double at) {
         q_ = stepper.y1.head(system.nq);
         v_ = stepper.y1.segment(system.nq, system.nv);
-        resting.clear();
+        asked = {modes, {}, {}};
         for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
-            if (at_rest(p, w, e, v_)) resting.push_back(e);
-        resolve_modes(p, w, at, q_, v_, resting);
-        const bool all_stick = std::all_of(resting.begin(), resting.end(), [&](int e) {
+            if (at_rest(p, w, e, v_)) asked.at_rest.push_back(e);
+        resolve_modes(p, w, at, q_, v_, asked);
+        const bool all_stick = std::all_of(asked.at_rest.begin(), asked.at_rest.end(), [&](int e) {
             return w.state.mode[e] == sticking || modes[e] != sticking;
         });
-        w.state.mode = modes;
-        want_rows(p, w);
+        set_modes(p, w, modes);
         begin_step(p, w, at, q_, v_);
         return all_stick;
     };
@@ -295,7 +288,7 @@ bool Simulation::release_indeterminate() {
     }
     stepper.step(begin, high);
     settle(begin + high, stepper.y1, stepper.f1);
-    trigger_element = resting.front();
+    trigger_element = asked.at_rest.front();
     released_together = true;
     return true;
 }

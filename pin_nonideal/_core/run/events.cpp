@@ -10,7 +10,7 @@ void Simulation::remember_directions() {
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
         const Friction& f = p.frictions[e];
         if (f.dim == 1 || !slips(w.state.mode[e])) continue;
-        const Vec3 u = slip_velocity(w, f);
+        const Vec3 u = slip_velocity(w.now, f);
         slip_at_start[e] = u.norm();
         if (u.norm() > 1e-12) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
     }
@@ -38,39 +38,28 @@ void Simulation::switch_modes(double at, VecX& state, int trigger) {
     }
     const std::vector<signed char> before = w.state.mode;
     const std::vector<Vec3> directions = w.state.slip_direction;
-    if (trigger < 0) {  // the start: every element by its velocity
-        std::fill(w.state.mode.begin(), w.state.mode.end(), 1);
-        kinematics(p.mechanism, w.now.terms, q_, v_);
-        evaluate_rows(p, w, at, v_);
-    }
-    std::vector<int> candidates;
-    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
-        if (e == trigger || at_rest(p, w, e, v_)) {
-            candidates.push_back(e);
-            continue;
-        }
-        follow_velocity(p, w, e);
-    }
-    const int breaking = released_together ? any_at_limit : trigger >= 0 && before[trigger] == sticking ? trigger : -1;
+    ModeQuestion asked = trigger < 0 ? first_question(p, w, at, q_, v_) : question(p, w, v_, trigger);
+    if (released_together) asked.breaking = asked.at_rest;
+    else if (trigger >= 0 && before[trigger] == sticking) asked.breaking = {trigger};
     released_together = false;
     for (;;) {
-        resolve_modes(p, w, at, q_, v_, candidates, breaking);
+        resolve_modes(p, w, at, q_, v_, asked);
         // What sticks from now on has no slip velocity at all, not one of rounding.
         project(p, w, at, q_, v_);
         begin_step(p, w, at, q_, v_);
         // Nearly redundant elements that stuck together leave one that slips a velocity, which may oppose its mode.
+        std::vector<int>& candidates = asked.at_rest;
         const auto moving = std::stable_partition(candidates.begin(), candidates.end(), [&](int e) {
             return at_rest(p, w, e, v_) || speed_along(e) >= 0.0;
         });
         if (moving == candidates.end()) break;
-        std::for_each(moving, candidates.end(), [&](int e) { follow_velocity(p, w, e); });
+        std::for_each(moving, candidates.end(), [&](int e) { follow_velocity(p, w, e, asked); });
         candidates.erase(moving, candidates.end());
     }
     state.head(system.nq) = q_;
     state.segment(system.nq, system.nv) = v_;
-    if (p.needs_reactions) gather_reactions(p, w);
     w.state.indeterminate = false;
-    for (int e : candidates)
+    for (int e : asked.at_rest)
         if (w.state.mode[e] == sticking && ((e == trigger && before[e] == sticking) ||
             friction_force(p, w, e).norm() > static_limit(p, w, e, at, q_, v_) * (1.0 + 1e-9)))
             w.state.indeterminate = true;
@@ -85,7 +74,7 @@ void Simulation::switch_modes(double at, VecX& state, int trigger) {
         recent_events.push_back(at);
     }
     if (trigger < 0) return;
-    if (before == w.state.mode) recent_events.push_back(at);
+    if (before == static_cast<const std::vector<signed char>&>(w.state.mode)) recent_events.push_back(at);
     bridge_cluster(at, state, trigger);
 }
 

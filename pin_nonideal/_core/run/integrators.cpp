@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "math/lanes.hpp"
+#include "dynamics/evaluation.hpp"
 #include "friction/modes.hpp"
 #include "constraints/projection.hpp"
 #include "run/tableaux.hpp"
@@ -49,7 +50,7 @@ void System::derivative(double t, const VecX& y, VecX& dy) {
         collect(t, y, dy);
         return;
     }
-    evaluate_on_constraints(p, w, t, q_buffer, v_buffer);
+    project_and_evaluate(p, w, t, q_buffer, v_buffer);
     smallest_pivot = std::min(smallest_pivot, w.now.rows.distance);
     projected = y;
     projected.head(nq) = q_buffer;
@@ -65,13 +66,10 @@ void System::collect(double t, const VecX& y, VecX& dy) {
         v_buffer = y.segment(nq, nv);
         powers(p, w, v_buffer, dy.data() + nq + nv + nz);
     }
-    bool gathered = !p.needs_reactions;
     for (int e = 0; e < ne; ++e) {
         double& share = dy[ny - ne + e];
         share = 0.0;
         if (w.state.mode[e] != sticking || w.state.indeterminate) continue;
-        if (!gathered) gather_reactions(p, w);
-        gathered = true;
         q_buffer = y.head(nq);
         v_buffer = y.segment(nq, nv);
         const double limit = static_limit(p, w, e, t, q_buffer, v_buffer);
@@ -90,8 +88,8 @@ void powers(const Program& p, Workspace& w, const VecX& v, double* out) {
         out[2] = v.dot(w.scratch.work);
     }
     if (!p.has_laws()) return;
-    law_forces(p, w, v);
-    for (size_t l = 0; l < p.law_names.size(); ++l) out[3 + l] = v.dot(w.now.law_force[l]);
+    law_forces(p, w, v, w.scratch.law_force);
+    for (size_t l = 0; l < p.law_names.size(); ++l) out[3 + l] = v.dot(w.scratch.law_force[l]);
 }
 
 // out = y + (part_0 K_0 + ... + part_{n-1} K_{n-1}) for as many numbers from i as `Several` holds.

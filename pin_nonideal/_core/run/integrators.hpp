@@ -8,7 +8,7 @@
 
 #include <string>
 
-#include "dynamics/evaluation.hpp"
+#include "dynamics/workspace.hpp"
 
 namespace pn {
 

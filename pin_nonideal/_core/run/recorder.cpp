@@ -1,5 +1,7 @@
 #include "run/recorder.hpp"
 
+#include "dynamics/evaluation.hpp"
+
 namespace pn {
 
 static void append(std::vector<double>& to, const VecX& x) { to.insert(to.end(), x.data(), x.data() + x.size()); }
@@ -17,7 +19,7 @@ void Recorder::sample(double t, const VecX& y, bool evaluated) {
         if (system.nz > 0) w.state.z = y.segment(system.nq + system.nv, system.nz);
         evaluate(p, w, t, q_, v_);
     } else if (!evaluated && p.constraints > 0) {
-        look_at(p, w, t, q_, v_);
+        update_kinematics(p, w, t, q_, v_);
     }
     double position, velocity;
     violations(p, w, position, velocity);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "dynamics/split.hpp"
 #include "run/integrators.hpp"
 
 namespace pn {

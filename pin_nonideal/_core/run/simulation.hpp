@@ -5,6 +5,9 @@
 #include <functional>
 #include <optional>
 
+#include "dynamics/evaluation.hpp"
+#include "dynamics/solution.hpp"
+#include "dynamics/step_start.hpp"
 #include "friction/modes.hpp"
 #include "constraints/projection.hpp"
 #include "run/recorder.hpp"

@@ -3,7 +3,12 @@
 // First order, and no creep: what sticks has no velocity at all. All elements are solved together in every step.
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
+#include "dynamics/solution.hpp"
+#include "dynamics/step_start.hpp"
+#include "friction/cone_program.hpp"
+#include "friction/problem.hpp"
 #include "run/simulation.hpp"
 #include "tree/liegroup.hpp"
 
@@ -23,14 +28,7 @@ void Simulation::moreau_step(double step) {
     VecX v0 = y.segment(nq, nv), qm(nq), move = 0.5 * step * v0;
     retract(m, y.data(), move.data(), qm.data());
     // The motion without friction of the elements, constraints met at the end of the step.
-    std::vector<int> dims;
-    int rows = 0;
-    for (int e = 0; e < n; ++e) {
-        w.state.mode[e] = unloaded;
-        dims.push_back(p.frictions[e].dim);
-        rows += dims.back();
-    }
-    want_rows(p, w);
+    set_modes(p, w, std::vector<signed char>(n, unloaded));
     begin_step(p, w, mid, qm, v0);
     for (int i = 0; i < p.constraints; ++i) {
         const Block& block = p.blocks[i];
@@ -38,77 +36,55 @@ void Simulation::moreau_step(double step) {
             w.now.b[block.row + k] = -w.now.values[i].rate[block.kept[k]] / step;
     }
     const VecX force = w.now.F + (p.has_laws() ? w.now.C : VecX(VecX::Zero(nv)));
-    solve_motion(p, w, force);
-    const VecX a_free = w.now.a;
-    VecX alpha0(rows), f = VecX::Zero(rows), limits(n), met(n);  // met: limits that f was found for
-    MatX W(rows, rows), response(nv, rows), multipliers(p.layout.rows, rows);
-    const VecX lam_free = w.now.lam;
-    const auto slip = [&](const VecX& a, VecX& out_alpha) {
-        for (int e = 0, at = 0; e < n; ++e) {
-            const Block& block = p.blocks[p.frictions[e].block];
-            multiply(block, w.now.A, a, w.scratch.r);
-            for (size_t k = 0; k < block.kept.size(); ++k) out_alpha[at++] = w.scratch.r[block.row + k];
-        }
-    };
-    slip(a_free, alpha0);
+    solve_acceleration(p, w, force);
+    const VecX a_free = w.now.a, lam_free = w.now.lam;
+    std::vector<int> all(n);
+    std::iota(all.begin(), all.end(), 0);
+    FrictionProblem problem(p, w, all);
+    const std::vector<int>& dims = problem.dims;
+    problem.alpha0 = problem.along(p, w, a_free);
     for (int e = 0, at = 0; e < n; ++e)
-        for (int k = 0; k < dims[e]; ++k, ++at) alpha0[at] += w.now.values[p.frictions[e].block].rate[k] / step;
-    const VecX b = w.now.b;
-    w.now.b.setZero();
-    VecX unit = VecX::Zero(p.layout.rows), column(nv), alpha(rows);
-    for (int e = 0, at = 0; e < n; ++e) {
-        const Block& block = p.blocks[p.frictions[e].block];
-        for (size_t k = 0; k < block.kept.size(); ++k, ++at) {
-            column.setZero();
-            unit[block.row + k] = 1.0;
-            add_transpose(block, w.now.A, unit, column);
-            unit[block.row + k] = 0.0;
-            solve_motion(p, w, column);
-            response.col(at) = w.now.a;
-            multipliers.col(at) = w.now.lam;
-            slip(w.now.a, alpha);
-            W.col(at) = alpha;
-        }
-    }
-    w.now.b = b;
+        for (int k = 0; k < dims[e]; ++k, ++at) problem.alpha0[at] += w.now.values[p.frictions[e].block].rate[k] / step;
+    VecX f = VecX::Zero(problem.rows), limits(n), met(n);  // met: limits that f was found for
     // Limits for the load of this very step.
     for (int pass = 0; pass < load_passes; ++pass) {
-        w.now.a = a_free + response * f;
-        w.now.lam = lam_free + multipliers * f;
+        w.now.a = a_free + problem.response * f;
+        w.now.lam = lam_free + problem.multipliers * f;
         for (int e = 0, at = 0; e < n; ++e) {
             w.now.slip_force[e] = Vec3::Zero();
             for (int k = 0; k < dims[e]; ++k) w.now.slip_force[e][k] = f[at++];
-            w.state.mode[e] = 1;
         }
-        if (p.needs_reactions) gather_reactions(p, w);
+        w.now.renew();
         double change = 0.0, size = 0.0;
         for (int e = 0; e < n; ++e) {
             const Friction& friction = p.frictions[e];
-            const double speed = slip_velocity(w, friction).norm();
+            const double speed = slip_velocity(w.now, friction).norm();
             const double limit = load_limit(p, w, friction, mid, w.now.terms.q, v0) *
-                                 (speed == 0.0 ? friction.static_ratio : speed_factor(friction, speed));
+                                 (speed == 0.0 ? friction.static_ratio : friction.speed_factor(speed));
             change = std::max(change, std::abs(limit - limits[e]));
             size = std::max(size, limit);
             limits[e] = limit;
         }
         if (pass > 0 && (change <= load_tolerance * size || !p.needs_reactions)) break;
-        f = friction_program(W, alpha0, dims, limits);
+        f = friction_program(problem.W, problem.alpha0, dims, limits);
         met = limits;
         if (pass + 1 == load_passes) throw Failure(Failure::Kind::paradox, t, {0}, change);
     }
-    const VecX end = alpha0 + W * f;
-    VecX v1 = v0 + step * (a_free + response * f);
+    const VecX end = problem.alpha0 + problem.W * f;
+    std::vector<signed char> modes(n);
+    VecX v1 = v0 + step * (a_free + problem.response * f);
     for (int e = 0, at = 0; e < n; at += dims[e], ++e) {
         const bool held = f.segment(at, dims[e]).norm() < met[e] * (1.0 - 1e-12);
-        w.state.mode[e] = held ? sticking : dims[e] > 1 || end[at] > 0.0 ? 1 : -1;
-        if (w.state.mode[e] == sticking)
+        modes[e] = held ? sticking : dims[e] > 1 || end[at] > 0.0 ? 1 : -1;
+        if (held)
             if (const auto* d = std::get_if<DofRows>(&p.blocks[p.frictions[e].block].kind))
                 for (int k = 0; k < d->count; ++k) v1[d->dof + k] = 0.0;
     }
+    set_modes(p, w, modes);
     if (system.energy) {  // work over the step, by the mean velocity
         const VecX mean = 0.5 * (v0 + v1);
         probe_rate_.setZero();
-        w.now.lam = lam_free + multipliers * f;
+        w.now.lam = lam_free + problem.multipliers * f;
         powers(p, w, mean, probe_rate_.data() + nq + nv + system.nz);
         const int at = nq + nv + system.nz;
         // Where a slip turns inside the step its mean velocity may go with the friction that meets its end: that is
@@ -136,7 +112,6 @@ void Simulation::step_in_time(double stop, double dt) {
     const std::vector<signed char> before = w.state.mode;
     moreau_step(end - t);
     t = end;
-    want_rows(p, w);
     q_ = y.head(system.nq);
     v_ = y.segment(system.nq, system.nv);
     begin_step(p, w, t, q_, v_);  // factors of the new modes: what sticks must not move as the rest is projected

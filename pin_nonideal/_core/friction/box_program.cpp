@@ -1,11 +1,10 @@
-// Friction forces of elements at rest, all at once, each of one direction: min f^T W f / 2 + alpha0^T f in the box
-// |f_e| <= s_e, exactly.
+#include "friction/box_program.hpp"
+
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <Eigen/QR>
-
-#include "friction/modes.hpp"
 
 namespace pn {
 
@@ -82,7 +81,9 @@ VecX active_set(const MatX& W, const VecX& alpha0, const VecX& s) {
     return f;
 }
 
-// One direction each: block principal pivoting, single (least index) once it fails to make progress.
+}  // namespace
+
+// Block principal pivoting, single (least index) once it fails to make progress.
 VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s) {
     const int n = static_cast<int>(s.size());
     VecX f = VecX::Zero(n);
@@ -114,14 +115,6 @@ VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s) {
         }
     }
     return active_set(W, alpha0, s);
-}
-
-}  // namespace
-
-VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& limits) {
-    if (alpha0.size() == 0) return VecX::Zero(0);
-    if (std::all_of(dims.begin(), dims.end(), [](int d) { return d == 1; })) return box_program(W, alpha0, limits);
-    return ball_program(W, alpha0, dims, limits);
 }
 
 }  // namespace pn

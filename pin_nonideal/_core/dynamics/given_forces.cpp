@@ -1,8 +1,9 @@
-// Given forces F: springs, wrenches, user forces and actuation.
+#include "dynamics/given_forces.hpp"
+
 #include <algorithm>
 #include <cmath>
 
-#include "dynamics/evaluation.hpp"
+#include "dynamics/workspace.hpp"
 
 namespace pn {
 
@@ -99,7 +100,7 @@ struct Torque {
 
 }  // namespace
 
-void actuation_torque(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& tau) {
+static void actuation_torque(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& tau) {
     if (w.now.has_override) tau = w.now.override_torque;
     else std::visit(Torque{p, w, t, q, v, tau}, p.actuation);
 }
@@ -113,11 +114,11 @@ void given_forces(const Program& p, Workspace& w, double t, const VecX& q, const
     for (const GivenForce& f : p.forces) std::visit(apply, f);
     if (!p.has_body_forces) return;
     // From the leaves to the root: each joint feels the forces on its subtree.
-    std::copy(w.now.body_force.begin(), w.now.body_force.end(), w.now.reaction_body.begin());
+    std::copy(w.now.body_force.begin(), w.now.body_force.end(), w.scratch.subtree_force.begin());
     for (int i = static_cast<int>(p.mechanism.joints.size()) - 1; i > 0; --i) {
         const Joint& j = p.mechanism.joints[i];
-        for (int k = j.iv; k < j.iv + j.nv; ++k) w.now.external[k] += dot(w.now.terms.J[k], w.now.reaction_body[i]);
-        if (j.parent != 0) w.now.reaction_body[j.parent] += w.now.reaction_body[i];
+        for (int k = j.iv; k < j.iv + j.nv; ++k) w.now.external[k] += dot(w.now.terms.J[k], w.scratch.subtree_force[i]);
+        if (j.parent != 0) w.scratch.subtree_force[j.parent] += w.scratch.subtree_force[i];
     }
 }
 

@@ -1,0 +1,80 @@
+#include "dynamics/solution.hpp"
+
+#include "tree/factor.hpp"
+
+namespace pn {
+
+// Pivots of M that differ by more than RowSystem::refine tells cost the row equations as many digits; these passes give
+// them back.
+constexpr int refinement_passes = 2;
+
+// r := b - A x, or b - B x with the scaled rows, for the rows in use.
+static void row_residuals(const Program& p, const Evaluation& now, const std::vector<double>& rows, const VecX& x,
+                          const VecX& b, VecX& r) {
+    for (int i : now.rows.blocks) {
+        const Block& block = p.blocks[i];
+        multiply(block, rows, x, r);
+        for (size_t k = 0; k < block.kept.size(); ++k) r[block.row + k] = b[block.row + k] - r[block.row + k];
+    }
+}
+
+// x, a force, becomes the acceleration under it and the constraints A a = b; lam are their multipliers.
+static void constrained_solve(const Program& p, Workspace& w, VecX& x, const VecX& b, VecX& lam) {
+    Evaluation& now = w.now;
+    solve_R(p.mechanism, now.terms, x);  // a_s' = R^-1 (F + C), Eq. (5)
+    if (!now.rows.blocks.empty()) {
+        row_residuals(p, now, now.B, x, b, w.scratch.r);
+        solve_rows(p.layout, now.rows, w.scratch.r, lam);  // J B^T (b - B a_s') = B^T lam, Eqs. (38), (39)
+        for (int i : now.rows.blocks) add_transpose(p.blocks[i], now.B, lam, x);  // scaled, Eq. (40)
+    }
+    solve_Rt(p.mechanism, now.terms, x);
+}
+
+void solve_acceleration(const Program& p, Workspace& w, const VecX& force, const VecX& b, VecX& a, VecX& lam) {
+    Evaluation& now = w.now;
+    Scratch& scratch = w.scratch;
+    a = force;
+    constrained_solve(p, w, a, b, lam);
+    if (now.rows.blocks.empty() || !now.rows.refine) return;
+    for (int pass = 0; pass < refinement_passes; ++pass) {  // what the equations still miss is solved for again
+        multiply_M(p.mechanism, now.terms, a, scratch.scaled);
+        scratch.scaled_free = force - scratch.scaled;
+        for (int i : now.rows.blocks) add_transpose(p.blocks[i], now.A, lam, scratch.scaled_free);
+        row_residuals(p, now, now.A, a, b, scratch.miss);
+        constrained_solve(p, w, scratch.scaled_free, scratch.miss, scratch.lam_step);
+        a += scratch.scaled_free;
+        lam += scratch.lam_step;
+    }
+}
+
+void solve_acceleration(const Program& p, Workspace& w, const VecX& force) {
+    w.now.renew();
+    solve_acceleration(p, w, force, w.now.b, w.now.a, w.now.lam);
+}
+
+bool is_immobile(const Program& p, const Workspace& w) {
+    if (p.moves_in_time || p.frictions.empty()) return false;
+    int held = 0;
+    for (char locked : w.now.terms.locked) held += locked;
+    bool sticks = held > 0;
+    for (int i : w.now.rows.blocks) {
+        const Block& block = p.blocks[i];
+        for (size_t k = 0; k < block.kept.size(); ++k) held += w.now.rows.active[block.row + k];
+        sticks |= i >= p.constraints;
+    }
+    return sticks && held >= p.mechanism.nv;
+}
+
+const VecX& holding_forces(const Program& p, Workspace& w) {
+    Evaluation& now = w.now;
+    if (now.has_holding) return now.holding;
+    now.has_holding = true;
+    multiply_M(p.mechanism, now.terms, now.a, now.holding);
+    now.holding -= now.F + now.C;
+    w.scratch.work.setZero();
+    for (int i : now.rows.blocks) add_transpose(p.blocks[i], now.A, now.lam, w.scratch.work);
+    now.holding -= w.scratch.work;
+    return now.holding;
+}
+
+}  // namespace pn

@@ -1,0 +1,115 @@
+#include "dynamics/step_start.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "constraints/projection.hpp"
+#include "dynamics/evaluation.hpp"
+
+namespace pn {
+
+// Rows that were found dependent must be met by the solution all the same, to this part of their terms; of
+// accelerations in play a thousandth counts, and as many m/s^2 where nothing is accelerated.
+constexpr double consistency_tolerance = 1e-6, background = 1e-3;
+
+void select_rows(const Program& p, Workspace& w) {
+    for (int r = 0; r < p.layout.rows; ++r) w.now.rows.wanted[r] = r < p.constraint_rows();
+    std::fill(w.now.terms.locked.begin(), w.now.terms.locked.end(), char(0));
+    for (size_t e = 0; e < p.frictions.size(); ++e) {
+        const Block& block = p.blocks[p.frictions[e].block];
+        if (w.state.mode[e] != sticking) continue;
+        if (const auto* d = std::get_if<DofRows>(&block.kind))
+            for (int k = 0; k < d->count; ++k) w.now.terms.locked[d->dof + k] = 1;
+        else
+            for (size_t k = 0; k < block.kept.size(); ++k) w.now.rows.wanted[block.row + k] = 1;
+    }
+    w.now.rows.use_wanted(p.blocks);
+    w.state.ideal_decided = false;
+}
+
+// Residual of the dependent rows; the worst block, or -1 when all are met.
+static int contradicting_block(const Program& p, Workspace& w, double& worst) {
+    int found = -1;
+    double excess = 1.0;
+    const double reach = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm() + background;  // accelerations in play
+    for (int i : w.now.rows.blocks) {
+        const Block& block = p.blocks[i];
+        const int n = static_cast<int>(block.kept.size());
+        for (int k = 0; k < n; ++k) {
+            const int row = block.row + k;
+            if (!w.now.rows.wanted[row] || w.now.rows.active[row]) continue;
+            double sum = -w.now.b[row], size = std::abs(w.now.b[row]);
+            const double* A = w.now.A.data() + block.offset + k;
+            for (size_t l = 0; l < block.support.size(); ++l) {
+                const double term = A[l * n] * w.now.a[block.support[l]];
+                sum += term;
+                size += std::abs(term);
+            }
+            const double allowed = consistency_tolerance * (size + background * reach);
+            if (std::abs(sum) > allowed * excess) {
+                excess = std::abs(sum) / allowed;
+                worst = sum;
+                found = i;
+            }
+        }
+    }
+    return found;
+}
+
+static void choose_rows(const Program& p, Workspace& w) {
+    const bool sticks = std::count(w.state.mode.begin(), w.state.mode.end(), sticking) > 0;
+    decide_rows(p.layout, p.blocks, w.now.B, w.now.rows, sticks ? rank_tolerance_sticking : rank_tolerance);
+    factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+    ++w.counters.factorizations;
+}
+
+// Chooses the rows of a step where the factors found there ask for it; returns whether it did.
+static bool configure_step(const Program& p, Workspace& w) {
+    w.state.ideal_decided = false;
+    if (w.now.rows.blocks.empty() || !w.now.rows.orthogonal) return false;
+    choose_rows(p, w);
+    return true;
+}
+
+// Names the contradicting block, and the one that shares the step with it and carries the largest multipliers.
+[[noreturn]] static void contradict(const Program& p, const Workspace& w, double t, int block, double residual) {
+    std::vector<int> blame{block};
+    double largest = -1.0;
+    int other = -1;
+    for (int i : w.now.rows.blocks) {
+        if (i == block) continue;
+        const double size = w.now.lam.segment(p.blocks[i].row, p.blocks[i].kept.size()).cwiseAbs().maxCoeff();
+        if (size > largest) { largest = size; other = i; }
+    }
+    if (other >= 0) blame.push_back(other);
+    throw Failure(Failure::Kind::inconsistent, t, blame, residual);
+}
+
+// Laws are asked only once the rows are independent: others give them multipliers that mean nothing.
+static void move_step(const Program& p, Workspace& w, double t, const VecX& v, bool chosen) {
+    assemble_forces(p, w, t, v);
+    solve_dynamics(p, w, t, v);
+    if (w.now.rows.blocks.empty() || !w.now.rows.redundant) return;
+    double residual = 0.0;
+    int block = contradicting_block(p, w, residual);
+    if (block >= 0 && !chosen) {  // what was dependent at an earlier step is not any more
+        choose_rows(p, w);
+        solve_dynamics(p, w, t, v);
+        block = contradicting_block(p, w, residual);
+    }
+    if (block >= 0) contradict(p, w, t, block, residual);
+}
+
+void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    configure(p, w, t, q, v);
+    move_step(p, w, t, v, configure_step(p, w));
+}
+
+bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v) {
+    const bool chosen = configure_step(p, w);
+    const bool moved = project_velocity(p, w, t, v);
+    move_step(p, w, t, v, chosen);
+    return moved;
+}
+
+}  // namespace pn

@@ -1,0 +1,120 @@
+#include "friction/friction.hpp"
+
+#include "dynamics/solution.hpp"
+#include "friction/reactions.hpp"
+
+namespace pn {
+
+// Slip slower than this part of the scene's speed has no direction of its own but rounding.
+constexpr double directed_speed = 1e-9;
+
+Vec3 slip_velocity(const Evaluation& now, const Friction& f) {
+    const RowValues& values = now.values[f.block];
+    Vec3 u = Vec3::Zero();
+    for (int k = 0; k < f.dim; ++k) u[k] = values.rate[k];
+    return u;
+}
+
+double load_limit(const Program& p, Workspace& w, const Friction& f, double t, const VecX& q, const VecX& v) {
+    using Load = Friction::Load;
+    switch (f.load) {
+        case Load::none: return f.constant;
+        case Load::user: return f.user_limit(t, q, v, w);
+        case Load::contact: return f.constant + f.mu * std::abs(reactions(p, w).lam[p.blocks[f.anchor].row]);
+        default: break;
+    }
+    Force r;
+    Vec3 axis;
+    if (f.joint > 0) {
+        r = joint_wrench(p, w, f.joint);
+        axis = w.now.terms.body[f.joint].R * f.axis;
+    } else {
+        r = anchor_wrench(p, w, f.anchor);
+        const Frame& frame = *frame1(p.blocks[f.anchor].kind);
+        axis = w.now.terms.body[frame.joint].R * (frame.R * f.axis);
+    }
+    if (f.load == Load::spherical) return f.constant + f.mu * f.radius * r.lin.norm();
+    const double axial = r.lin.dot(axis);
+    const double radial = (r.lin - axial * axis).norm();
+    if (f.load == Load::prismatic) return f.constant + f.mu * (radial + f.inverse_span * r.ang.norm());
+    const double bending = f.inverse_span == 0.0 ? 0.0 : (r.ang - r.ang.dot(axis) * axis).norm() * f.inverse_span;
+    return f.constant + f.mu * (f.radius * (radial + bending) + f.axial_radius * std::abs(axial));
+}
+
+double slip_factor(const Program& p, const Workspace& w, int e) {
+    const Friction& f = p.frictions[e];
+    return f.speed_factor(w.state.mode[e] == sticking ? 0.0 : slip_velocity(w.now, f).norm());
+}
+
+void update_limit(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
+    w.now.load[e] = load_limit(p, w, p.frictions[e], t, q, v);
+    w.now.limit[e] = w.now.load[e] * slip_factor(p, w, e);
+}
+
+double static_limit(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
+    const Friction& f = p.frictions[e];
+    if (f.reaction == Reaction::total) w.now.load[e] = load_limit(p, w, f, t, q, v);
+    return w.now.load[e] * f.static_ratio;
+}
+
+Vec3 friction_force(const Program& p, Workspace& w, int e) {
+    const Friction& f = p.frictions[e];
+    if (w.state.mode[e] != sticking) return w.now.slip_force[e];
+    Vec3 force = Vec3::Zero();
+    const Block& block = p.blocks[f.block];
+    if (const auto* d = std::get_if<DofRows>(&block.kind))
+        for (int k = 0; k < f.dim; ++k) force[k] = holding_forces(p, w)[d->dof + k];
+    else
+        for (int k = 0; k < f.dim; ++k) force[k] = w.now.lam[block.row + k];
+    return force;
+}
+
+// Unit direction of the friction force of a slipping element.
+static Vec3 force_direction(const Program& p, Workspace& w, int e) {
+    const Friction& f = p.frictions[e];
+    if (f.dim == 1) return Vec3(-w.state.mode[e], 0.0, 0.0);
+    const Vec3 u = slip_velocity(w.now, f);
+    const double speed = u.norm();
+    if (speed > directed_speed * (1.0 + w.now.speed))
+        // Past a reversal inside a step the direction goes on as it was, so that the step sees a smooth law.
+        w.state.last_direction[e] = u.dot(w.state.slip_direction[e]) >= 0.0 ? Vec3(u / speed) : Vec3(-u / speed);
+    return -w.state.last_direction[e];
+}
+
+void add_slip_force(const Program& p, Workspace& w, int e, VecX& C) {
+    if (!slips(w.state.mode[e])) return;
+    const Block& block = p.blocks[p.frictions[e].block];
+    w.now.slip_force[e] = w.now.limit[e] * force_direction(p, w, e);
+    w.now.reactions.current = false;
+    if (const auto* d = std::get_if<DofRows>(&block.kind))
+        for (int k = 0; k < d->count; ++k) C[d->dof + k] += w.now.slip_force[e][k];
+    else
+        add_along(block, w.now, w.now.slip_force[e], C);
+}
+
+void add_slip_forces(const Program& p, Workspace& w, bool loaded, VecX& C) {
+    for (size_t e = 0; e < p.frictions.size(); ++e)
+        if ((p.frictions[e].reaction != Reaction::none) == loaded) add_slip_force(p, w, e, C);
+}
+
+void add_along(const Block& block, const Evaluation& now, const Vec3& f, VecX& C) {
+    const int n = static_cast<int>(block.kept.size());
+    const double* A = now.A.data() + block.offset;
+    for (size_t l = 0; l < block.support.size(); ++l) {
+        double sum = 0.0;
+        for (int k = 0; k < n; ++k) sum += A[l * n + k] * f[k];
+        if (sum != 0.0) C[block.support[l]] += sum;
+    }
+}
+
+void add_wrench(const Block& block, const Terms& terms, const Wrench& unit, double size, std::vector<Force>& body) {
+    for (int side = 0; side < 2; ++side) {
+        const int joint = side == 0 ? block.joint1 : block.joint2;
+        if (joint == 0) continue;
+        const double s = side == 0 ? size : -size;
+        const Vec3 force = s * unit.force;
+        body[joint] += Force{force, s * unit.couple + (unit.point - terms.body[joint].ref).cross(force)};
+    }
+}
+
+}  // namespace pn

@@ -1,0 +1,15 @@
+// The motion together with the laws that its reactions load: C depends on the reactions, which depend on C.
+//
+// Unknown y: the limits of slipping frictions and the forces of user laws. Given y the motion follows from the
+// factors at hand, the motion gives the loads, and the loads give an image g(y). A fixed point is iterated while it
+// contracts well; else Newton's method solves y = g(y). det(I - dg/dy) tells whether the solution is the only one.
+#pragma once
+
+#include "dynamics/workspace.hpp"
+
+namespace pn {
+
+// C, a and lam for the forces F and the laws C_smooth that read no reactions.
+void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
+
+}  // namespace pn

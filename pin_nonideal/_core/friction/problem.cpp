@@ -1,0 +1,84 @@
+#include "friction/problem.hpp"
+
+#include "dynamics/solution.hpp"
+#include "tree/factor.hpp"
+
+namespace pn {
+
+// Part of an element's free response that the constraints must leave it; less is rounding.
+constexpr double least_response = 1e-13;
+
+static const Block& block_of(const Program& p, int element) { return p.blocks[p.frictions[element].block]; }
+
+FrictionProblem::FrictionProblem(const Program& p, Workspace& w, std::vector<int> list) : elements(std::move(list)) {
+    for (int e : elements) {
+        dims.push_back(p.frictions[e].dim);
+        rows += dims.back();
+    }
+    const int nv = p.mechanism.nv;
+    W.resize(rows, rows);
+    response.resize(nv, rows);
+    multipliers.resize(p.layout.rows, rows);
+    free.resize(rows);
+    const VecX no_drift = VecX::Zero(p.layout.rows);
+    VecX force(nv), a(nv), lam = no_drift, unit = no_drift;
+    int column = 0;
+    for (int e : elements) {
+        const Block& block = block_of(p, e);
+        for (size_t k = 0; k < block.kept.size(); ++k, ++column) {
+            force.setZero();
+            unit[block.row + k] = 1.0;
+            add_transpose(block, w.now.A, unit, force);
+            unit[block.row + k] = 0.0;
+            solve_acceleration(p, w, force, no_drift, a, lam);
+            response.col(column) = a;
+            multipliers.col(column) = lam;
+            W.col(column) = along(p, w, a);
+            solve_R(p.mechanism, w.now.terms, force);
+            free[column] = force.squaredNorm();
+        }
+    }
+}
+
+VecX FrictionProblem::along(const Program& p, Workspace& w, const VecX& x) const {
+    VecX out(rows);
+    int at = 0;
+    for (int e : elements) {
+        const Block& block = block_of(p, e);
+        multiply(block, w.now.A, x, w.scratch.r);
+        for (size_t k = 0; k < block.kept.size(); ++k) out[at++] = w.scratch.r[block.row + k];
+    }
+    return out;
+}
+
+VecX FrictionProblem::slip_accelerations(const Program& p, Workspace& w) const {
+    VecX alpha = along(p, w, w.now.a);
+    int at = 0;
+    for (int e : elements) {
+        const Block& block = block_of(p, e);
+        for (size_t k = 0; k < block.kept.size(); ++k) alpha[at++] -= w.now.b[block.row + k];
+    }
+    return alpha;
+}
+
+void FrictionProblem::add_forces(const Program& p, Workspace& w, const VecX& f, VecX& C) const {
+    VecX by_row = VecX::Zero(p.layout.rows);
+    int at = 0;
+    for (int e : elements) {
+        const Block& block = block_of(p, e);
+        for (size_t k = 0; k < block.kept.size(); ++k, ++at) by_row[block.row + k] = w.now.slip_force[e][k] = f[at];
+        add_transpose(block, w.now.A, by_row, C);
+    }
+    w.now.reactions.current = false;
+}
+
+void FrictionProblem::clean() {
+    W = (0.5 * (W + W.transpose())).eval();
+    for (int i = 0; i < rows; ++i) {
+        if (W(i, i) > least_response * free[i]) continue;
+        W.row(i).setZero();
+        W.col(i).setZero();
+    }
+}
+
+}  // namespace pn

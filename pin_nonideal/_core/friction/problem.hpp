@@ -1,0 +1,31 @@
+// The friction problem of some elements together: with their forces f as unknowns, slip accelerations are
+// alpha = alpha0 + W f, W the Delassus matrix of their directions after the constraints in use.
+#pragma once
+
+#include "dynamics/workspace.hpp"
+
+namespace pn {
+
+struct FrictionProblem {
+    std::vector<int> elements, dims;  // dims[i] rows of alpha and f for element i, one after the other
+    int rows = 0;
+    VecX alpha0;       // without any friction of these elements
+    MatX W;            // alpha for a unit of each friction force
+    MatX response, multipliers;  // a and lam for it
+    VecX free;         // alpha that it would cause if no constraint held
+
+    // For the factors in the workspace, in which these elements do not stick; alpha0 is left to the caller.
+    FrictionProblem(const Program& p, Workspace& w, std::vector<int> elements);
+
+    // Rows A x of the elements' directions.
+    VecX along(const Program& p, Workspace& w, const VecX& x) const;
+    // Slip accelerations A a - b of the motion at hand.
+    VecX slip_accelerations(const Program& p, Workspace& w) const;
+    // C += A^T f; each element's part of f becomes its slip force.
+    void add_forces(const Program& p, Workspace& w, const VecX& f, VecX& C) const;
+    // W as theory has it: symmetric, and exactly zero for what the constraints alone decide, such as the friction of a
+    // driven joint.
+    void clean();
+};
+
+}  // namespace pn
