@@ -49,7 +49,7 @@ class Frames:
             return Frame(zero, np.eye(3), np.zeros((3, nv)), np.zeros((3, nv)), zero, zero, zero, zero)
         at = (self.model, self.data, self.model.getFrameId(name), pin.LOCAL_WORLD_ALIGNED)
         place = self.data.oMf[at[2]]
-        p, R, J = place.translation.copy(), place.rotation.copy(), pin.getFrameJacobian(*at)
+        p, R, J = place.translation.copy(), place.rotation.copy(), pin.getFrameJacobian(*at).reshape(6, -1)
         u, du = pin.getFrameVelocity(*at), pin.getFrameClassicalAcceleration(*at)
         return Frame(p, R, J[:3], J[3:], u.linear, u.angular, du.linear, du.angular)
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+import pin_nonideal as pn
+
 GRAVITY = 9.81
 # Step control at which runs of a hundred steps stay well within 1e-10 of their closed forms.
 TIGHT = {"rtol": 1e-12, "atol": 1e-13}
@@ -70,3 +72,9 @@ def at_events(run):
 
 def assert_close(value, reference, tolerance):
     np.testing.assert_allclose(value, reference, rtol=0.0, atol=tolerance)
+
+
+def again(scene, **changes):
+    """The scene made again, with some of its arguments changed."""
+    names = ("constraints", "laws", "contacts", "forces", "actuation", "q0", "v0", "name", "terms")
+    return pn.Scene(scene.model, **{**{name: getattr(scene, name) for name in names}, **changes})

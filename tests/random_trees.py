@@ -57,6 +57,16 @@ JOINTS = {
 }
 
 
+def any_joint(rng, deepest=2):
+    """A joint of any kind, or a composite of one to four of them, nested as deep as `deepest`."""
+    if deepest == 0 or rng.uniform() < 0.6:
+        return JOINTS[str(rng.choice(list(JOINTS)))]()
+    joint = pin.JointModelComposite(any_joint(rng, deepest - 1), placement(rng))
+    for _ in range(int(rng.integers(0, 4))):
+        joint.addJoint(any_joint(rng, deepest - 1), placement(rng))
+    return joint
+
+
 def placement(rng, size=0.3):
     """A random place and orientation."""
     return pin.SE3(_rotation(rng), size * rng.standard_normal(3))
@@ -75,8 +85,9 @@ def inertia(rng, mass=1.0):
 
 
 def add(model, name, kind, parent, rng, mass=1.0):
-    """One joint with a body and a frame "<name> tip" at a random place of it."""
-    joint = model.addJoint(parent, JOINTS[kind](), placement(rng), name)
+    """One joint, by its kind or ready-made, with a body and a frame "<name> tip" at a random place of it."""
+    joint = JOINTS[kind]() if isinstance(kind, str) else kind
+    joint = model.addJoint(parent, joint, placement(rng), name)
     model.appendBodyToJoint(joint, inertia(rng, mass), pin.SE3.Identity())
     model.addFrame(pin.Frame(f"{name} tip", joint, 0, placement(rng), pin.FrameType.OP_FRAME))
     return joint

@@ -22,6 +22,7 @@ from pin_nonideal.errors import InputError, LoadingError, OutputError, RunInterr
 from pin_nonideal.runs import checkpoint
 from pin_nonideal.runs.options import run_options
 
+from .mechanisms import again
 from .random_trees import add
 from .refusals import refuses
 from .same_run import assert_same_run
@@ -64,6 +65,16 @@ RUNS = {
     "redundant loops": (lambda: pn.load("n_four_bar", N=4), 0.5, {"record": "forces", "output_dt": 0.05}),
     "sliding feet": (lambda: pn.load("solo12_standing"), 0.2, {"record": "energy", "rtol": 1e-5}),
     "sampled torque": (driven_arm, 0.2, {"record": "energy"}),
+    "events, Pinocchio's terms": (
+        lambda: again(cart(), terms="pinocchio"),
+        1.5,
+        {"record": ALL, "rtol": 1e-6},
+    ),
+    "redundant loops, Pinocchio's terms": (
+        lambda: pn.load("n_four_bar", N=4, terms="pinocchio"),
+        0.5,
+        {"record": "forces", "output_dt": 0.05},
+    ),
     "rolling": (lambda: pn.load("rolling_disk"), 0.5, {"output_dt": 0.1}),
 }
 

@@ -9,6 +9,7 @@ import pytest
 import pin_nonideal as pn
 from oracles.differences import consistent, rows_at
 
+from .mechanisms import again
 from .random_trees import state, tree
 from .row_cases import ROBOTS
 
@@ -19,9 +20,12 @@ RUN = {"rtol": 1e-10, "atol": 1e-11}
 KEPT = 1e-8
 
 
-@pytest.fixture(scope="module", params=ROBOTS)
+@pytest.fixture(
+    scope="module", params=[(name, terms) for terms in ("core", "pinocchio") for name in ROBOTS], ids="-".join
+)
 def robot(request):
-    scene = pn.load(request.param)
+    name, terms = request.param
+    scene = pn.load(name, terms=terms)
     rng = np.random.default_rng(1)
     states = [scene.initial_state()] + [consistent(scene, rng, 0.0, speed) for speed in (0.3, 3.0)]
     return scene, states
@@ -90,20 +94,6 @@ def test_the_ledger_of_every_robot_closes(robot):
     assert run.violation_rate.max() <= 1e-11 * (1.0 + np.abs(run.v).max())
 
 
-def rewritten(scene, constraints):
-    """The scene with other constraints in place of its own."""
-    return pn.Scene(
-        scene.model,
-        constraints=constraints,
-        laws=scene.laws,
-        contacts=scene.contacts,
-        forces=scene.forces,
-        actuation=scene.actuation,
-        q0=scene.q0,
-        v0=scene.v0,
-    )
-
-
 def same_forces(one, two, in_play):
     for key in ("a", "F_ideal", "F_nonideal"):
         x, y = getattr(one, key), getattr(two, key)
@@ -115,10 +105,10 @@ def test_order_and_copies_of_constraints_do_not_matter(robot):
     scene, states = robot
     if not scene.constraints:
         pytest.skip("it has no constraint")
-    again = [c for c in scene.constraints if isinstance(c, pn.PointAnchor)]
-    copies = [type(c)(c.frame1, c.frame2, axes=c.axes, name=f"{c.name} again") for c in again]
+    anchors = [c for c in scene.constraints if isinstance(c, pn.PointAnchor)]
+    copies = [type(c)(c.frame1, c.frame2, axes=c.axes, name=f"{c.name} again") for c in anchors]
     for other in (scene.constraints[::-1], [*copies, *scene.constraints]):
-        turned = rewritten(scene, other)
+        turned = again(scene, constraints=other)
         for q, v in states:
             expected = scene.solve(q, v)
             same_forces(expected, turned.solve(q, v), np.abs(expected.a).max())
@@ -144,7 +134,7 @@ def test_the_scale_of_rows_does_not_matter(robot, scale):
         residual=None if scene._nonholonomic().any() else residual,
         rate=lambda t, q, v: pick(3, t, q, v),
     )
-    scaled = rewritten(scene, [copy])
+    scaled = again(scene, constraints=[copy])
     for q, v in states:
         expected, found = scene.solve(q, v), scaled.solve(q, v)
         same_forces(expected, found, np.abs(expected.a).max())

@@ -52,11 +52,11 @@ def lower(
     Raises:
         InputError, UnknownNameError: what a description refers to does not exist or does not fit.
     """
-    where = Resolution(model, q0)
     try:
         out = Lowered(core.Builder(model, terms == "pinocchio") if builder is None else builder)
     except ValueError as error:
         raise InputError(str(error)) from None
+    where = Resolution(model, q0)
     taken: set[str] = set()
     constraint_names = unique_names(constraints, taken)
     contact_names = unique_names(contacts, taken)

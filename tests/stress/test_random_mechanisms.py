@@ -22,10 +22,10 @@ BALANCE = 1e-5
 CLOSURE = 1e-9
 
 
-def closures(model, q, rng):
+def closures(model, q, rng, most=2):
     """Loops that are closed at q, of random kinds, between random bodies or a body and the world."""
     made = []
-    for k in range(int(rng.integers(0, 3))):
+    for k in range(int(rng.integers(0, most + 1))):
         bodies = rng.choice(model.njoints, size=2, replace=False)
         first, second = (int(b) for b in bodies) if bodies[0] else (int(bodies[1]), 0)
         place = place_of(model, q, f"j{first - 1} tip")
