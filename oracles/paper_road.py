@@ -56,7 +56,7 @@ def gram_schmidt(vectors, basis):
 def null_basis(B):
     """V, (n, n - k): orthonormal columns with B V = 0, Eqs. (12)-(14)."""
     n = B.shape[1]
-    columns = gram_schmidt(np.eye(n), gram_schmidt(B, []))
+    columns = gram_schmidt(np.eye(n), gram_schmidt(B, []))  # Eqs. (12)-(14)
     return np.array(columns).reshape(-1, n).T
 
 
@@ -91,8 +91,8 @@ def stacked_road(M, F, A, b, C):
     n = len(M)
     eye, zero = np.eye(n), np.zeros
     W = np.block([[eye, -eye], [B, zero(B.shape)], [zero(V.T.shape), V.T]])
-    right = np.concatenate([root @ np.linalg.solve(M, F), b, V.T @ np.linalg.solve(root, C)])
-    inverse = np.block([[J @ (eye + E), J], [J, J @ (eye + D)]])
+    right = np.concatenate([root @ np.linalg.solve(M, F), b, V.T @ np.linalg.solve(root, C)])  # Eq. (15)
+    inverse = np.block([[J @ (eye + E), J], [J, J @ (eye + D)]])  # Eqs. (20)-(24)
     x = inverse @ W.T @ right
     return np.linalg.solve(root, x[:n]), root @ x[n:]
 

@@ -17,8 +17,8 @@ class PointContact:
     Residual: phi = n . (p - p_plane) - radius [m].
     Rows: 1.  lam: the normal force on the frame's body [N]; positive presses, and a negative one (a pull) is
     reported.
-    Sliding friction on the body at the contact point: -mu lam u/|u|, with u the slip velocity in the plane
-    (Eqs. 77-80); sticking holds while the tangential force is below static_ratio mu lam.
+    Sliding friction on the body at the contact point: -mu lam u/|u|, with u the slip velocity in the
+    plane, Eqs. (77)-(80); sticking holds while the tangential force is below static_ratio mu lam.
 
     Args:
         frame: name of a frame of the model.

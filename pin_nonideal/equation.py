@@ -119,7 +119,7 @@ def solve(
         # Light links make M^-1 f huge where a constraint then holds it back.  What is still out of balance is
         # small, so its response brings back the digits lost in that difference.
         for _ in range(REFINEMENTS):
-            more_a, more_lam = respond(f - M @ a + A_k.T @ lam_k, r - A_k @ a)
+            more_a, more_lam = respond(f - M @ a + A_k.T @ lam_k, r - A_k @ a)  # what Eqs. (3), (4) miss
             a, lam_k = a + more_a, lam_k + more_lam
 
         F_ideal = A_k.T @ lam_k[:, 0]  # Eq. (39)
@@ -196,7 +196,7 @@ def _check_consistent(
     A: Array, b: Array, a: Array, E: Array, chosen: list[int], row_scale: Array, in_play: float
 ) -> None:
     """Raise when a row that was left out as redundant is not satisfied by the others."""
-    residual = A @ a - b
+    residual = A @ a - b  # Eq. (3)
     dropped = np.ones(len(A), dtype=bool)
     dropped[chosen] = False
     demanded = float(np.max(np.abs(b[chosen]) / row_scale[chosen], initial=0.0))

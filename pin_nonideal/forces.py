@@ -1,4 +1,4 @@
-"""Given forces that are no constraints: they belong to F in M a = F + F^c (Eq. 4)."""
+"""Given forces that are no constraints: they belong to F in M a = F + F^c, Eq. (4)."""
 
 from __future__ import annotations
 
