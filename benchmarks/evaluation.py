@@ -19,6 +19,7 @@ from .problems import Problem
 from .tools import pinocchio_scipy as loop
 
 SAME_ACCELERATION = 1e-9  # relative; Pinocchio's with a proximal term of 1e-12 agrees to 1e-13
+PINOCCHIO_TERMS = 'pin_nonideal, terms="pinocchio"'
 
 
 CASES: dict[str, Callable[[], Problem]] = {
@@ -101,7 +102,11 @@ def mujoco_batch(case: Problem) -> timing.Batch | None:
 def measure_case(case: Problem, rounds: int) -> dict[str, Any]:
     """Times of everybody on one case, and ours over the faster of Pinocchio's builds and over MuJoCo."""
     scene = case.scene()
-    batches = {"pin_nonideal": our_batch(scene, case.q0, case.v0), **compiled_batches(case)}
+    batches = {
+        "pin_nonideal": our_batch(scene, case.q0, case.v0),
+        PINOCCHIO_TERMS: our_batch(case.scene("pinocchio"), case.q0, case.v0),
+        **compiled_batches(case),
+    }
     batches["pinocchio from Python"] = python_batch(case)
     rival = mujoco_batch(case)
     if rival is not None:
@@ -112,6 +117,7 @@ def measure_case(case: Problem, rounds: int) -> dict[str, Any]:
         "title": case.title, "nv": case.model.nv,
         "rows": int(scene.new_runner().rows(case.q0, case.v0, 0.0)[1].size) if case.anchors else 0,
         "seconds": {name: t.best for name, t in times.items()},
+        "own_pass": timing.ratio(times["pin_nonideal"], times[PINOCCHIO_TERMS]),
     }  # fmt: skip
     if compiled:
         best = min(compiled, key=lambda name: times[name].best)
@@ -134,4 +140,6 @@ def measure(quick: bool, only: str | None, say: Callable[[str], None] = print) -
             f", {result['ratio']:.2f} of {result['peer']}" if "ratio" in result else ", C++ peers not built"
         )
         say(f"  {result['title']}: {ours:.2f} us{versus}")
+        theirs = result["seconds"][PINOCCHIO_TERMS] * 1e6
+        say(f"    {PINOCCHIO_TERMS}: {theirs:.2f} us; the own pass takes {result['own_pass']:.2f} of it")
     return results

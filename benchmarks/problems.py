@@ -82,8 +82,12 @@ class Problem:
         pairs = zip(self.solution.q[-len(q) :], q, strict=True)
         return max(float(np.abs(pin.difference(self.model, exact, found)).max()) for exact, found in pairs)
 
-    def scene(self) -> pn.Scene:
-        """The problem as a scene of the package."""
+    def scene(self, terms: str = "core") -> pn.Scene:
+        """The problem as a scene of the package.
+
+        Args:
+            terms: who computes M and the bias forces.
+        """
         laws = []
         for i in range(1, self.model.njoints):
             dof = self.model.joints[i].idx_v
@@ -103,6 +107,7 @@ class Problem:
             q0=self.q0,
             v0=self.v0,
             name=self.name,
+            terms=terms,
         )
 
 

@@ -50,19 +50,21 @@ def taken(runner, q, v, count):
 
 
 found = {}
-for name in sys.argv[2:]:
-    scene = pn.load(name)
+for case in sys.argv[2:]:
+    name, terms = case.split(":")
+    scene = pn.load(name, terms=terms)
     runner = scene.new_runner()
     q, v = scene.initial_state()
     if name == "panda_friction":  # one joint at rest sticks
         v[0] = 0.0
     taken(runner, q, v, 10)
-    found[name] = [taken(runner, q, v, count) for count in (10, 1010)]
+    found[case] = [taken(runner, q, v, count) for count in (10, 1010)]
 found["the counter itself"] = [0, allocations.value]
 print(json.dumps(found))
 """
 
-NAMES = ["four_bar", "delta", "solo12_standing", "panda_friction", "n_four_bar", "rolling_disk", "five_bar"]
+ROBOTS = ["four_bar", "delta", "solo12_standing", "panda_friction", "n_four_bar", "rolling_disk", "five_bar"]
+NAMES = [f"{name}:{terms}" for terms in ("core", "pinocchio") for name in ROBOTS]
 
 
 @pytest.fixture(scope="module")
