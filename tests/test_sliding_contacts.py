@@ -233,3 +233,18 @@ def test_a_body_that_rocks_on_two_contacts():
         lost = run.energy[f"PointContact(leg{leg})"]
         assert (np.diff(lost) <= 1e-11 * -lost[-1]).all()
     assert np.abs(run.energy["balance"]).max() < 1e-8
+
+
+@pytest.mark.parametrize("options", [{}, {"method": "moreau", "dt": 1e-2}])
+@pytest.mark.parametrize("mu", [0.0, 0.5])
+def test_a_contact_that_nothing_presses(mu, options):
+    """On a plane along which the point moves, whatever it does: no row, no load, no friction, no pull."""
+    model = point_mass("XZ")
+    wall = pn.PointContact("mass", mu=mu, normal="y", name="wall")
+    scene = pn.Scene(model, contacts=[wall], v0=[1.0, 2.0])
+    assert scene.dropped == [("wall", 0, "vanishes")]
+    run = pn.simulate(scene, 0.5, record="forces", **options)
+    assert run.events == []
+    np.testing.assert_array_equal(run.lam, 0.0)
+    assert_close(run.q[-1], [0.5, 1.0 - 0.5 * GRAVITY * 0.25], 0.05 if options else 1e-12)
+    assert_close(run.v[-1], [1.0, 2.0 - GRAVITY * 0.5], 1e-12)

@@ -75,6 +75,11 @@ void Program::finish() {
     touched_dofs.clear();
     for (int dof = 0; dof < mechanism.nv; ++dof)
         if (reached[dof]) touched_dofs.push_back(dof);
+    // A contact whose normal nothing moves along has no row: it carries nothing and never pulls.
+    const auto bare = [&](int block) { return blocks[block].kept.empty(); };
+    contacts.erase(std::remove_if(contacts.begin(), contacts.end(), bare), contacts.end());
+    for (Friction& f : frictions)
+        if (f.load == Friction::Load::contact && bare(f.anchor)) f.load = Friction::Load::none;
     for (const Friction& f : frictions) {
         needs_reactions |= f.reaction != Reaction::none;
         needs_joint_reactions |= f.reaction != Reaction::none && f.joint > 0;
