@@ -50,7 +50,8 @@ static void move_rows(const Program& p, Workspace& w, double t, const VecX& v) {
         const Block& block = p.blocks[i];
         RowValues& values = w.now.values[i];
         evaluate(block.kind, state, Part::motion, values);
-        for (size_t k = 0; k < block.kept.size(); ++k) w.now.b[block.row + k] = -values.drift[block.kept[k]];
+        for (size_t k = 0; k < block.kept.size(); ++k)
+            w.now.b[block.row + k] = -values.drift[block.kept[k]];  // Eq. (3)
     }
 }
 
@@ -67,7 +68,8 @@ void update_kinematics(const Program& p, Workspace& w, double t, const VecX& q, 
 void scale_rows(const Program& p, Workspace& w) {
     for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
-        scale_rows(p.mechanism, w.now.terms, block, w.now.A.data() + block.offset, w.now.B.data() + block.offset);
+        scale_rows(p.mechanism, w.now.terms, block, w.now.A.data() + block.offset,
+                   w.now.B.data() + block.offset);  // Eq. (7)
     }
 }
 

@@ -27,7 +27,7 @@ static void constrained_solve(const Program& p, Workspace& w, VecX& x, const Vec
         solve_rows(p.layout, now.rows, w.scratch.r, lam);  // J B^T (b - B a_s') = B^T lam, Eqs. (38), (39)
         for (int i : now.rows.blocks) add_transpose(p.blocks[i], now.B, lam, x);  // scaled, Eq. (40)
     }
-    solve_Rt(p.mechanism, now.terms, x);
+    solve_Rt(p.mechanism, now.terms, x);  // without rows a = M^-1 F, Eq. (1)
 }
 
 void solve_acceleration(const Program& p, Workspace& w, const VecX& force, const VecX& b, VecX& a, VecX& lam) {
@@ -73,7 +73,7 @@ const VecX& holding_forces(const Program& p, Workspace& w) {
     now.holding -= now.F + now.C;
     w.scratch.work.setZero();
     for (int i : now.rows.blocks) add_transpose(p.blocks[i], now.A, now.lam, w.scratch.work);
-    now.holding -= w.scratch.work;
+    now.holding -= w.scratch.work;  // F_c = M a - F, Eq. (4), less what the rows and laws give
     return now.holding;
 }
 

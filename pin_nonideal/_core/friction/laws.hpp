@@ -1,4 +1,4 @@
-// Nonideal laws: what C(q, v, t, reactions) is made of (Eq. 9, w^T F^c = w^T C).
+// Nonideal laws: what C(q, v, t, reactions) is made of Eq. (9), w^T F^c = w^T C.
 //
 // Each smooth law is one struct that says what it exerts, through one function `act`, on dofs, on bodies or along the
 // rows of a block, and how its own states change. The same function makes C and, where joints carry its forces, the
