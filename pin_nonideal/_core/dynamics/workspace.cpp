@@ -54,7 +54,7 @@ static void size(const Program& p, const Evaluation& now, Scratch& scratch) {
     scratch.shift_steps.assign(projection_limit, scratch.shift);
     scratch.ideal_rows = now.rows;
     scratch.ideal_locked.assign(nv, 0);
-    for (VecX* x : {&scratch.image, &scratch.newton_step}) *x = VecX::Zero(p.unknowns());
+    scratch.unknown = scratch.image = VecX::Zero(p.unknowns());
     scratch.subtree_force = now.body_force;
     scratch.law_force.assign(p.law_names.size(), VecX::Zero(nv));
 }

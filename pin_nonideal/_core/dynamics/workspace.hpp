@@ -19,7 +19,7 @@ struct RunState {
     VecX z;                       // states of laws
     VecX held_torque;             // of sampled control
     bool has_held = false;
-    VecX unknown;                 // of the implicit reaction equation: where its next solution starts
+    VecX unknown;                 // of the implicit reaction equation, by element and law: where its next solution starts
     bool warm = false;
     VecX shift_third;             // multipliers of third order in the step, over its cube
     bool ideal_decided = false;   // which rows are independent without what sticks, over this step
@@ -70,7 +70,7 @@ struct Scratch {
     // steps that they took.
     VecX shift_start, shift, shift_sum;
     std::vector<VecX> shift_steps;
-    VecX image, newton_step;  // of the implicit reaction equation
+    VecX unknown, image;  // of the implicit reaction equation
     MatX jacobian;
     std::vector<Force> subtree_force;
     std::vector<VecX> law_force;  // of each law, for its power

@@ -12,10 +12,16 @@ namespace pn {
 namespace {
 
 constexpr double reaction_tolerance = 4e-15;  // relative change of y that counts as rounding
+constexpr double newton_tolerance = 3.2e-14;  // the same behind a linear solve
+constexpr double stalled = 1e-12;             // Newton's error that no longer falls is rounding where it is below this
+constexpr double slow_change = 1e-13;         // a change that contracts slowly is followed where it is above this
 constexpr double good_contraction = 0.25;     // slower fixed points go to Newton's method
+constexpr double difference = 1e-7;           // part of the unknowns' size: square root of the rounding, with a margin
+constexpr double least_size = 1e-300;         // of unknowns that are all zero
 constexpr int fixed_point_limit = 30, newton_limit = 30;
 constexpr int most_mixed = 6;                 // laws whose mixtures of branches are all looked at; else one by one
-constexpr double same_solution = 1e-9;        // relative distance below which two solutions are the same
+constexpr double same_solution = 1e-9;        // relative residual at which a point is a solution
+constexpr double other_solution = 1e-6;       // relative distance beyond which it is another one
 
 struct Implicit {
     const Program& p;
@@ -88,7 +94,7 @@ struct Implicit {
     void differentiate(const VecX& y, const VecX& g, double size) {
         w.scratch.jacobian.resize(n, n);
         VecX shifted = y, image_there(n);
-        const double h = 1e-7 * std::max(size, 1e-300);
+        const double h = difference * std::max(size, least_size);
         for (int k = 0; k < n; ++k) {
             shifted[k] = y[k] + h;
             image(shifted, image_there);
@@ -162,8 +168,6 @@ struct Implicit {
             if (there == 0.0 || leads_elsewhere(y, y + (I - other).partialPivLu().solve(beyond), size)) paradox(there);
             return false;
         });
-        w.scratch.jacobian = J;
-        w.now.determinant = here;
     }
 
     // Whether Newton's method from `start` finds a solution that is not y.
@@ -172,12 +176,12 @@ struct Implicit {
         try {
             for (int it = 0; it < newton_limit; ++it) {
                 image(start, g);
-                const VecX miss = g - start;
+                const VecX residual = g - start;
                 const double scale = std::max({size, start.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});
-                if (miss.cwiseAbs().maxCoeff() <= same_solution * scale)
-                    return (start - y).cwiseAbs().maxCoeff() > 1e3 * same_solution * scale;
+                if (residual.cwiseAbs().maxCoeff() <= same_solution * scale)
+                    return (start - y).cwiseAbs().maxCoeff() > other_solution * scale;
                 differentiate(start, g, scale);
-                start += (MatX::Identity(n, n) - w.scratch.jacobian).partialPivLu().solve(miss);
+                start += (MatX::Identity(n, n) - w.scratch.jacobian).partialPivLu().solve(residual);
             }
         } catch (const Failure& failure) {
             if (failure.kind != Failure::Kind::not_finite) throw;
@@ -189,11 +193,11 @@ struct Implicit {
         double last = std::numeric_limits<double>::infinity();
         for (int it = 0; it < newton_limit; ++it) {
             image(y, g);
-            const VecX miss = g - y;
+            const VecX residual = g - y;
             size = std::max({size, y.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});
-            const double error = miss.cwiseAbs().maxCoeff();
+            const double error = residual.cwiseAbs().maxCoeff();
             if (!g.allFinite()) throw Failure(Failure::Kind::not_finite, t);
-            if (error <= 8.0 * reaction_tolerance * size || (it > 3 && error <= 1e-12 * size && error >= last)) {
+            if (error <= newton_tolerance * size || (it > 3 && error <= stalled * size && error >= last)) {
                 differentiate(y, g, size);
                 check_uniqueness(y, size);
                 image(y, g);
@@ -201,22 +205,19 @@ struct Implicit {
             }
             last = error;
             differentiate(y, g, size);
-            y += (MatX::Identity(n, n) - w.scratch.jacobian).partialPivLu().solve(miss);
+            y += (MatX::Identity(n, n) - w.scratch.jacobian).partialPivLu().solve(residual);
         }
         w.now.determinant = least_determinant(w.scratch.jacobian);
         paradox(w.now.determinant);
     }
 
-    void solve() {
-        VecX &y = w.state.unknown, &g = w.scratch.image;
-        if (!w.state.warm) y.head(n).setZero();
-        w.state.warm = false;  // what a failure leaves in y is no start for the next evaluation
+    // Fixed-point steps from the solution before; false where they contract slowly.
+    bool iterate() {
+        VecX &y = w.scratch.unknown, &g = w.scratch.image;
         auto yn = y.head(n);
         double last = 0.0;
         for (int it = 0; it < fixed_point_limit; ++it) {
-            VecX& at = w.scratch.newton_step;
-            at = y;
-            image(at, g);
+            image(y, g);
             double size = 0.0, change = 0.0;
             for (int k = 0; k < n; ++k) {
                 size = std::max(size, std::abs(g[k]));
@@ -224,22 +225,42 @@ struct Implicit {
             }
             if (!g.head(n).allFinite()) throw Failure(Failure::Kind::not_finite, t);
             yn = g.head(n);
-            if (change <= reaction_tolerance * size) return;
-            if (it > 1 && change > good_contraction * last && change > 1e-13 * size) break;
-            if (it > 1 && change >= last) return;  // rounding
+            if (change <= reaction_tolerance * size) return true;
+            if (it > 1 && change > good_contraction * last && change > slow_change * size) return false;
+            if (it > 1 && change >= last) return true;  // rounding
             // The next change would be below rounding: the motion just found needs one more pass and no check.
             if (it > 0 && change * (change / last) <= reaction_tolerance * size) {
                 set(g);
                 motion();
-                return;
+                return true;
             }
             last = change;
         }
-        VecX start = yn, value(n);
-        newton(start, value, 0.0);
-        yn = start;
-        set(start);
-        motion();
+        return false;
+    }
+
+    // Places of the unknowns among those of all elements and laws, which a warm start keeps.
+    template <class Exchange>
+    void exchange(const Exchange& swap) const {
+        const int elements = static_cast<int>(p.frictions.size());
+        int k = 0;
+        each_unknown([&](size_t e) { swap(k++, static_cast<int>(e), 1); },
+                     [&](const UserLaw& law) { swap(k, elements + law.index * nv(), nv()); k += nv(); });
+    }
+
+    void solve() {
+        VecX &kept = w.state.unknown, &y = w.scratch.unknown;
+        y.setZero();
+        if (w.state.warm) exchange([&](int k, int place, int count) { y.segment(k, count) = kept.segment(place, count); });
+        w.state.warm = false;  // what a failure leaves is no start for the next evaluation
+        if (!iterate()) {
+            VecX start = y.head(n), g(n);
+            newton(start, g, 0.0);
+            y.head(n) = start;
+            set(start);
+            motion();
+        }
+        exchange([&](int k, int place, int count) { kept.segment(place, count) = y.segment(k, count); });
     }
 };
 

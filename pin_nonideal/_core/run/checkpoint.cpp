@@ -68,9 +68,9 @@ static void fields(Archive& a, Evaluation& x) {
 
 static void fields(Archive& a, Scratch& x) {
     auto& [scaled, scaled_free, trial, work, r, miss, lam_step, ideal_rows, ideal_locked, shift_start, shift, shift_sum,
-           shift_steps, image, newton_step, jacobian, subtree_force, law_force] = x;
+           shift_steps, scratch_unknown, image, jacobian, subtree_force, law_force] = x;
     a(scaled, scaled_free, trial, work, r, miss, lam_step, ideal_rows, ideal_locked, shift_start, shift, shift_sum,
-      shift_steps, image, newton_step, subtree_force, law_force);
+      shift_steps, scratch_unknown, image, subtree_force, law_force);
     a.matrix(jacobian);
 }
 
