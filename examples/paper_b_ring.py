@@ -45,7 +45,7 @@ class Ring:
 
     def residual(self, t, q):
         """The ring, halved so that its rate is x xdot + y ydot."""
-        return np.array([(q @ q - self.radius**2) / 2.0])
+        return np.array([(q @ q - self.radius**2) / 2.0])  # Eq. (2)
 
     def rate(self, t, q, v):
         """Rate of the residual."""

@@ -58,7 +58,7 @@ class Incline:
 
     def residual(self, t, q):
         """Depth below the plane."""
-        return np.array([q[1] - q[0] * np.tan(self.alpha) + self.beta * np.sin(self.omega * t)])
+        return np.array([q[1] - q[0] * np.tan(self.alpha) + self.beta * np.sin(self.omega * t)])  # Eq. (2)
 
     def rate(self, t, q, v):
         """Rate of the residual."""

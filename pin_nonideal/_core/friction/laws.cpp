@@ -57,7 +57,9 @@ void smooth_laws(const Program& p, Workspace& w, double t, const VecX& q, const 
     GeneralizedForce sink{p, w.now, C, &w.now.dz};
     const LawState state = law_state(w, v);
     for (const Law& each : p.laws)
-        std::visit([&](const auto& law) { if (law.reaction == Reaction::none) law.act(state, sink); }, each);  // Eq. (9)
+        std::visit([&](const auto& law) {
+            if (law.reaction == Reaction::none) law.act(state, sink);  // Eq. (9)
+        }, each);
     for (size_t e = 0; e < p.frictions.size(); ++e)
         if (p.frictions[e].reaction == Reaction::none) update_limit(p, w, e, t, q, v);
     add_slip_forces(p, w, false, C);
