@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import pinocchio as pin
 
-from .checks import positive
+from .checks import choice, positive
 from .errors import InputError, OutputError
 from .files import file_path, whole_file
 from .page.payload import packed_run
@@ -106,6 +106,8 @@ def replay(
     fps = positive("replay: fps", fps)
     if title is not None and not isinstance(title, str):
         raise InputError(f"replay: title must be a string or None; got {title!r}")
+    choice("replay: compress", compress, (True, False))
+    choice("replay: forces", forces, (True, False))
     check_scene(run, "a replay")
     page = ReplayPage(_page(run, fps, title or run.name, plots, compress, forces))
     return page if path is None else page.save(path)

@@ -252,7 +252,7 @@ class Scene:
             InconsistentConstraintsError, FrictionParadoxError, SingularMassError: there is no solution.
         """
         if modes is not None:
-            asked = np.asarray(modes)
+            asked = np.asarray(modes, dtype=object)
             if asked.shape != (len(self.element_names),) or not np.isin(asked, (-1, 0, 1)).all():
                 raise InputError(
                     f"modes must hold {len(self.element_names)} numbers out of -1, 0, 1; got {modes}"

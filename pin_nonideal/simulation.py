@@ -163,9 +163,9 @@ def rollout(
     starts_v = array("rollout: v", v, (None, scene.model.nv))
     if len(starts_q) != len(starts_v):
         raise InputError(f"rollout: q and v must have as many rows; got {len(starts_q)} and {len(starts_v)}")
+    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, record)
     if method in SCIPY:
         raise InputError(f'rollout: method must be one of the core\'s; "{method}" runs in SciPy')
-    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, record)
     begin = time.perf_counter()
     q0, v0 = scene.nearest_states(starts_q, starts_v, options["t0"], threads)
     outcomes = scene.roll_out(q0, v0, options, threads)

@@ -111,6 +111,10 @@ ROLLOUTS = {
     "threads": ({"threads": 0}, "rollout: threads must be at least 1; got 0"),
     "threads many": ({"threads": 2**31}, "rollout: threads must be at most 1000000000; got 2147483648"),
     "threads float": ({"threads": 1.5}, "rollout: threads must be an integer; got 1.5"),
+    "method array": (
+        {"method": np.zeros(0)},
+        f"simulate: method must be one of {METHODS}; got array([], dtype=float64)",
+    ),
     "method": ({"method": "Radau"}, 'rollout: method must be one of the core\'s; "Radau" runs in SciPy'),
     "length": (
         {"q": 0.5 * Q[None]},

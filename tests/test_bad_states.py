@@ -92,7 +92,7 @@ def test_lists_and_integers_are_fine():
     np.testing.assert_allclose(scene.solve(Q.tolist(), V.astype(int)).a, expected, rtol=1e-13)
 
 
-@pytest.mark.parametrize("modes", [[], [2], ["slip"], [1, 1], 1])
+@pytest.mark.parametrize("modes", [[], [2], ["slip"], [b"\x80"], [1, 1], 1])
 def test_modes_that_are_none(modes):
     scene = pn.Scene(MODEL, laws=[pn.JointFriction("j0", coulomb=1.0)])
     with refuses(f"modes must hold 1 numbers out of -1, 0, 1; got {modes}", InputError):

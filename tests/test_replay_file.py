@@ -107,6 +107,12 @@ def test_a_title_must_be_text() -> None:
         replay(four_bar(), title=3)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("switch", ["compress", "forces"])
+def test_switches_are_true_or_false(switch: str) -> None:
+    with pytest.raises(InputError, match=f"^replay: {switch} must be one of True, False; got 3$"):
+        replay(four_bar(), **{switch: 3})  # type: ignore[arg-type]
+
+
 def test_equal_shapes_are_stored_once() -> None:
     model = jointed(*[pin.JointModelRZ()] * 4)  # four equal bars, drawn in place of geometry
     content = packed_run(run_of(model, [0.0, 1.0], lambda t: np.full(4, t)), 60.0, "title", None, True)
