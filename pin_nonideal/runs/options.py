@@ -8,11 +8,12 @@ import numpy as np
 
 from pin_nonideal.actuation import SampledControl
 from pin_nonideal.checks import array, choice, label, nonnegative, number, positive, sequence
+from pin_nonideal.compilation.scene import core
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene import Scene
 
-ADAPTIVE = ("dop853", "dopri5")
-FIXED = ("rk4", "semi_implicit_euler", "moreau")
+# Those of the core: whether each chooses its own steps.
+METHODS: dict[str, bool] = core.methods
 SCIPY = ("Radau", "BDF", "LSODA")
 RECORDS = ("a", "forces", "energy", "power")
 FIELDS = {"F_ideal": "forces", "F_nonideal": "forces", "lam": "forces", "lam_ideal": "forces"}
@@ -52,9 +53,8 @@ def run_options(
     Raises:
         InputError: one is wrong, or they do not go together.
     """
-    methods = (*ADAPTIVE, *FIXED, *SCIPY)
-    choice("simulate: method", method, methods)
-    if method in FIXED:
+    choice("simulate: method", method, (*METHODS, *SCIPY))
+    if not METHODS.get(method, True):
         if dt is None:
             raise InputError(f'simulate: method "{method}" needs a step dt')
         unused = [name for name, value in (("rtol", rtol), ("atol", atol)) if value is not None]

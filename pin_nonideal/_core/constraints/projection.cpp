@@ -237,6 +237,13 @@ bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
     return project_velocity(p, w, t, v) || moved;
 }
 
+void remove_normal_part(const Program& p, Workspace& w, Eigen::Ref<VecX> motion) {
+    w.scratch.work = motion;
+    for (int i : w.now.rows.blocks) multiply(p.blocks[i], w.now.A, w.scratch.work, w.scratch.r);
+    least_move(p, w, w.scratch.work);
+    motion -= w.scratch.work;
+}
+
 void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
     set_modes(p, w, std::vector<signed char>(p.frictions.size(), 1));
     configure(p, w, t, q, v);

@@ -41,6 +41,9 @@ bool project_velocity(const Program& p, Workspace& w, double t, VecX& v);
 // Moves both, and leaves the workspace configured there.
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 
+// Takes from a small motion what the rows forbid, by the factors in the workspace.
+void remove_normal_part(const Program& p, Workspace& w, Eigen::Ref<VecX> motion);
+
 // Where no step has left factors: those of the state itself serve, with the rows that are independent there, all elements
 // slipping.
 void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v);

@@ -6,16 +6,18 @@
 
 #include "friction/cone_program.hpp"
 #include "python/bindings.hpp"
+#include "friction/modes.hpp"
 
 using namespace pn;
 
 NB_MODULE(_core, m) {
     nb::set_leak_warnings(false);  // a user's function may hold the scene that holds it: a cycle, not a fault
     m.attr("pinocchio_version") = PIN_NONIDEAL_PINOCCHIO_VERSION;
-    // Changes with the members of what a checkpoint holds.
-    m.attr("state_layout") = std::to_string(sizeof(Workspace)) + "." + std::to_string(sizeof(Simulation)) + "." +
-                             std::to_string(sizeof(long)) + " for Pinocchio " PIN_NONIDEAL_PINOCCHIO_VERSION;
-
+    m.attr("state_layout") = state_layout() + " for Pinocchio " PIN_NONIDEAL_PINOCCHIO_VERSION;
+    // Methods of integration by name; true of those that choose their own steps.
+    nb::dict all;
+    for (const Method& method : methods()) all[method.name] = method.adaptive();
+    m.attr("methods") = all;
     bind_failures(m);
     bind_reactions(m);
     bind_builder(m);

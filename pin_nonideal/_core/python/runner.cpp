@@ -5,6 +5,10 @@
 
 #include <nanobind/stl/vector.h>
 
+#include "constraints/projection.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/step_start.hpp"
+#include "friction/modes.hpp"
 #include "tree/liegroup.hpp"
 
 using namespace nanobind::literals;
@@ -168,7 +172,7 @@ nb::object Runner::derivative(double t, const Array& y_in, bool energy) {
     const VecX y = read_state(system, map(y_in));
     VecX rate(system.ny);
     choose_modes(t, nb::none());
-    system.collect(t, y, rate);
+    system.rate_of_evaluation(t, y, rate);
     return to_numpy(rate.data(), system.ny - system.ne);
 }
 
@@ -192,8 +196,7 @@ nb::dict Runner::record(const Array& times, const Array2& states, const Array& m
         const double* row = states.data() + k * states.shape(1);
         const VecX y = read_state(system, Eigen::Map<const VecX>(row, states.shape(1)));
         choose_modes(times.data()[k], nb::none());
-        recorder.moved_energy = moved.data()[k];
-        recorder.sample(times.data()[k], y, true);
+        recorder.sample(times.data()[k], y, moved.data()[k], true);
     }
     return Outcome{w->counters, std::move(out)}.hand_over();
 }
@@ -203,7 +206,7 @@ VecX Runner::read_state(const System& system, const VecX& outside) {
     if (outside.size() != system.ny - system.ne) throw std::invalid_argument("y does not fit the scene");
     y.head(outside.size()) = outside;
     q = y.head(system.nq);
-    v = y.segment(system.nq, system.nv);
+    v = system.velocity(y);
     if (system.nz > 0) w->state.z = y.segment(system.nq + system.nv, system.nz);
     w->now.has_override = false;
     return y;

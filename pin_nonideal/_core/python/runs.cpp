@@ -11,6 +11,8 @@
 
 #include <nanobind/stl/string.h>
 
+#include "constraints/projection.hpp"
+
 namespace pn {
 
 namespace {
@@ -101,6 +103,7 @@ nb::dict Runner::resume(const nb::bytes& state, const nb::dict& options) {
     const Options o = read_options(options);
     const std::string bytes(static_cast<const char*>(state.data()), state.size());
     Recording recording;
+    w = std::make_unique<Workspace>(*p);
     {
         nb::gil_scoped_release release;
         pn::resume(*p, *w, bytes, o, recording);

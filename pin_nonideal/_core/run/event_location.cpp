@@ -1,126 +1,71 @@
-// Where an event lies inside a step.
-//
-// A slipping element watches its slip velocity, a sticking one its multiplier against the static limit, a contact its
-// normal force. The interpolant gives the first guess of the instant; the step is then taken again up to there and the
-// guess corrected by Newton's or the secant method, so that an event is as accurate as a step.
+#include "run/event_location.hpp"
+
 #include <algorithm>
 #include <cmath>
 
-#include "run/simulation.hpp"
+#include "constraints/projection.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/step_start.hpp"
+#include "friction/modes.hpp"
 
 namespace pn {
 
 namespace {
 
+using EventKind = FoundEvent::Kind;
+
+// --- What may have happened in a step. Speeds [rad/s or m/s] grow with the largest of the scene, as 1 + speed.
+// Part of a limit by which rounding may pass it: of a force that stands still, and of the share that stages see.
+constexpr double limit_rounding = 1e-12, share_rounding = 1e-9;
+// Part of the range of the shares at the stages by which they may go further in between.
+constexpr double range_between = 0.5;
+// Part of the speed of rest by which an element that has just begun to slip may lie on the other side.
+constexpr double fresh_slip = 1e-3;
+// Slip of several directions below this has come to rest in fixed steps, which do not locate it.
+constexpr double arrived_speed = 1e-7;
+// Slip that has more than this part left of what its step began with, and more than this speed, passes by rest.
+constexpr double rest_part = 0.05, passing_speed = 1e-6;
+// A fixed step covers this part of the time to rest, and this part of its own length at least.
+constexpr double part_toward_rest = 0.5, least_shortened = 1e-3;
+// Parts of a step at which a speed is looked at that dips through zero and back.
+constexpr double dip_places[] = {0.2, 0.4, 0.6, 0.8};
+
+// --- The interpolant
 constexpr int location_grid = 24;  // points of a step at which a margin is looked at first
 constexpr int dip_passes = 40;     // golden sections: a dip of 1e-16 of the margin's own change
 constexpr double beyond = 2.0;     // part of a step: none of it
+// A parabola through three points lies lower than the middle one by an eighth of its second difference at most; twice
+// that is looked into.
+constexpr double parabola_part = 0.25;
+constexpr int root_passes = 60;
+constexpr double root_width = 1e-13, root_margin = 1e-13;  // the guess of a step that is taken again
 
-}  // namespace
-
-// Slip speed the way that the mode says.
-double Simulation::speed_along(int e) const {
-    const Friction& f = p.frictions[e];
-    const Vec3 u = slip_velocity(w.now, f);
-    return f.dim == 1 ? w.state.mode[e] * u[0] : u.dot(w.state.slip_direction[e]);
-}
-
-// Positive before the event, zero at it. The workspace must be evaluated at the state.
-double Simulation::margin(const Watch& watch, double at, const VecX& state) {
-    if (watch.contact >= 0) return w.now.lam[p.blocks[p.contacts[watch.contact]].row];
-    if (watch.slip) return speed_along(watch.element);
-    q_ = state.head(system.nq);
-    v_ = state.segment(system.nq, system.nv);
-    return static_limit(p, w, watch.element, at, q_, v_) * (1.0 + 1e-12) - friction_force(p, w, watch.element).norm();
-}
-
-// Fixed steps shrink toward the rest of a slip of several directions, whose direction may turn fast at the end.
-double Simulation::toward_rest(double size) {
-    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
-        const Friction& f = p.frictions[e];
-        if (f.dim == 1 || !slips(w.state.mode[e])) continue;
-        const Block& block = p.blocks[f.block];
-        q_ = y.head(system.nq);
-        v_ = derivative.segment(system.nq, system.nv);
-        multiply(block, w.now.A, v_, w.scratch.r);
-        const double slip = slip_velocity(w.now, f).squaredNorm();
-        double change = 0.0;
-        for (int k = 0; k < f.dim; ++k) {
-            const double rate = w.scratch.r[block.row + k] - w.now.b[block.row + k];
-            change += rate * rate;
-        }
-        if (slip < change * size * size) size = std::min(size, std::max(0.5 * std::sqrt(slip / change), 1e-3 * size));
-    }
-    return size;
-}
-
-// What lies past its event at the step's end (the workspace is evaluated there), or may have crossed inside.
-std::vector<Simulation::Watch> Simulation::crossed() {
-    std::vector<Watch> list;
-    if (stepper.method.order > 1)
-        for (int i = 0; i < static_cast<int>(p.contacts.size()); ++i)
-            if (!pulls[i] && w.now.lam[p.blocks[p.contacts[i]].row] < 0.0) list.push_back({-1, false, i});
-    if (p.frictions.empty()) return list;
-    const double t1 = stepper.t0 + stepper.h;
-    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
-        const Watch watch{e, w.state.mode[e] != sticking};
-        if (!watch.slip) {
-            if (w.state.indeterminate) continue;
-            bool past = margin(watch, t1, stepper.y1) < 0.0;
-            double least = HUGE_VAL, most = -HUGE_VAL;  // or may have been past it inside, between two stages
-            for (int i = 0; i < stepper.method.stages; ++i) {
-                const double share = stepper.K[i][system.ny - system.ne + e];
-                least = std::min(least, share);
-                most = std::max(most, share);
-            }
-            const double range = most - least;
-            past |= std::max(std::abs(least), std::abs(most)) + 0.5 * range > 1.0 + 1e-9 && range > 1e-9;
-            if (past) list.push_back(watch);
-            continue;
-        }
-        const double speed = stepper.y1.segment(system.nq, system.nv).cwiseAbs().maxCoeff();
-        const double noise = 1e-3 * rest_speed * (1.0 + speed);  // of an element that has just begun to slip
-        if (p.frictions[e].dim > 1 && !stepper.method.adaptive) {
-            const double now = slip_velocity(w.now, p.frictions[e]).norm();
-            if (now < slip_at_start[e] && now <= arrived_speed * (1.0 + speed)) arrived = e;
-        }
-        if (margin(watch, t1, stepper.y1) < -noise) {
-            list.push_back(watch);
-            continue;
-        }
-        // A dip through zero and back: the cubic through both ends and their slopes tells.
-        const auto* d = std::get_if<DofRows>(&p.blocks[p.frictions[e].block].kind);
-        if (!d || d->count != 1 || stepper.method.order < 2) continue;
-        const int i = system.nq + d->dof;
-        const double s = w.state.mode[e], u0 = s * stepper.y0[i], u1 = s * stepper.y1[i];
-        const double a0 = s * stepper.h * stepper.K[0][i], a1 = s * stepper.h * stepper.f1[i];
-        for (double x : {0.2, 0.4, 0.6, 0.8}) {
-            const double z = 1.0 - x;
-            const double u = z * z * (1.0 + 2.0 * x) * u0 + x * x * (1.0 + 2.0 * z) * u1 + x * z * (z * a0 - x * a1);
-            if (u < -noise) { list.push_back(watch); break; }
-        }
-    }
-    return list;
-}
+// --- The step taken again
+constexpr int correction_passes = 12, sure_passes = 3;  // after the latter rounding of margins ends it
+constexpr double time_rounding = 2e-16, corrected_width = 1e-13;
+constexpr double difference_part = 1e-6, least_difference = 1e-12;  // of the step, and [s]
+constexpr double release_width = 1e-12;                             // bisection of the instant of a release
 
 // Root of a margin between a part of the step where it is positive and one where it is negative: secants, kept inside
 // (Illinois).
 template <class Margin>
-static double root_between(double low, double gl, double high, double gh, const Margin& margin) {
-    if (gl <= 0.0) return low;  // it starts at zero and goes the wrong way at once
+double root_between(double low, double margin_low, double high, double margin_high, const Margin& margin) {
+    if (margin_low <= 0.0) return low;  // it starts at zero and goes the wrong way at once
     int side = 0;
-    for (int it = 0; it < 60 && high - low > 1e-13; ++it) {
-        double mid = (low * gh - high * gl) / (gh - gl);
+    for (int it = 0; it < root_passes && high - low > root_width; ++it) {
+        double mid = (low * margin_high - high * margin_low) / (margin_high - margin_low);
         if (!(mid > low && mid < high)) mid = 0.5 * (low + high);
-        const double g = margin(mid);
-        if (std::abs(g) < 1e-13) return mid;
-        if (g > 0.0) {
-            low = mid; gl = g;
-            if (side == 1) gh *= 0.5;
+        const double here = margin(mid);
+        if (std::abs(here) < root_margin) return mid;
+        if (here > 0.0) {
+            low = mid;
+            margin_low = here;
+            if (side == 1) margin_high *= 0.5;
             side = 1;
         } else {
-            high = mid; gh = g;
-            if (side == -1) gl *= 0.5;
+            high = mid;
+            margin_high = here;
+            if (side == -1) margin_low *= 0.5;
             side = -1;
         }
     }
@@ -129,7 +74,7 @@ static double root_between(double low, double gl, double high, double gh, const 
 
 // A place between a and b where the margin is negative, by golden sections toward its least value; none: b.
 template <class Margin>
-static double dip_between(double a, double b, const Margin& margin, double& value) {
+double dip_between(double a, double b, const Margin& margin, double& value) {
     constexpr double golden = 0.3819660112501051;
     const double end = b;
     double x1 = a + golden * (b - a), x2 = b - golden * (b - a), g1 = margin(x1), g2 = margin(x2);
@@ -149,148 +94,250 @@ static double dip_between(double a, double b, const Margin& margin, double& valu
     return end;
 }
 
+}  // namespace
+
+double slip_along_mode(const Program& p, const Workspace& w, int e) {
+    const Friction& f = p.frictions[e];
+    const Vec3 u = slip_velocity(w.now, f);
+    return f.dim == 1 ? w.state.mode[e] * u[0] : u.dot(w.state.slip_direction[e]);
+}
+
+EventLocator::EventLocator(System& system, Stepper& stepper, const std::vector<double>& slip_at_start,
+                           const std::vector<char>& pulls)
+    : system_(system), stepper_(stepper), p(system.p), w(system.w), slip_at_start_(slip_at_start), pulls_(pulls),
+      probe_(VecX::Zero(system.ny)), probe_rate_(probe_) {}
+
+double EventLocator::shorten_toward_rest(const VecX& rate, double size) {
+    for (int e = 0; e < system_.ne; ++e) {
+        const Friction& f = p.frictions[e];
+        if (f.dim == 1 || !slips(w.state.mode[e])) continue;
+        const Block& block = p.blocks[f.block];
+        system_.v = system_.velocity(rate);
+        multiply(block, w.now.A, system_.v, w.scratch.r);
+        const double slip = slip_velocity(w.now, f).squaredNorm();
+        double change = 0.0;
+        for (int k = 0; k < f.dim; ++k) {
+            const double along = w.scratch.r[block.row + k] - w.now.b[block.row + k];
+            change += along * along;
+        }
+        if (slip < change * size * size)
+            size = std::min(size, std::max(part_toward_rest * std::sqrt(slip / change), least_shortened * size));
+    }
+    return size;
+}
+
+// Positive before the event, zero at it. The workspace must be evaluated at the state.
+double EventLocator::margin(const Watch& watch, double t, const VecX& y) {
+    if (watch.kind == Watch::Kind::contact) return w.now.lam[p.blocks[p.contacts[watch.index]].row];
+    if (watch.kind == Watch::Kind::slip) return slip_along_mode(p, w, watch.index);
+    system_.read(y);
+    return static_limit(p, w, watch.index, t, system_.q, system_.v) * (1.0 + limit_rounding) -
+           friction_force(p, w, watch.index).norm();
+}
+
+double EventLocator::margin_at_end(const Watch& watch) {
+    return margin(watch, stepper_.t0 + stepper_.h, stepper_.y1);
+}
+
+// Slip of several directions that has come to rest at the end of a fixed step.
+bool EventLocator::has_arrived(int e) const {
+    if (p.frictions[e].dim == 1 || stepper_.method.adaptive() || w.state.mode[e] == sticking) return false;
+    const double speed = system_.velocity(stepper_.y1).cwiseAbs().maxCoeff();
+    const double slip = slip_velocity(w.now, p.frictions[e]).norm();
+    return slip < slip_at_start_[e] && slip <= arrived_speed * (1.0 + speed);
+}
+
+// Whether what sticks is past its limit at the step's end, or may have been inside, between two stages.
+bool EventLocator::may_reach_limit(int e) {
+    const bool past = margin({Watch::Kind::stick, e}, stepper_.t0 + stepper_.h, stepper_.y1) < 0.0;
+    double least = HUGE_VAL, most = -HUGE_VAL;
+    for (int i = 0; i < stepper_.stages; ++i) {
+        const double share = system_.share(stepper_.rates[i], e);
+        least = std::min(least, share);
+        most = std::max(most, share);
+    }
+    const double range = most - least, largest = std::max(std::abs(least), std::abs(most));
+    return past || (largest + range_between * range > 1.0 + share_rounding && range > share_rounding);
+}
+
+// Whether what slips goes the other way at the step's end, or may have done so inside.
+bool EventLocator::may_stop(int e) const {
+    const double speed = system_.velocity(stepper_.y1).cwiseAbs().maxCoeff();
+    const double noise = fresh_slip * rest_speed * (1.0 + speed);
+    return slip_along_mode(p, w, e) < -noise || dips(e, noise);
+}
+
+// A dip through zero and back: the cubic through both ends and their slopes tells, of an element on one dof.
+bool EventLocator::dips(int e, double noise) const {
+    const auto* dof = std::get_if<DofRows>(&p.blocks[p.frictions[e].block].kind);
+    if (!dof || dof->count != 1 || stepper_.method.order < 2) return false;
+    const int i = system_.nq + dof->dof;
+    const double sign = w.state.mode[e], u0 = sign * stepper_.y0[i], u1 = sign * stepper_.y1[i];
+    const double a0 = sign * stepper_.h * stepper_.rates.front()[i];
+    const double a1 = sign * stepper_.h * stepper_.rates[stepper_.stages][i];
+    return std::any_of(std::begin(dip_places), std::end(dip_places), [&](double x) {
+        const double z = 1.0 - x;
+        return z * z * (1.0 + 2.0 * x) * u0 + x * x * (1.0 + 2.0 * z) * u1 + x * z * (z * a0 - x * a1) < -noise;
+    });
+}
+
+// What lies past its event at the step's end (the workspace is evaluated there), or may have crossed inside.
+std::vector<EventLocator::Watch> EventLocator::crossed() {
+    std::vector<Watch> list;
+    if (stepper_.method.order > 1)
+        for (int i = 0; i < static_cast<int>(p.contacts.size()); ++i)
+            if (!pulls_[i] && w.now.lam[p.blocks[p.contacts[i]].row] < 0.0)
+                list.push_back({Watch::Kind::contact, i});
+    for (int e = 0; e < system_.ne; ++e) {
+        if (w.state.mode[e] != sticking) {
+            if (may_stop(e)) list.push_back({Watch::Kind::slip, e});
+            continue;
+        }
+        if (!w.state.indeterminate && may_reach_limit(e)) list.push_back({Watch::Kind::stick, e});
+    }
+    return list;
+}
+
 // Part of the step at which a watched margin first falls below zero, on a grid and between its points; beyond the step
 // where it does not.
-double Simulation::first_crossing(const Watch& watch) {
-    const auto margin_at = [&](double s) {
-        const double at = stepper.t0 + s * stepper.h;
-        stepper.interpolate(s, probe_);
-        system.derivative(at, probe_, probe_rate_);
-        return margin(watch, at, probe_);
+double EventLocator::first_crossing(const Watch& watch) {
+    const auto margin_at = [&](double part) {
+        const double t = stepper_.t0 + part * stepper_.h;
+        stepper_.interpolate(part, probe_);
+        system_.derivative(t, probe_, probe_rate_);
+        return margin(watch, t, probe_);
     };
+    constexpr double apart = 1.0 / location_grid;
     double g[location_grid + 1];
     g[0] = margin_at(0.0);
     for (int k = 1; k <= location_grid; ++k) {
-        constexpr double part = 1.0 / location_grid;
-        g[k] = margin_at(k * part);
-        if (g[k] < 0.0) return root_between((k - 1) * part, g[k - 1], k * part, g[k], margin_at);
+        g[k] = margin_at(k * apart);
+        if (g[k] < 0.0) return root_between((k - 1) * apart, g[k - 1], k * apart, g[k], margin_at);
         if (k == 1 || g[k - 1] > g[k - 2] || g[k - 1] > g[k]) continue;
-        const double curve = g[k - 2] - 2.0 * g[k - 1] + g[k];  // a parabola lies lower by an eighth of it at most
-        if (g[k - 1] > 0.25 * curve) continue;
+        if (g[k - 1] > parabola_part * (g[k - 2] - 2.0 * g[k - 1] + g[k])) continue;
         double value = 0.0;
-        const double dip = dip_between((k - 2) * part, k * part, margin_at, value);
-        if (value < 0.0) return root_between((k - 2) * part, g[k - 2], dip, value, margin_at);
+        const double dip = dip_between((k - 2) * apart, k * apart, margin_at, value);
+        if (value < 0.0) return root_between((k - 2) * apart, g[k - 2], dip, value, margin_at);
     }
     return beyond;
 }
 
-// Takes the step again up to the event, and corrects the instant by what the margin is there.
-void Simulation::step_onto(const Watch& found, double part) {
-    const double full = stepper.h, begin = stepper.t0;
-    double size = std::clamp(part, 0.0, 1.0) * full, before = 0.0, margin_before = 0.0;
-    for (int it = 0; it < 12; ++it) {
-        stepper.step(begin, size);
-        settle(begin + size, stepper.y1, stepper.f1);
-        const double g = margin(found, begin + size, stepper.y1);
-        double slope = 0.0;
-        if (found.slip && p.frictions[found.element].dim == 1) {
-            const Block& block = p.blocks[p.frictions[found.element].block];
-            multiply(block, w.now.A, w.now.a, w.scratch.r);
-            slope = w.state.mode[found.element] * (w.scratch.r[block.row] - w.now.b[block.row]);
-        } else if (it == 0) {
-            const double d = std::max(1e-6 * full, 1e-12);
-            slope = 0.0;
-            before = size;
-            margin_before = g;
-            const double other = std::max(0.0, size - d);
-            if (other < size) {
-                stepper.step(begin, other);
-                settle(begin + other, stepper.y1, stepper.f1);
-                slope = (g - margin(found, begin + other, stepper.y1)) / (size - other);
-            }
-        } else if (size != before) {
-            slope = (g - margin_before) / (size - before);
-        }
-        before = size;
-        margin_before = g;
-        if (!(std::abs(slope) > 0.0)) break;
-        const double next = std::clamp(size - g / slope, 0.0, full);
-        if (std::abs(next - size) <= 2e-16 * std::max(std::abs(begin), full) || next == size) break;
-        if (it > 3 && std::abs(next - size) < 1e-13 * full) break;
-        size = next;
-    }
-    if (stepper.h != size) {
-        stepper.step(begin, size);
-        settle(begin + size, stepper.y1, stepper.f1);
-    }
+void EventLocator::end_step_at(double size) {
+    stepper_.take(stepper_.t0, size);
+    system_.project_and_evaluate(stepper_.t0 + size, stepper_.y1, stepper_.end_rate());
 }
 
-// True when the step now ends at an event; the workspace is evaluated at its end either way.
-bool Simulation::locate_event() {
-    arrived = parting = -1;
-    const std::vector<Watch> watches = crossed();
-    if (arrived >= 0) {
-        trigger_element = located_element = arrived;
-        return true;
+// Rate of a margin at the end of the step of this size: known for slip along one direction, else by a step a little
+// shorter.
+double EventLocator::margin_rate(const Watch& watch, double size, double here, double full) {
+    if (known_rate(watch)) {
+        const Block& block = p.blocks[p.frictions[watch.index].block];
+        multiply(block, w.now.A, w.now.a, w.scratch.r);
+        return w.state.mode[watch.index] * (w.scratch.r[block.row] - w.now.b[block.row]);
     }
-    if (watches.empty()) return release_indeterminate();
-    stepper.make_dense();
+    const double shorter = std::max(0.0, size - std::max(difference_part * full, least_difference));
+    if (!(shorter < size)) return 0.0;
+    end_step_at(shorter);
+    return (here - margin_at_end(watch)) / (size - shorter);
+}
+
+bool EventLocator::known_rate(const Watch& watch) const {
+    return watch.kind == Watch::Kind::slip && p.frictions[watch.index].dim == 1;
+}
+
+// Takes the step again up to the event, and corrects the instant by what the margin is there.
+void EventLocator::step_onto(const Watch& watch, double part) {
+    const double full = stepper_.h, begin = stepper_.t0;
+    double size = std::clamp(part, 0.0, 1.0) * full, size_before = 0.0, margin_before = 0.0;
+    for (int it = 0; it < correction_passes; ++it) {
+        end_step_at(size);
+        const double here = margin_at_end(watch);
+        double rate = 0.0;
+        if (it == 0 || known_rate(watch)) rate = margin_rate(watch, size, here, full);
+        else if (size != size_before) rate = (here - margin_before) / (size - size_before);
+        size_before = size;
+        margin_before = here;
+        if (!(std::abs(rate) > 0.0)) break;
+        const double next = std::clamp(size - here / rate, 0.0, full);
+        if (std::abs(next - size) <= time_rounding * std::max(std::abs(begin), full) || next == size) break;
+        if (it > sure_passes && std::abs(next - size) < corrected_width * full) break;
+        size = next;
+    }
+    if (stepper_.h != size) end_step_at(size);
+}
+
+// Slip of several directions may turn far without coming to rest. It has come to rest when hardly anything is left of
+// the slip that the step began with.
+bool EventLocator::passes_by_rest(int e) const {
+    if (p.frictions[e].dim == 1) return false;
+    const double speed = system_.velocity(stepper_.y1).cwiseAbs().maxCoeff();
+    const double slip = slip_velocity(w.now, p.frictions[e]).norm();
+    return slip > rest_part * slip_at_start_[e] && slip > passing_speed * (1.0 + speed);
+}
+
+std::optional<FoundEvent> EventLocator::locate() {
+    const auto found = [&](EventKind kind, int index) {
+        return FoundEvent{kind, index, stepper_.t0 + stepper_.h};
+    };
+    for (int e = system_.ne - 1; e >= 0; --e)
+        if (has_arrived(e)) return found(EventKind::rest_or_limit, e);
+    const std::vector<Watch> watches = crossed();
+    if (watches.empty()) return release_together();
+    stepper_.make_interpolant();
     double first = beyond;
-    Watch found{-1, false};
+    const Watch* earliest = nullptr;
     for (const Watch& watch : watches) {
         const double part = first_crossing(watch);
-        if (part < first) { first = part; found = watch; }
+        if (!(part < first)) continue;
+        first = part;
+        earliest = &watch;
     }
-    if (first == beyond) {  // what may have crossed did not
-        q_ = stepper.y1.head(system.nq);
-        v_ = stepper.y1.segment(system.nq, system.nv);
-        if (system.nz > 0) w.state.z = stepper.y1.segment(system.nq + system.nv, system.nz);
-        evaluate(p, w, stepper.t0 + stepper.h, q_, v_);
-        return false;
+    if (!earliest) {  // what may have crossed did not
+        system_.read(stepper_.y1);
+        system_.read_law_states(stepper_.y1);
+        evaluate(p, w, stepper_.t0 + stepper_.h, system_.q, system_.v);
+        return std::nullopt;
     }
-    trigger_element = found.contact < 0 ? found.element : no_trigger;
-    located_element = found.element;
-    parting = found.contact;
-    step_onto(found, first);
-    if (found.contact >= 0) return true;
-    // Slip of several directions may turn far without coming to rest: then the step just ends here. It has come to
-    // rest when hardly anything is left of the slip that the step began with.
-    const Friction& f = p.frictions[found.element];
-    if (found.slip && f.dim > 1) {
-        const double speed = stepper.y1.segment(system.nq, system.nv).cwiseAbs().maxCoeff();
-        const double now = slip_velocity(w.now, f).norm();
-        const bool passing = now > rest_part * slip_at_start[found.element] && now > 1e-6 * (1.0 + speed);
-        if (passing) trigger_element = no_trigger;
-    }
-    release_indeterminate();  // which may come earlier
-    return true;
+    step_onto(*earliest, first);
+    if (earliest->kind == Watch::Kind::contact) return found(EventKind::pull, earliest->index);
+    const bool turns = earliest->kind == Watch::Kind::slip && passes_by_rest(earliest->index);
+    if (const auto released = release_together()) return released;  // which may come earlier
+    return found(turns ? EventKind::turn : EventKind::rest_or_limit, earliest->index);
+}
+
+// Whether all elements at rest at the step's end that stuck before it can stick on.
+bool EventLocator::can_hold(const std::vector<signed char>& modes, ModeQuestion& asked) {
+    const double t = stepper_.t0 + stepper_.h;
+    system_.read(stepper_.y1);
+    asked = {modes, {}, {}};
+    for (int e = 0; e < system_.ne; ++e)
+        if (at_rest(p, w, e, system_.v)) asked.at_rest.push_back(e);
+    resolve_modes(p, w, t, system_.q, system_.v, asked);
+    const bool all_stick = std::all_of(asked.at_rest.begin(), asked.at_rest.end(), [&](int e) {
+        return w.state.mode[e] == sticking || modes[e] != sticking;
+    });
+    set_modes(p, w, modes);
+    begin_step(p, w, t, system_.q, system_.v);
+    return all_stick;
 }
 
 // Where redundant elements stick together, the multiplier of one says little: they hold as long as some forces within
 // all limits do, those of elements included that slip but do not move. Halves the step down to the instant at which
 // none do.
-bool Simulation::release_indeterminate() {
-    if (!w.state.indeterminate) return false;
-    const double full = stepper.h, begin = stepper.t0;
+std::optional<FoundEvent> EventLocator::release_together() {
+    if (!w.state.indeterminate) return std::nullopt;
+    const double full = stepper_.h;
     const std::vector<signed char> modes = w.state.mode;
     ModeQuestion asked;
-    const auto holds = [&](double at) {
-        q_ = stepper.y1.head(system.nq);
-        v_ = stepper.y1.segment(system.nq, system.nv);
-        asked = {modes, {}, {}};
-        for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
-            if (at_rest(p, w, e, v_)) asked.at_rest.push_back(e);
-        resolve_modes(p, w, at, q_, v_, asked);
-        const bool all_stick = std::all_of(asked.at_rest.begin(), asked.at_rest.end(), [&](int e) {
-            return w.state.mode[e] == sticking || modes[e] != sticking;
-        });
-        set_modes(p, w, modes);
-        begin_step(p, w, at, q_, v_);
-        return all_stick;
-    };
-    if (holds(begin + full)) return false;
+    if (can_hold(modes, asked)) return std::nullopt;
     double low = 0.0, high = full;
-    while (high - low > 1e-12 * std::max(std::abs(begin), full)) {
+    while (high - low > release_width * std::max(std::abs(stepper_.t0), full)) {
         const double mid = 0.5 * (low + high);
-        stepper.step(begin, mid);
-        settle(begin + mid, stepper.y1, stepper.f1);
-        (holds(begin + mid) ? low : high) = mid;
+        end_step_at(mid);
+        (can_hold(modes, asked) ? low : high) = mid;
     }
-    stepper.step(begin, high);
-    settle(begin + high, stepper.y1, stepper.f1);
-    trigger_element = asked.at_rest.front();
-    released_together = true;
-    return true;
+    end_step_at(high);
+    return FoundEvent{EventKind::released_together, asked.at_rest.front(), stepper_.t0 + high};
 }
 
 }  // namespace pn

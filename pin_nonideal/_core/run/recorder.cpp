@@ -1,6 +1,7 @@
 #include "run/recorder.hpp"
 
 #include "dynamics/evaluation.hpp"
+#include "dynamics/power.hpp"
 
 namespace pn {
 
@@ -12,33 +13,31 @@ void Recorder::reserve(size_t samples) {
     for (const auto& [values, width] : widths) values->reserve(samples * width);
 }
 
-void Recorder::sample(double t, const VecX& y, bool evaluated) {
-    q_ = y.head(system.nq);
-    v_ = y.segment(system.nq, system.nv);
+void Recorder::sample(double t, const VecX& y, double moved_energy, bool evaluated) {
+    system.read(y);
     if (!evaluated && options.evaluates()) {
-        if (system.nz > 0) w.state.z = y.segment(system.nq + system.nv, system.nz);
-        evaluate(p, w, t, q_, v_);
+        system.read_law_states(y);
+        evaluate(p, w, t, system.q, system.v);
     } else if (!evaluated && p.constraints > 0) {
-        update_kinematics(p, w, t, q_, v_);
+        update_kinematics(p, w, t, system.q, system.v);
     }
     double position, velocity;
     violations(p, w, position, velocity);
     out.t.push_back(t);
-    append(out.q, q_);
-    append(out.v, v_);
+    append(out.q, system.q);
+    append(out.v, system.v);
     out.violation.push_back(position);
     out.violation_rate.push_back(velocity);
     if (system.nz > 0) append(out.z, y.segment(system.nq + system.nv, system.nz));
     for (size_t e = 0; e < p.frictions.size(); ++e) out.modes.push_back(w.state.mode[e]);
     if (options.a) append(out.a, w.now.a);
     if (options.power) {
-        power_.resize(3 + p.law_names.size());
-        power_.setZero();
-        powers(p, w, v_, power_.data());
+        power_.setZero(power_count(p));
+        powers(p, w, system.v, power_.data());
         append(out.power, power_);
     }
     if (options.energy) {
-        out.energy.push_back(kinetic_energy(p.mechanism, w.now.terms, v_));
+        out.energy.push_back(kinetic_energy(p.mechanism, w.now.terms, system.v));
         out.energy.push_back(potential_energy(p.mechanism, w.now.terms));
         append(out.energy, y.segment(system.nq + system.nv + system.nz, system.nw));
         out.energy.push_back(moved_energy);

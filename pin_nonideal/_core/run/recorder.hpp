@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "dynamics/split.hpp"
-#include "run/integrators.hpp"
+#include "run/system.hpp"
 
 namespace pn {
 
@@ -37,12 +37,11 @@ class Recorder {
 public:
     Recorder(System& system, const RecordOptions& options, Recording& out)
         : p(system.p), w(system.w), system(system), options(options), out(out) {}
-    double moved_energy = 0.0;  // by projection, so far
-
     // Room for so many samples.
     void reserve(size_t samples);
-    // The state at t; the workspace is evaluated there when `evaluated`, and anyway its rows are.
-    void sample(double t, const VecX& y, bool evaluated);
+    // The state at t; moved_energy was moved by projection so far. The workspace is evaluated there when `evaluated`, and
+    // left so where anything of that is recorded.
+    void sample(double t, const VecX& y, double moved_energy, bool evaluated);
 
 private:
     const Program& p;
@@ -50,7 +49,7 @@ private:
     System& system;
     RecordOptions options;
     Recording& out;
-    VecX q_, v_, power_;
+    VecX power_;
     Split split_;
 };
 

@@ -3,18 +3,32 @@
 #include <algorithm>
 #include <cmath>
 
+#include "constraints/projection.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/step_start.hpp"
+#include "run/events.hpp"
+
 namespace pn {
 
 namespace {
 
-// At rest only the functions of the user tell when it ends. They are looked at in steps of this length at most [s], or
+// At rest only the functions of the user tell when it ends. They are evaluated in steps of this length at most [s], or
 // of this part of the rest so far.
 constexpr double rest_step = 0.1, rest_part_step = 0.002;
+// A step that falls short of the stop by less than this part goes there; one that takes more than this part of the way
+// is made one of two even steps instead of a long and a tiny one.
+constexpr double whole_way = 1.0 - 1e-10, even_part = 0.5;
 
 // The next step aims at error = safety^order, so far below the tolerance that what the motion adds to the error from
 // one step to the next seldom rejects it: over smooth motions a sixth fewer evaluations to the same error than with 0.9,
 // where a third of the steps fails. A step tried again knows its error, and aims closer.
 constexpr double safety = 0.65, retry_safety = 0.9, shrink_limit = 0.2, growth_limit = 10.0;
+// Error of a step that could not be evaluated: the next one is as short as the control makes it.
+constexpr double failed_error = 1e4;
+// A step of fewer spacings of floating-point times than these leads nowhere.
+constexpr double least_spacings = 4.0;
+// Steps below this part of the time are short enough to tell what fails of its own.
+constexpr double tiny_step = 1e-10;
 
 // Unit roundoff in an acceleration at a sine s to a singular position: 1/s of it in the place, 1/s^2 in the velocity
 // after projection, 1/s^3 where the rows are solved.
@@ -27,261 +41,364 @@ constexpr int detour_limit = 3;
 constexpr long early_steps = 20000;
 constexpr double least_progress = 1e-10;
 
+// Progress is told after so many steps.
+constexpr long steps_a_tick = 16;
 // Room for samples is taken at once up to this number; longer runs may stop before they fill it.
 constexpr double most_reserved = 1e5;
 
+// Chatter: this many events within this time [s] make the run go on by time stepping for a while, in so many steps.
+constexpr int chatter_events = 60;
+constexpr double chatter_time = 1e-4;
+constexpr int chatter_steps = 50;
+
+// Part of a step of time stepping that is not worth one of its own.
+constexpr double least_part = 1e-9;
+// Times closer than this part of them, or this many seconds, are the same.
+double same_time(double t) { return 1e-12 * std::max(1.0, std::abs(t)); }
+// Number of whole lengths in a time that should be a multiple of them, rounding aside.
+double whole_lengths(double time, double length) { return std::floor(time / length * (1.0 + 1e-14) + 1e-9); }
+
 }  // namespace
 
-Simulation::Simulation(const Program& program, Workspace& workspace, const Options& options, Recording& recording)
-    : p(program), w(workspace), o(options), out(recording), system(program, workspace, options.record.energy),
-      stepper(options.method, system), recorder(system, options.record, recording) {
-    t_end = o.t0 + o.duration;
-    for (VecX* x : {&y, &derivative, &probe_, &probe_rate_}) *x = VecX::Zero(system.ny);
-    q_ = VecX::Zero(system.nq);
-    v_ = VecX::Zero(system.nv);
-    pulls.assign(p.contacts.size(), 0);
+Simulation::Simulation(const Program& program, Workspace& workspace, const Options& run_options, Recording& recording)
+    : p(program), w(workspace), options(run_options), out(recording), t_end(options.t0 + options.duration),
+      system(program, workspace, options.record.energy), stepper(options.method, system),
+      norm(system, options.rtol, options.atol), locator(system, stepper, slip_at_start, pulls), moreau(system),
+      recorder(system, options.record, recording), sample_(VecX::Zero(system.ny)) {
+    y = rate = configured_y = sample_;
     slip_at_start.assign(p.frictions.size(), 0.0);
+    pulls.assign(p.contacts.size(), 0);
+}
+
+void Simulation::start(const VecX& q0, const VecX& v0) {
+    t = options.t0;
+    y.setZero();
+    y.head(system.nq) = q0;
+    y.segment(system.nq, system.nv) = v0;
+    if (system.nz > 0) y.segment(system.nq + system.nv, system.nz) = w.state.z;
+    samples = 1;
+    // The steps of adaptive methods are not known before.
+    const double apart = options.output_dt > 0.0 ? options.output_dt : options.dt;
+    if (apart > 0.0) recorder.reserve(static_cast<size_t>(std::min(options.duration / apart + 2.0, most_reserved)));
+    w.state.has_held = false;
+    w.state.warm = false;
+    sample_control();
+    switch_modes(system, t, y, rate, std::nullopt);
+    emit(t, y, true);
+    report_pulls(std::nullopt);
+    h = options.dt;
+    if (options.method.adaptive()) {
+        h = norm.initial_step(options.method.order, t, y, rate, t_end - t);
+        system.read(y);
+        begin_step(p, w, t, system.q, system.v);
+    }
+    configured_now();
+}
+
+void Simulation::run() {
+    const bool in_time = options.method.scheme == Method::Scheme::moreau;
+    while (t < t_end) {
+        between_steps();
+        if (in_time) {
+            step_in_time(t_end, options.dt);
+            continue;
+        }
+        Proposal proposal = propose();
+        while (!control_error(proposal, integrate(proposal))) proposal = propose();
+        const std::optional<FoundEvent> event = locate_event();
+        accept(proposal, event);
+        record(event);
+    }
+    if (options.save) save();
 }
 
 // The only place where a run is interrupted or saved: what is left here is all that the next step needs.
 void Simulation::between_steps() {
     try {
-        if (o.tick && (++ticks & 15) == 0) o.tick(t);
+        if (options.tick && ++ticks % steps_a_tick == 0) options.tick(t);
     } catch (...) {
-        if (o.save) save();
+        if (options.save) save();
         throw;
     }
-    if (o.save && Clock::now() >= next_save) save();
-    if (out.steps == early_steps && t - o.t0 < least_progress * o.duration)
+    if (options.save && Clock::now() >= next_save) save();
+    if (out.steps == early_steps && t - options.t0 < least_progress * options.duration)
         throw Failure(Failure::Kind::step_size, t, {}, static_cast<double>(out.steps));
 }
 
-// --- Actuation and stops ------------------------------------------------------------------------------------------
-
-void Simulation::sample_control(double now) {
-    const auto* sampled = std::get_if<SampledTorque>(&p.actuation);
-    if (!sampled || w.now.has_override) return;
-    if (w.state.has_held && now < o.t0 + next_period * sampled->period) return;
-    q_ = y.head(system.nq);
-    v_ = y.segment(system.nq, system.nv);
-    sampled->function(now, q_, v_, w.state.held_torque);
-    w.state.has_held = true;
-    next_period = static_cast<long>(std::floor((now - o.t0) / sampled->period * (1.0 + 1e-14) + 1e-9)) + 1;
-    // The torque jumps here: the derivative is taken anew.
-    begin_step(p, w, now, q_, v_);
-    system.collect(now, y, derivative);
+void Simulation::save() {
+    options.save(to_bytes(w, *this, out));
+    next_save = Clock::now() + options.save_interval;
 }
 
-double Simulation::next_stop(double now) const {
+void Simulation::restore(const std::string& state) { from_bytes(state, system, *this, out); }
+
+// --- Propose ----------------------------------------------------------------------------------------------------------
+
+void Simulation::sample_control() {
+    const auto* sampled = std::get_if<SampledTorque>(&p.actuation);
+    if (!sampled || w.now.has_override) return;
+    if (w.state.has_held && t < options.t0 + next_period * sampled->period) return;
+    system.read(y);
+    sampled->function(t, system.q, system.v, w.state.held_torque);
+    w.state.has_held = true;
+    next_period = static_cast<long>(whole_lengths(t - options.t0, sampled->period)) + 1;
+    // The torque jumps here: the derivative is taken anew.
+    begin_step(p, w, t, system.q, system.v);
+    system.rate_of_evaluation(t, y, rate);
+    configured_now();
+}
+
+// Where actuation jumps or bends next.
+double Simulation::next_stop() const {
     double stop = t_end;
     if (const auto* sampled = std::get_if<SampledTorque>(&p.actuation))
-        stop = std::min(stop, o.t0 + next_period * sampled->period);
+        stop = std::min(stop, options.t0 + next_period * sampled->period);
     if (const auto* table = std::get_if<TorqueTable>(&p.actuation)) {
-        const auto next = std::upper_bound(table->times.begin(), table->times.end(), now);
+        const auto next = std::upper_bound(table->times.begin(), table->times.end(), t);
         if (next != table->times.end()) stop = std::min(stop, *next);
     }
     return stop;
 }
 
-// --- Samples --------------------------------------------------------------------------------------------------------
-
-void Simulation::emit(double at, const VecX& state, bool evaluated) {
-    if (!out.t.empty() && at <= out.t.back()) return;
-    recorder.sample(at, state, evaluated);
-}
-
-// Samples of the output grid before t_now, from the interpolant of the last step.
-void Simulation::emit_between(double t_now) {
-    while (o.output_dt > 0.0 && next_sample < t_now - 1e-12 * std::max(1.0, std::abs(t_now))) {
-        stepper.make_dense();
-        stepper.interpolate((next_sample - stepper.t0) / stepper.h, probe_);
-        q_ = probe_.head(system.nq);
-        v_ = probe_.segment(system.nq, system.nv);
-        if (!w.now.rows.blocks.empty()) {
-            project(p, w, next_sample, q_, v_);
-            probe_.head(system.nq) = q_;
-            probe_.segment(system.nq, system.nv) = v_;
-        }
-        emit(next_sample, probe_, false);
-        next_sample = o.t0 + ++samples * o.output_dt;
-    }
-}
-
-// --- Steps ----------------------------------------------------------------------------------------------------------
-
-double Simulation::energy_at(const VecX& state) {
-    q_ = state.head(system.nq);
-    v_ = state.segment(system.nq, system.nv);
-    place_bodies(p.mechanism, w.now.terms, q_);
-    mass_matrix(p.mechanism, w.now.terms);
-    return kinetic_energy(p.mechanism, w.now.terms, v_) + potential_energy(p.mechanism, w.now.terms);
-}
-
-void Simulation::settle(double at, VecX& state, VecX& rate) {
-    double before = 0.0;
-    if (o.record.energy && !w.now.rows.blocks.empty()) before = energy_at(state);
-    q_ = state.head(system.nq);
-    v_ = state.segment(system.nq, system.nv);
-    if (system.nz > 0) w.state.z = state.segment(system.nq + system.nv, system.nz);
-    bool moved = project_position(p, w, at, q_, v_);
-    require_closed(p, w, at);
-    moved |= begin_step_on_rates(p, w, at, v_);
-    state.head(system.nq) = q_;
-    state.segment(system.nq, system.nv) = v_;
-    system.collect(at, state, rate);
-    if (moved && o.record.energy)
-        pending_energy = kinetic_energy(p.mechanism, w.now.terms, v_) + potential_energy(p.mechanism, w.now.terms) - before;
-    else pending_energy = 0.0;
-}
-
-void Simulation::start(const VecX& q0, const VecX& v0) {
-    t = o.t0;
-    y.setZero();
-    y.head(system.nq) = q0;
-    y.segment(system.nq, system.nv) = v0;
-    if (system.nz > 0) y.segment(system.nq + system.nv, system.nz) = w.state.z;
-    next_sample = o.t0 + o.output_dt;
-    samples = 1;
-    const double apart = o.output_dt > 0.0 ? o.output_dt : o.dt;  // the steps of adaptive methods are not known before
-    if (apart > 0.0) recorder.reserve(static_cast<size_t>(std::min(o.duration / apart + 2.0, most_reserved)));
-    w.state.has_held = false;
-    w.state.warm = false;
-    next_period = 0;
-    sample_control(t);
-    switch_modes(t, y, -1);
-    out.events.clear();
-    emit(t, y, true);
-    report_pulls(t);
-    h = o.dt;
-    if (o.method.adaptive) {
-        stepper.K[0] = derivative;
-        h = stepper.initial_step(t, y, o.rtol, o.atol, t_end - t);
-        begin_step(p, w, t, q_ = y.head(system.nq), v_ = y.segment(system.nq, system.nv));
-    }
-}
-
-void Simulation::run() {
-    while (t < t_end) {
-        between_steps();
-        if (o.method.kind == Method::Kind::moreau) {
-            step_in_time(t_end, o.dt);
-            continue;
-        }
-        sample_control(t);
-        double stop = next_stop(t);
-        if (!o.method.adaptive) {  // the fixed grid, whatever events cut out of it
-            const double k = std::floor((t - o.t0) / o.dt * (1.0 + 1e-14) + 1e-9) + 1.0;
-            stop = std::min(stop, o.t0 + k * o.dt);
-        }
-        advance_to(stop);
-    }
-    if (o.save) save();
-}
-
-// One accepted step, or one that ends at an event, not beyond `stop`.
-void Simulation::advance_to(double stop) {
+Simulation::Proposal Simulation::propose() {
+    sample_control();
+    const bool adaptive = options.method.adaptive();
+    double stop = next_stop();
+    if (!adaptive)  // the fixed grid, whatever events cut out of it
+        stop = std::min(stop, options.t0 + (whole_lengths(t - options.t0, options.dt) + 1.0) * options.dt);
     const double remaining = stop - t;
-    double size = o.method.adaptive ? h : remaining;
-    if (o.method.adaptive && p.asks_functions && (system.v(y).array() == 0.0).all()) {
-        const double since = out.events.empty() ? o.t0 : out.events.back().time;
+    double size = adaptive ? h : remaining;
+    if (adaptive && p.asks_functions && (system.velocity(y).array() == 0.0).all()) {
+        const double since = out.events.empty() ? options.t0 : out.events.back().time;
         size = std::min(size, std::max(rest_step, rest_part_step * (t - since)));
     }
     bool last = false;
-    if (size >= remaining * (1.0 - 1e-10)) {
+    if (size >= remaining * whole_way) {
         size = remaining;
         last = true;
-    } else if (size > 0.5 * remaining) {
-        size = 0.5 * remaining;  // two even steps instead of a long and a tiny one
+    } else if (size > even_part * remaining) {
+        size = even_part * remaining;
     }
-    if (!o.method.adaptive && !p.frictions.empty()) {
-        const double shorter = toward_rest(size);
+    if (!adaptive && !p.frictions.empty()) {
+        const double shorter = locator.shorten_toward_rest(rate, size);
         last &= shorter == size;
         size = shorter;
     }
+    return {size, stop, last};
+}
+
+// --- Integrate ----------------------------------------------------------------------------------------------------------
+
+std::optional<double> Simulation::integrate(const Proposal& proposal) {
     stepper.y0 = y;
-    stepper.K[0] = derivative;
-    double error = 0.0;
+    stepper.start_rate() = rate;
     try {
-        const double start_pivot = w.now.rows.distance;
-        system.on_constraints = start_pivot < near_singular && !w.now.rows.blocks.empty();
-        system.smallest_pivot = 1.0;
-        stepper.step(t, size);
-        if (system.smallest_pivot < near_singular && !system.on_constraints) {
-            system.on_constraints = true;
-            stepper.step(t, size);
-        }
-        if (!stepper.y1.allFinite()) throw Failure(Failure::Kind::not_finite, t + size);
-        const double way = std::sqrt(start_pivot) + std::sqrt(w.now.rows.distance);
-        if (o.method.adaptive && std::sqrt(system.smallest_pivot) < clearance * way &&
-            rounding_at(system.smallest_pivot) > o.rtol && detours++ < detour_limit) {
-            h = detour * size;
-            ++out.rejected;
-            return;
-        }
-        if (o.method.kind == Method::Kind::dop853) error = stepper.error_norm(o.rtol, o.atol);
-        if (error <= 1.0) {
-            settle(t + size, stepper.y1, stepper.f1);
-            if (o.method.kind == Method::Kind::semi_implicit_euler) learn_third_order(w, size);
-            if (o.method.kind == Method::Kind::dopri5) error = stepper.error_norm(o.rtol, o.atol);
-        }
+        return try_step(proposal.size);
     } catch (const Failure& failure) {
         // A stage may leave the domain where the step is too long; a shorter one decides whether it is the motion.
         // Where the motion runs away no step is short enough, and that is what is wrong.
-        const double tiny = 1e-10 * std::max(1.0, std::abs(t));
-        const bool runs_away = tiny * derivative.segment(system.nq, system.nv).norm() > system.v(y).norm();
-        if (!o.method.adaptive || (size < tiny && !runs_away) || failure.kind == Failure::Kind::interrupted) throw;
+        const double tiny = tiny_step * std::max(1.0, std::abs(t));
+        const bool runs_away = tiny * system.velocity(rate).norm() > system.velocity(y).norm();
+        if (!options.method.adaptive() || (proposal.size < tiny && !runs_away) ||
+            failure.kind == Failure::Kind::interrupted)
+            throw;
         if (failure.kind == Failure::Kind::closure) opened = failure;
-        error = 1e4;
-    }
-    if (!(error <= 1.0)) {
-        ++out.rejected;
-        const double factor = std::isfinite(error) ? retry_safety * std::pow(error, -1.0 / o.method.order) : 0.0;
-        h = size * std::max(shrink_limit, factor);
-        last_rejected = true;
-        if (!(h >= 4.0 * std::abs(std::nextafter(t, t_end) - t))) {
-            if (opened) throw *opened;
-            throw Failure(Failure::Kind::step_size, t);
-        }
-        q_ = y.head(system.nq);
-        v_ = y.segment(system.nq, system.nv);
-        return;
-    }
-    if (o.method.adaptive) {
-        double factor = growth_limit;
-        if (error > 0.0) factor = std::min(factor, safety * std::pow(error, -1.0 / o.method.order));
-        if (last_rejected) factor = std::min(1.0, factor);
-        last_rejected = false;
-        if (!(last && factor * size < h)) h = size * std::max(factor, shrink_limit);
-    }
-    detours = 0;
-    opened.reset();
-    const bool event = locate_event();
-    ++out.steps;
-    t = event || !last ? stepper.t0 + stepper.h : stop;
-    recorder.moved_energy += pending_energy;
-    remember_directions();
-    emit_between(t);
-    y = stepper.y1;
-    derivative = stepper.f1;
-    if (event && trigger_element != no_trigger) {
-        switch_modes(t, y, trigger_element);
-        emit(t, y, true);
-        return;
-    }
-    if (event && parting < 0) {
-        recent_events.push_back(t);
-        bridge_cluster(t, y, located_element);
-    }
-    report_pulls(t);
-    const bool on_grid = o.output_dt > 0.0 && std::abs(next_sample - t) <= 1e-12 * std::max(1.0, std::abs(t));
-    if (o.output_dt == 0.0 || on_grid || t >= t_end) {
-        if (on_grid) next_sample = o.t0 + ++samples * o.output_dt;
-        q_ = y.head(system.nq);
-        v_ = y.segment(system.nq, system.nv);
-        if (stepper.has_dense) evaluate(p, w, t, q_, v_);
-        emit(t, y, true);
+        return failed_error;
     }
 }
+
+// One step; where its error is allowed its end is projected and evaluated.
+std::optional<double> Simulation::try_step(double size) {
+    const double start_pivot = w.now.rows.distance;
+    system.on_constraints = start_pivot < near_singular && !w.now.rows.blocks.empty();
+    system.smallest_pivot = 1.0;
+    stepper.take(t, size);
+    if (system.smallest_pivot < near_singular && !system.on_constraints) {
+        system.on_constraints = true;
+        stepper.take(t, size);
+    }
+    if (!stepper.y1.allFinite()) throw Failure(Failure::Kind::not_finite, t + size);
+    if (nears_singularity(start_pivot) && detours++ < detour_limit) return std::nullopt;
+    const bool needs_end = options.method.first_same_as_last;
+    double error = needs_end ? 0.0 : stepper.error(norm);
+    if (!(error <= 1.0)) return error;
+    system.project_and_evaluate(t + size, stepper.y1, stepper.end_rate());
+    stepper.learn();
+    if (needs_end) error = stepper.error(norm);
+    return error;
+}
+
+// Whether rounding near a singular position would spoil a stage, which a step of another length keeps clear of.
+bool Simulation::nears_singularity(double start_pivot) const {
+    const double way = std::sqrt(start_pivot) + std::sqrt(w.now.rows.distance);
+    return options.method.adaptive() && std::sqrt(system.smallest_pivot) < clearance * way &&
+           rounding_at(system.smallest_pivot) > options.rtol;
+}
+
+// --- Control the error ----------------------------------------------------------------------------------------------------
+
+bool Simulation::control_error(const Proposal& proposal, std::optional<double> error) {
+    if (!error) {
+        ++out.rejected;
+        h = detour * proposal.size;
+        return false;
+    }
+    if (!(*error <= 1.0)) {
+        reject(proposal, *error);
+        return false;
+    }
+    if (options.method.adaptive()) {
+        double factor = growth_limit;
+        if (*error > 0.0) factor = std::min(factor, safety * std::pow(*error, -1.0 / options.method.order));
+        if (last_rejected) factor = std::min(1.0, factor);
+        if (!(proposal.last && factor * proposal.size < h)) h = proposal.size * std::max(factor, shrink_limit);
+    }
+    last_rejected = false;
+    detours = 0;
+    opened.reset();
+    return true;
+}
+
+void Simulation::reject(const Proposal& proposal, double error) {
+    ++out.rejected;
+    last_rejected = true;
+    const double factor =
+        std::isfinite(error) ? retry_safety * std::pow(error, -1.0 / options.method.order) : 0.0;
+    h = proposal.size * std::max(shrink_limit, factor);
+    if (h >= least_spacings * std::abs(std::nextafter(t, t_end) - t)) return;
+    if (opened) throw *opened;
+    throw Failure(Failure::Kind::step_size, t);
+}
+
+// --- Accept -----------------------------------------------------------------------------------------------------------------
+
+void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent>& event) {
+    ++out.steps;
+    t = event ? event->time : proposal.last ? proposal.stop : stepper.t0 + stepper.h;
+    moved_energy += system.moved_energy;
+    remember_directions(system, slip_at_start);
+    y = stepper.y1;
+    rate = stepper.end_rate();
+    configured_now();
+    emit_inside_step();
+    if (!event) return;
+    if (event->changes_modes()) change_modes(*event);
+    if (event->kind != FoundEvent::Kind::turn) return;
+    recent_events.push_back(t);
+    bridge_cluster(event->index);
+}
+
+void Simulation::change_modes(const FoundEvent& event) {
+    const Modes before = w.state.mode;
+    for (const Event& change : switch_modes(system, t, y, rate, event)) {
+        out.events.push_back(change);
+        recent_events.push_back(t);
+    }
+    if (std::equal(before.begin(), before.end(), w.state.mode.begin())) recent_events.push_back(t);
+    configured_now();
+    bridge_cluster(event.index);
+}
+
+// Events that come too thick are bridged by time stepping, which needs none.
+void Simulation::bridge_cluster(int element) {
+    if (recent_events.size() > chatter_events) recent_events.erase(recent_events.begin());
+    if (recent_events.size() < chatter_events || t - recent_events.front() > chatter_time) return;
+    recent_events.clear();
+    out.events.push_back({t, Event::Kind::chatter, element});
+    const double stop = std::min(t_end, t + chatter_time);
+    while (t < stop) step_in_time(stop, chatter_time / chatter_steps);
+    switch_modes(system, t, y, rate, std::nullopt);
+    configured_now();
+}
+
+// --- Record -----------------------------------------------------------------------------------------------------------------
+
+void Simulation::record(const std::optional<FoundEvent>& event) {
+    if (event && event->changes_modes()) {
+        emit(t, y, true);
+        return;
+    }
+    report_pulls(event);
+    const bool on_grid = options.output_dt > 0.0 && std::abs(next_sample() - t) <= same_time(t);
+    if (options.output_dt != 0.0 && !on_grid && t < t_end) return;
+    samples += on_grid;
+    if (stepper.has_interpolant()) {
+        system.read(y);
+        evaluate(p, w, t, system.q, system.v);
+        configured_now();
+    }
+    emit(t, y, true);
+}
+
+void Simulation::configured_now() {
+    configured_t = t;
+    configured_y = y;
+}
+
+void Simulation::emit(double at, const VecX& state, bool evaluated) {
+    if (!out.t.empty() && at <= out.t.back()) return;
+    recorder.sample(at, state, moved_energy, evaluated);
+}
+
+// Samples of the output grid before the step's end, from its interpolant.
+void Simulation::emit_inside_step() {
+    const bool places = !w.now.rows.blocks.empty() || options.record.evaluates() || p.constraints > 0;
+    while (options.output_dt > 0.0 && next_sample() < t - same_time(t)) {
+        const double at = next_sample();
+        stepper.make_interpolant();
+        stepper.interpolate((at - stepper.t0) / stepper.h, sample_);
+        if (!w.now.rows.blocks.empty()) {
+            system.read(sample_);
+            project(p, w, at, system.q, system.v);
+            system.write(sample_);
+        }
+        if (places) {
+            configured_t = at;
+            configured_y = sample_;
+        }
+        emit(at, sample_, false);
+        ++samples;
+    }
+}
+
+// A maintained contact that would have to pull, told once each time it begins.
+void Simulation::report_pulls(const std::optional<FoundEvent>& event) {
+    const bool found = event && event->kind == FoundEvent::Kind::pull;
+    for (int i = 0; i < static_cast<int>(p.contacts.size()); ++i) {
+        const bool pull = (found && i == event->index) || w.now.lam[p.blocks[p.contacts[i]].row] < 0.0;
+        if (pull && !pulls[i]) out.events.push_back({t, Event::Kind::pull, p.contacts[i]});
+        pulls[i] = pull;
+    }
+}
+
+// --- Time stepping ----------------------------------------------------------------------------------------------------------
+
+void Simulation::step_in_time(double stop, double dt) {
+    sample_control();
+    double end = std::min({t + dt, stop, next_stop()});
+    if (options.output_dt > 0.0) end = std::min(end, std::max(next_sample(), std::nextafter(t, stop)));
+    if (stop - end < least_part * dt) end = stop;
+    const Modes before = w.state.mode;
+    moreau.step(t, end - t, y, moved_energy);
+    ++out.steps;
+    t = end;
+    system.read(y);
+    // Factors of the new modes: what sticks must not move as the rest is projected.
+    begin_step(p, w, t, system.q, system.v);
+    system.project_and_evaluate(t, y, rate);
+    configured_now();
+    remember_directions(system, slip_at_start);
+    moved_energy += system.moved_energy;
+    for (int e = 0; e < system.ne; ++e)
+        if (before[e] != w.state.mode[e])
+            out.events.push_back({t, kind_of_change(before[e], w.state.mode[e]), e});
+    report_pulls(std::nullopt);
+    const bool on_grid = options.output_dt > 0.0 && next_sample() <= t + same_time(t);
+    samples += on_grid;
+    if (options.output_dt == 0.0 || on_grid || t >= t_end) emit(t, y, true);
+}
+
+// --- Runs -------------------------------------------------------------------------------------------------------------------
 
 template <class Steps>
 static void keep_what_stops(Recording& out, Steps steps) {

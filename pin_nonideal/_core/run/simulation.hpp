@@ -1,22 +1,17 @@
-// The time loop: steps, projection, events, samples.
+// The time loop: propose a step, integrate it, control the error, locate an event, accept, record.
 #pragma once
 
 #include <chrono>
 #include <functional>
 #include <optional>
 
-#include "dynamics/evaluation.hpp"
-#include "dynamics/solution.hpp"
-#include "dynamics/step_start.hpp"
-#include "friction/modes.hpp"
-#include "constraints/projection.hpp"
-#include "run/recorder.hpp"
+#include "run/checkpoint.hpp"
+#include "run/event_location.hpp"
+#include "run/moreau.hpp"
 
 namespace pn {
 
 using Clock = std::chrono::steady_clock;
-
-class Archive;
 
 struct Options {
     Method method;
@@ -31,11 +26,11 @@ struct Options {
 
 // Runs into `out`; failures end the run there and keep the samples.
 void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, const Options& options, Recording& out);
-// Goes on from the state that `save` was given, with the same options; throws std::invalid_argument when the state does
-// not fit.
+// Goes on in a new workspace from the state that `save` was given, with the same options; throws std::invalid_argument
+// when the state does not fit.
 void resume(const Program& p, Workspace& w, const std::string& state, const Options& options, Recording& out);
 
-class Simulation {
+class Simulation : Progress {
 public:
     Simulation(const Program& p, Workspace& w, const Options& options, Recording& out);
     void start(const VecX& q0, const VecX& v0);
@@ -44,66 +39,59 @@ public:
     void run();
 
 private:
-    // Chatter: this many events within this time make the run go on by time stepping for a while.
-    static constexpr int chatter_events = 60;
-    static constexpr double chatter_time = 1e-4;
-    static constexpr int chatter_steps = 50;
+    struct Proposal {
+        double size;
+        double stop;  // the step must not go beyond
+        bool last;    // it ends there
+    };
+
+    // The six verbs of a step. Integrating gives the norm of the error, 1 at the tolerance, or nothing where the step
+    // would pass too near a singular position; what the control of the error refuses is proposed again.
+    Proposal propose();
+    std::optional<double> integrate(const Proposal& proposal);
+    bool control_error(const Proposal& proposal, std::optional<double> error);
+    std::optional<FoundEvent> locate_event() { return locator.locate(); }
+    void accept(const Proposal& proposal, const std::optional<FoundEvent>& event);
+    void record(const std::optional<FoundEvent>& event);
+
+    std::optional<double> try_step(double size);
+    bool nears_singularity(double start_pivot) const;
+    void reject(const Proposal& proposal, double error);
 
     void between_steps();
     void save();
-    void archive(Archive& a);
-    void sample_control(double t);
-    double next_stop(double t) const;
-    void advance_to(double stop);
-    // Brings the step's end onto the constraints and evaluates there.
-    void settle(double t, VecX& y, VecX& derivative);
-    double energy_at(const VecX& y);
-    void emit_between(double t_end);
-    void emit(double t, const VecX& y, bool evaluated);
+    void sample_control();
+    double next_stop() const;
+    double next_sample() const { return options.t0 + samples * options.output_dt; }
 
-    // Events.
-    static constexpr int no_trigger = -2;
-    static constexpr double rest_part = 0.05, arrived_speed = 1e-7;
-    double toward_rest(double size);
-    struct Watch { int element; bool slip; int contact = -1; };  // a friction element, or a contact's pressure
-    double speed_along(int element) const;
-    double margin(const Watch& watch, double t, const VecX& y);  // negative past the event; evaluated state
-    std::vector<Watch> crossed();
-    double first_crossing(const Watch& watch);
-    void step_onto(const Watch& found, double part);
-    bool locate_event();
-    bool release_indeterminate();
-    void remember_directions();
-    void switch_modes(double t, VecX& y, int trigger);
-    void bridge_cluster(double t, VecX& y, int element);
-    void report_pulls(double t);
+    void emit(double at, const VecX& state, bool evaluated);
+    void emit_inside_step();
+    void report_pulls(const std::optional<FoundEvent>& event);
+    void configured_now();
 
-    // Time stepping at velocity level.
-    void moreau_step(double h);
-    void step_in_time(double stop, double dt);  // one step, not beyond `stop`
+    void change_modes(const FoundEvent& event);
+    void bridge_cluster(int element);
+    // One step of time stepping, not beyond `stop`.
+    void step_in_time(double stop, double dt);
 
     const Program& p;
     Workspace& w;
-    const Options& o;
+    const Options& options;
     Recording& out;
+    const double t_end;
     System system;
     Stepper stepper;
+    ErrorNorm norm;
+    EventLocator locator;
+    Moreau moreau;
     Recorder recorder;
-    double t = 0.0, h = 0.0, t_end = 0.0;
-    VecX y, derivative, q_, v_, probe_, probe_rate_;
-    long samples = 0;  // of the output grid, so far
+    VecX sample_;
     long ticks = 0;
     Clock::time_point next_save;
-    double next_sample = 0.0;
-    std::vector<double> recent_events, slip_at_start;
-    std::vector<char> pulls;
+    // Of the trials of one step.
     bool last_rejected = false;
-    int detours = 0;  // in a row, around a singular position
-    std::optional<Failure> opened;  // a loop that a trial of this step could not close
-    double pending_energy = 0.0;  // moved by the projection that ends the step
-    int trigger_element = -1, located_element = -1, arrived = -1, parting = -1;
-    bool released_together = false;  // redundant elements that could hold no longer
-    long next_period = 0;
+    int detours = 0;                // around a singular position
+    std::optional<Failure> opened;  // a loop that a trial could not close
 };
 
 }  // namespace pn

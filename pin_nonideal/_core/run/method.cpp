@@ -1,11 +1,16 @@
-// Coefficients of the explicit Runge-Kutta methods, as data.
+// Coefficients of the methods.
 //
 // dop853: the method of order 8 of Dormand and Prince with embedded orders 5 and 3 and the dense output of order 7, in
 // Hairer, Norsett, Wanner, "Solving Ordinary Differential Equations I", 2nd ed. dopri5: Dormand and Prince (1980) with
 // Shampine's dense output of order 4. Rows of A are stored below the diagonal, one after the other.
-#pragma once
+#include "run/method.hpp"
 
-namespace pn::tableau {
+#include <cstddef>
+#include <stdexcept>
+
+namespace pn {
+
+namespace {
 
 constexpr double dop853_A[] = {
     0.05260015195876773, 0.0197250569845379, 0.0591751709536137, 0.02958758547680685,
@@ -120,4 +125,82 @@ constexpr double rk4_C[] = {
     0.0, 0.5, 0.5, 1.0,
 };
 
-}  // namespace pn::tableau
+// What does not fit ends the compilation.
+constexpr void require(bool fits) {
+    if (!fits) throw std::logic_error("lengths of a table");
+}
+
+template <size_t a, size_t s>
+constexpr Method runge_kutta(const char* name, int order, const double (&A)[a], const double (&B)[s],
+                             const double (&C)[s]) {
+    require(s < most_rates && 2 * a == s * (s - 1));
+    Method m;
+    m.name = name;
+    m.order = order;
+    m.stages = static_cast<int>(s);
+    m.A = A;
+    m.B = B;
+    m.C = C;
+    return m;
+}
+
+template <size_t n>
+constexpr Method with_error(Method m, const double (&E)[n], const double* coarse = nullptr) {
+    require(static_cast<int>(n) == m.stages || static_cast<int>(n) == m.stages + 1);
+    m.first_same_as_last = static_cast<int>(n) > m.stages;
+    m.E = E;
+    m.E_coarse = coarse;
+    return m;
+}
+
+template <size_t a, size_t s, size_t d>
+constexpr Method with_terms(Method m, const double (&A)[a], const double (&C)[s], const double (&D)[d]) {
+    m.further_stages = static_cast<int>(s);
+    const int rates = m.stages + 1 + m.further_stages;
+    require(rates <= most_rates && d % rates == 0);
+    require(static_cast<int>(2 * a) == m.further_stages * (2 * m.stages + 1 + m.further_stages));
+    m.terms = static_cast<int>(d) / rates;
+    m.A_further = A;
+    m.C_further = C;
+    m.D = D;
+    return m;
+}
+
+template <size_t n>
+constexpr Method with_powers(Method m, const double (&P)[n]) {
+    require(n % (m.stages + 1) == 0);
+    m.powers = static_cast<int>(n) / (m.stages + 1);
+    m.P = P;
+    return m;
+}
+
+constexpr Method scheme(const char* name, Method::Scheme scheme) {
+    Method m;
+    m.name = name;
+    m.scheme = scheme;
+    return m;
+}
+
+constexpr Method list[] = {
+    with_terms(with_error(runge_kutta("dop853", 8, dop853_A, dop853_B, dop853_C), dop853_E5, dop853_E3),
+               dop853_A_dense, dop853_C_dense, dop853_D),
+    with_powers(with_error(runge_kutta("dopri5", 5, dopri5_A, dopri5_B, dopri5_C), dopri5_E), dopri5_P),
+    runge_kutta("rk4", 4, rk4_A, rk4_B, rk4_C),
+    scheme("semi_implicit_euler", Method::Scheme::semi_implicit_euler),
+    scheme("moreau", Method::Scheme::moreau),
+};
+
+}  // namespace
+
+const std::vector<Method>& methods() {
+    static const std::vector<Method> all(std::begin(list), std::end(list));
+    return all;
+}
+
+const Method& method_named(const std::string& name) {
+    for (const Method& method : methods())
+        if (name == method.name) return method;
+    throw std::invalid_argument("unknown method " + name);
+}
+
+}  // namespace pn

@@ -1,0 +1,21 @@
+#include "dynamics/power.hpp"
+
+namespace pn {
+
+int power_count(const Program& p) { return first_law_power + static_cast<int>(p.law_names.size()); }
+
+void powers(const Program& p, Workspace& w, const VecX& v, double* out) {
+    out[0] = p.driven ? v.dot(w.now.tau) : 0.0;
+    out[1] = p.driven ? v.dot(w.now.external) : 0.0;
+    out[2] = 0.0;
+    if (!w.now.rows.blocks.empty()) {
+        w.scratch.work.setZero();
+        for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.A, w.now.lam, w.scratch.work);
+        out[2] = v.dot(w.scratch.work);
+    }
+    if (!p.has_laws()) return;
+    law_forces(p, w, v, w.scratch.law_force);
+    for (size_t l = 0; l < p.law_names.size(); ++l) out[first_law_power + l] = v.dot(w.scratch.law_force[l]);
+}
+
+}  // namespace pn

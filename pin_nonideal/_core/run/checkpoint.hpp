@@ -1,0 +1,33 @@
+// A run between two steps as bytes, from which it goes on bit by bit as if it had never stopped.
+#pragma once
+
+#include <string>
+
+#include "run/recorder.hpp"
+
+namespace pn {
+
+// What of a time loop survives from step to step, beside the RunState of its workspace.
+struct Progress {
+    double t = 0.0, h = 0.0;  // now, and the step that the error control suggests
+    VecX y, rate;             // the state now, and its rate
+    // Where the workspace was configured last: at the state now, or at a sample inside the last step.
+    double configured_t = 0.0;
+    VecX configured_y;
+    double moved_energy = 0.0;  // by projection, so far
+    long samples = 0;           // of the output grid, so far
+    long next_period = 0;       // of sampled control
+    std::vector<double> recent_events;  // times, for the count of those that come too thick
+    std::vector<double> slip_at_start;  // of the step, by element
+    std::vector<char> pulls;            // by contact
+};
+
+std::string to_bytes(Workspace& w, Progress& progress, Recording& out);
+// Into a new workspace: what the next step needs of an evaluation is made from the state. Throws std::invalid_argument
+// when the bytes do not fit the scene.
+void from_bytes(const std::string& bytes, System& system, Progress& progress, Recording& out);
+
+// Changes with the members of what the bytes hold.
+std::string state_layout();
+
+}  // namespace pn

@@ -1,0 +1,23 @@
+// What happens at an event of stick and slip: new modes for all elements at rest together.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "run/event_location.hpp"
+#include "run/recorder.hpp"
+
+namespace pn {
+
+// New modes at (t, y), which is brought onto the constraints; without an event, as at the start of a run, for every
+// element by its velocity. The workspace ends evaluated there, with the rate in dy. Returns what has changed, nothing
+// where there was no event.
+std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event);
+
+// Kind of the event in which the mode of an element changes so.
+Event::Kind kind_of_change(signed char before, signed char after);
+
+// Keeps the slip directions at a step's end for the next step; the slip speeds go into `slip`.
+void remember_directions(System& system, std::vector<double>& slip);
+
+}  // namespace pn

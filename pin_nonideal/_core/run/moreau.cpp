@@ -1,0 +1,141 @@
+#include "run/moreau.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "dynamics/power.hpp"
+#include "dynamics/solution.hpp"
+#include "dynamics/step_start.hpp"
+#include "friction/cone_program.hpp"
+#include "friction/modes.hpp"
+#include "tree/liegroup.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr int load_passes = 60;           // of limits that depend on the load
+constexpr double load_tolerance = 1e-13;  // change of the limits, as a part of the largest, that is rounding
+constexpr double limit_rounding = 1e-12;  // part of its limit within which a force is at it
+
+}  // namespace
+
+Moreau::Moreau(System& system)
+    : system_(system), p(system.p), w(system.w), elements_(system.ne), q_mid_(VecX::Zero(system.nq)),
+      limit_(VecX::Zero(system.ne)), force_limit_(limit_), power_(VecX::Zero(system.nw)) {
+    std::iota(elements_.begin(), elements_.end(), 0);
+}
+
+void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
+    const Mechanism& m = p.mechanism;
+    h_ = h;
+    v0_ = system_.velocity(y);
+    VecX move = 0.5 * h * v0_;
+    retract(m, y.data(), move.data(), q_mid_.data());
+    solve_without_friction(t + 0.5 * h);
+    const FrictionProblem problem = pose_problem();
+    solve_friction(problem, t);
+    end_velocity(problem);
+    if (system_.energy) book_work(problem, y, moved_energy);
+    if (system_.nz > 0) y.segment(system_.nq + system_.nv, system_.nz) += h * w.now.dz;
+    move = 0.5 * h * v1_;
+    retract(m, q_mid_.data(), move.data(), y.data());
+    y.segment(system_.nq, system_.nv) = v1_;
+}
+
+// The motion without friction of the elements, constraints met at the end of the step.
+void Moreau::solve_without_friction(double t) {
+    set_modes(p, w, std::vector<signed char>(system_.ne, unloaded));
+    begin_step(p, w, t, q_mid_, v0_);
+    for (int i = 0; i < p.constraints; ++i) {
+        const Block& block = p.blocks[i];
+        for (size_t k = 0; k < block.kept.size(); ++k)
+            w.now.b[block.row + k] = -w.now.values[i].rate[block.kept[k]] / h_;
+    }
+    const VecX force = w.now.F + (p.has_laws() ? w.now.C : VecX(VecX::Zero(system_.nv)));
+    solve_acceleration(p, w, force);
+    a_free_ = w.now.a;
+    lam_free_ = w.now.lam;
+}
+
+// Slip velocities at the step's end over h take the place of slip accelerations.
+FrictionProblem Moreau::pose_problem() {
+    FrictionProblem problem(p, w, elements_);
+    problem.alpha0 = problem.along(p, w, a_free_);
+    int at = 0;
+    for (const Friction& friction : p.frictions)
+        for (int k = 0; k < friction.dim; ++k) problem.alpha0[at++] += w.now.values[friction.block].rate[k] / h_;
+    return problem;
+}
+
+// The motion under the friction forces.
+void Moreau::apply_forces(const FrictionProblem& problem) {
+    w.now.a = a_free_ + problem.response * force_;
+    w.now.lam = lam_free_ + problem.multipliers * force_;
+    for (int e = 0, at = 0; e < system_.ne; ++e) {
+        w.now.slip_force[e] = Vec3::Zero();
+        for (int k = 0; k < problem.dims[e]; ++k) w.now.slip_force[e][k] = force_[at++];
+    }
+    w.now.renew();
+}
+
+// Limits for the load of the motion in the workspace; returns their largest change.
+double Moreau::update_limits(double t) {
+    double change = 0.0;
+    for (int e = 0; e < system_.ne; ++e) {
+        const Friction& friction = p.frictions[e];
+        const double speed = slip_velocity(w.now, friction).norm();
+        const double limit = load_limit(p, w, friction, t, w.now.terms.q, v0_) *
+                             (speed == 0.0 ? friction.static_ratio : friction.speed_factor(speed));
+        change = std::max(change, std::abs(limit - limit_[e]));
+        limit_[e] = limit;
+    }
+    return change;
+}
+
+// Friction forces, with limits for the load of this very step.
+void Moreau::solve_friction(const FrictionProblem& problem, double t) {
+    force_.setZero(problem.rows);
+    for (int pass = 0; pass < load_passes; ++pass) {
+        apply_forces(problem);
+        const double change = update_limits(t + 0.5 * h_);
+        const double largest = system_.ne > 0 ? std::max(0.0, limit_.maxCoeff()) : 0.0;
+        if (pass > 0 && (change <= load_tolerance * largest || !p.needs_reactions)) return;
+        force_ = friction_program(problem.W, problem.alpha0, problem.dims, limit_);
+        force_limit_ = limit_;
+        if (pass + 1 == load_passes) throw Failure(Failure::Kind::paradox, t, {0}, change);
+    }
+}
+
+// Velocity at the step's end, and the modes there: what stays below its limit sticks.
+void Moreau::end_velocity(const FrictionProblem& problem) {
+    const VecX alpha = problem.alpha0 + problem.W * force_;
+    std::vector<signed char> modes(system_.ne);
+    v1_ = v0_ + h_ * (a_free_ + problem.response * force_);
+    for (int e = 0, at = 0; e < system_.ne; at += problem.dims[e], ++e) {
+        const int dim = problem.dims[e];
+        const bool held = force_.segment(at, dim).norm() < force_limit_[e] * (1.0 - limit_rounding);
+        modes[e] = held ? sticking : dim > 1 || alpha[at] > 0.0 ? 1 : -1;
+        if (!held) continue;
+        if (const auto* dofs = std::get_if<DofRows>(&p.blocks[p.frictions[e].block].kind))
+            v1_.segment(dofs->dof, dofs->count).setZero();
+    }
+    set_modes(p, w, modes);
+}
+
+// Work over the step, by the mean velocity. Where a slip turns inside the step its mean velocity may go with the
+// friction that meets its end: that is work of the scheme, not of friction.
+void Moreau::book_work(const FrictionProblem& problem, VecX& y, double& moved_energy) {
+    w.now.lam = lam_free_ + problem.multipliers * force_;
+    powers(p, w, 0.5 * (v0_ + v1_), power_.data());
+    for (const Friction& friction : p.frictions) {
+        double& power = power_[first_law_power + friction.law];
+        if (!(power > 0.0)) continue;
+        moved_energy += h_ * power;
+        power = 0.0;
+    }
+    system_.work(y) += h_ * power_;
+}
+
+}  // namespace pn

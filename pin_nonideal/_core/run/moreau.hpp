@@ -1,0 +1,39 @@
+// Time stepping at velocity level (Moreau's midpoint rule): with u the slip velocities at the step's end and P the
+// percussions, M (v1 - v0) = h (F + C) + A^T P + N^T P_f, A v1 + phi_t = 0, and P_f opposes u within h times its limit.
+// First order, and no creep: what sticks has no velocity at all. All elements are solved together in every step.
+#pragma once
+
+#include <vector>
+
+#include "friction/problem.hpp"
+#include "run/system.hpp"
+
+namespace pn {
+
+class Moreau {
+public:
+    explicit Moreau(System& system);
+
+    // One step of size h from y at t; what the scheme itself adds to the energy goes into moved_energy. The modes are
+    // those of the step's end, which is left to be projected and evaluated.
+    void step(double t, double h, VecX& y, double& moved_energy);
+
+private:
+    void solve_without_friction(double t);
+    FrictionProblem pose_problem();
+    void solve_friction(const FrictionProblem& problem, double t);
+    void apply_forces(const FrictionProblem& problem);
+    double update_limits(double t);
+    void end_velocity(const FrictionProblem& problem);
+    void book_work(const FrictionProblem& problem, VecX& y, double& moved_energy);
+
+    System& system_;
+    const Program& p;
+    Workspace& w;
+    std::vector<int> elements_;  // all of them
+    double h_ = 0.0;
+    VecX q_mid_, v0_, v1_, a_free_, lam_free_;  // free: without friction of the elements
+    VecX force_, limit_, force_limit_, power_;  // of the elements; force_limit is the one that force was found for
+};
+
+}  // namespace pn

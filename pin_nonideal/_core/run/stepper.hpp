@@ -1,0 +1,36 @@
+// A step of the method that a run was asked for; which stepper takes it is chosen once.
+#pragma once
+
+#include <variant>
+
+#include "run/error_norm.hpp"
+#include "run/runge_kutta.hpp"
+#include "run/semi_implicit_euler.hpp"
+
+namespace pn {
+
+class Stepper : public Step {
+public:
+    Stepper(const Method& method, System& system);
+
+    const Method& method;
+
+    // y1 = one step of size h from (t0, y0); the rate there must be known.
+    void take(double t, double size);
+    // Norm of the error estimate, 1 at the tolerance; 0 of methods without one.
+    double error(ErrorNorm& norm);
+    // What the projection of the end of an accepted step has shown, for methods that use it.
+    void learn();
+
+    // Interpolant over the step; needs the rate at its end. Leaves the workspace at other states.
+    void make_interpolant();
+    void interpolate(double part, VecX& y) const;
+    bool has_interpolant() const { return has_interpolant_; }
+
+private:
+    System& system_;
+    std::variant<std::monostate, RungeKutta, SemiImplicitEuler> scheme_;
+    bool has_interpolant_ = false;
+};
+
+}  // namespace pn

@@ -1,0 +1,92 @@
+#include "run/system.hpp"
+
+#include <algorithm>
+
+#include "constraints/projection.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/power.hpp"
+#include "dynamics/step_start.hpp"
+#include "friction/friction.hpp"
+#include "tree/liegroup.hpp"
+
+namespace pn {
+
+// Below any limit of friction [N or N m]: what carries none at all still has a share.
+constexpr double least_limit = 1e-300;
+
+System::System(const Program& program, Workspace& workspace, bool with_energy)
+    : p(program), w(workspace), energy(with_energy), nq(p.mechanism.nq), nv(p.mechanism.nv), nz(p.states),
+      nw(with_energy ? power_count(p) : 0), ne(static_cast<int>(p.frictions.size())), ny(nq + nv + nz + nw + ne),
+      q(VecX::Zero(nq)), v(VecX::Zero(nv)), projected_(VecX::Zero(ny)) {}
+
+void System::read(const VecX& y) {
+    q = y.head(nq);
+    v = y.segment(nq, nv);
+}
+
+void System::write(VecX& y) const {
+    y.head(nq) = q;
+    y.segment(nq, nv) = v;
+}
+
+void System::read_law_states(const VecX& y) {
+    if (nz > 0) w.state.z = y.segment(nq + nv, nz);
+}
+
+void System::derivative(double t, const VecX& y, VecX& dy) {
+    read(y);
+    read_law_states(y);
+    if (!on_constraints) {
+        evaluate(p, w, t, q, v);
+        if (!w.now.rows.blocks.empty()) smallest_pivot = std::min(smallest_pivot, w.now.rows.distance);
+        rate_of_evaluation(t, y, dy);
+        return;
+    }
+    pn::project_and_evaluate(p, w, t, q, v);
+    smallest_pivot = std::min(smallest_pivot, w.now.rows.distance);
+    projected_ = y;
+    write(projected_);
+    rate_of_evaluation(t, projected_, dy);
+}
+
+void System::rate_of_evaluation(double t, const VecX& y, VecX& dy) {
+    read(y);
+    configuration_rate(p.mechanism, q.data(), v.data(), dy.data());
+    dy.segment(nq, nv) = w.now.a;
+    if (nz > 0) dy.segment(nq + nv, nz) = w.now.dz;
+    if (energy) powers(p, w, v, dy.data() + nq + nv + nz);
+    for (int e = 0; e < ne; ++e) {
+        double& share = dy[ny - ne + e];
+        share = 0.0;
+        if (w.state.mode[e] != sticking || w.state.indeterminate) continue;
+        const double limit = static_limit(p, w, e, t, q, v);
+        const Vec3 force = friction_force(p, w, e);  // of one direction with its sign: smooth where it passes zero
+        share = (p.frictions[e].dim == 1 ? force[0] : force.norm()) / std::max(limit, least_limit);
+    }
+}
+
+double System::energy_at(const VecX& y) {
+    read(y);
+    place_bodies(p.mechanism, w.now.terms, q);
+    mass_matrix(p.mechanism, w.now.terms);
+    return kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms);
+}
+
+void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
+    const double before = energy && !w.now.rows.blocks.empty() ? energy_at(y) : 0.0;
+    read(y);
+    read_law_states(y);
+    bool moved = project_position(p, w, t, q, v);
+    require_closed(p, w, t);
+    moved |= begin_step_on_rates(p, w, t, v);
+    write(y);
+    rate_of_evaluation(t, y, dy);
+    moved_energy = 0.0;
+    if (!moved || !energy) return;
+    moved_energy =
+        kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms) - before;
+}
+
+void System::normalize(VecX& y) const { pn::normalize(p.mechanism, y.data()); }
+
+}  // namespace pn

@@ -1,0 +1,49 @@
+// The right-hand side of y' = f(t, y) on the flat state y = (q, v, z, work, shares): z are the states of laws, work the
+// integrals of the ledger's powers, shares the integrals of force / limit of each sticking element, so that the step
+// control resolves a load that comes and goes while nothing moves, and the stages tell whether a limit was passed.
+//
+// q is integrated in ambient coordinates (a quaternion as four numbers): the right-hand side extends smoothly off the
+// unit sphere, so the order is kept, and lengths are restored at the step's end.
+#pragma once
+
+#include "dynamics/workspace.hpp"
+
+namespace pn {
+
+struct System {
+    const Program& p;
+    Workspace& w;
+    const bool energy;  // integrate the powers of the ledger
+    // Near a singular position the motion off the constraints differs wildly from the motion on them, so stages are
+    // projected first: y' = f(P(y)) has the same solutions and no such cliff.
+    bool on_constraints = false;
+    double smallest_pivot = 1.0;  // of the rows' factor, over the evaluations since it was set
+    double moved_energy = 0.0;    // by the last projection of a step's end, where the ledger is kept
+    const int nq, nv, nz, nw, ne, ny;  // sizes of q, v, z, work, shares, y
+    VecX q, v;                         // of the state read last
+
+    System(const Program& program, Workspace& workspace, bool with_energy);
+
+    // Takes q and v from y, or puts them there.
+    void read(const VecX& y);
+    void write(VecX& y) const;
+    // Takes the states of laws from y.
+    void read_law_states(const VecX& y);
+    auto velocity(const VecX& y) const { return y.segment(nq, nv); }
+    auto work(VecX& y) const { return y.segment(nq + nv + nz, nw); }
+    double share(const VecX& y, int element) const { return y[ny - ne + element]; }
+
+    void derivative(double t, const VecX& y, VecX& dy);
+    // dy from the evaluation that the workspace holds.
+    void rate_of_evaluation(double t, const VecX& y, VecX& dy);
+    // Brings a step's end onto the constraints and evaluates there, as the next step begins.
+    void project_and_evaluate(double t, VecX& y, VecX& dy);
+    void normalize(VecX& y) const;
+
+private:
+    double energy_at(const VecX& y);
+
+    VecX projected_;
+};
+
+}  // namespace pn
