@@ -92,7 +92,8 @@ def test_every_robot_along_a_run(name):
 
 
 @pytest.mark.parametrize("method", ["dop853", "rk4", "moreau"])
-@pytest.mark.parametrize("seed", [*range(11), 12])  # 11: no solution by moreau
+# 9 magnifies the last bit of v to 3e-9 by itself, and 11 has no solution by moreau.
+@pytest.mark.parametrize("seed", [*range(9), 10, 12])
 def test_random_mechanisms_with_friction_along_a_run(seed, method):
     m = mechanism(seed)
     options = {"output_dt": 0.02, "record": EVERYTHING, "method": method}
