@@ -24,26 +24,9 @@ public:
     // A vector whose length changes over a run.
     template <class T>
     void list(std::vector<T>& x) { resized(x); }
-    // Numbers of things, below `limit`, each at most once.
-    void indices(std::vector<int>& x, int limit) {
-        resized(x);
-        require(static_cast<int>(x.size()) <= limit);
-        for (int i : x) require(0 <= i && i < limit);
-    }
-    void matrix(MatX& x) {
-        long rows = x.rows(), columns = x.cols();
-        (*this)(rows, columns);
-        if (reads) {
-            const long room = static_cast<long>((bytes.size() - at) / sizeof(double));
-            require(rows >= 0 && columns >= 0 && rows <= room && columns <= room && rows * columns <= room);
-            x.resize(rows, columns);
-        }
-        raw(x.data(), x.size() * sizeof(double));
-    }
     void require(bool fits) const {
         if (!fits) throw std::invalid_argument("the state does not fit the scene");
     }
-    bool reading() const { return reads; }
     void end() const { require(at == bytes.size()); }
 
 private:
@@ -78,10 +61,6 @@ private:
         raw(x.data(), x.size() * sizeof(double));
     }
     void item(Vec3& x) { raw(&x[0], 3 * sizeof(double)); }
-    void item(Mat3& x) { (*this)(x.c[0], x.c[1], x.c[2]); }
-    void item(Motion& x) { (*this)(x.lin, x.ang); }
-    void item(Force& x) { (*this)(x.lin, x.ang); }
-    void item(Inertia& x) { (*this)(x.mass, x.first, x.second); }
     template <class T>
     void item(std::vector<T>& x) {
         same(x.size());

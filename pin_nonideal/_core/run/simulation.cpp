@@ -19,23 +19,10 @@ constexpr double rest_step = 0.1, rest_part_step = 0.002;
 // is made one of two even steps instead of a long and a tiny one.
 constexpr double whole_way = 1.0 - 1e-10, even_part = 0.5;
 
-// The next step aims at error = safety^order, so far below the tolerance that what the motion adds to the error from
-// one step to the next seldom rejects it: over smooth motions a sixth fewer evaluations to the same error than with 0.9,
-// where a third of the steps fails. A step tried again knows its error, and aims closer.
-constexpr double safety = 0.65, retry_safety = 0.9, shrink_limit = 0.2, growth_limit = 10.0;
-// Error of a step that could not be evaluated: the next one is as short as the control makes it.
-constexpr double failed_error = 1e4;
 // A step of fewer spacings of floating-point times than these leads nowhere.
 constexpr double least_spacings = 4.0;
 // Steps below this part of the time are short enough to tell what fails of its own.
 constexpr double tiny_step = 1e-10;
-
-// Unit roundoff in an acceleration at a sine s to a singular position: 1/s of it in the place, 1/s^2 in the velocity
-// after projection, 1/s^3 where the rows are solved.
-double rounding_at(double pivot) { return 2.2e-16 / (pivot * std::sqrt(pivot)); }
-// A step whose evaluations come nearer than this part of its way through is shortened so, which moves them elsewhere.
-constexpr double clearance = 0.04, detour = 0.85;
-constexpr int detour_limit = 3;
 
 // A run that has come less than this part of its way after so many steps never ends.
 constexpr long early_steps = 20000;
@@ -63,7 +50,7 @@ double whole_lengths(double time, double length) { return std::floor(time / leng
 Simulation::Simulation(const Program& program, Workspace& workspace, const Options& run_options, Recording& recording)
     : p(program), w(workspace), options(run_options), out(recording), t_end(options.t0 + options.duration),
       system(program, workspace, options.record.energy), stepper(options.method, system),
-      norm(system, options.rtol, options.atol), locator(system, stepper, slip_at_start, pulls), moreau(system),
+      norm(system, options.rtol, options.atol), control(options.method, options.rtol), locator(system, stepper, slip_at_start, pulls), moreau(system),
       recorder(system, options.record, recording), sample_(VecX::Zero(system.ny)) {
     y = rate = configured_y = sample_;
     slip_at_start.assign(p.frictions.size(), 0.0);
@@ -218,7 +205,7 @@ std::optional<double> Simulation::try_step(double size) {
         stepper.take(t, size);
     }
     if (!stepper.y1.allFinite()) throw Failure(Failure::Kind::not_finite, t + size);
-    if (nears_singularity(start_pivot) && detours++ < detour_limit) return std::nullopt;
+    if (control.wants_detour(system.smallest_pivot, start_pivot, w.now.rows.distance)) return std::nullopt;
     const bool needs_end = options.method.first_same_as_last;
     double error = needs_end ? 0.0 : stepper.error(norm);
     if (!(error <= 1.0)) return error;
@@ -228,44 +215,13 @@ std::optional<double> Simulation::try_step(double size) {
     return error;
 }
 
-// Whether rounding near a singular position would spoil a stage, which a step of another length keeps clear of.
-bool Simulation::nears_singularity(double start_pivot) const {
-    const double way = std::sqrt(start_pivot) + std::sqrt(w.now.rows.distance);
-    return options.method.adaptive() && std::sqrt(system.smallest_pivot) < clearance * way &&
-           rounding_at(system.smallest_pivot) > options.rtol;
-}
-
 // --- Control the error ----------------------------------------------------------------------------------------------------
 
 bool Simulation::control_error(const Proposal& proposal, std::optional<double> error) {
-    if (!error) {
-        ++out.rejected;
-        h = detour * proposal.size;
-        return false;
-    }
-    if (!(*error <= 1.0)) {
-        reject(proposal, *error);
-        return false;
-    }
-    if (options.method.adaptive()) {
-        double factor = growth_limit;
-        if (*error > 0.0) factor = std::min(factor, safety * std::pow(*error, -1.0 / options.method.order));
-        if (last_rejected) factor = std::min(1.0, factor);
-        if (!(proposal.last && factor * proposal.size < h)) h = proposal.size * std::max(factor, shrink_limit);
-    }
-    last_rejected = false;
-    detours = 0;
-    opened.reset();
-    return true;
-}
-
-void Simulation::reject(const Proposal& proposal, double error) {
-    ++out.rejected;
-    last_rejected = true;
-    const double factor =
-        std::isfinite(error) ? retry_safety * std::pow(error, -1.0 / options.method.order) : 0.0;
-    h = proposal.size * std::max(shrink_limit, factor);
-    if (h >= least_spacings * std::abs(std::nextafter(t, t_end) - t)) return;
+    const bool accepted = control.accepts(error, proposal.size, proposal.last, h);
+    if (accepted) opened.reset();
+    else ++out.rejected;
+    if (accepted || !error || h >= least_spacings * std::abs(std::nextafter(t, t_end) - t)) return accepted;
     if (opened) throw *opened;
     throw Failure(Failure::Kind::step_size, t);
 }

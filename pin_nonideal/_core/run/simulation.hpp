@@ -8,6 +8,7 @@
 #include "run/checkpoint.hpp"
 #include "run/event_location.hpp"
 #include "run/moreau.hpp"
+#include "run/step_control.hpp"
 
 namespace pn {
 
@@ -55,8 +56,6 @@ private:
     void record(const std::optional<FoundEvent>& event);
 
     std::optional<double> try_step(double size);
-    bool nears_singularity(double start_pivot) const;
-    void reject(const Proposal& proposal, double error);
 
     void between_steps();
     void save();
@@ -82,16 +81,14 @@ private:
     System system;
     Stepper stepper;
     ErrorNorm norm;
+    StepControl control;
     EventLocator locator;
     Moreau moreau;
     Recorder recorder;
     VecX sample_;
     long ticks = 0;
     Clock::time_point next_save;
-    // Of the trials of one step.
-    bool last_rejected = false;
-    int detours = 0;                // around a singular position
-    std::optional<Failure> opened;  // a loop that a trial could not close
+    std::optional<Failure> opened;  // a loop that a trial of this step could not close
 };
 
 }  // namespace pn
