@@ -37,7 +37,7 @@ CASES: dict[str, Callable[[], Problem]] = {
 
 def our_batch(scene: pn.Scene, q: Any, v: Any) -> timing.Batch:
     """The core's own evaluation."""
-    runner = scene.new_runner()
+    runner = scene._compiled.program.runner()
     return timing.counted(lambda count: runner.time_evaluations(q, v, 0.0, count))
 
 
@@ -115,7 +115,7 @@ def measure_case(case: Problem, rounds: int) -> dict[str, Any]:
     compiled = [name for name in times if name.startswith("pinocchio_")]
     result: dict[str, Any] = {
         "title": case.title, "nv": case.model.nv,
-        "rows": int(scene.new_runner().rows(case.q0, case.v0, 0.0)[1].size) if case.anchors else 0,
+        "rows": scene._compiled.program.rows if case.anchors else 0,
         "seconds": {name: t.best for name, t in times.items()},
         "own_pass": timing.ratio(times["pin_nonideal"], times[PINOCCHIO_TERMS]),
     }  # fmt: skip

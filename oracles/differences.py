@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from pin_nonideal.states.rows import holonomic_rows
+
 # Central differences of fourth order at this step: truncation 1e-14, rounding 1e-16 / 1e-3; with a margin for
 # the curvature of short levers.
 STEP = 1e-3
@@ -30,7 +32,7 @@ def rows_at(scene, runner, q, v, t):
 
 
 def assert_rows_match_differences(scene, q, v, t, a):
-    model, runner = scene.model, scene.new_runner()
+    model, runner = scene.model, scene._compiled.program.runner()
     A, b, phi, rate = rows_at(scene, runner, q, v, t)
     size = 1.0 + np.abs(A).max(initial=0.0)
     np.testing.assert_allclose(phi, 0.0, atol=MET * size)
@@ -47,7 +49,7 @@ def assert_rows_match_differences(scene, q, v, t, a):
     w = np.linspace(-1.0, 1.0, model.nv)
     there = rows_at(scene, runner, q, w, t)[3]
     change = fourth_order(lambda s: rows_at(scene, runner, moved(s, w), w, t + s)[2])
-    position = ~np.asarray(scene._nonholonomic())
+    position = holonomic_rows(scene._compiled.program)
     scale = size + np.abs(there).max(initial=0.0)
     np.testing.assert_allclose(change[position], there[position], atol=DIFFERENCES * scale)
     np.testing.assert_array_equal(change[~position], 0.0)

@@ -40,7 +40,7 @@ class Conditions:
 
     def __init__(self, scene, slips):
         self.scene, self.slips, self.model = scene, slips, scene.model
-        self.data, self.runner = scene.model.createData(), scene.new_runner()
+        self.data, self.runner = scene.model.createData(), scene._compiled.program.runner()
         self.laws = {law.name: law for law in scene.laws}
         self.anchors = {c.name: c for c in scene.constraints}
 

@@ -20,7 +20,7 @@ def assert_same_terms(scene, q, v, t, core_F, F, A, b):
     still = given_force(scene, q, np.zeros_like(v), t)
     size = np.abs(F).max() + np.abs(F - still).max() + np.abs(still).max()
     np.testing.assert_allclose(core_F, F, rtol=0, atol=MET * size)
-    core_A, core_b, _, _ = rows_at(scene, scene.new_runner(), q, v, t)
+    core_A, core_b, _, _ = rows_at(scene, scene._compiled.program.runner(), q, v, t)
     size = 1.0 + np.abs(A).max(initial=0.0)
     np.testing.assert_allclose(core_A, A, rtol=0, atol=MET * size)
     size = size * (1.0 + np.abs(v).max()) ** 2 + np.abs(b).max(initial=0.0)
@@ -53,27 +53,27 @@ def kkt_acceleration(M, force, A, b):
 
 def assert_solves_its_rows(scene, q, v, t, modes=None):
     """Acceleration, split of the forces, multipliers and rank; returns the core's answer."""
-    raw = scene.new_runner().solve(q, v, t, None, modes)
+    raw = scene._compiled.program.runner().solve(q, v, t, None, modes)
     M, F = mass_matrix(scene.model, q), given_force(scene, q, v, t)
     A, b = rows(scene, q, v, t)
-    assert_same_terms(scene, q, v, t, raw["F"], F, A, b)
-    C = raw["C"]  # held to the laws by friction_conditions
+    assert_same_terms(scene, q, v, t, raw.F, F, A, b)
+    C = raw.C  # held to the laws by friction_conditions
     a = kkt_acceleration(M, F + C, A, b)
     in_play = np.abs(a).max() + np.abs(np.linalg.solve(M, F + C)).max()
-    np.testing.assert_allclose(raw["a"], a, rtol=0, atol=KKT * in_play)
+    np.testing.assert_allclose(raw.a, a, rtol=0, atol=KKT * in_play)
     # The equation itself, and the identity of the multipliers.
-    force = np.abs(M) @ np.abs(a) + np.abs(F) + np.abs(A.T) @ np.abs(raw["lam"])
-    assert (np.abs(M @ raw["a"] - F - C - A.T @ raw["lam"]) <= KKT * force.max()).all()
-    split = raw["F_ideal"] + raw["F_nonideal"] - C
-    assert (np.abs(A.T @ raw["lam"] - split) <= KKT * force.max()).all()
+    force = np.abs(M) @ np.abs(a) + np.abs(F) + np.abs(A.T) @ np.abs(raw.lam)
+    assert (np.abs(M @ raw.a - F - C - A.T @ raw.lam) <= KKT * force.max()).all()
+    split = raw.F_ideal + raw.F_nonideal - C
+    assert (np.abs(A.T @ raw.lam - split) <= KKT * force.max()).all()
     # The paper's equation on the same arrays.
     oracle = pn.solve(M, F, A, b, C)
     for key in ("a", "F_ideal", "F_nonideal"):
         expected = getattr(oracle, key)
         scale = in_play if key == "a" else force.max()
-        np.testing.assert_allclose(raw[key], expected, rtol=0, atol=KKT * scale)
-    assert raw["rank"] == oracle.rank
+        np.testing.assert_allclose(getattr(raw, key), expected, rtol=0, atol=KKT * scale)
+    assert raw.rank == oracle.rank
     if not scene.dropped:
         most = np.abs(oracle.lam).max(initial=1.0)
-        np.testing.assert_allclose(raw["lam"], oracle.lam, rtol=0, atol=MULTIPLIERS * most)
+        np.testing.assert_allclose(raw.lam, oracle.lam, rtol=0, atol=MULTIPLIERS * most)
     return raw

@@ -9,8 +9,11 @@ from __future__ import annotations
 import importlib
 from pathlib import Path
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 import pinocchio
+
+__all__ = ["core", "load_core"]
 
 _AGAIN = 'run "pip install ." in the checkout, which builds the core for the Pinocchio that it needs'
 
@@ -53,3 +56,9 @@ def _missing() -> str:
         'imported because Python runs in its parent; run "pip install -e ." there, or start Python in '
         "another folder"
     )
+
+
+if TYPE_CHECKING:
+    from . import _core as core
+else:
+    core = load_core()

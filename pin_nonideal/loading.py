@@ -17,7 +17,7 @@ from .formats.generators import GENERATORS
 from .formats.mjcf import read_mjcf
 from .formats.robot_yaml import MODEL_KEYS, Table, check_keys, optional_string, read_yaml
 from .formats.urdf import RobotFile, read_mimics, read_urdf
-from .scene import Scene
+from .scene import Scene, loaded
 
 FILE_PARAMETERS = ("free_flyer", "package_dirs", "merge_ball_joints")
 
@@ -55,9 +55,8 @@ def load(name: str | os.PathLike[str], *, terms: str = "core", **parameters: Any
     text = os.fspath(name) if isinstance(name, (str, os.PathLike)) else None
     if not isinstance(text, str) or not text or "\0" in text:
         raise InputError(f"name must be the name of a robot or a path; got {name!r}")
-    scene = Scene(**_load(name, text, parameters), terms=terms)
-    scene.origin = _origin(text, parameters if terms == "core" else {**parameters, "terms": terms})
-    return scene
+    origin = _origin(text, parameters if terms == "core" else {**parameters, "terms": terms})
+    return loaded(Scene(**_load(name, text, parameters), terms=terms), origin)
 
 
 def _origin(text: str, parameters: dict[str, Any]) -> dict[str, Any] | None:

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .actuation import Actuation
 from .checks import array, choice, number, optional_text, sequence
-from .compilation.analysis import check_model, check_user_constraints, drop_rows
-from .compilation.failures import named_failure
+from .compilation.analysis import check_model
+from .compilation.lowering import Descriptions
 from .compilation.report import report
-from .compilation.scene import core, lower
+from .compilation.scene import CompiledScene
 from .contacts import Contact
+from .core import core
 from .equation import Solution
-from .errors import InputError, RunError
+from .errors import InputError
 from .forces import Force
 from .laws import Law
 from .states.configurations import configuration, require_resolved, unit_parts
-from .states.projection import Rows, nearest_state, nearest_states, nonholonomic_rows
+from .types import Array, GeometryModel, Model
 
-Array = NDArray[np.float64]
+Rest = ParamSpec("Rest")
+Result = TypeVar("Result")
 
 TERMS = ("core", "pinocchio")
 
@@ -64,12 +66,11 @@ class Scene:
         element_names: names of the frictional elements, in the order of `modes`.
         law_names: names of the laws, in the order of the ledger's columns.
         dropped: (name, row, reason) of rows that can never act.
-        origin: name and parameters that `load` made the scene from; None of another one.
     """
 
     def __init__(
         self,
-        model: Any,
+        model: Model,
         *,
         constraints: Sequence[Any] = (),
         laws: Sequence[Law] = (),
@@ -78,8 +79,8 @@ class Scene:
         actuation: Actuation | None = None,
         q0: ArrayLike | None = None,
         v0: ArrayLike | None = None,
-        visual_model: Any = None,
-        collision_model: Any = None,
+        visual_model: GeometryModel | None = None,
+        collision_model: GeometryModel | None = None,
         name: str | None = None,
         notes: Sequence[str] = (),
         source: str | None = None,
@@ -108,31 +109,21 @@ class Scene:
         self._unit_parts = tuple(unit_parts(model))
         self.q0 = pin.neutral(model) if q0 is None else self._configuration(q0, "q0")
         self.v0 = np.zeros(model.nv) if v0 is None else self._velocity(v0, "v0")
-        self._lowered = low = lower(
-            model,
-            self.q0,
-            constraints=self.constraints,
-            contacts=self.contacts,
-            laws=self.laws,
-            forces=self.forces,
-            actuation=actuation,
-            terms=terms,
-        )
-        self._builder = low.builder
-        self.constraint_slices, self.anchor_frames = low.slices, low.anchors
-        self.element_names, self.law_names, self.z0 = list(low.friction_names), list(low.law_names), low.z0
-        if low.unprojected:
-            names = ", ".join(f'"{n}"' for n in low.unprojected)
+        said = Descriptions(self.constraints, self.contacts, self.laws, self.forces, actuation, terms)
+        self._compiled = CompiledScene(model, self.q0, self.v0, said)
+        self.constraint_slices, self.anchor_frames = self._compiled.slices, self._compiled.anchors
+        self.element_names = self._compiled.program.element_names
+        self.law_names = self._compiled.program.law_names
+        self.dropped = self._compiled.dropped
+        if self._compiled.unprojected:
+            names = ", ".join(f'"{n}"' for n in self._compiled.unprojected)
             self.notes.append(
                 f"{names}: no residual and no rate, so drift of these rows cannot be projected away"
             )
-        self._builder.finish()
-        check_user_constraints(model, self.q0, self.v0, self.constraints, low)
-        self.dropped = drop_rows(model, self.q0, low)
-        self._runner = self._builder.runner()
+        self._runner = self._compiled.program.runner()
         self._nv = int(model.nv)
         self._closed: tuple[Array, Array] | None = None
-        self.origin: dict[str, Any] | None = None
+        self._origin: dict[str, Any] | None = None  # what `load` made the scene from
 
     def __repr__(self) -> str:
         return (
@@ -192,37 +183,14 @@ class Scene:
 
     def _project(self, q: Array, v: Array, t: float) -> tuple[Array, Array]:
         require_resolved(self.model, q)
-        try:
-            return nearest_state(self.model, self._lowered, self._nonholonomic(), q, v, t)
-        except core.CoreFailure as failure:
-            raise self.failure(failure) from None
+        return self._compiled.project(q, v, t)
 
-    def nearest_states(self, q: Array, v: Array, t: float, threads: int) -> tuple[Array, Array]:
-        """What `project` gives for each of many states.
-
-        Args:
-            q: configurations, (n, nq).
-            v: velocities, (n, nv).
-            t: time [s].
-            threads: number of native threads.
-
-        Returns:
-            q (n, nq), v (n, nv).
-
-        Raises:
-            LoopClosureError: the constraints cannot be met from one of them.
-            InputError: a quaternion or (cos, sin) pair is not of unit length, or a coordinate is too large.
-        """
+    def _project_all(self, q: Array, v: Array, t: float, threads: int) -> tuple[Array, Array]:
+        """What `project` gives for each of many states, (n, nq) and (n, nv), on several threads."""
         if self._unit_parts:
             q = np.array([self._configuration(one, "q") for one in q]).reshape(q.shape)
         require_resolved(self.model, q)
-        try:
-            return nearest_states(self.model, self._lowered, self._nonholonomic(), q, v, t, threads)
-        except core.CoreFailure as failure:
-            raise self.failure(failure) from None
-
-    def _nonholonomic(self) -> Rows:
-        return nonholonomic_rows(self.constraints, self._lowered)
+        return self._compiled.project_all(q, v, t, threads)
 
     # --- one instant ----------------------------------------------------------------------------------------
 
@@ -258,15 +226,9 @@ class Scene:
                     f"modes must hold {len(self.element_names)} numbers out of -1, 0, 1; got {modes}"
                 )
             modes = [int(m) for m in asked]
-        out = self._call(self._runner.solve, q, v, t, tau, modes)
-        return Solution(
-            out["a"],
-            out["F_ideal"],
-            out["F_nonideal"],
-            out["lam"],
-            out["rank"],
-            np.array(out["modes"], dtype=np.int8),
-        )
+        now = self._call(self._runner.solve, q, v, t, tau, modes)
+        used = np.array(now.modes, dtype=np.int8)
+        return Solution(now.a, now.F_ideal, now.F_nonideal, now.lam, now.rank, used)
 
     def acceleration(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike | None = None, t: float = 0.0) -> Array:
         """Just the acceleration, for loops of one's own.
@@ -292,44 +254,38 @@ class Scene:
         return a
 
     def _call(
-        self, function: Any, q: ArrayLike, v: ArrayLike, t: float, tau: ArrayLike | None, *rest: Any
-    ) -> Any:
+        self,
+        function: Callable[Concatenate[Array, Array, float, Array | None, Rest], Result],
+        q: ArrayLike,
+        v: ArrayLike,
+        t: float,
+        tau: ArrayLike | None,
+        *rest: Rest.args,
+        **named: Rest.kwargs,
+    ) -> Result:
         q_in, v_in = self._configuration(q, "q"), self._velocity(v, "v")
         torque = None if tau is None else np.array(array("tau", tau, (self.model.nv,)))
         try:
-            return function(q_in, v_in, number("t", t), torque, *rest)
+            return function(q_in, v_in, number("t", t), torque, *rest, **named)
         except core.CoreFailure as failure:
-            raise self.failure(failure) from None
-
-    def new_runner(self) -> Any:
-        """A workspace of the core for one run."""
-        return self._builder.runner()
-
-    def roll_out(self, q: Array, v: Array, options: dict[str, Any], threads: int) -> Any:
-        """Runs of many states in native threads, as the core returns them.
-
-        Those not begun when one was interrupted are None.
-
-        Args:
-            q: configurations, (n, nq).
-            v: velocities, (n, nv).
-            options: of the runs.
-            threads: number of threads.
-        """
-        return core.rollout(self._builder, q, v, self.z0, options, threads)
-
-    # --- words ----------------------------------------------------------------------------------------------
-
-    def failure(self, failure: Any) -> RunError:
-        """The core's failure as the exception that names what is to blame.
-
-        Args:
-            failure: the core's CoreFailure.
-        """
-        return named_failure(failure, self.model, self._lowered)
+            raise self._compiled.named(failure) from None
 
     def report(self) -> str:
         """What the scene is made of: joints, constraints, rows, rank, mobility, and what was left out."""
         q, v = self.initial_state()
-        self._runner.solve(q, v, 0.0, None, [1] * len(self.element_names))
-        return report(self, self._runner.rank)
+        self._runner.solve(q, v, 0.0, modes=[1] * len(self.element_names))
+        notes = [f"note: {n}" for n in self.notes]
+        credits = {"source": self.source, "licence": self.licence}
+        notes += [f"{key}: {value}" for key, value in credits.items() if value]
+        return report(self._compiled, self.name, self._runner.rank, notes)
+
+
+def loaded(scene: Scene, origin: dict[str, Any] | None) -> Scene:
+    """The scene, which remembers what `load` made it from, so that `resume` can load it again.
+
+    Args:
+        scene: as loaded.
+        origin: name and parameters, or None when a file cannot hold them.
+    """
+    scene._origin = origin
+    return scene

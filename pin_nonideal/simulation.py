@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 import os
-import sys
 import time
 from collections.abc import Sequence
-from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .checks import array, choice, count
-from .compilation.failures import LEFT, check_closed
-from .errors import InputError, OutputError, RunError, RunInterrupted, UserFunctionError
+from .core import core
+from .errors import InputError, RunError, RunInterrupted
 from .runs.checkpoint import Saver
 from .runs.options import SCIPY, run_options
+from .runs.progress import progress_bar
+from .runs.results import finish
 from .scene import Scene
-from .trajectory import Event, Stats, Trajectory
-
-Array = NDArray[np.float64]
-
-EVENT_KINDS = ("stick", "slip", "reverse", "pull", "chatter")
-
-NOTHING = np.empty(0)  # what the core does not hand over: fields without a number
+from .trajectory import Trajectory
 
 
 def simulate(
@@ -83,32 +76,29 @@ def simulate(
         raise InputError(f"simulate: scene must be a Scene; got {type(scene).__name__}")
     options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, record)
     q0, v0 = (
-        scene.project(q, v, options["t0"])
-        if (q is not None or v is not None or t0)
-        else scene.initial_state()
+        scene.project(q, v, options.t0) if (q is not None or v is not None or t0) else scene.initial_state()
     )
     choice("simulate: progress", progress, (True, False, None))
+    saver = None
     if checkpoint is not None:
         if method in SCIPY:
             raise InputError(
                 f'simulate: checkpoint needs one of the core\'s methods; "{method}" runs in SciPy, which '
                 "does not give its state away"
             )
-        Saver(checkpoint, scene, options, checkpoint_interval)
-    bar = progress_bar(progress, options)
-    options["tick"] = bar.update if bar else None
+        saver = Saver(checkpoint, scene, options, checkpoint_interval)
     begin = time.perf_counter()
-    try:
+    with progress_bar(progress, options) as tick:
         if method in SCIPY:
             from .runs.scipy_methods import simulate_stiff
 
-            raw = simulate_stiff(scene, q0, v0, options)
+            outcome, stopped = simulate_stiff(scene, q0, v0, options, tick)
         else:
-            raw = scene.new_runner().simulate(q0, v0, scene.z0, options)
-    finally:
-        if bar:
-            bar.close()
-    return finish(scene, raw, options, time.perf_counter() - begin)
+            interval = saver.interval if saver else 0.0
+            runner = scene._compiled.program.runner()
+            outcome = runner.simulate(q0, v0, options, tick=tick, save=saver, save_interval=interval)
+            stopped = outcome.stopped
+    return finish(scene, outcome, stopped, options, time.perf_counter() - begin)
 
 
 def rollout(
@@ -167,164 +157,18 @@ def rollout(
     if method in SCIPY:
         raise InputError(f'rollout: method must be one of the core\'s; "{method}" runs in SciPy')
     begin = time.perf_counter()
-    q0, v0 = scene.nearest_states(starts_q, starts_v, options["t0"], threads)
-    outcomes = scene.roll_out(q0, v0, options, threads)
+    q0, v0 = scene._project_all(starts_q, starts_v, options.t0, threads)
+    outcomes = core.rollout(scene._compiled.program, q0, v0, options, threads)
     wall = time.perf_counter() - begin
     results: list[Trajectory] = []
     failed: list[RunError] = []
     for i, outcome in enumerate(outcomes):
         try:
             if outcome is not None:
-                results.append(finish(scene, outcome.hand_over(), options, wall))
+                results.append(finish(scene, outcome, outcome.stopped, options, wall))
         except RunError as error:
             error.index = i
             failed.append(error)
     if failed:  # an interrupt before the runs that it ended in other threads
         raise min(failed, key=lambda error: not isinstance(error, RunInterrupted))
     return results
-
-
-def finish(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: float) -> Trajectory:
-    """Shapes the core's flat arrays; raises what stopped the run, with the trajectory attached.
-
-    Args:
-        scene: the scene that ran.
-        raw: arrays by name.
-        options: what was asked for.
-        wall: wall time [s].
-
-    Raises:
-        RunError: the run stopped early.
-        OutputError: its first checkpoint could not be written.
-    """
-    trajectory = shaped(scene, raw, options, wall)
-    error = raw["error"]
-    if error is None:
-        if raw["largest_violation"] > LEFT:
-            check_closed(scene, trajectory)
-    else:
-        last = float(trajectory.t[-1]) if len(trajectory) else options["t0"]
-        if isinstance(error, KeyboardInterrupt):
-            stopped: RunError = RunInterrupted(
-                f"the run was interrupted at t = {last:.4g} s; the trajectory up to there is in "
-                "error.trajectory",
-                time=last,
-            )
-            cause: BaseException | None = None
-        elif isinstance(error, OutputError):
-            raise error
-        elif isinstance(error, RunError):
-            stopped, cause = error, error.__cause__
-        else:
-            stopped = UserFunctionError(
-                f"a function of the scene failed at t = {last:.4g} s: {error}", time=last
-            )
-            cause = error if isinstance(error, BaseException) else None
-        stopped.time = last if stopped.time is None else stopped.time
-        stopped.trajectory = trajectory
-        raise stopped from cause
-    if raw["failure"] is not None:
-        failure = scene.failure(raw["failure"])
-        failure.args = (f"{failure}; the trajectory up to there is in error.trajectory", *failure.args[1:])
-        failure.trajectory = trajectory
-        raise failure
-    return trajectory
-
-
-def shaped(scene: Scene, raw: dict[str, Any], options: dict[str, Any], wall: float) -> Trajectory:
-    """A Trajectory from the core's flat arrays.
-
-    Args:
-        scene: the scene that ran.
-        raw: arrays by name.
-        options: what was asked for.
-        wall: wall time [s].
-    """
-    t = raw.get("t", NOTHING)
-    steps, rejected, evaluations, factorizations, projections, iterations = raw["counters"]
-    nt, nq, nv = len(t), scene.q0.size, scene.v0.size
-
-    def table(key: str, width: int) -> Array:
-        result: Array = raw.get(key, NOTHING).reshape(nt, width)
-        return result
-
-    fields: dict[str, Any] = {}
-    if options["a"]:
-        fields["a"] = table("a", nv)
-    if options["forces"]:
-        m = max((s.stop for s in scene.constraint_slices.values()), default=0)
-        for key, width in (("F_ideal", nv), ("F_nonideal", nv), ("lam", m), ("lam_ideal", m)):
-            fields[key] = table(key, width)
-    if options["power"] or options["energy"]:
-        columns = ["actuation", "forces", "constraints", *_columns(scene.law_names)]
-        if options["power"]:
-            fields["power"] = dict(zip(columns, table("power", len(columns)).T, strict=True))
-        if options["energy"]:
-            fields["energy"] = _ledger(columns, table("energy", len(columns) + 3))
-    if scene.z0.size:
-        fields["z"] = table("z", scene.z0.size)
-    elements = scene.element_names
-    if elements:
-        fields["modes"] = table("modes", len(elements)).astype(np.int8)
-    if raw["events"]:
-        names = dict.fromkeys(EVENT_KINDS, elements) | {"pull": list(scene.constraint_slices)}
-        kinds = [(t, EVENT_KINDS[kind], element) for t, kind, element in raw["events"]]
-        fields["events"] = [Event(t, kind, names[kind][element]) for t, kind, element in kinds]
-    return Trajectory(
-        t=t,
-        q=table("q", nq),
-        v=table("v", nv),
-        violation=raw.get("violation", NOTHING),
-        violation_rate=raw.get("violation_rate", NOTHING),
-        stats=Stats(steps, rejected, evaluations, factorizations, projections, iterations, wall),
-        scene=scene,
-        element_names=list(elements),
-        name=scene.name,
-        **fields,
-    )
-
-
-def _ledger(columns: Sequence[str], numbers: Array) -> dict[str, Array]:
-    ledger = {
-        "kinetic": numbers[:, 0],
-        "potential": numbers[:, 1],
-        "total": numbers[:, 0] + numbers[:, 1],
-    }
-    ledger |= dict(zip([*columns, "projection"], numbers[:, 2:].T, strict=True))
-    done = numbers[:, 2:].sum(axis=1)
-    ledger["balance"] = ledger["total"] - ledger["total"][:1] - done
-    return ledger
-
-
-def _columns(laws: Sequence[str]) -> list[str]:
-    """Law names as ledger columns that no other column bears."""
-    taken = {"kinetic", "potential", "total", "actuation", "forces", "constraints", "projection", "balance"}
-    return [f"law {name}" if name in taken else name for name in laws]
-
-
-class _Bar:
-    def __init__(self, total: float, t0: float) -> None:
-        from tqdm import tqdm
-
-        self._t0 = t0
-        self._bar = tqdm(
-            total=total, unit="s", bar_format="{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]"
-        )
-
-    def update(self, t: float) -> None:
-        self._bar.n = t - self._t0
-        self._bar.refresh()
-
-    def close(self) -> None:
-        self._bar.close()
-
-
-def progress_bar(progress: bool | None, options: dict[str, Any]) -> _Bar | None:
-    """The bar that shows how far a run has come, or None where it is not wanted.
-
-    Args:
-        progress: True, False, or None for a terminal only.
-        options: of the run.
-    """
-    shown = sys.stderr.isatty() if progress is None else progress
-    return _Bar(options["duration"], options["t0"]) if shown else None

@@ -165,15 +165,11 @@ def test_an_interrupted_run_loses_nothing(tmp_path):
     path, scene = tmp_path / "run", pn.load("four_bar")
     alone = pn.simulate(scene, 100.0)
 
-    class Interrupt:
-        def __init__(self, total, t0): ...
-        def update(self, t):
-            raise KeyboardInterrupt
-
-        def close(self): ...
+    def interrupt(t):
+        raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("pin_nonideal.simulation._Bar", Interrupt)
+        patch.setattr("pin_nonideal.simulation.progress_bar", lambda *_: contextlib.nullcontext(interrupt))
         with pytest.raises(RunInterrupted) as caught:
             pn.simulate(scene, 100.0, progress=True, checkpoint=path)
     stopped = caught.value.trajectory
@@ -305,15 +301,15 @@ def states_of(scene, duration):
     """What the core hands over to be written, and the options to read it with."""
     states = []
     options = run_options(scene, duration, 0.0, "dop853", 1e-6, None, None, None, ())
-    start = *scene.initial_state(), scene.z0
-    scene.new_runner().simulate(*start, options | {"save": states.append, "save_interval": 0.0})
+    q, v = scene.initial_state()
+    scene._compiled.program.runner().simulate(q, v, options, save=states.append)
     return states, options
 
 
 def resumed(scene, state, options):
     """The record of the run that goes on from a state, or None when the state is refused."""
     try:
-        return scene.new_runner().resume(state, options)
+        return scene._compiled.program.runner().resume(state, options)
     except ValueError as error:
         reason = str(error)
     assert reason == "the state does not fit the scene"
@@ -339,9 +335,10 @@ def test_states_that_were_made_up():
     for place in range(0, len(state) - 7, 16):
         record = resumed(scene, state[:place] + b"\xff" * 8 + state[place + 8 :], options)
         refused += record is None
-        assert record is None or len(record["q"]) == len(record["t"]) * scene.model.nq
-    arrays = [x for x in resumed(scene, state, options).values() if isinstance(x, np.ndarray)]
-    assert refused > len(arrays)  # each is preceded by its length
+        assert record is None or len(record.q) == len(record.t) * scene.model.nq
+    record = resumed(scene, state, options)
+    arrays = [x for x in (getattr(record, name) for name in dir(record)) if isinstance(x, np.ndarray)]
+    assert refused > sum(x.size > 0 for x in arrays)  # each is preceded by its length
 
 
 def test_no_file_and_other_files(tmp_path):

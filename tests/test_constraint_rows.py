@@ -67,7 +67,7 @@ def test_rolling_rates_are_the_slip_of_the_contact_point(kind):
     assert (contact - plane.translation) @ n == pytest.approx(0.0, abs=MET)
     slip = material_velocity(scene.model, q, v, rolling.frame, contact)
     slip = slip - material_velocity(scene.model, q, v, rolling.plane, contact)
-    rate = rows_at(scene, scene.new_runner(), q, v, 0.0)[3]
+    rate = rows_at(scene, scene._compiled.program.runner(), q, v, 0.0)[3]
     np.testing.assert_allclose(rate, plane.rotation.T @ slip, atol=10 * MET)
 
 
@@ -77,7 +77,7 @@ def test_knife_edge_rate_is_the_velocity_along_its_axis():
     q, v = state(scene.model, rng)
     tip = place_of(scene.model, q, "b2 tip")
     u = material_velocity(scene.model, q, v, "b2 tip", tip.translation)
-    rate = rows_at(scene, scene.new_runner(), q, v, 0.0)[3]
+    rate = rows_at(scene, scene._compiled.program.runner(), q, v, 0.0)[3]
     np.testing.assert_allclose(rate, [u @ tip.rotation @ AXIS], atol=10 * MET)
 
 

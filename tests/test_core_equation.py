@@ -24,7 +24,7 @@ def anchored(rng, *, others=(), laws=(), **keywords):
 
 def combination(scene, weights):
     """A user constraint whose rows are combinations of the scene's rows."""
-    runner, weights = scene.new_runner(), np.asarray(weights)
+    runner, weights = scene._compiled.program.runner(), np.asarray(weights)
 
     def pick(part):
         return lambda t, q, v, *_: weights @ rows_at(scene, runner, q, v, t)[part]
@@ -46,14 +46,14 @@ def test_closures_of_robots_from_the_community(name):
     q, v = scene.initial_state()
     v = scene.project(q, 0.1 * rng.standard_normal(scene.model.nv))[1]
     raw = assert_solves_its_rows(scene, q, v, 0.0)
-    assert raw["rank"] == len(raw["lam"]) - len(scene.dropped)
+    assert raw.rank == len(raw.lam) - len(scene.dropped)
 
 
 def test_three_parallel_cranks():
     """A bar on three cranks of equal length: redundant on the constraints, and only there."""
     scene = parallel_cranks()
     raw = assert_solves_its_rows(scene, *scene.initial_state(), 0.0)
-    assert (raw["rank"], len(raw["lam"]), scene.dropped) == (3, 4, [])
+    assert (raw.rank, len(raw.lam), scene.dropped) == (3, 4, [])
 
 
 def test_rows_that_combine_others():
@@ -64,12 +64,12 @@ def test_rows_that_combine_others():
     assert not doubled.dropped
     q, v = consistent(plain, rng, 0.0)
     raw = assert_solves_its_rows(doubled, q, v, 0.0)
-    assert raw["rank"] == 3
+    assert raw.rank == 3
     expected = assert_solves_its_rows(plain, q, v, 0.0)
-    np.testing.assert_allclose(raw["a"], expected["a"], rtol=0, atol=KKT * np.abs(expected["a"]).max())
+    np.testing.assert_allclose(raw.a, expected.a, rtol=0, atol=KKT * np.abs(expected.a).max())
     # The load is shared with least norm: lam = [I W^T]^+ lam_plain.
-    share = np.linalg.pinv(np.hstack([np.eye(3), weights.T])) @ expected["lam"]
-    np.testing.assert_allclose(raw["lam"], share, rtol=0, atol=1e-9 * np.abs(share).max())
+    share = np.linalg.pinv(np.hstack([np.eye(3), weights.T])) @ expected.lam
+    np.testing.assert_allclose(raw.lam, share, rtol=0, atol=1e-9 * np.abs(share).max())
 
 
 LAWS = {
@@ -94,8 +94,8 @@ def test_laws(kind):
     scene = anchored(rng, laws=LAWS[kind])
     q, v = consistent(scene, rng, 0.0)
     raw = assert_solves_its_rows(scene, q, v, 0.0)
-    assert np.abs(raw["F_nonideal"]).max() > 0.0
-    assert v @ raw["C"] < 0.0
+    assert np.abs(raw.F_nonideal).max() > 0.0
+    assert v @ raw.C < 0.0
 
 
 @pytest.mark.parametrize("kind", ["constant", "load, total", "load, ideal", "several"])
@@ -110,15 +110,15 @@ def test_prescribed_modes_and_sticking(kind):
     both = anchored(np.random.default_rng(4), others=[hold])
     q, v = both.project(q, v)
     raw = assert_solves_its_rows(scene, q, v, 0.0, modes=[0] * len(stuck))
-    np.testing.assert_array_equal(raw["a"][dofs], 0.0)
+    np.testing.assert_array_equal(raw.a[dofs], 0.0)
     # The same motion with the stuck directions as ideal constraints, and the force that holds as multiplier.
     smooth = [law for law in LAWS[kind] if not isinstance(law, pn.JointFriction)]
     grease = [law for law in LAWS[kind] if getattr(law, "viscous", 0.0)]
     smooth += [pn.JointFriction(law.joint, viscous=law.viscous) for law in grease]
     oracle = pn.Scene(scene.model, constraints=both.constraints, q0=both.q0, laws=smooth)
     expected = oracle.solve(q, v)
-    np.testing.assert_allclose(raw["a"], expected.a, rtol=0, atol=KKT * np.abs(expected.a).max())
-    force = [float(f[0]) for f in raw["friction"]]
+    np.testing.assert_allclose(raw.a, expected.a, rtol=0, atol=KKT * np.abs(expected.a).max())
+    force = [float(f[0]) for f in raw.friction]
     held = expected.lam[oracle.constraint_slices["hold"]]
     np.testing.assert_allclose(force, held, rtol=0, atol=1e-8 * np.abs(held).max())
 
@@ -142,6 +142,6 @@ def test_contact_friction_slides_against_the_slip():
         )
         q, v = consistent(rough, rng, 0.0)
         raw = assert_solves_its_rows(rough, q, v, 0.0)
-        slides = np.linalg.norm(raw["friction"][0])
-        assert slides == pytest.approx(0.5 * abs(raw["lam"][0]), rel=1e-9)
-        assert v @ raw["C"] < 0.0
+        slides = np.linalg.norm(raw.friction[0])
+        assert slides == pytest.approx(0.5 * abs(raw.lam[0]), rel=1e-9)
+        assert v @ raw.C < 0.0

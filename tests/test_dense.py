@@ -30,17 +30,17 @@ SAME_ACROSS_EVENTS = 1e-8
 
 def assert_same_instant(scene, q, v, t):
     """M, F and the acceleration; C is the core's, which friction_conditions holds to the laws."""
-    runner = scene.new_runner()
+    runner = scene._compiled.program.runner()
     raw = runner.solve(q, v, t)
-    dense = DenseScene(scene, lambda t, q, v: raw["C"])
+    dense = DenseScene(scene, lambda t, q, v: raw.C)
     M, F, _, _ = dense.terms(t, q, v)
-    rest, _ = pn.Scene(scene.model).new_runner().terms(q, v)
+    rest, _ = pn.Scene(scene.model)._compiled.program.runner().terms(q, v)
     size = np.abs(F).max() + np.abs(dense.terms(t, q, 0.0 * v)[1]).max()
     np.testing.assert_allclose(rest.reshape(M.shape), M, rtol=0, atol=ROUNDING * np.abs(M).max())
-    np.testing.assert_allclose(raw["F"], F, rtol=0, atol=ROUNDING * size)
+    np.testing.assert_allclose(raw.F, F, rtol=0, atol=ROUNDING * size)
     a = dense.acceleration(t, q, v)[0]
-    in_play = np.abs(a).max() + np.abs(np.linalg.solve(M, F + raw["C"])).max()
-    np.testing.assert_allclose(raw["a"], a, rtol=0, atol=KKT * in_play)
+    in_play = np.abs(a).max() + np.abs(np.linalg.solve(M, F + raw.C)).max()
+    np.testing.assert_allclose(raw.a, a, rtol=0, atol=KKT * in_play)
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -195,7 +195,7 @@ def test_sampled_control_is_held_and_sampled_on_its_grid():
     scene = pn.Scene(model, actuation=pn.SampledControl(control, period=0.05))
     run = pn.simulate(scene, 1.0, t0=0.2, record="a")
     assert calls == pytest.approx([0.2 + 0.05 * k for k in range(20)], abs=1e-12)
-    mass = float(scene.new_runner().terms(run.q[0], run.v[0])[0][0])
+    mass = float(scene._compiled.program.runner().terms(run.q[0], run.v[0])[0][0])
     held = [np.sign(np.sin(40.0 * t + 0.1)) / mass for t in calls]
     assert run.v[-1, 0] == pytest.approx(0.05 * np.sum(held), abs=1e-12)
 
@@ -317,7 +317,7 @@ def test_copies_scaled_by_any_factor_do_not_matter(scale):
     base, parts = loops()
     run, q, v = final(base, parts)
     plain = pn.Scene(base.model, constraints=parts, q0=base.q0)
-    runner = plain.new_runner()
+    runner = plain._compiled.program.runner()
     m = len(rows_at(plain, runner, q, v, 0.0)[1])
 
     def pick(part, t, q, v):

@@ -8,6 +8,7 @@ import pytest
 
 import pin_nonideal as pn
 from oracles.differences import consistent, rows_at
+from pin_nonideal.states.rows import holonomic_rows
 
 from .mechanisms import again
 from .random_trees import state, tree
@@ -40,16 +41,16 @@ def virtual_displacements(A):
 
 def test_ideal_forces_do_no_work_on_virtual_displacements(robot):
     scene, states = robot
-    runner = scene.new_runner()
+    runner = scene._compiled.program.runner()
     for q, v in states:
         A = rows_at(scene, runner, q, v, 0.0)[0]
         s = scene.solve(q, v)
         w = virtual_displacements(A)
         assert len(w) == scene.model.nv - s.rank
-        size = np.abs(A.T) @ np.abs(runner.solve(q, v, 0.0)["lam_ideal"])
+        size = np.abs(A.T) @ np.abs(runner.solve(q, v, 0.0).lam_ideal)
         assert np.abs(w @ s.F_ideal).max(initial=0.0) <= ROUNDING * size.max(initial=0.0)
         # Eq. (9): on them the whole force of constraint does the work that C prescribes.
-        C = runner.solve(q, v, 0.0)["C"]
+        C = runner.solve(q, v, 0.0).C
         total = s.F_ideal + s.F_nonideal
         in_play = size.max(initial=0.0) + np.abs(C).max()
         assert np.abs(w @ (total - C)).max(initial=0.0) <= ROUNDING * in_play
@@ -58,16 +59,16 @@ def test_ideal_forces_do_no_work_on_virtual_displacements(robot):
 def test_friction_never_feeds_energy(robot):
     """Power of C is not positive; that of F_nonideal is the same, where the constraints stand still."""
     scene, states = robot
-    runner = scene.new_runner()
+    runner = scene._compiled.program.runner()
     moving = any(isinstance(c, pn.PrescribedMotion) for c in scene.constraints)
     for q, v in states:
         raw = runner.solve(q, v, 0.0)
-        size = np.abs(v) @ np.abs(raw["C"]) + np.abs(v) @ np.abs(raw["F_nonideal"])
-        assert v @ raw["C"] <= ROUNDING * size
+        size = np.abs(v) @ np.abs(raw.C) + np.abs(v) @ np.abs(raw.F_nonideal)
+        assert v @ raw.C <= ROUNDING * size
         if not moving:
-            assert v @ raw["F_nonideal"] == pytest.approx(v @ raw["C"], abs=ROUNDING * size)
+            assert v @ raw.F_nonideal == pytest.approx(v @ raw.C, abs=ROUNDING * size)
         if not scene.laws:
-            assert np.abs(raw["F_nonideal"]).max() == 0.0
+            assert np.abs(raw.F_nonideal).max() == 0.0
 
 
 def test_ideal_forces_of_constraints_that_stand_still_have_no_power(robot):
@@ -75,8 +76,8 @@ def test_ideal_forces_of_constraints_that_stand_still_have_no_power(robot):
     if any(isinstance(c, pn.PrescribedMotion) for c in scene.constraints):
         pytest.skip("a drive does work")
     for q, v in states:
-        raw = scene.new_runner().solve(q, v, 0.0)
-        assert abs(v @ raw["F_ideal"]) <= ROUNDING * (np.abs(v) @ np.abs(raw["F_ideal"]) + 1.0)
+        raw = scene._compiled.program.runner().solve(q, v, 0.0)
+        assert abs(v @ raw.F_ideal) <= ROUNDING * (np.abs(v) @ np.abs(raw.F_ideal) + 1.0)
 
 
 def test_the_ledger_of_every_robot_closes(robot):
@@ -119,7 +120,7 @@ def test_the_scale_of_rows_does_not_matter(robot, scale):
     scene, states = robot
     if not scene.constraints or any(c.mu for c in scene.laws if isinstance(c, pn.JointFriction)):
         pytest.skip("no constraint, or laws that ask for the reaction of an anchor")
-    runner = scene.new_runner()
+    runner = scene._compiled.program.runner()
     m = len(rows_at(scene, runner, *states[0], 0.0)[1])
 
     def pick(part, t, q, v):
@@ -131,7 +132,7 @@ def test_the_scale_of_rows_does_not_matter(robot, scale):
     copy = pn.UserConstraint(
         lambda t, q, v, data: (pick(0, t, q, v), pick(1, t, q, v)),
         m,
-        residual=None if scene._nonholonomic().any() else residual,
+        residual=residual if holonomic_rows(scene._compiled.program).all() else None,
         rate=lambda t, q, v: pick(3, t, q, v),
     )
     scaled = again(scene, constraints=[copy])

@@ -53,7 +53,7 @@ found = {}
 for case in sys.argv[2:]:
     name, terms = case.split(":")
     scene = pn.load(name, terms=terms)
-    runner = scene.new_runner()
+    runner = scene._compiled.program.runner()
     q, v = scene.initial_state()
     if name == "panda_friction":  # one joint at rest sticks
         v[0] = 0.0

@@ -33,7 +33,7 @@ def assert_close(found, expected, tolerance, size=0.0, what=""):
 
 def assert_same_evaluation(scene, q, v):
     other = again(scene, terms="pinocchio")
-    one, two = scene.new_runner(), other.new_runner()
+    one, two = scene._compiled.program.runner(), other.new_runner()
     still = np.abs(one.terms(q, np.zeros_like(v))[1]).max(initial=0.0)
     for x, y, size in zip(two.terms(q, v), one.terms(q, v), (0.0, still), strict=True):
         assert_close(x, y, ROUNDING, size)
@@ -136,6 +136,6 @@ def test_workspaces_keep_no_second_derivatives():
         scene = pn.load("n_four_bar", N=59, terms=terms)
         assert scene.model.nv == 119
         before = resident()
-        kept = [scene.new_runner() for _ in range(8)]
+        kept = [scene._compiled.program.runner() for _ in range(8)]
         assert resident() - before < 8 * 10.0
         del kept

@@ -290,9 +290,9 @@ class TestModesAndLoads:
         """The ideal motion knows no friction, so sticking does not change its reactions."""
         laws = [pn.JointFriction(f"pin{i}", mu=0.3, radius=0.05, reaction="ideal") for i in range(2)]
         scene = arm(laws, (0.4, 0.3))
-        runner, rest = scene.new_runner(), np.zeros(2)
+        runner, rest = scene._compiled.program.runner(), np.zeros(2)
         limits = [
-            runner.solve(scene.q0, rest, 0.0, None, modes)["limits"]
+            runner.solve(scene.q0, rest, 0.0, None, modes).limits
             for modes in ([1, 1], [0, 1], [1, 0], [0, 0])
         ]
         for other in limits[1:]:

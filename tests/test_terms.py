@@ -27,7 +27,7 @@ def terms(request):
 
 def assert_terms_match(model, terms, rng, count=3, speed=2.0):
     data = model.createData()
-    runner = pn.Scene(model, terms=terms).new_runner()
+    runner = pn.Scene(model, terms=terms)._compiled.program.runner()
     for _ in range(count):
         q, v = state(model, rng, speed)
         M, bias = runner.terms(q, v)
@@ -82,7 +82,7 @@ def test_cosines_and_sines_of_all_angles(together, terms):
         body(model, 0, pin.JointModelRY(), f"j{k}", 1.0, lever=(1.0, 0.0, 0.0), inertia=np.eye(3))
     for gravity, exact in (((0.0, 0.0, 1.0), np.cos), ((1.0, 0.0, 0.0), np.sin)):
         model.gravity.linear = np.array(gravity)
-        runner = pn.Scene(model, terms=terms).new_runner()
+        runner = pn.Scene(model, terms=terms)._compiled.program.runner()
         for k in range(len(ANGLES) - together + 1):
             q = np.array(ANGLES[k : k + together])
             moments = runner.terms(q, np.zeros(together))[1]
@@ -94,7 +94,7 @@ def test_joints_numbered_across_branches():
     rng = np.random.default_rng(6)
     kinds = ["free flyer", "revolute x", "spherical", "prismatic y", "planar"]
     model = tree(kinds, rng, parents=[0, 1, 1, 2, 3])
-    data, runner = model.createData(), pn.Scene(model).new_runner()
+    data, runner = model.createData(), pn.Scene(model)._compiled.program.runner()
     q, v = state(model, rng)
     pin.computeJointJacobians(model, data, q)
     bodies = range(1, model.njoints)
@@ -142,7 +142,7 @@ def test_a_robot_far_from_the_origin_keeps_its_digits(terms):
     kinds = ["free flyer", "revolute x", "spherical", "prismatic unaligned", "universal", "revolute z"]
     model = tree(kinds, rng, parents=[0, 1, 2, 1, 4, 5])
     scene = pn.Scene(model, terms=terms)
-    runner = scene.new_runner()
+    runner = scene._compiled.program.runner()
     q, v = state(model, rng)
     q[:3] = 0.0
     far = q.copy()
@@ -166,7 +166,7 @@ def test_a_robot_that_slid_far_keeps_its_digits(slides, terms):
     q[:3] = 0.0
     far = q.copy()
     far[:3] = [1e4, -2e4, 3e3]
-    runner = scene.new_runner()
+    runner = scene._compiled.program.runner()
     for here, there in zip(runner.terms(q, v), runner.terms(far, v), strict=True):
         np.testing.assert_allclose(there, here, rtol=0, atol=1e-14 * np.abs(here).max())
     a = scene.acceleration(q, v)
@@ -176,7 +176,7 @@ def test_a_robot_that_slid_far_keeps_its_digits(slides, terms):
 def test_quaternions_that_are_not_quite_unit_do_not_change_the_motion(terms):
     rng = np.random.default_rng(5)
     model = tree(["free flyer", "spherical", "endless x"], rng)
-    runner = pn.Scene(model, terms=terms).new_runner()
+    runner = pn.Scene(model, terms=terms)._compiled.program.runner()
     q, v = state(model, rng)
     off = q.copy()
     off[3:7] *= 1.0 + 3e-7

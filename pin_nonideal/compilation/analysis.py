@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -11,12 +10,12 @@ from numpy.typing import NDArray
 
 from pin_nonideal.checks import array
 from pin_nonideal.constraints import UserConstraint
+from pin_nonideal.core import core
 from pin_nonideal.errors import InconsistentConstraintsError, InputError, LoopClosureError
 from pin_nonideal.states.closure import CLOSURE_TOLERANCE
+from pin_nonideal.states.rows import row_slices, rows_at
+from pin_nonideal.types import Array, Model
 
-from .program import Lowered
-
-Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 # Rows below this part of the largest entry of A at random states vanish structurally, and rows whose
@@ -26,7 +25,7 @@ STRUCTURAL = 1e-11
 DERIVATIVE_TOLERANCE = 1e-4
 
 
-def check_model(model: Any) -> None:
+def check_model(model: Model) -> None:
     """Every number of a model is finite, no mass or armature is negative, and gravity has no angular part.
 
     Args:
@@ -59,27 +58,27 @@ def check_model(model: Any) -> None:
         )
 
 
-def drop_rows(model: Any, q0: Array, low: Lowered) -> list[tuple[str, int, str]]:
-    """Leaves out rows that vanish at every state and rows that are copies of others.
+def idle_rows(model: Model, q0: Array, program: core.Program) -> list[tuple[str, int, str]]:
+    """Rows that can never act: they vanish at every state, or are copies of others.
 
     Args:
         model: pinocchio.Model.
         q0: configuration around which the rows are sampled, (nq,).
-        low: the program; its builder keeps the other rows.
+        program: the scene with all its rows.
 
     Returns:
-        (name, row, reason) of each row left out.
+        (name, row, reason) of each.
 
     Raises:
         InconsistentConstraintsError: a row that vanishes asks for an acceleration.
         LoopClosureError: a row that vanishes has a gap.
     """
-    fixed = np.zeros(low.rows, dtype=bool)  # rows that may look special at a few states and times only
-    for name, block in low.blocks.items():
-        fixed[low.slices[name]] = block in low.opaque
+    owners = [(c.name, row) for c in program.constraints for row in range(c.count)]
+    # Rows that may look special at a few states and times only.
+    fixed = np.array([c.moves_in_time for c in program.constraints for _ in range(c.count)], dtype=bool)
     if fixed.all():
         return []
-    runner, generator, samples = low.builder.runner(), np.random.default_rng(1), []
+    runner, generator, samples = program.runner(), np.random.default_rng(1), []
     for _ in range(3):
         q = pin.integrate(model, q0, generator.standard_normal(model.nv))
         samples.append(rows_at(runner, q, generator.standard_normal(model.nv), 0.37)[:3])
@@ -88,7 +87,6 @@ def drop_rows(model: Any, q0: Array, low: Lowered) -> list[tuple[str, int, str]]
     gaps = np.abs(np.column_stack([phi for _, _, phi in samples])).max(axis=1)
     length = np.linalg.norm(wide, axis=1)
     vanishing = (length <= STRUCTURAL * max(float(length.max()), 1e-300)) & ~fixed
-    owners = [(name, row - s.start) for name, s in low.slices.items() for row in range(s.start, s.stop)]
     dropped = []
     for row in map(int, np.flatnonzero(vanishing)):
         _check_vanishing(*owners[row], np.abs(right[row]).max(), np.abs(right).max(), gaps[row])
@@ -97,10 +95,6 @@ def drop_rows(model: Any, q0: Array, low: Lowered) -> list[tuple[str, int, str]]
     for first, second in _copies(wide, right, length, keep & ~fixed):
         keep[second] = False
         dropped.append((*owners[second], f'copy of a row of "{owners[first][0]}"'))
-    for name, s in low.slices.items():
-        if not keep[s].all():
-            low.builder.keep_rows(low.blocks[name], np.flatnonzero(keep[s]).tolist())
-    low.builder.finish()
     rows = {owner: row for row, owner in enumerate(owners)}
     return sorted(dropped, key=lambda entry: rows[entry[:2]])
 
@@ -151,7 +145,7 @@ def _copies(wide: Array, right: Array, length: Array, candidates: Rows) -> list[
 
 
 def check_user_constraints(
-    model: Any, q0: Array, v0: Array, constraints: Sequence[Any], low: Lowered
+    model: Model, q0: Array, v0: Array, constraints: Sequence[object], program: core.Program
 ) -> None:
     """Compares once, by central differences: d residual/dt = rate and d rate/dt = A a - b.
 
@@ -160,23 +154,22 @@ def check_user_constraints(
         q0: configuration near which they are compared, (nq,).
         v0: velocity, (nv,).
         constraints: descriptions of all constraints.
-        low: the program.
+        program: the scene as the core knows it.
 
     Raises:
         InputError: they differ.
     """
     mine = [
-        (name, c)
-        for name, c in zip(low.slices, constraints, strict=False)
+        (rows, name, c)
+        for (name, rows), c in zip(row_slices(program).items(), constraints, strict=False)
         if isinstance(c, UserConstraint) and (c.residual is not None or c.rate is not None)
     ]
     if not mine:
         return
-    runner, h, t = low.builder.runner(), 1e-5, 0.21
+    runner, h, t = program.runner(), 1e-5, 0.21
     generator = np.random.default_rng(3)
     n = model.nv
-    for name, c in mine:
-        rows = low.slices[name]
+    for rows, name, c in mine:
         q = pin.integrate(model, q0, 0.1 * generator.standard_normal(n))
         v, a = v0 + generator.standard_normal(n), generator.standard_normal(n)
         A, b, _, rate = (x[rows] for x in rows_at(runner, q, v, t))
@@ -201,16 +194,3 @@ def _compare(name: str, left: str, x: Array, right: str, y: Array, scale: float)
             f'UserConstraint "{name}": {left} must equal {right}; row {k}: {x[k]:.6g} by differences against '
             f"{y[k]:.6g}; mend the function, the residual or the rate"
         )
-
-
-def rows_at(runner: Any, q: Array, v: Array, t: float) -> tuple[Array, Array, Array, Array]:
-    """A (m, nv), b (m,), residual (m,) and rate (m,) of all rows at one state.
-
-    Args:
-        runner: a workspace of the core.
-        q: configuration, (nq,).
-        v: velocity, (nv,).
-        t: time [s].
-    """
-    A, b, phi, rate = runner.rows(q, v, t)
-    return A.reshape(-1, len(v)), b, phi, rate

@@ -9,12 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, RunError, UnknownNameError, UserFunctionError, nearest
 from pin_nonideal.timefunctions import Constant, Polynomial, Sinusoid, Spline
-
-Array = NDArray[np.float64]
+from pin_nonideal.types import Array
 
 # Where a user's function of time is compared with its differences [s]: at no round time, since it may have
 # corners there, and at several, since one may fall on a corner all the same.
@@ -143,14 +142,13 @@ class Reactions:
         lam: multipliers of all rows, in the order and scale of the descriptions, (m,).
     """
 
-    def __init__(self, view: Any, names: ReactionNames) -> None:
+    def __init__(self, view: core.ReactionView, names: ReactionNames) -> None:
         self._view, self._names = view, names
 
     @property
     def lam(self) -> Array:
         """Multipliers of all rows, (m,)."""
-        result: Array = self._view.lam
-        return result
+        return self._view.lam
 
     def __getitem__(self, name: str) -> Array:
         """Multipliers of one constraint or contact.
@@ -180,8 +178,8 @@ class Reactions:
         """
         known = self._names
         if name in known.blocks:
-            return np.asarray(self._view.of_block(known.blocks[name]))
+            return self._view.of_block(known.blocks[name])
         if name in known.joints:
-            return np.asarray(self._view.of_joint(known.joints[name]))
+            return self._view.of_joint(known.joints[name])
         names = [*known.blocks, *known.joints]
         raise UnknownNameError(f'no joint or constraint "{name}" in this scene{nearest(name, names)}')

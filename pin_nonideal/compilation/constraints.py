@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Sequence
+from contextlib import suppress
 from fractions import Fraction
 from functools import singledispatch
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from pin_nonideal.checks import axis_triad, unit_axis
 from pin_nonideal.constraints import (
@@ -25,27 +26,26 @@ from pin_nonideal.constraints import (
     UserConstraint,
 )
 from pin_nonideal.contacts import PointContact
+from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, UnknownNameError
 from pin_nonideal.timefunctions import Constant
+from pin_nonideal.types import Array
 
 from .callbacks import checked, time_function
 from .names import Resolution, placed_on, words
-from .program import Lowered
-
-Array = NDArray[np.float64]
 
 # A rational gear ratio with a larger denominator than this leaves the angle of endless joints undetermined.
 LARGEST_GEAR = 64
 
 
 @singledispatch
-def lower_constraint(c: Any, name: str, out: Lowered, where: Resolution) -> None:
+def lower_constraint(c: Any, name: str, out: core.Builder, where: Resolution) -> None:
     """Adds one constraint to the program; a constraint model of Pinocchio when it is no description of ours.
 
     Args:
         c: the description.
         name: its unique name.
-        out: the program.
+        out: the program under construction.
         where: frames and joints by name.
 
     Raises:
@@ -61,46 +61,35 @@ def lower_constraint(c: Any, name: str, out: Lowered, where: Resolution) -> None
     if kind == "PointAnchorConstraintModel" or (
         kind == "RigidConstraintModel" and c.type == pin.ContactType.CONTACT_3D
     ):
-        out.add_rows(name, out.builder.add_point(name, f1, f2, [0, 1, 2]), 3)
+        out.add_point(name, f1, f2, [0, 1, 2])
     else:
-        out.add_rows(name, out.builder.add_frame(name, f1, f2), 6)
-
-
-def _add_anchor(c: Any, name: str, block: int, rows: int, out: Lowered, where: Resolution) -> None:
-    """Books the rows of what joins two frames, and the frames when both have an index."""
-    out.add_rows(name, block, rows)
-    try:
-        first = where.frame_id(c.frame1, "")
-        second = None if c.frame2 is None else where.frame_id(c.frame2, "")
-    except UnknownNameError:
-        return  # a joint without a frame of its own
-    out.anchors.append((name, first, second))
+        out.add_frame(name, f1, f2)
 
 
 @lower_constraint.register
-def _(c: PointAnchor, name: str, out: Lowered, where: Resolution) -> None:
+def _(c: PointAnchor, name: str, out: core.Builder, where: Resolution) -> None:
     f1, f2 = where.pair(c, words(c, name))
     axes = ["xyz".index(a) for a in c.axes]
-    _add_anchor(c, name, out.builder.add_point(name, f1, f2, axes), len(axes), out, where)
+    out.add_point(name, f1, f2, axes)
 
 
 @lower_constraint.register
-def _(c: FrameAnchor, name: str, out: Lowered, where: Resolution) -> None:
+def _(c: FrameAnchor, name: str, out: core.Builder, where: Resolution) -> None:
     f1, f2 = where.pair(c, words(c, name))
-    _add_anchor(c, name, out.builder.add_frame(name, f1, f2), 6, out, where)
+    out.add_frame(name, f1, f2)
 
 
 @lower_constraint.register
-def _(c: HingeAnchor, name: str, out: Lowered, where: Resolution) -> None:
+def _(c: HingeAnchor, name: str, out: core.Builder, where: Resolution) -> None:
     who = words(c, name)
     f1, f2 = where.pair(c, who)
     t1, t2, u = axis_triad(where.hinge_axis(c, who))
     normal1 = [-x for x in t2]
-    _add_anchor(c, name, out.builder.add_hinge(name, f1, f2, u, normal1, t1), 5, out, where)
+    out.add_hinge(name, f1, f2, u, normal1, t1)
 
 
 @lower_constraint.register
-def _(c: Distance, name: str, out: Lowered, where: Resolution) -> None:
+def _(c: Distance, name: str, out: core.Builder, where: Resolution) -> None:
     who = words(c, name)
     f1, f2 = where.pair(c, who)
     length = c.length
@@ -111,14 +100,11 @@ def _(c: Distance, name: str, out: Lowered, where: Resolution) -> None:
         length = Constant(gap)
     elif not callable(length):
         length = Constant(length)
-    block = out.builder.add_distance(name, f1, f2, time_function(length, who))
-    if not isinstance(length, Constant):
-        out.opaque.add(block)
-    _add_anchor(c, name, block, 1, out, where)
+    out.add_distance(name, f1, f2, time_function(length, who))
 
 
 @lower_constraint.register
-def _(c: JointCoupling, name: str, out: Lowered, where: Resolution) -> None:
+def _(c: JointCoupling, name: str, out: core.Builder, where: Resolution) -> None:
     who = words(c, name)
     j1, j2 = where.joint(c.joint1, who), where.joint(c.joint2, who)
     endless = [where.model.joints[j].nq == 2 for j in (j1, j2)]
@@ -132,39 +118,37 @@ def _(c: JointCoupling, name: str, out: Lowered, where: Resolution) -> None:
         period = turn
     elif endless[1]:
         period = turn * abs(c.ratio)
-    out.add_rows(name, out.builder.add_coupling(name, j1, j2, c.ratio, c.offset, period, position), 1)
+    out.add_coupling(name, j1, j2, c.ratio, c.offset, period, position)
 
 
 @lower_constraint.register
-def _(c: PrescribedMotion, name: str, out: Lowered, where: Resolution) -> None:
+def _(c: PrescribedMotion, name: str, out: core.Builder, where: Resolution) -> None:
     who = words(c, name)
     joint = where.joint(c.joint, who)
     period = 2.0 * math.pi if where.model.joints[joint].nq == 2 else 0.0
-    block = out.builder.add_motion(name, joint, time_function(c.function, who), period)
-    out.opaque.add(block)
-    out.add_rows(name, block, 1)
+    out.add_motion(name, joint, time_function(c.function, who), period)
 
 
 @lower_constraint.register
-def _(c: KnifeEdge, name: str, out: Lowered, where: Resolution) -> None:
+def _(c: KnifeEdge, name: str, out: core.Builder, where: Resolution) -> None:
     who = words(c, name)
     frame = where.frame(c.frame, who)
-    out.add_rows(name, out.builder.add_knife(name, frame, list(unit_axis(who, c.axis))), 1)
+    out.add_knife(name, frame, list(unit_axis(who, c.axis)))
 
 
 @lower_constraint.register
-def _(c: Rolling, name: str, out: Lowered, where: Resolution) -> None:
+def _(c: Rolling, name: str, out: core.Builder, where: Resolution) -> None:
     who = words(c, name)
     plane = where.plane(c.plane, who)
     frame = where.frame(c.frame, who)
     t1, t2, n = axis_triad(unit_axis(who, c.normal))
     sphere = c.axis is None
     axle = [0.0, 0.0, 1.0] if c.axis is None else list(unit_axis(who, c.axis))
-    out.add_rows(name, out.builder.add_rolling(name, frame, plane, c.radius, sphere, axle, t1, t2, n), 3)
+    out.add_rolling(name, frame, plane, c.radius, sphere, axle, t1, t2, n)
 
 
 @lower_constraint.register
-def _(c: UserConstraint, name: str, out: Lowered, where: Resolution) -> None:
+def _(c: UserConstraint, name: str, out: core.Builder, where: Resolution) -> None:
     model, size, who = where.model, c.size, words(c, name)
     function = checked(c.function, f"{who}: function", (size, model.nv), (size,))
     local = threading.local()
@@ -189,20 +173,16 @@ def _(c: UserConstraint, name: str, out: Lowered, where: Resolution) -> None:
             result: Array = rows(t, q, v)[0] @ v + moving
             return result
 
-    if residual is None and rate is None:
-        out.unprojected.append(name)
-    block = out.builder.add_user(name, size, rows, residual, rate)
-    out.opaque.add(block)
-    out.add_rows(name, block, size)
+    out.add_user(name, size, rows, residual, rate)
 
 
-def lower_contact(c: Any, name: str, out: Lowered, where: Resolution) -> None:
+def lower_contact(c: Any, name: str, out: core.Builder, where: Resolution) -> None:
     """Adds the normal row of a contact; its friction follows all rows (`lower_contact_friction`).
 
     Args:
         c: the description.
         name: its unique name.
-        out: the program.
+        out: the program under construction.
         where: frames and joints by name.
 
     Raises:
@@ -211,4 +191,22 @@ def lower_contact(c: Any, name: str, out: Lowered, where: Resolution) -> None:
     if not isinstance(c, PointContact):
         raise InputError(f"a contact must be a PointContact; got {c!r}")
     f1, f2, (_, _, normal) = where.contact(c, words(c, name))
-    out.add_rows(name, out.builder.add_contact(name, f1, f2, list(normal), c.radius), 1)
+    out.add_contact(name, f1, f2, list(normal), c.radius)
+
+
+def anchor_frames(
+    constraints: Sequence[tuple[str, object]], where: Resolution
+) -> list[tuple[str, int, int | None]]:
+    """Name, frame id and frame id (None for the world) of what joins two frames that both have an index.
+
+    Args:
+        constraints: names and descriptions.
+        where: frames and joints by name.
+    """
+    found: list[tuple[str, int, int | None]] = []
+    for name, c in constraints:
+        if isinstance(c, (PointAnchor, FrameAnchor, HingeAnchor, Distance)):
+            with suppress(UnknownNameError):  # a joint without a frame of its own
+                second = None if c.frame2 is None else where.frame_id(c.frame2, "")
+                found.append((name, where.frame_id(c.frame1, ""), second))
+    return found

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
-import numpy as np
 import pinocchio as pin
 
-from pin_nonideal.core import load_core
+from pin_nonideal.core import core
 from pin_nonideal.errors import (
     FrictionParadoxError,
     InconsistentConstraintsError,
@@ -19,43 +17,18 @@ from pin_nonideal.errors import (
     SingularMassError,
     StepSizeError,
 )
-
-from .analysis import rows_at
-from .program import Lowered
-
-core = load_core()
-
-# A sample with a larger gap than this [m or rad] has left the constraints: after every step projection comes
-# down to rounding, and in singular positions to the square root of it.
-LEFT = 1e-6
+from pin_nonideal.types import Model
 
 
-def check_closed(scene: Any, trajectory: Any) -> None:
-    """Raises when a run has left its constraints, as it must when a drive pulls a loop apart.
+def opened(name: str, gaps: dict[str, float], t: float, after: str = "") -> LoopClosureError:
+    """The exception of a run that has left its constraints.
 
     Args:
-        scene: the scene that ran.
-        trajectory: its samples.
-
-    Raises:
-        LoopClosureError: with the samples before.
+        name: of the constraint with the largest gap.
+        gaps: of each constraint [m or rad].
+        t: time [s].
+        after: more words.
     """
-    if not scene.constraint_slices:
-        return
-    left = trajectory.violation > LEFT
-    if not left.any():
-        return
-    k = int(left.argmax())
-    t = float(trajectory.t[k])
-    residual = np.abs(rows_at(scene.new_runner(), trajectory.q[k], trajectory.v[k], t)[2])
-    gaps = {key: float(residual[rows].max()) for key, rows in scene.constraint_slices.items()}
-    name = max(gaps, key=lambda key: gaps[key])
-    stopped = _opened(name, gaps, t, "; the trajectory up to there is in error.trajectory")
-    stopped.trajectory = trajectory.first(k)
-    raise stopped
-
-
-def _opened(name: str, gaps: dict[str, float], t: float, after: str = "") -> LoopClosureError:
     return LoopClosureError(
         f'loop "{name}" has opened by t = {t:.4g} s: gap {gaps[name]:.2g} (m or rad); no position near there '
         f"satisfies all constraints: check lengths and drives{after}",
@@ -64,27 +37,28 @@ def _opened(name: str, gaps: dict[str, float], t: float, after: str = "") -> Loo
     )
 
 
-def named_failure(failure: Any, model: Any, low: Lowered) -> RunError:
+def named_failure(failure: core.CoreFailure, model: Model, program: core.Program) -> RunError:
     """The exception that says in names what the core says in numbers.
 
     Args:
         failure: the core's CoreFailure.
         model: pinocchio.Model.
-        low: the program with its names.
+        program: the scene as the core knows it.
     """
     kinds, kind, t, value = core.FailureKind, failure.kind, failure.time, failure.value
     if kind is kinds.singular_mass:
         return _singular(model, failure.elements[0], t)
     if kind is kinds.inconsistent:
-        return _inconsistent([*low.blocks, *low.friction_names], failure.elements, value, t)
+        names = [*(c.name for c in program.constraints), *program.element_names]
+        return _inconsistent(names, failure.elements, value, t)
     if kind is kinds.not_finite:
         return NonFiniteError(f"acceleration is not finite at t = {t:.4g} s", time=t)
     if kind is kinds.paradox:
-        names = (low.friction_names[i] for i in failure.elements)
-        return _paradox(", ".join(names) or ", ".join(low.law_names), value, t)
+        elements = ", ".join(program.element_names[i] for i in failure.elements)
+        return _paradox(elements or ", ".join(program.law_names), value, t)
     if kind is kinds.closure:
-        name = list(low.blocks)[failure.elements[0]]
-        return _opened(name, {name: value}, t)
+        name = program.constraints[failure.elements[0]].name
+        return opened(name, {name: value}, t)
     if kind is kinds.interrupted:
         return RunInterrupted(f"the run was interrupted at t = {t:.4g} s", time=t)
     return _stuck(value, t)
@@ -126,7 +100,7 @@ def _inconsistent(names: Sequence[str], items: list[int], residual: float, t: fl
     )
 
 
-def _singular(model: Any, dof: int, t: float) -> RunError:
+def _singular(model: Model, dof: int, t: float) -> RunError:
     joint = next(i for i, j in enumerate(model.joints) if i and j.idx_v <= dof < j.idx_v + j.nv)
     bodies = [f.name for f in model.frames if f.parentJoint == joint and f.type == pin.FrameType.BODY]
     links = ", ".join(f'"{b}"' for b in bodies) or "its body"

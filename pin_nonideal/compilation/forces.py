@@ -6,28 +6,26 @@ from functools import singledispatch
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pin_nonideal.actuation import HoldPosition, SampledControl, Table
 from pin_nonideal.checks import array
+from pin_nonideal.core import core
 from pin_nonideal.errors import InputError
 from pin_nonideal.forces import JointSpring, SpringDamper, UserForce, Wrench
 from pin_nonideal.states.configurations import configuration
+from pin_nonideal.types import Array, Model
 
 from .callbacks import checked
 from .names import Resolution, words
-from .program import Lowered
-
-Array = NDArray[np.float64]
 
 
 @singledispatch
-def lower_force(f: Any, out: Lowered, where: Resolution) -> None:
+def lower_force(f: object, out: core.Builder, where: Resolution) -> None:
     """Adds one given force to the program.
 
     Args:
         f: the description.
-        out: the program.
+        out: the program under construction.
         where: frames and joints by name.
 
     Raises:
@@ -37,61 +35,63 @@ def lower_force(f: Any, out: Lowered, where: Resolution) -> None:
 
 
 @lower_force.register
-def _(f: SpringDamper, out: Lowered, where: Resolution) -> None:
-    out.builder.add_spring_damper(*where.pair(f, words(f)), f.stiffness, f.damping, f.rest_length)
+def _(f: SpringDamper, out: core.Builder, where: Resolution) -> None:
+    frame1, frame2 = where.pair(f, words(f))
+    out.add_spring_damper(frame1, frame2, stiffness=f.stiffness, damping=f.damping, rest_length=f.rest_length)
 
 
 @lower_force.register
-def _(f: JointSpring, out: Lowered, where: Resolution) -> None:
-    out.builder.add_joint_spring(where.joint(f.joint, words(f)), f.stiffness, f.rest, f.damping)
+def _(f: JointSpring, out: core.Builder, where: Resolution) -> None:
+    joint = where.joint(f.joint, words(f))
+    out.add_joint_spring(joint, stiffness=f.stiffness, rest=f.rest, damping=f.damping)
 
 
 @lower_force.register
-def _(f: Wrench, out: Lowered, where: Resolution) -> None:
+def _(f: Wrench, out: core.Builder, where: Resolution) -> None:
     frame = where.frame(f.frame, words(f))
     if callable(f.value):
-        out.builder.add_wrench(frame, [0.0] * 6, checked(f.value, f"{words(f)}: value", (6,)))
+        out.add_wrench(frame, function=checked(f.value, f"{words(f)}: value", (6,)))
     else:
-        out.builder.add_wrench(frame, list(f.value), None)
+        out.add_wrench(frame, value=list(f.value))
 
 
 @lower_force.register
-def _(f: UserForce, out: Lowered, where: Resolution) -> None:
-    out.builder.add_user_force(checked(f.function, f"{words(f)}: function", (where.model.nv,)))
+def _(f: UserForce, out: core.Builder, where: Resolution) -> None:
+    out.add_user_force(checked(f.function, f"{words(f)}: function", (where.model.nv,)))
 
 
-def lower_actuation(u: Any, out: Lowered, where: Resolution) -> None:
+def lower_actuation(u: Any, out: core.Builder, where: Resolution) -> None:
     """Sets the torques that drive the scene.
 
     Args:
         u: None, an array (nv,), a function, or a description.
-        out: the program.
+        out: the program under construction.
         where: frames and joints by name.
 
     Raises:
         InputError: shapes do not fit the model.
     """
-    add, model = out.builder, where.model
-    nv = model.nv
+    model, nv = where.model, where.model.nv
     if u is None:
         return
     if isinstance(u, SampledControl):
-        add.set_sampled_torque(checked(u.function, f"{words(u)}: function", (nv,)), u.period)
+        out.set_sampled_torque(checked(u.function, f"{words(u)}: function", (nv,)), u.period)
     elif isinstance(u, HoldPosition):
         q = where.q0 if u.q is None else configuration(model, u.q, f"{words(u)}: q")
-        add.set_hold_position(_gains(u, "kp", model), _gains(u, "kd", model), np.ascontiguousarray(q))
+        kp, kd = _gains(u, "kp", model), _gains(u, "kd", model)
+        out.set_hold_position(kp=kp, kd=kd, q=np.ascontiguousarray(q))
     elif isinstance(u, Table):
         times, values = np.asarray(u.times), np.asarray(u.values)
         if values.shape[1] != nv:
             raise InputError(f"{words(u)}: values must have {nv} columns (nv); got {values.shape[1]}")
-        add.set_torque_table(times.tolist(), np.ascontiguousarray(values))
+        out.set_torque_table(times.tolist(), np.ascontiguousarray(values))
     elif callable(u):
-        add.set_torque_function(checked(u, "actuation", (nv,)))
+        out.set_torque_function(checked(u, "actuation", (nv,)))
     else:
-        add.set_constant_torque(np.ascontiguousarray(array("actuation", u, (nv,))))
+        out.set_constant_torque(np.ascontiguousarray(array("actuation", u, (nv,))))
 
 
-def _gains(u: HoldPosition, key: str, model: Any) -> Array:
+def _gains(u: HoldPosition, key: str, model: Model) -> Array:
     """A gain for every degree of freedom; a number acts on joints of one degree of freedom."""
     gain, who = getattr(u, key), f"{words(u)}: {key}"
     if np.ndim(gain) == 0:

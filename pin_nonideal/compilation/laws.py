@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import singledispatch
 from typing import Any, NamedTuple
 
-import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from pin_nonideal.constraints import HingeAnchor, JointCoupling
 from pin_nonideal.contacts import PointContact
+from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, UnknownNameError, UserFunctionError, nearest
 from pin_nonideal.laws import Drag, JointFriction, LuGre, SigmoidFriction, UserFriction, UserLaw
+from pin_nonideal.types import Array
 
 from .callbacks import ReactionNames, Reactions, checked
 from .names import Resolution, words
-from .program import Lowered
-
-Array = NDArray[np.float64]
 
 
 class Surroundings(NamedTuple):
@@ -31,18 +29,18 @@ class Surroundings(NamedTuple):
     """
 
     where: Resolution
-    constraints: dict[str, Any]
+    constraints: dict[str, object]
     reactions: ReactionNames
 
 
 @singledispatch
-def lower_law(law: Any, name: str, out: Lowered, around: Surroundings) -> None:
+def lower_law(law: object, name: str, out: core.Builder, around: Surroundings) -> None:
     """Adds one law to the program.
 
     Args:
         law: the description.
         name: its unique name.
-        out: the program.
+        out: the program under construction.
         around: what it may refer to.
 
     Raises:
@@ -66,7 +64,7 @@ def _rubbing_joint(name: str, who: str, around: Surroundings, *, freedoms: tuple
 
 
 @lower_law.register
-def _(law: JointFriction, name: str, out: Lowered, around: Surroundings) -> None:
+def _(law: JointFriction, name: str, out: core.Builder, around: Surroundings) -> None:
     if law.joint in around.constraints and not around.where.model.existJointName(law.joint):
         _anchor_friction(law, name, out, around)
     else:
@@ -74,58 +72,71 @@ def _(law: JointFriction, name: str, out: Lowered, around: Surroundings) -> None
 
 
 @lower_law.register
-def _(law: SigmoidFriction, name: str, out: Lowered, around: Surroundings) -> None:
+def _(law: SigmoidFriction, name: str, out: core.Builder, around: Surroundings) -> None:
     joint = _rubbing_joint(law.joint, words(law, name), around)
     dof = around.where.model.joints[joint].idx_v
-    out.builder.add_sigmoid(out.add_law(name), dof, law.phi1, law.phi2, law.phi3)
+    out.add_sigmoid(out.add_law(name), dof, phi1=law.phi1, phi2=law.phi2, phi3=law.phi3)
 
 
 @lower_law.register
-def _(law: LuGre, name: str, out: Lowered, around: Surroundings) -> None:
+def _(law: LuGre, name: str, out: core.Builder, around: Surroundings) -> None:
     joint = _rubbing_joint(law.joint, words(law, name), around)
     dof = around.where.model.joints[joint].idx_v
-    numbers = (law.stiffness, law.damping, law.viscous, law.coulomb, law.stiction, law.stribeck_velocity)
-    out.builder.add_bristle(out.add_law(name), dof, *numbers)
-    out.add_states(1)
+    out.add_lugre(
+        out.add_law(name),
+        dof,
+        stiffness=law.stiffness,
+        damping=law.damping,
+        viscous=law.viscous,
+        coulomb=law.coulomb,
+        stiction=law.coulomb if law.stiction is None else law.stiction,
+        stribeck_velocity=law.stribeck_velocity,
+    )
 
 
 @lower_law.register
-def _(law: Drag, name: str, out: Lowered, around: Surroundings) -> None:
+def _(law: Drag, name: str, out: core.Builder, around: Surroundings) -> None:
     frame = around.where.frame(law.frame, words(law, name))
-    out.builder.add_drag(out.add_law(name), frame, law.coefficient, law.exponent)
+    out.add_drag(out.add_law(name), frame, coefficient=law.coefficient, exponent=law.exponent)
 
 
 @lower_law.register
-def _(law: UserLaw, name: str, out: Lowered, around: Surroundings) -> None:
+def _(law: UserLaw, name: str, out: core.Builder, around: Surroundings) -> None:
     nv, names = around.where.model.nv, around.reactions
     shapes = ((nv,), (law.states,)) if law.states else ((nv,),)
     function = checked(law.function, f"{words(law, name)}: function", *shapes)
 
-    def call(t: float, q: Array, v: Array, view: Any, *z: Array) -> Any:
+    def call(t: float, q: Array, v: Array, view: core.ReactionView | None, *z: Array) -> Any:
         return function(t, q, v, None if view is None else Reactions(view, names), *z)
 
-    out.builder.add_user_law(out.add_law(name), law.states, law.reaction or "none", call)
-    out.add_states(law.states)
+    reaction = core.Reaction[law.reaction or "none"]
+    out.add_user_law(out.add_law(name), states=law.states, reaction=reaction, function=call)
 
 
 @lower_law.register
-def _(law: UserFriction, name: str, out: Lowered, around: Surroundings) -> None:
+def _(law: UserFriction, name: str, out: core.Builder, around: Surroundings) -> None:
     who, names = words(law, name), around.reactions
     direction = checked(law.direction, f"{who}: direction", (around.where.model.nv,))
     limit = checked(law.limit, f"{who}: limit", ())
 
-    def bound(t: float, q: Array, v: Array, view: Any) -> float:
+    def bound(t: float, q: Array, v: Array, view: core.ReactionView) -> float:
         value = float(limit(t, q, v, Reactions(view, names)))
         if value < 0.0:
             raise UserFunctionError(f"{who}: limit must not be negative; got {value:g}")
         return value
 
-    block = out.builder.add_user_slip(name, direction)
-    ratio = law.static_ratio
-    out.add_friction(name, out.add_law(name), block, "user", "total", limit=bound, static_ratio=ratio)
+    block = out.add_user_slip(name, direction)
+    out.add_friction(
+        out.add_law(name),
+        block,
+        load=core.Load.user,
+        reaction=core.Reaction.total,
+        user_limit=bound,
+        static_ratio=law.static_ratio,
+    )
 
 
-def _joint_friction(law: JointFriction, name: str, out: Lowered, around: Surroundings) -> None:
+def _joint_friction(law: JointFriction, name: str, out: core.Builder, around: Surroundings) -> None:
     """Friction in a joint of the tree."""
     where, constraints, who = around.where, around.constraints, words(law, name)
     model = where.model
@@ -134,23 +145,23 @@ def _joint_friction(law: JointFriction, name: str, out: Lowered, around: Surroun
         if not model.existFrame(law.joint, pin.FrameType.FIXED_JOINT):
             raise UnknownNameError(f'{who}: no joint or anchor "{law.joint}"{nearest(law.joint, known)}')
     joint = _rubbing_joint(law.joint, who, around, freedoms=(1, 3))
-    kind, axis = where.bearing(joint)
-    if kind is None:
+    load, axis = where.bearing(joint)
+    if load is core.Load.none:
         raise InputError(
             f'{who}: joint "{law.joint}" must be revolute, prismatic, helical or spherical; '
             f"it is {model.joints[joint].shortname()}"
         )
-    _check_radius(law, who, kind)
+    _check_radius(law, who, load)
     dof, count = model.joints[joint].idx_v, model.joints[joint].nv
     index = out.add_law(name)
     if law.viscous:
-        out.builder.add_viscous(index, dof, count, -1, law.viscous)
+        out.add_viscous(index, law.viscous, dof=dof, count=count)
     if _is_dry(law):
-        block = out.builder.add_dof_slip(name, dof, count)
-        _dry_friction(law, name, out, index, block, kind, axis, joint=joint)
+        block = out.add_dof_slip(name, dof, count)
+        _dry_friction(law, out, index, block, load, axis, joint=joint)
 
 
-def _anchor_friction(law: JointFriction, name: str, out: Lowered, around: Surroundings) -> None:
+def _anchor_friction(law: JointFriction, name: str, out: core.Builder, around: Surroundings) -> None:
     """Friction in a hinge that closes a loop."""
     anchor, who = around.constraints[law.joint], words(law, name)
     if not isinstance(anchor, HingeAnchor):
@@ -158,20 +169,21 @@ def _anchor_friction(law: JointFriction, name: str, out: Lowered, around: Surrou
             f'{who}: "{law.joint}" is a {type(anchor).__name__}, which has no axis to rub about; '
             "use a HingeAnchor"
         )
-    _check_radius(law, who, "revolute")
+    _check_radius(law, who, core.Load.revolute)
     f1, f2 = around.where.pair(anchor, who)
     axis = list(around.where.hinge_axis(anchor, who))
-    block = out.builder.add_hinge_slip(name, f1, f2, axis)
+    block = out.add_hinge_slip(name, f1, f2, axis)
     index = out.add_law(name)
     if law.viscous:
-        out.builder.add_viscous(index, -1, 1, block, law.viscous)
+        out.add_viscous(index, law.viscous, block=block)
     if _is_dry(law):
-        _dry_friction(law, name, out, index, block, "revolute", axis, anchor=out.blocks[law.joint])
+        anchored = around.reactions.blocks[law.joint]
+        _dry_friction(law, out, index, block, core.Load.revolute, axis, anchor=anchored)
 
 
-def _check_radius(law: JointFriction, who: str, kind: str) -> None:
+def _check_radius(law: JointFriction, who: str, load: core.Load) -> None:
     """A coefficient without a radius would be no friction at all."""
-    radii = {"revolute": ("radius", "axial_radius"), "spherical": ("radius",)}.get(kind, ())
+    radii = {core.Load.revolute: ("radius", "axial_radius"), core.Load.spherical: ("radius",)}.get(load, ())
     if law.mu and radii and not any(getattr(law, key) for key in radii):
         needed = " or ".join(radii)
         raise InputError(
@@ -185,24 +197,21 @@ def _is_dry(law: JointFriction) -> bool:
 
 def _dry_friction(
     law: JointFriction,
-    name: str,
-    out: Lowered,
+    out: core.Builder,
     index: int,
     block: int,
-    kind: str,
-    axis: Any,
+    load: core.Load,
+    axis: Sequence[float],
     *,
     joint: int = -1,
     anchor: int = -1,
 ) -> None:
     """The element that sticks and slips along a block, loaded by a joint or by the block of an anchor."""
-    load, reaction = (kind, law.reaction) if law.mu else ("none", "none")
     out.add_friction(
-        name,
         index,
         block,
-        load,
-        reaction,
+        load=load if law.mu else core.Load.none,
+        reaction=core.Reaction[law.reaction if law.mu else "none"],
         joint=joint,
         anchor=anchor,
         axis=axis,
@@ -216,20 +225,26 @@ def _dry_friction(
     )
 
 
-def lower_contact_friction(c: PointContact, name: str, out: Lowered, where: Resolution) -> None:
+def lower_contact_friction(c: PointContact, name: str, out: core.Builder, around: Surroundings) -> None:
     """Adds the Coulomb friction along the plane of a contact.
 
     Args:
         c: the description.
         name: its unique name.
-        out: the program.
-        where: frames and joints by name.
+        out: the program under construction.
+        around: what it may refer to.
     """
     if c.mu == 0.0:
         return
-    f1, f2, (t1, t2, n) = where.contact(c, words(c, name))
+    f1, f2, (t1, t2, n) = around.where.contact(c, words(c, name))
     law = out.add_law(name)
-    block = out.builder.add_contact_slip(name, f1, f2, c.radius, t1, t2, n)
+    block = out.add_contact_slip(name, f1, f2, c.radius, t1, t2, n)
     out.add_friction(
-        name, law, block, "contact", "total", anchor=out.blocks[name], mu=c.mu, static_ratio=c.static_ratio
+        law,
+        block,
+        load=core.Load.contact,
+        reaction=core.Reaction.total,
+        anchor=around.reactions.blocks[name],
+        mu=c.mu,
+        static_ratio=c.static_ratio,
     )

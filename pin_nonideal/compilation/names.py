@@ -7,22 +7,22 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from pin_nonideal.checks import Vector3, axis_triad, unit_axis
 from pin_nonideal.constraints import HingeAnchor
 from pin_nonideal.contacts import PointContact
+from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.states.placements import frame_on_joint, joint_placements
+from pin_nonideal.types import Array, Model, Placement
 
-Array = NDArray[np.float64]
 # A frame as the core takes it: joint, orientation by rows, place.
 Frame = tuple[int, list[float], list[float]]
 
 WORLD: Frame = (0, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0])
 
 
-def placed_on(joint: int, placement: Any) -> Frame:
+def placed_on(joint: int, placement: Placement) -> Frame:
     """A placement on a joint's body as the core takes it.
 
     Args:
@@ -40,7 +40,7 @@ class Resolution:
         q0: configuration at which `frame2=None` and lengths left out are read, (nq,).
     """
 
-    def __init__(self, model: Any, q0: Array) -> None:
+    def __init__(self, model: Model, q0: Array) -> None:
         self.model, self.q0 = model, q0
         self._placements = joint_placements(model, q0)
 
@@ -61,7 +61,7 @@ class Resolution:
         """The frame that a plane belongs to: the world's when there is no name."""
         return WORLD if name is None else self.frame(name, who)
 
-    def in_world(self, frame: Frame) -> Any:
+    def in_world(self, frame: Frame) -> Placement:
         """Where a frame is in the world at q0, pinocchio.SE3."""
         joint, R, p = frame
         return self._placements[joint] * pin.SE3(np.reshape(R, (3, 3)), np.array(p))
@@ -108,14 +108,14 @@ class Resolution:
         plane = self.plane(c.plane, who)
         return self.frame(c.frame, who), plane, axis_triad(unit_axis(who, c.normal))
 
-    def bearing(self, joint: int) -> tuple[str | None, Array]:
-        """What a joint is to the friction in it, and its axis in the joint's frame, (3,).
+    def bearing(self, joint: int) -> tuple[core.Load, list[float]]:
+        """What loads a joint that rubs, and its axis in the joint's frame, (3,).
 
         Args:
             joint: index.
 
         Returns:
-            "revolute" (helical joints too), "prismatic", "spherical", or None for all others.
+            revolute (helical joints too), prismatic, spherical, or none for all others.
         """
         item = self.model.joints[joint]
         data = item.createData()
@@ -123,16 +123,16 @@ class Resolution:
         S = np.asarray(data.S).reshape(6, -1)
         if item.nv == 3:
             spherical = "Spherical" in item.shortname() and "ZYX" not in item.shortname()
-            return ("spherical" if spherical else None), np.array([0.0, 0.0, 1.0])
+            return (core.Load.spherical if spherical else core.Load.none), [0.0, 0.0, 1.0]
         if item.nv != 1 or "Composite" in item.shortname():
-            return None, np.array([0.0, 0.0, 1.0])
+            return core.Load.none, [0.0, 0.0, 1.0]
         lin, ang = S[:3, 0], S[3:, 0]
         if np.linalg.norm(ang) > 0.5:
-            return "revolute", ang / np.linalg.norm(ang)
-        return "prismatic", lin / np.linalg.norm(lin)
+            return core.Load.revolute, (ang / np.linalg.norm(ang)).tolist()
+        return core.Load.prismatic, (lin / np.linalg.norm(lin)).tolist()
 
 
-def unique_names(descriptions: Sequence[Any], taken: set[str]) -> list[str]:
+def unique_names(descriptions: Sequence[object], taken: set[str]) -> list[str]:
     """A name for each description: its own, or its kind and what it acts on.
 
     Args:
@@ -162,7 +162,7 @@ def unique_names(descriptions: Sequence[Any], taken: set[str]) -> list[str]:
     return names
 
 
-def words(description: Any, name: str | None = None) -> str:
+def words(description: object, name: str | None = None) -> str:
     """Words that name a description in a message: its class, and the name it has or was given.
 
     Args:

@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
 
 from pin_nonideal.laws import JointFriction
+from pin_nonideal.types import Model
 
-if TYPE_CHECKING:
-    from pin_nonideal.scene import Scene
+from .scene import CompiledScene
 
 UNLIMITED = 1e3  # positions that no joint reaches [rad or m]
 
 
-def report(scene: Scene, rank: int) -> str:
+def report(scene: CompiledScene, name: str, rank: int, notes: Sequence[str]) -> str:
     """Joints, constraints, rows, rank, mobility, and what was left out.
 
     Args:
-        scene: the scene.
+        scene: the compiled scene.
+        name: shown above all.
         rank: of its rows in the initial state.
+        notes: remarks that follow.
     """
-    model = scene.model
-    rows = max((s.stop for s in scene.constraint_slices.values()), default=0)
-    lines = [f"{scene.name}: {model.njoints - 1} joints, nq {model.nq}, nv {model.nv}"]
+    model, rows = scene.model, scene.program.rows
+    lines = [f"{name}: {model.njoints - 1} joints, nq {model.nq}, nv {model.nv}"]
     for i in range(1, model.njoints):
         kind = model.joints[i].shortname().removeprefix("JointModel")
         lines.append(f"  joint {model.names[i]}: {kind}, on {model.names[model.parents[i]]}")
-    for name, s in scene.constraint_slices.items():
+    for name, s in scene.slices.items():
         lines.append(f"  constraint {name}: {s.stop - s.start} rows")
-    for name in scene.law_names:
+    for name in scene.program.law_names:
         lines.append(f"  law {name}")
     lines.append(f"rows {rows}, rank {rank}, mobility {model.nv - rank}")
     for name, row, reason in scene.dropped:
@@ -36,32 +37,29 @@ def report(scene: Scene, rank: int) -> str:
     if redundant > 0:
         lines.append(f"  redundant: {redundant} further rows, decided at every step")
     lines.append("skipped: " + (", ".join(_skipped(scene)) or "nothing"))
-    lines += [f"note: {n}" for n in scene.notes]
-    for key in ("source", "licence"):
-        if getattr(scene, key):
-            lines.append(f"{key}: {getattr(scene, key)}")
-    return "\n".join(lines)
+    return "\n".join([*lines, *notes])
 
 
-def _skipped(scene: Scene) -> list[str]:
+def _skipped(scene: CompiledScene) -> list[str]:
     """Parts of an evaluation that this scene does without."""
     skipped = []
-    if not scene.constraint_slices:
+    if not scene.slices:
         skipped.append("rows and their factorization (no constraint)")
-    if not scene.law_names:
+    if not scene.program.law_names:
         skipped.append("laws C (none)")
-    depends = any(isinstance(law, JointFriction) and law.mu for law in scene.laws)
-    depends |= any(getattr(law, "reaction", None) for law in scene.laws if not isinstance(law, JointFriction))
-    if not depends and not any(c.mu for c in scene.contacts):
+    said = scene.said
+    depends = any(isinstance(law, JointFriction) and law.mu for law in said.laws)
+    depends |= any(getattr(law, "reaction", None) for law in said.laws if not isinstance(law, JointFriction))
+    if not depends and not any(c.mu for c in said.contacts):
         skipped.append("reactions (no law reads them)")
-    if not scene.forces and scene.actuation is None:
+    if not said.forces and said.actuation is None:
         skipped.append("given forces (none)")
     if any(_limited(scene.model, joint) for joint in range(1, scene.model.njoints)):
         skipped.append("limits of joints (the motion may pass them)")
     return skipped
 
 
-def _limited(model: Any, joint: int) -> bool:
+def _limited(model: Model, joint: int) -> bool:
     """Whether a joint of one degree of freedom has a limit of position that it could reach."""
     i = model.idx_qs[joint]
     bounds = (model.lowerPositionLimit[i], model.upperPositionLimit[i])

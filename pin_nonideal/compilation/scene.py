@@ -1,78 +1,85 @@
-"""From descriptions to the compiled core: names become indices, user functions become checked ones."""
+"""A scene as the core knows it: the finished program, and what its numbers are called."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from pin_nonideal.constraints import UserConstraint
+from pin_nonideal.core import core
+from pin_nonideal.errors import InputError, RunError
+from pin_nonideal.states.projection import nearest_state, nearest_states
+from pin_nonideal.states.rows import row_slices
+from pin_nonideal.types import Array, Model
 
-import numpy as np
-from numpy.typing import NDArray
-
-from pin_nonideal.core import load_core
-from pin_nonideal.errors import InputError
-
-from .callbacks import ReactionNames
-from .constraints import lower_constraint, lower_contact
-from .forces import lower_actuation, lower_force
-from .laws import Surroundings, lower_contact_friction, lower_law
-from .names import Resolution, unique_names
-from .program import Lowered
-
-core = load_core()
+from .analysis import check_user_constraints, idle_rows
+from .constraints import anchor_frames
+from .failures import named_failure
+from .lowering import Descriptions, lower
+from .names import Resolution
 
 
-def lower(
-    model: Any,
-    q0: NDArray[np.float64],
-    *,
-    constraints: Sequence[Any],
-    contacts: Sequence[Any],
-    laws: Sequence[Any],
-    forces: Sequence[Any],
-    actuation: Any,
-    terms: str = "core",
-    builder: Any = None,
-) -> Lowered:
-    """Writes one scene into the core's builder: rows first, then the laws that read them, then given forces.
+class CompiledScene:
+    """Descriptions compiled into the core's program.
 
     Args:
         model: pinocchio.Model.
         q0: configuration at which `frame2=None` and lengths left out are read, (nq,).
-        constraints: descriptions, or constraint models of Pinocchio.
-        contacts: descriptions.
-        laws: descriptions.
-        forces: descriptions.
-        actuation: None, an array (nv,), a function, or a description.
-        terms: who computes M and the bias forces, "core" or "pinocchio".
-        builder: what the scene is written into; a new program of the core when None.
-
-    Returns:
-        The program under construction with its names.
+        v0: velocity near which derivatives of the user's constraints are compared, (nv,).
+        said: what the scene is made of.
 
     Raises:
-        InputError, UnknownNameError: what a description refers to does not exist or does not fit.
+        InputError, UnknownNameError: something does not fit the model.
+        InconsistentConstraintsError: rows that vanish ask for an acceleration.
+
+    Attributes:
+        model: pinocchio.Model.
+        q0: see above.
+        said: see above.
+        program: the core's, without the rows that can never act.
+        slices: rows of `lam` of each constraint and contact, by name.
+        anchors: (name, frame id, frame id or None for the world) of what joins two frames.
+        dropped: (name, row, reason) of rows that can never act.
+        unprojected: names of user constraints without residual and rate.
     """
-    try:
-        out = Lowered(core.Builder(model, terms == "pinocchio") if builder is None else builder)
-    except ValueError as error:
-        raise InputError(str(error)) from None
-    where = Resolution(model, q0)
-    taken: set[str] = set()
-    constraint_names = unique_names(constraints, taken)
-    contact_names = unique_names(contacts, taken)
-    law_names = unique_names(laws, set())
-    for c, name in zip(constraints, constraint_names, strict=True):
-        lower_constraint(c, name, out, where)
-    for c, name in zip(contacts, contact_names, strict=True):
-        lower_contact(c, name, out, where)
-    joints = {name: i for i, name in enumerate(model.names) if i}
-    names = ReactionNames(out.slices, out.blocks, joints)
-    around = Surroundings(where, dict(zip(constraint_names, constraints, strict=True)), names)
-    for law, name in zip(laws, law_names, strict=True):
-        lower_law(law, name, out, around)
-    for c, name in zip(contacts, contact_names, strict=True):
-        lower_contact_friction(c, name, out, where)
-    for f in forces:
-        lower_force(f, out, where)
-    lower_actuation(actuation, out, where)
-    return out
+
+    def __init__(self, model: Model, q0: Array, v0: Array, said: Descriptions) -> None:
+        self.model, self.q0, self.said = model, q0, said
+        try:
+            builder = core.Builder(model, pinocchio_terms=said.terms == "pinocchio")
+        except ValueError as error:
+            raise InputError(str(error)) from None
+        where = Resolution(model, q0)
+        lower(said, builder, where)
+        self.program = builder.finish()
+        self.slices = row_slices(self.program)
+        named = list(zip(self.slices, said.constraints, strict=False))  # contacts follow
+        self.anchors = anchor_frames(named, where)
+        self.unprojected = [
+            name
+            for name, c in named
+            if isinstance(c, UserConstraint) and c.residual is None and c.rate is None
+        ]
+        check_user_constraints(model, q0, v0, said.constraints, self.program)
+        self.dropped = idle_rows(model, q0, self.program)
+        if self.dropped:
+            idle = {(name, row) for name, row, _ in self.dropped}
+            for block, c in enumerate(self.program.constraints):
+                kept = [row for row in range(c.count) if (c.name, row) not in idle]
+                builder.keep_rows(block, kept)
+            self.program = builder.finish()
+
+    def project(self, q: Array, v: Array, t: float) -> tuple[Array, Array]:
+        """Nearest state on the constraints, see `states.projection.nearest_state`."""
+        try:
+            return nearest_state(self.model, self.program, q, v, t)
+        except core.CoreFailure as failure:
+            raise self.named(failure) from None
+
+    def project_all(self, q: Array, v: Array, t: float, threads: int) -> tuple[Array, Array]:
+        """That of each of many states, see `states.projection.nearest_states`."""
+        try:
+            return nearest_states(self.model, self.program, q, v, t, threads)
+        except core.CoreFailure as failure:
+            raise self.named(failure) from None
+
+    def named(self, failure: core.CoreFailure) -> RunError:
+        """The core's failure as the exception that names what is to blame."""
+        return named_failure(failure, self.model, self.program)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from pin_nonideal.core import load_core
+from pin_nonideal.core import core
 from pin_nonideal.errors import SingularMassError
 
 # Rounding in M is a few units in the last place of the largest term of each entry; once rows and columns
@@ -32,9 +32,8 @@ def mass_diagnosis(model: Any, q: Any = None) -> str | None:
     if model.nv == 0:
         return None
     q = pin.neutral(model) if q is None else np.asarray(q, dtype=float)
-    builder = load_core().Builder(model)
-    builder.finish()
-    M = np.asarray(builder.runner().terms(q, np.zeros(model.nv))[0]).reshape(model.nv, model.nv)
+    runner = core.Builder(model).finish().runner()
+    M = runner.terms(q, np.zeros(model.nv))[0].reshape(model.nv, model.nv)
     diagonal = M.diagonal()
     largest = float(diagonal.max())
     bare = [i for i in range(model.nv) if not diagonal[i] > SINGULAR**2 * max(largest, 0.0)]

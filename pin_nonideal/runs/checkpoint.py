@@ -11,21 +11,24 @@ import json
 import os
 import time
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum
+from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from pin_nonideal.checks import nonnegative
-from pin_nonideal.compilation.scene import core, lower
+from pin_nonideal.compilation.lowering import lower
+from pin_nonideal.compilation.names import Resolution
+from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, LoadingError, OutputError
 from pin_nonideal.files import file_path, whole_file
+from pin_nonideal.scene import Scene
 from pin_nonideal.trajectory import UNREADABLE
 
-if TYPE_CHECKING:
-    from pin_nonideal.scene import Scene
+from .options import RunOptions
 
 FORMAT = 1
 # Longer than any run [s].
@@ -49,7 +52,7 @@ class Checkpoint:
     scene: str
     origin: dict[str, Any] | None
     fingerprint: str
-    options: dict[str, Any]
+    options: RunOptions
     interval: float
     wall_s: float
     state: bytes
@@ -61,33 +64,35 @@ class Saver:
     Args:
         path: the file.
         scene: what runs.
-        options: of the run; what the core needs to call this object is added.
+        options: of the run.
         interval: wall time between checkpoints [s].
         wall_s: wall time that earlier parts of the run took [s].
+
+    Attributes:
+        interval: see above, bounded.
     """
 
     def __init__(
         self,
         path: str | os.PathLike[str],
         scene: Scene,
-        options: dict[str, Any],
-        interval: Any,
+        options: RunOptions,
+        interval: float,
         wall_s: float = 0.0,
     ) -> None:
         self._path = file_path("simulate: checkpoint", path)
         self._wall = wall_s - time.perf_counter()
         self._written = False
-        held = {k: v for k, v in options.items() if k not in ("tick", "save", "save_interval")}
+        self.interval = min(nonnegative("simulate: checkpoint_interval", interval), FOREVER)
         self._header = {
             "format": FORMAT,
             "version": _version(),
             "scene": scene.name,
-            "origin": scene.origin,
+            "origin": scene._origin,
             "fingerprint": fingerprint(scene),
-            "options": {**held, "atol": options["atol"].tolist()},
-            "interval": min(nonnegative("simulate: checkpoint_interval", interval), FOREVER),
+            "options": {**vars(options), "atol": options.atol.tolist()},
+            "interval": self.interval,
         }
-        options["save"], options["save_interval"] = self, self._header["interval"]
 
     def __call__(self, state: bytes) -> None:
         """Replaces the file; a run that has a checkpoint goes on when a later one cannot be written.
@@ -132,13 +137,12 @@ def read_checkpoint(path: Path) -> Checkpoint:
             )
         if hashlib.sha256(state).hexdigest() != header["digest"]:
             raise LoadingError(f'"{path}" is damaged: its state is not the one that was written')
-        options = header["options"]
-        options["atol"] = np.array(options["atol"], dtype=float)
+        held = header["options"]
         return Checkpoint(
             scene=header["scene"],
             origin=header["origin"],
             fingerprint=header["fingerprint"],
-            options=options,
+            options=RunOptions(**{**held, "atol": np.array(held["atol"], dtype=float)}),
             interval=float(header["interval"]),
             wall_s=float(header["wall_s"]),
             state=state,
@@ -154,9 +158,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
 
 def _version() -> list[str]:
     """Of the package and of what its core keeps of a run: another one steps differently in the last bits."""
-    from pin_nonideal import __version__
-
-    return [__version__, core.state_layout]
+    return [metadata.version("pin-nonideal"), core.state_layout]
 
 
 def fingerprint(scene: Scene) -> str:
@@ -168,43 +170,38 @@ def fingerprint(scene: Scene) -> str:
         scene: the scene.
     """
     digest = hashlib.sha256((scene.model.saveToString() + scene.terms).encode())
-    lower(
-        scene.model,
-        scene.q0,
-        constraints=scene.constraints,
-        contacts=scene.contacts,
-        laws=scene.laws,
-        forces=scene.forces,
-        actuation=scene.actuation,
-        builder=_Transcript(core.Builder(scene.model), digest),
-    )
+    transcript: Any = _Transcript(core.Builder(scene.model), digest)
+    lower(scene._compiled.said, transcript, Resolution(scene.model, scene.q0))
     return digest.hexdigest()
 
 
 class _Transcript:
     """The core's builder, with a digest of what it is told."""
 
-    def __init__(self, builder: Any, digest: Any) -> None:
+    def __init__(self, builder: core.Builder, digest: Any) -> None:
         self._builder, self._digest = builder, digest
 
     def __getattr__(self, name: str) -> Any:
         method = getattr(self._builder, name)
+        if not callable(method):
+            return method
 
-        def told(*arguments: Any) -> Any:
-            self._digest.update(json.dumps([name, _plain(arguments)]).encode())
-            return method(*arguments)
+        def told(*arguments: Any, **named: Any) -> Any:
+            said = [name, _plain(arguments), {key: _plain(value) for key, value in named.items()}]
+            self._digest.update(json.dumps(said).encode())
+            return method(*arguments, **named)
 
         return told
 
 
 def _plain(x: Any) -> Any:
     """Numbers, names and functions as JSON knows them."""
-    if isinstance(x, Mapping):
-        return {str(key): _plain(value) for key, value in x.items()}
     if isinstance(x, (list, tuple, np.ndarray)):
         return [_plain(each) for each in x]
     if isinstance(x, np.generic):
         return x.item()
+    if isinstance(x, Enum):
+        return x.name
     return "a function" if callable(x) else x
 
 

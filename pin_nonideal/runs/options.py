@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pin_nonideal.actuation import SampledControl
 from pin_nonideal.checks import array, choice, label, nonnegative, number, positive, sequence
-from pin_nonideal.compilation.scene import core
+from pin_nonideal.core import core
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene import Scene
+from pin_nonideal.types import Array
 
 # Those of the core: whether each chooses its own steps.
-METHODS: dict[str, bool] = core.methods
+METHODS = {method.name: method.adaptive for method in core.methods()}
 SCIPY = ("Radau", "BDF", "LSODA")
 RECORDS = ("a", "forces", "energy", "power")
 FIELDS = {"F_ideal": "forces", "F_nonideal": "forces", "lam": "forces", "lam_ideal": "forces"}
@@ -26,18 +29,49 @@ MOST_SAMPLES = 1e8  # some gigabytes for a small robot
 LEAST_RTOL, LEAST_ATOL = 1e-14, 1e-100
 
 
+@dataclass(frozen=True, eq=False)
+class RunOptions:
+    """What a run was asked for, as the core reads it and a checkpoint holds it.
+
+    Attributes:
+        method: of integration.
+        duration: length of time [s].
+        t0: initial time [s].
+        rtol: relative tolerance.
+        atol: absolute tolerances of positions, velocities and states of laws, (2 nv + nz,).
+        dt: step of the fixed-step methods [s], or 0.
+        output_dt: time between samples [s], or 0 for every accepted step.
+        a: whether accelerations are recorded.
+        forces: whether forces and multipliers are.
+        energy: whether the ledger is.
+        power: whether powers are.
+    """
+
+    method: str
+    duration: float
+    t0: float
+    rtol: float
+    atol: Array
+    dt: float
+    output_dt: float
+    a: bool
+    forces: bool
+    energy: bool
+    power: bool
+
+
 def run_options(
     scene: Scene,
-    duration: Any,
-    t0: Any,
-    method: Any,
-    rtol: Any,
-    atol: Any,
-    dt: Any,
-    output_dt: Any,
-    record: Any,
-) -> dict[str, Any]:
-    """Options of a run as the core takes them.
+    duration: float,
+    t0: float,
+    method: str,
+    rtol: float | None,
+    atol: ArrayLike | None,
+    dt: float | None,
+    output_dt: float | None,
+    record: str | Sequence[str],
+) -> RunOptions:
+    """Options of a run, checked.
 
     Args:
         scene: what to simulate.
@@ -67,7 +101,7 @@ def run_options(
     nv = scene.model.nv
     if nv == 0:
         raise InputError(f'simulate: "{scene.name}" has no joint that moves; there is nothing to simulate')
-    tolerance = np.full(2 * nv + scene.z0.size, DEFAULT_ATOL)
+    tolerance = np.full(2 * nv + scene._compiled.program.states, DEFAULT_ATOL)
     if atol is not None:
         given = np.asarray(atol)
         if given.ndim == 0:
@@ -89,17 +123,19 @@ def run_options(
     for name in wanted:
         groups.add(FIELDS.get(name, name))
         choice("simulate: record", FIELDS.get(name, name), RECORDS)
-    return {
-        "method": method,
-        "duration": length,
-        "t0": begin,
-        "rtol": max(relative, LEAST_RTOL) if relative else 0.0,
-        "atol": np.ascontiguousarray(np.maximum(tolerance, LEAST_ATOL)),
-        **{key: lengths.get(key, 0.0) for key in steps},
-        **{key: key in groups for key in RECORDS},
-        "tick": None,
-        "save": None,
-    }
+    return RunOptions(
+        method=method,
+        duration=length,
+        t0=begin,
+        rtol=max(relative, LEAST_RTOL) if relative else 0.0,
+        atol=np.ascontiguousarray(np.maximum(tolerance, LEAST_ATOL)),
+        dt=lengths.get("dt", 0.0),
+        output_dt=lengths.get("output_dt", 0.0),
+        a="a" in groups,
+        forces="forces" in groups,
+        energy="energy" in groups,
+        power="power" in groups,
+    )
 
 
 def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, float]) -> None:

@@ -10,10 +10,11 @@ from pin_nonideal.errors import InputError, LoadingError
 from pin_nonideal.files import file_path
 from pin_nonideal.loading import load
 from pin_nonideal.scene import Scene
-from pin_nonideal.simulation import finish, progress_bar
 from pin_nonideal.trajectory import Trajectory
 
 from .checkpoint import Saver, read_checkpoint, refuse_other_scene
+from .progress import progress_bar
+from .results import finish
 
 
 def resume(
@@ -65,15 +66,13 @@ def resume(
     choice("resume: progress", progress, (True, False, None))
     options = held.options
     interval = held.interval if checkpoint_interval is None else checkpoint_interval
-    Saver(source, scene, options, interval, held.wall_s)
-    bar = progress_bar(progress, options)
-    options["tick"] = bar.update if bar else None
+    saver = Saver(source, scene, options, interval, held.wall_s)
     begin = time.perf_counter()
     try:
-        raw = scene.new_runner().resume(held.state, options)
+        with progress_bar(progress, options) as tick:
+            runner = scene._compiled.program.runner()
+            outcome = runner.resume(held.state, options, tick=tick, save=saver, save_interval=saver.interval)
     except ValueError as error:
         raise LoadingError(f'"{source}" is damaged: {error}') from error
-    finally:
-        if bar:
-            bar.close()
-    return finish(scene, raw, options, held.wall_s + time.perf_counter() - begin)
+    wall = held.wall_s + time.perf_counter() - begin
+    return finish(scene, outcome, outcome.stopped, options, wall)

@@ -9,17 +9,20 @@ without located events: prefer the core's methods there.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pin_nonideal.actuation import SampledControl
-from pin_nonideal.compilation.scene import core
+from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, RunError, StepSizeError
 from pin_nonideal.scene import Scene
+from pin_nonideal.types import Array
 
-Array = NDArray[np.float64]
+from .options import RunOptions
+
+Tick = Callable[[float], None]  # with the time
 
 # Relative step of central differences of the right-hand side: the cube root of the rounding, where rounding
 # and curvature cost the same.
@@ -33,10 +36,10 @@ FREE = 1e100
 class _Run:
     """One run: right-hand side, Jacobian, and samples so far."""
 
-    def __init__(self, scene: Scene, options: dict[str, Any]) -> None:
-        self.scene, self.options = scene, options
-        self.runner = scene.new_runner()
-        self.energy = bool(options["energy"])
+    def __init__(self, scene: Scene, options: RunOptions, tick: Tick | None) -> None:
+        self.scene, self.options, self.tick = scene, options, tick
+        self.runner, self.states = scene._compiled.program.runner(), scene._compiled.program.states
+        self.energy = options.energy
         self.work = 3 + len(scene.law_names) if self.energy else 0
         self.moved = 0.0  # energy, by projections that the run went on from
         self.steps = 0
@@ -44,8 +47,7 @@ class _Run:
 
     def rate(self, t: float, y: Array) -> Array:
         """dy/dt."""
-        result: Array = self.runner.derivative(t, np.ascontiguousarray(y), self.energy)
-        return result
+        return self.runner.derivative(t, np.ascontiguousarray(y), self.energy)
 
     def jacobian(self, t: float, y: Array) -> Array:
         """d(dy/dt)/dy by central differences.
@@ -64,7 +66,7 @@ class _Run:
 
     def tolerance(self) -> Array:
         """Absolute tolerance in ambient coordinates: a quaternion takes the smallest of its joint's."""
-        given, model = self.options["atol"], self.scene.model
+        given, model = self.options.atol, self.scene.model
         positions = np.empty(model.nq)
         for joint in list(model.joints)[1:]:
             own = given[joint.idx_v : joint.idx_v + joint.nv]
@@ -76,15 +78,15 @@ class _Run:
         """Keeps the projected state, unless that time has a sample already."""
         if self.samples and t <= self.samples[-1][0]:
             return
-        settled, moved = self.runner.settle(t, np.ascontiguousarray(y), self.energy)
-        self.samples.append((t, settled, self.moved + moved))
+        on, moved = self.runner.project_outside(t, np.ascontiguousarray(y), self.energy)
+        self.samples.append((t, on, self.moved + moved))
 
     def step(self, solver: Any, grid: _Grid) -> None:
         """One step of SciPy's, and the samples inside it."""
         message = solver.step()
         if solver.status == "failed":
             raise StepSizeError(
-                f"{self.options['method']} cannot go on at t = {solver.t:.6g} s ({message}): the motion is "
+                f"{self.options.method} cannot go on at t = {solver.t:.6g} s ({message}): the motion is "
                 "singular there; look at the last samples, or loosen rtol and atol; the trajectory up to "
                 "there is in error.trajectory",
                 time=float(solver.t),
@@ -97,20 +99,19 @@ class _Run:
                 self.sample(t, dense(t))
         if last or not grid.dt:
             self.sample(now, solver.y)
-        if self.options["method"] == "Radau" and self.scene.constraint_slices:
-            solver.y, moved = self.runner.settle(now, np.ascontiguousarray(solver.y), self.energy)
+        if self.options.method == "Radau" and self.scene.constraint_slices:
+            solver.y, moved = self.runner.project_outside(now, np.ascontiguousarray(solver.y), self.energy)
             solver.f = self.rate(now, solver.y)
             self.moved += moved
-        if self.options["tick"] is not None:
-            self.options["tick"](now)
+        if self.tick is not None:
+            self.tick(now)
 
-    def recorded(self) -> dict[str, Any]:
-        """The samples as the core hands over its own."""
+    def recorded(self) -> core.Outcome:
+        """The samples as the core records its own."""
         times, states, moved = zip(*self.samples, strict=True) if self.samples else ((), (), ())
-        width = self.scene.model.nq + self.scene.model.nv + self.scene.z0.size + self.work
+        width = self.scene.model.nq + self.scene.model.nv + self.states + self.work
         rows = np.array(states).reshape(len(times), width)
-        raw: dict[str, Any] = self.runner.record(np.array(times), rows, np.array(moved), self.options)
-        return raw | {"counters": (self.steps, *raw["counters"][1:])}
+        return self.runner.record(np.array(times), rows, np.array(moved), self.options, steps=self.steps)
 
 
 class _Grid:
@@ -119,14 +120,16 @@ class _Grid:
     def __init__(self, t0: float, dt: float) -> None:
         self.t0, self.dt, self.k = t0, dt, 1
 
-    def before(self, t: float) -> Any:
+    def before(self, t: float) -> Iterator[float]:
         """Times of the grid before t, or at it, that were not asked for yet."""
         while self.t0 + self.k * self.dt <= t:
             yield self.t0 + self.k * self.dt
             self.k += 1
 
 
-def simulate_stiff(scene: Scene, q0: Array, v0: Array, options: dict[str, Any]) -> dict[str, Any]:
+def simulate_stiff(
+    scene: Scene, q0: Array, v0: Array, options: RunOptions, tick: Tick | None
+) -> tuple[core.Outcome, BaseException | None]:
     """Runs one of SciPy's implicit methods.
 
     Args:
@@ -134,31 +137,29 @@ def simulate_stiff(scene: Scene, q0: Array, v0: Array, options: dict[str, Any]) 
         q0: initial configuration on the constraints, (nq,).
         v0: initial velocity on the constraints, (nv,).
         options: as checked by `simulate`.
+        tick: called with the time after every step.
 
     Returns:
-        Arrays by name, and what stopped the run, as the core's own runs return them.
+        What the core recorded of it, and what stopped the run.
 
     Raises:
         InputError: the scene's torque is held between samples, which these methods would step over.
     """
     from scipy import integrate
 
-    method = options["method"]
     if isinstance(scene.actuation, SampledControl):
-        raise InputError(f'simulate: SampledControl needs one of the core\'s methods; got "{method}"')
-    run = _Run(scene, options)
-    t0, t_end = options["t0"], options["t0"] + options["duration"]
-    grid = _Grid(t0, options["output_dt"])
-    y0 = np.concatenate([q0, v0, scene.z0, np.zeros(run.work)])
-    stopped: dict[str, Any] = {}
+        raise InputError(f'simulate: SampledControl needs one of the core\'s methods; got "{options.method}"')
+    run = _Run(scene, options, tick)
+    t0, t_end = options.t0, options.t0 + options.duration
+    grid = _Grid(t0, options.output_dt)
+    y0 = np.concatenate([q0, v0, np.zeros(run.states + run.work)])
     try:
         run.sample(t0, y0)
-        tolerance = {"rtol": max(options["rtol"], LEAST_RTOL), "atol": run.tolerance()}
-        solver = getattr(integrate, method)(run.rate, t0, y0, t_end, jac=run.jacobian, **tolerance)
+        tolerance = {"rtol": max(options.rtol, LEAST_RTOL), "atol": run.tolerance()}
+        method = getattr(integrate, options.method)
+        solver = method(run.rate, t0, y0, t_end, jac=run.jacobian, **tolerance)
         while solver.status == "running":
             run.step(solver, grid)
-    except (KeyboardInterrupt, RunError) as error:
-        stopped = {"error": error}
-    except core.CoreFailure as failure:
-        stopped = {"failure": failure}
-    return run.recorded() | stopped
+    except (KeyboardInterrupt, RunError, core.CoreFailure) as error:
+        return run.recorded(), error
+    return run.recorded(), None

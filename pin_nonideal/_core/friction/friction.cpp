@@ -19,7 +19,7 @@ double load_limit(const Program& p, Workspace& w, const Friction& f, double t, c
     using Load = Friction::Load;
     switch (f.load) {
         case Load::none: return f.constant;
-        case Load::user: return f.user_limit(t, q, v, w);
+        case Load::user: return f.user_limit(p, t, q, v, w);
         case Load::contact: return f.constant + f.mu * std::abs(reactions(p, w).lam[p.blocks[f.anchor].row]);
         default: break;
     }

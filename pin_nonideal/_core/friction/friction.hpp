@@ -22,7 +22,7 @@ struct Friction {
     int joint = -1;   // tree joint that carries the load
     int anchor = -1;  // or the block (hinge anchor, contact) that does
     Vec3 axis = Vec3::UnitZ();  // in the joint's frame, or in frame 1 of the anchor
-    std::function<double(double t, const VecX& q, const VecX& v, Workspace& w)> user_limit;
+    std::function<double(const Program& p, double t, const VecX& q, const VecX& v, Workspace& w)> user_limit;
 
     // Limit over load at a slip speed.
     template <class Real>

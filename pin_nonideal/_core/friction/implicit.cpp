@@ -76,7 +76,7 @@ struct Implicit {
         if (!std::isfinite(w.now.a.squaredNorm())) throw Failure(Failure::Kind::not_finite, t);
         int k = 0;
         each_unknown([&](size_t e) { g[k++] = load(e) * slip_factor(p, w, e); },
-                     [&](const UserLaw& law) { g.segment(k, nv()) = ask(law, w, t, q, v); k += nv(); });
+                     [&](const UserLaw& law) { g.segment(k, nv()) = ask(p, law, w, t, q, v); k += nv(); });
         ++w.counters.iterations;
     }
 
@@ -276,7 +276,7 @@ static void ideal_loads(const Program& p, Workspace& w, double t, const VecX& q,
     for (size_t e = 0; e < p.frictions.size(); ++e)
         if (p.frictions[e].reaction == Reaction::ideal) update_limit(p, w, e, t, q, v);
     each_law<UserLaw>(p.laws, [&](const UserLaw& law) {
-        if (law.reaction == Reaction::ideal) w.now.base_C += ask(law, w, t, q, v);
+        if (law.reaction == Reaction::ideal) w.now.base_C += ask(p, law, w, t, q, v);
     });
 }
 

@@ -44,16 +44,16 @@ LawState law_state(const Workspace& w, const VecX& v) {
 
 }  // namespace
 
-const VecX& ask(const UserLaw& law, Workspace& w, double t, const VecX& q, const VecX& v) {
+const VecX& ask(const Program& p, const UserLaw& law, Workspace& w, double t, const VecX& q, const VecX& v) {
     VecX& C = w.now.user_C[law.index];
-    law.function(t, q, v, w, C, w.state.z.data() + law.state, w.now.dz.data() + law.state);
+    law.function(p, t, q, v, w, C, w.state.z.data() + law.state, w.now.dz.data() + law.state);
     return C;
 }
 
 void smooth_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     VecX& C = w.now.C_smooth;
     C.setZero();
-    each_law<UserLaw>(p.laws, [&](const UserLaw& law) { if (law.reaction == Reaction::none) ask(law, w, t, q, v); });
+    each_law<UserLaw>(p.laws, [&](const UserLaw& law) { if (law.reaction == Reaction::none) ask(p, law, w, t, q, v); });
     GeneralizedForce sink{p, w.now, C, &w.now.dz};
     const LawState state = law_state(w, v);
     for (const Law& each : p.laws)

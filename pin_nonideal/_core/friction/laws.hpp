@@ -103,8 +103,8 @@ struct UserLaw {
     int law = 0, index = 0, state = 0, states = 0;  // index: among the user's laws
     Reaction reaction = Reaction::none;
     // C (and dz when it has states) for provisional reactions held in the workspace.
-    std::function<void(double t, const VecX& q, const VecX& v, Workspace& w, VecX& C, const double* z, double* dz)>
-        function;
+    std::function<void(const Program& p, double t, const VecX& q, const VecX& v, Workspace& w, VecX& C, const double* z,
+                       double* dz)> function;
 
     template <class Sink>
     void act(const LawState& s, Sink& sink) const { sink.on_all(s.user_force[index]); }
@@ -121,7 +121,7 @@ void each_law(Laws& laws, const Function& f) {
 }
 
 // The force of a user's law, for the reactions that the workspace holds: into w.now.user_C, and to its caller.
-const VecX& ask(const UserLaw& law, Workspace& w, double t, const VecX& q, const VecX& v);
+const VecX& ask(const Program& p, const UserLaw& law, Workspace& w, double t, const VecX& q, const VecX& v);
 // C of every law that does not read reactions, and the constant part of slipping friction.
 void smooth_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 // C of each law at the evaluation in the workspace.

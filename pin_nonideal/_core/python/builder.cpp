@@ -2,6 +2,8 @@
 #include "python/callbacks.hpp"
 #include "tree/model_extraction.hpp"
 
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -36,124 +38,179 @@ int Builder::add_law(const std::string& name) {
     return static_cast<int>(p->law_names.size()) - 1;
 }
 
-namespace {
-
-Reaction reaction_named(const std::string& name) {
-    return name == "total" ? Reaction::total : name == "ideal" ? Reaction::ideal : Reaction::none;
+std::shared_ptr<const Program> Builder::finish() const {
+    auto finished = std::make_shared<Program>(*p);
+    finished->finish();
+    return finished;
 }
+
+std::vector<ConstraintRows> constraint_rows(const Program& p) {
+    std::vector<ConstraintRows> out;
+    for (int i = 0; i < p.constraints; ++i) {
+        const Block& block = p.blocks[i];
+        ConstraintRows rows{block.name, block.user_row, block.total, {}, moves_in_time(block.kind)};
+        for (int k = 0; k < block.total; ++k) rows.holonomic.push_back(has_residual(block.kind, k));
+        out.push_back(std::move(rows));
+    }
+    return out;
+}
+
+namespace {
 
 // Frictional elements, which act along their directions of slip.
 void bind_friction(nb::class_<Builder>& builder) {
     builder
-        .def("add_friction", [](Builder& b, const std::string& name, int law, int block, const std::string& load,
-                                const std::string& reaction, int joint, int anchor, const std::vector<double>& axis,
-                                const nb::dict& x, nb::object user_limit) {
+        .def("add_friction", [](Builder& b, int law, int block, Friction::Load load,
+                                Reaction reaction, int joint, int anchor, const std::vector<double>& axis,
+                                double constant, double mu, double radius, double axial_radius, double inverse_span,
+                                double static_ratio, double stribeck_velocity,
+                                const Function<double(double, Numbers, Numbers, ReactionView)>& user_limit) {
             Friction f;
             f.law = law;
             f.block = block;
             f.dim = b.p->blocks[block].total;
-            using L = Friction::Load;
-            f.load = load == "revolute" ? L::revolute : load == "prismatic" ? L::prismatic
-                     : load == "spherical" ? L::spherical : load == "contact" ? L::contact
-                     : load == "user" ? L::user : L::none;
-            f.reaction = reaction_named(reaction);
+            f.load = load;
+            f.reaction = reaction;
             f.joint = joint;
             f.anchor = anchor;
             f.axis = vec3(axis);
-            f.constant = nb::cast<double>(x["constant"]);
-            f.mu = nb::cast<double>(x["mu"]);
-            f.radius = nb::cast<double>(x["radius"]);
-            f.axial_radius = nb::cast<double>(x["axial_radius"]);
-            f.inverse_span = nb::cast<double>(x["inverse_span"]);
-            f.static_ratio = nb::cast<double>(x["static_ratio"]);
-            f.stribeck_velocity = nb::cast<double>(x["stribeck_velocity"]);
-            if (!user_limit.is_none()) f.user_limit = limit_function(b.p.get(), user_limit);
+            f.constant = constant;
+            f.mu = mu;
+            f.radius = radius;
+            f.axial_radius = axial_radius;
+            f.inverse_span = inverse_span;
+            f.static_ratio = static_ratio;
+            f.stribeck_velocity = stribeck_velocity;
+            if (user_limit) f.user_limit = limit_function(*user_limit);
             b.p->frictions.push_back(std::move(f));
-            return static_cast<int>(b.p->frictions.size()) - 1;
-        }, "name"_a, "law"_a, "block"_a, "load"_a, "reaction"_a, "joint"_a, "anchor"_a, "axis"_a, "numbers"_a,
-           "user_limit"_a.none());
+        }, "law"_a, "block"_a, nb::kw_only(), "load"_a = Friction::Load::none, "reaction"_a = Reaction::none,
+           "joint"_a = -1, "anchor"_a = -1, "axis"_a = std::vector<double>{0.0, 0.0, 1.0}, "constant"_a = 0.0,
+           "mu"_a = 0.0, "radius"_a = 0.0, "axial_radius"_a = 0.0, "inverse_span"_a = 0.0, "static_ratio"_a = 1.0,
+           "stribeck_velocity"_a = 0.0, "user_limit"_a = nb::none());
 }
 
 void bind_laws(nb::class_<Builder>& builder) {
     builder
-        .def("add_viscous", [](Builder& b, int law, int dof, int count, int block, double coefficient) {
+        .def("add_law", &Builder::add_law, "name"_a)
+        .def("add_viscous", [](Builder& b, int law, double coefficient, int dof, int count, int block) {
             b.p->laws.push_back(Viscous{law, dof, count, block, coefficient});
-        })
+        }, "law"_a, "coefficient"_a, nb::kw_only(), "dof"_a = -1, "count"_a = 1, "block"_a = -1)
         .def("add_drag", [](Builder& b, int law, const FrameTuple& frame, double coefficient, double exponent) {
             b.p->laws.push_back(Drag{law, frame_of(frame), coefficient, exponent, {}});
-        })
+        }, "law"_a, "frame"_a, "coefficient"_a, "exponent"_a)
         .def("add_sigmoid", [](Builder& b, int law, int dof, double phi1, double phi2, double phi3) {
             b.p->laws.push_back(Sigmoid{law, dof, phi1, phi2, phi3});
-        })
-        .def("add_bristle", [](Builder& b, int law, int dof, double sigma0, double sigma1, double sigma2,
-                               double coulomb, double stiction, double stribeck_velocity) {
-            b.p->laws.push_back(LuGre{law, dof, b.p->states, sigma0, sigma1, sigma2, coulomb, stiction,
-                                      stribeck_velocity});
+        }, "law"_a, "dof"_a, "phi1"_a, "phi2"_a, "phi3"_a)
+        .def("add_lugre", [](Builder& b, int law, int dof, double stiffness, double damping, double viscous,
+                             double coulomb, double stiction, double stribeck_velocity) {
+            b.p->laws.push_back(LuGre{law, dof, b.p->states, stiffness, damping, viscous, coulomb, stiction,
+                                     stribeck_velocity});
             ++b.p->states;
-        })
-        .def("add_user_law", [](Builder& b, int law, int states, const std::string& reaction, nb::object function) {
+        }, "law"_a, "dof"_a, "stiffness"_a, "damping"_a, "viscous"_a, "coulomb"_a, "stiction"_a,
+           "stribeck_velocity"_a)
+        .def("add_user_law", [](Builder& b, int law, int states, Reaction reaction,
+                                const nb::typed<nb::callable, nb::object(...)>& function) {
             UserLaw u;
             u.law = law;
             u.index = b.p->user_laws++;
             u.state = b.p->states;
             u.states = states;
             b.p->states += states;
-            u.reaction = reaction_named(reaction);
-            u.function = law_function(b.p.get(), function, states, u.reaction != Reaction::none);
+            u.reaction = reaction;
+            u.function = law_function(function, states, u.reaction != Reaction::none);
             b.p->laws.push_back(std::move(u));
-        });
+        }, "law"_a, "states"_a, "reaction"_a, "function"_a);
 }
+
+using TorqueOfState = nb::typed<nb::callable, Numbers(double, Numbers, Numbers)>;
 
 void bind_forces(nb::class_<Builder>& builder) {
     builder
         .def("add_spring_damper", [](Builder& b, const FrameTuple& f1, const FrameTuple& f2, double stiffness,
                                      double damping, double rest_length) {
             b.p->forces.emplace_back(SpringDamper{frame_of(f1), frame_of(f2), stiffness, damping, rest_length});
-        })
+        }, "frame1"_a, "frame2"_a, "stiffness"_a, "damping"_a, "rest_length"_a)
         .def("add_joint_spring", [](Builder& b, int joint, double stiffness, double rest, double damping) {
             b.p->forces.emplace_back(JointSpring{joint, stiffness, rest, damping});
-        })
-        .def("add_wrench", [](Builder& b, const FrameTuple& frame, const std::vector<double>& six,
-                              nb::object function) {
+        }, "joint"_a, "stiffness"_a, "rest"_a, "damping"_a)
+        .def("add_wrench", [](Builder& b, const FrameTuple& frame, const std::vector<double>& six) {
             FrameWrench wrench{frame_of(frame), {}, {}};
             std::copy(six.begin(), six.end(), wrench.value);
-            if (!function.is_none()) wrench.function = wrench_function(function);
             b.p->forces.emplace_back(std::move(wrench));
-        }, "frame"_a, "value"_a, "function"_a.none())
-        .def("add_user_force", [](Builder& b, nb::object f) {
+        }, "frame"_a, "value"_a)
+        .def("add_wrench", [](Builder& b, const FrameTuple& frame,
+                              const nb::typed<nb::callable, Numbers(double)>& function) {
+            b.p->forces.emplace_back(FrameWrench{frame_of(frame), wrench_function(function), {}});
+        }, "frame"_a, "function"_a)
+        .def("add_user_force", [](Builder& b, const TorqueOfState& f) {
             b.p->forces.emplace_back(UserForce{torque_function(f)});
-        });
+        }, "function"_a);
 }
 
 void bind_actuation(nb::class_<Builder>& builder) {
     builder
-        .def("set_constant_torque", [](Builder& b, Array tau) { b.p->actuation = ConstantTorque{map(tau)}; })
-        .def("set_torque_function", [](Builder& b, nb::object f) {
+        .def("set_constant_torque", [](Builder& b, Array tau) { b.p->actuation = ConstantTorque{map(tau)}; }, "tau"_a)
+        .def("set_torque_function", [](Builder& b, const TorqueOfState& f) {
             b.p->actuation = TorqueFunction{torque_function(f)};
-        })
-        .def("set_sampled_torque", [](Builder& b, nb::object f, double period) {
+        }, "function"_a)
+        .def("set_sampled_torque", [](Builder& b, const TorqueOfState& f, double period) {
             b.p->actuation = SampledTorque{torque_function(f), period};
-        })
+        }, "function"_a, "period"_a)
         .def("set_hold_position", [](Builder& b, Array kp, Array kd, Array q) {
             b.p->actuation = HoldPosition{map(kp), map(kd), map(q)};
-        })
+        }, "kp"_a, "kd"_a, "q"_a)
         .def("set_torque_table", [](Builder& b, std::vector<double> times, Array2 values) {
             b.p->actuation = TorqueTable{std::move(times), map(values).transpose()};
-        });
+        }, "times"_a, "values"_a);
+}
+
+void bind_enums(nb::module_& m) {
+    using Load = Friction::Load;
+    nb::enum_<Load>(m, "Load", "What loads the bearing that rubs.")
+        .value("none", Load::none)
+        .value("revolute", Load::revolute)
+        .value("prismatic", Load::prismatic)
+        .value("spherical", Load::spherical)
+        .value("contact", Load::contact)
+        .value("user", Load::user);
+    nb::enum_<Reaction>(m, "Reaction", "Of which motion a law reads the reactions.")
+        .value("none", Reaction::none)
+        .value("ideal", Reaction::ideal)
+        .value("total", Reaction::total);
+}
+
+void bind_program(nb::module_& m) {
+    nb::class_<ConstraintRows>(m, "ConstraintRows")
+        .def_ro("name", &ConstraintRows::name)
+        .def_ro("first", &ConstraintRows::first)
+        .def_ro("count", &ConstraintRows::count)
+        .def_ro("holonomic", &ConstraintRows::holonomic)
+        .def_ro("moves_in_time", &ConstraintRows::moves_in_time);
+    nb::class_<Program>(m, "Program")
+        .def_prop_ro("constraints", &constraint_rows)
+        .def_prop_ro("rows", [](const Program& p) { return p.user_rows; })
+        .def_prop_ro("states", [](const Program& p) { return p.states; })
+        .def_prop_ro("law_names", [](const Program& p) { return p.law_names; })
+        .def_prop_ro("element_names", [](const Program& p) {
+            std::vector<std::string> names;
+            for (const Friction& f : p.frictions) names.push_back(p.law_names[f.law]);
+            return names;
+        })
+        .def("runner", [](std::shared_ptr<const Program> p) { return Runner(std::move(p)); });
 }
 
 }  // namespace
 
 void bind_builder(nb::module_& m) {
+    bind_enums(m);
+    bind_program(m);
     nb::class_<Builder> builder(m, "Builder");
     builder.def(nb::init<nb::object, bool>(), "model"_a, "pinocchio_terms"_a = false)
-        .def("add_law", &Builder::add_law)
         .def("keep_rows", [](Builder& b, int block, std::vector<int> rows) {
             b.p->blocks[block].kept = std::move(rows);
-        })
-        .def("finish", [](Builder& b) { b.p->finish(); })
-        .def_prop_ro("states", [](Builder& b) { return b.p->states; })
-        .def("runner", [](Builder& b) { return new Runner(b.p); }, nb::rv_policy::take_ownership);
+        }, "block"_a, "rows"_a)
+        .def_prop_ro("constraints", [](const Builder& b) { return constraint_rows(*b.p); })
+        .def("finish", &Builder::finish);
     bind_constraints(builder);
     bind_slip_directions(builder);
     bind_friction(builder);

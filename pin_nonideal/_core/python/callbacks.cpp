@@ -7,37 +7,32 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+using namespace nanobind::literals;
+
 namespace pn {
 
-namespace {
-
-// What a user's law may ask about the reactions while it runs.
-struct ReactionView {
-    const Program* p;
-    Workspace* w;
-
-    nb::object lam() const {
-        VecX out = VecX::Zero(p->user_rows);
-        for (int i = 0; i < p->constraints; ++i) {
-            const Block& block = p->blocks[i];
-            for (size_t k = 0; k < block.kept.size(); ++k)
-                out[block.user_row + block.kept[k]] = reactions(*p, *w).lam[block.row + k];
-        }
-        return to_numpy(out);
+Numbers ReactionView::lam() const {
+    VecX out = VecX::Zero(p->user_rows);
+    for (int i = 0; i < p->constraints; ++i) {
+        const Block& block = p->blocks[i];
+        for (size_t k = 0; k < block.kept.size(); ++k)
+            out[block.user_row + block.kept[k]] = reactions(*p, *w).lam[block.row + k];
     }
-    nb::object six(const Force& f, const Mat3& R) const {
-        VecX out(6);
-        out << transpose_times(R, f.lin).eigen(), transpose_times(R, f.ang).eigen();
-        return to_numpy(out);
-    }
-    nb::object of_joint(int joint) const { return six(joint_wrench(*p, *w, joint), w->now.terms.body[joint].R); }
-    nb::object of_block(int block) const {
-        const Frame& f = *frame2(p->blocks[block].kind);
-        return six(anchor_wrench(*p, *w, block), w->now.terms.body[f.joint].R * f.R);
-    }
-};
+    return to_numpy(out);
+}
 
-}  // namespace
+static Numbers six(const Force& f, const Mat3& R) {
+    VecX out(6);
+    out << transpose_times(R, f.lin).eigen(), transpose_times(R, f.ang).eigen();
+    return to_numpy(out);
+}
+
+Numbers ReactionView::of_joint(int joint) const { return six(joint_wrench(*p, *w, joint), w->now.terms.body[joint].R); }
+
+Numbers ReactionView::of_block(int block) const {
+    const Frame& f = *frame2(p->blocks[block].kind);
+    return six(anchor_wrench(*p, *w, block), w->now.terms.body[f.joint].R * f.R);
+}
 
 TimeFunction time_function(const nb::object& f) {
     if (nb::isinstance<nb::tuple>(f)) {
@@ -100,18 +95,18 @@ UserSlipRow slip_row(nb::object direction) {
     }};
 }
 
-decltype(Friction::user_limit) limit_function(const Program* p, nb::object f) {
-    return [f, p](double t, const VecX& q, const VecX& v, Workspace& w) {
+decltype(Friction::user_limit) limit_function(nb::object f) {
+    return [f](const Program& p, double t, const VecX& q, const VecX& v, Workspace& w) {
         nb::gil_scoped_acquire gil;
-        return nb::cast<double>(f(t, to_numpy(q), to_numpy(v), ReactionView{p, &w}));
+        return nb::cast<double>(f(t, to_numpy(q), to_numpy(v), ReactionView{&p, &w}));
     };
 }
 
-decltype(UserLaw::function) law_function(const Program* p, nb::object f, int states, bool reads_reactions) {
-    return [f, p, states, reads_reactions](double t, const VecX& q, const VecX& v, Workspace& w, VecX& C,
-                                           const double* z, double* dz) {
+decltype(UserLaw::function) law_function(nb::object f, int states, bool reads_reactions) {
+    return [f, states, reads_reactions](const Program& p, double t, const VecX& q, const VecX& v, Workspace& w, VecX& C,
+                                        const double* z, double* dz) {
         nb::gil_scoped_acquire gil;
-        nb::object view = reads_reactions ? nb::cast(ReactionView{p, &w}) : nb::none();
+        nb::object view = reads_reactions ? nb::cast(ReactionView{&p, &w}) : nb::none();
         if (states == 0) {
             read_into(f(t, to_numpy(q), to_numpy(v), view), C);
             return;
@@ -125,9 +120,9 @@ decltype(UserLaw::function) law_function(const Program* p, nb::object f, int sta
 
 void bind_reactions(nb::module_& m) {
     nb::class_<ReactionView>(m, "ReactionView")
-        .def_prop_ro("lam", &ReactionView::lam)
-        .def("of_joint", &ReactionView::of_joint)
-        .def("of_block", &ReactionView::of_block);
+        .def_prop_ro("lam", &ReactionView::lam, nb::rv_policy::automatic)
+        .def("of_joint", &ReactionView::of_joint, "joint"_a)
+        .def("of_block", &ReactionView::of_block, "block"_a);
 }
 
 }  // namespace pn

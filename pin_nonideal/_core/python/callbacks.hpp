@@ -7,6 +7,15 @@
 
 namespace pn {
 
+// What a user's law may ask about the reactions while it runs.
+struct ReactionView {
+    const Program* p;
+    Workspace* w;
+    Numbers lam() const;
+    Numbers of_joint(int joint) const;
+    Numbers of_block(int block) const;
+};
+
 // ("polynomial", [c...]), ("sinusoid", [a, f, phase, offset]), ("spline", [breaks], [coefficients]) or a function.
 TimeFunction time_function(const nb::object& f);
 
@@ -19,8 +28,8 @@ std::function<void(double, double*)> wrench_function(nb::object f);
 UserRows user_rows(nb::object rows, nb::object residual, nb::object rate);
 UserSlipRow slip_row(nb::object direction);
 
-// Limit of friction, and force of a law; both may ask about the program's reactions.
-decltype(Friction::user_limit) limit_function(const Program* p, nb::object f);
-decltype(UserLaw::function) law_function(const Program* p, nb::object f, int states, bool reads_reactions);
+// Limit of friction, and force of a law; both may ask about the reactions.
+decltype(Friction::user_limit) limit_function(nb::object f);
+decltype(UserLaw::function) law_function(nb::object f, int states, bool reads_reactions);
 
 }  // namespace pn

@@ -9,26 +9,20 @@
 #include "friction/modes.hpp"
 
 using namespace pn;
+using namespace nanobind::literals;
 
 NB_MODULE(_core, m) {
     nb::set_leak_warnings(false);  // a user's function may hold the scene that holds it: a cycle, not a fault
     m.attr("pinocchio_version") = PIN_NONIDEAL_PINOCCHIO_VERSION;
     m.attr("state_layout") = state_layout() + " for Pinocchio " PIN_NONIDEAL_PINOCCHIO_VERSION;
-    // Methods of integration by name; true of those that choose their own steps.
-    nb::dict all;
-    for (const Method& method : methods()) all[method.name] = method.adaptive();
-    m.attr("methods") = all;
     bind_failures(m);
     bind_reactions(m);
     bind_builder(m);
     bind_runner(m);
-    m.def("nearest_states", &nearest_states);
-    nb::class_<Outcome>(m, "Outcome").def("hand_over", &Outcome::hand_over);
-    m.def("rollout", &rollout);
 
     // The friction program on arrays, for tests against enumeration.
     m.def("friction_program", [](const Array2& W, const Array& alpha0, const std::vector<int>& dims,
                                  const Array& limits) {
         return to_numpy(friction_program(map(W), map(alpha0), dims, map(limits)));
-    });
+    }, "W"_a, "alpha0"_a, "dims"_a, "limits"_a);
 }

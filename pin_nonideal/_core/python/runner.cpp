@@ -3,6 +3,9 @@
 
 #include <chrono>
 
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include "constraints/projection.hpp"
@@ -53,24 +56,22 @@ void read_buffer(nb::handle from, VecX& to) {
 Runner::Runner(std::shared_ptr<const Program> program)
     : p(std::move(program)), w(std::make_unique<Workspace>(*p)), q(p->mechanism.nq), v(p->mechanism.nv) {}
 
-void Runner::set(const Array& q_in, const Array& v_in, const nb::object& tau) {
+void Runner::set(const Array& q_in, const Array& v_in, const std::optional<Array>& tau) {
     const Mechanism& m = p->mechanism;
     const auto holds = [](const Array& x, int n) { return x.shape(0) == static_cast<size_t>(n); };
     if (!holds(q_in, m.nq) || !holds(v_in, m.nv) || !has_unit_lengths(m, q_in.data(), unit_tolerance))
         throw std::invalid_argument("q or v does not fit the model");
     q = map(q_in);
     v = map(v_in);
-    w->now.has_override = !tau.is_none();
-    if (!w->now.has_override) return;
-    const Array torque = nb::cast<Array>(tau);
-    if (!holds(torque, m.nv)) throw std::invalid_argument("tau does not fit the model");
-    w->now.override_torque = map(torque);
+    w->now.has_override = tau.has_value();
+    if (!tau) return;
+    if (!holds(*tau, m.nv)) throw std::invalid_argument("tau does not fit the model");
+    w->now.override_torque = map(*tau);
 }
 
-void Runner::choose_modes(double t, const nb::object& modes) {
-    if (modes.is_none()) return resolve_modes(*p, *w, t, q, v, first_question(*p, *w, t, q, v));
-    const auto given = nb::cast<std::vector<int>>(modes);
-    set_modes(*p, *w, std::vector<signed char>(given.begin(), given.end()));
+void Runner::choose_modes(double t, const std::optional<std::vector<int>>& modes) {
+    if (!modes) return resolve_modes(*p, *w, t, q, v, first_question(*p, *w, t, q, v));
+    set_modes(*p, *w, std::vector<signed char>(modes->begin(), modes->end()));
     w->state.warm = false;
     begin_step(*p, *w, t, q, v);
 }
@@ -84,36 +85,35 @@ void Runner::acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle
     w->now.has_override = !tau.is_none();
     if (w->now.has_override) read_buffer(tau, w->now.override_torque);
     if (p->frictions.empty()) begin_step(*p, *w, t, q, v);
-    else choose_modes(t, nb::none());
+    else choose_modes(t, {});
     const Buffer target(out, PyBUF_WRITABLE);
     target.check(w->now.a.size());
     std::copy(w->now.a.data(), w->now.a.data() + w->now.a.size(), target.data());
 }
 
-nb::dict Runner::solve(const Array& q_in, const Array& v_in, double t, nb::object tau, nb::object modes) {
+Instant Runner::solve(const Array& q_in, const Array& v_in, double t, const std::optional<Array>& tau,
+                      const std::optional<std::vector<int>>& modes) {
     set(q_in, v_in, tau);
     choose_modes(t, modes);
-    nb::dict out;
-    nb::list forces, limits, used;
+    Instant out;
     for (size_t e = 0; e < p->frictions.size(); ++e) {
-        Vec3 f = friction_force(*p, *w, static_cast<int>(e));
-        forces.append(to_numpy(&f[0], p->frictions[e].dim));
-        limits.append(w->state.mode[e] == sticking ? static_limit(*p, *w, static_cast<int>(e), t, q, v) : w->now.limit[e]);
-        used.append(static_cast<int>(w->state.mode[e]));
+        const int element = static_cast<int>(e);
+        const signed char mode = w->state.mode[e];
+        Vec3 f = friction_force(*p, *w, element);
+        out.friction.push_back(to_numpy(&f[0], p->frictions[e].dim));
+        out.limits.push_back(mode == sticking ? static_limit(*p, *w, element, t, q, v) : w->now.limit[e]);
+        out.modes.push_back(mode);
     }
     Split split;
     split_forces(*p, *w, split);
-    out["a"] = to_numpy(w->now.a);
-    out["F_ideal"] = to_numpy(split.F_ideal);
-    out["F_nonideal"] = to_numpy(split.F_nonideal);
-    out["C"] = to_numpy(split.C);
-    out["F"] = to_numpy(w->now.F);
-    out["lam"] = to_numpy(split.lam);
-    out["lam_ideal"] = to_numpy(split.lam_ideal);
-    out["rank"] = constraint_rank();
-    out["modes"] = used;
-    out["friction"] = forces;
-    out["limits"] = limits;
+    out.a = to_numpy(w->now.a);
+    out.F_ideal = to_numpy(split.F_ideal);
+    out.F_nonideal = to_numpy(split.F_nonideal);
+    out.C = to_numpy(split.C);
+    out.F = to_numpy(w->now.F);
+    out.lam = to_numpy(split.lam);
+    out.lam_ideal = to_numpy(split.lam_ideal);
+    out.rank = constraint_rank();
     return out;
 }
 
@@ -124,8 +124,8 @@ int Runner::constraint_rank() const {
     return rank;
 }
 
-nb::tuple Runner::rows(const Array& q_in, const Array& v_in, double t) {
-    set(q_in, v_in, nb::none());
+std::tuple<Numbers, Numbers, Numbers, Numbers> Runner::rows(const Array& q_in, const Array& v_in, double t) {
+    set(q_in, v_in, {});
     kinematics(p->mechanism, w->now.terms, q, v);
     evaluate_rows(*p, *w, t, v);
     const int nv = p->mechanism.nv;
@@ -145,12 +145,11 @@ nb::tuple Runner::rows(const Array& q_in, const Array& v_in, double t) {
             rate.push_back(values.rate[k]);
         }
     }
-    return nb::make_tuple(to_numpy(std::move(A)), to_numpy(std::move(b)), to_numpy(std::move(phi)),
-                          to_numpy(std::move(rate)));
+    return {to_numpy(std::move(A)), to_numpy(std::move(b)), to_numpy(std::move(phi)), to_numpy(std::move(rate))};
 }
 
-nb::tuple Runner::terms(const Array& q_in, const Array& v_in) {
-    set(q_in, v_in, nb::none());
+std::pair<Numbers, Numbers> Runner::terms(const Array& q_in, const Array& v_in) {
+    set(q_in, v_in, {});
     kinematics(p->mechanism, w->now.terms, q, v);
     inertia(p->mechanism, w->now.terms);
     const Mechanism& m = p->mechanism;
@@ -158,25 +157,26 @@ nb::tuple Runner::terms(const Array& q_in, const Array& v_in) {
     for (int k = 0; k < m.nv; ++k)
         for (int i = k, s = 0; i >= 0; i = m.dof_parent[i], ++s)
             M[k * m.nv + i] = M[i * m.nv + k] = w->now.terms.M[m.row_offset[k] + s];
-    return nb::make_tuple(to_numpy(std::move(M)), to_numpy(w->now.terms.nle));
+    return {to_numpy(std::move(M)), to_numpy(w->now.terms.nle)};
 }
 
-nb::tuple Runner::project_state(const Array& q_in, const Array& v_in, double t, double far) {
-    set(q_in, v_in, nb::none());
+std::tuple<Numbers, Numbers, double, double, double> Runner::project(const Array& q_in, const Array& v_in, double t,
+                                                                     double far) {
+    set(q_in, v_in, {});
     const Closure found = close(*p, *w, t, q, v, far);
-    return nb::make_tuple(to_numpy(q), to_numpy(v), found.before, found.after, found.rate);
+    return {to_numpy(q), to_numpy(v), found.before, found.after, found.rate};
 }
 
-nb::object Runner::derivative(double t, const Array& y_in, bool energy) {
+Numbers Runner::derivative(double t, const Array& y_in, bool energy) {
     System system(*p, *w, energy);
     const VecX y = read_state(system, map(y_in));
     VecX rate(system.ny);
-    choose_modes(t, nb::none());
+    choose_modes(t, {});
     system.rate_of_evaluation(t, y, rate);
     return to_numpy(rate.data(), system.ny - system.ne);
 }
 
-nb::tuple Runner::settle(double t, const Array& y_in, bool with_energy) {
+std::pair<Numbers, double> Runner::project_outside(double t, const Array& y_in, bool with_energy) {
     System system(*p, *w, with_energy);
     VecX y = read_state(system, map(y_in));
     const double before = energy();
@@ -184,21 +184,22 @@ nb::tuple Runner::settle(double t, const Array& y_in, bool with_energy) {
     normalize(p->mechanism, q.data());
     y.head(system.nq) = q;
     y.segment(system.nq, system.nv) = v;
-    return nb::make_tuple(to_numpy(y.data(), system.ny - system.ne), energy() - before);
+    return {to_numpy(y.data(), system.ny - system.ne), energy() - before};
 }
 
-nb::dict Runner::record(const Array& times, const Array2& states, const Array& moved, const nb::dict& options) {
-    const RecordOptions wanted = read_record(options);
+Outcome Runner::record(const Array& times, const Array2& states, const Array& moved, const RecordOptions& wanted,
+                       long steps) {
     System system(*p, *w, wanted.energy);
     Recording out;
     Recorder recorder(system, wanted, out);
     for (size_t k = 0; k < times.shape(0); ++k) {
         const double* row = states.data() + k * states.shape(1);
         const VecX y = read_state(system, Eigen::Map<const VecX>(row, states.shape(1)));
-        choose_modes(times.data()[k], nb::none());
+        choose_modes(times.data()[k], {});
         recorder.sample(times.data()[k], y, moved.data()[k], true);
     }
-    return Outcome{w->counters, std::move(out)}.hand_over();
+    out.steps = steps;
+    return {w->counters, std::move(out)};
 }
 
 VecX Runner::read_state(const System& system, const VecX& outside) {
@@ -219,33 +220,44 @@ double Runner::energy() {
 }
 
 double Runner::time_evaluations(const Array& q_in, const Array& v_in, double t, int count) {
-    set(q_in, v_in, nb::none());
-    choose_modes(t, nb::none());
+    set(q_in, v_in, {});
+    choose_modes(t, {});
     const auto begin = std::chrono::steady_clock::now();
     for (int i = 0; i < count; ++i) evaluate(*p, *w, t, q, v);
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / count;
 }
 
 void bind_runner(nb::module_& m) {
-    nb::class_<Runner>(m, "Runner")
+    constexpr auto own = nb::rv_policy::automatic;  // arrays that own their numbers
+    nb::class_<Instant>(m, "Instant")
+        .def_ro("a", &Instant::a, own)
+        .def_ro("F_ideal", &Instant::F_ideal, own)
+        .def_ro("F_nonideal", &Instant::F_nonideal, own)
+        .def_ro("C", &Instant::C, own)
+        .def_ro("F", &Instant::F, own)
+        .def_ro("lam", &Instant::lam, own)
+        .def_ro("lam_ideal", &Instant::lam_ideal, own)
+        .def_ro("rank", &Instant::rank)
+        .def_ro("modes", &Instant::modes)
+        .def_ro("friction", &Instant::friction, own)
+        .def_ro("limits", &Instant::limits);
+    nb::class_<Runner> runner(m, "Runner");
+    runner
         .def("acceleration", &Runner::acceleration, "q"_a, "v"_a, "t"_a, "tau"_a.none(), "out"_a)
-        .def("solve", &Runner::solve, "q"_a, "v"_a, "t"_a = 0.0, "tau"_a.none() = nb::none(),
-             "modes"_a.none() = nb::none())
-        .def("rows", &Runner::rows)
-        .def("terms", &Runner::terms)
-        .def("project", &Runner::project_state, "q"_a, "v"_a, "t"_a, "far"_a)
-        .def("derivative", &Runner::derivative)
-        .def("settle", &Runner::settle)
-        .def("record", &Runner::record)
-        .def("time_evaluations", &Runner::time_evaluations)
+        .def("solve", &Runner::solve, "q"_a, "v"_a, "t"_a = 0.0, "tau"_a = nb::none(), "modes"_a = nb::none())
+        .def("rows", &Runner::rows, "q"_a, "v"_a, "t"_a)
+        .def("terms", &Runner::terms, "q"_a, "v"_a)
+        .def("project", &Runner::project, "q"_a, "v"_a, "t"_a, "far"_a)
+        .def("derivative", &Runner::derivative, "t"_a, "y"_a, "energy"_a)
+        .def("project_outside", &Runner::project_outside, "t"_a, "y"_a, "energy"_a)
+        .def("time_evaluations", &Runner::time_evaluations, "q"_a, "v"_a, "t"_a, "count"_a)
         .def_prop_ro("rank", &Runner::constraint_rank)
         // How the rows were factored last: smallest pivot, orthogonal road taken, redundant, refined.
         .def_prop_ro("factorization", [](Runner& r) {
             const RowSystem& s = r.w->now.rows;
-            return nb::make_tuple(s.min_pivot, s.orthogonal, s.redundant, s.refine);
-        })
-        .def("simulate", &Runner::simulate)
-        .def("resume", &Runner::resume);
+            return std::make_tuple(s.min_pivot, s.orthogonal, s.redundant, s.refine);
+        });
+    bind_runs(m, runner);
 }
 
 }  // namespace pn

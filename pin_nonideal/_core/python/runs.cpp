@@ -9,7 +9,56 @@
 #include <system_error>
 #include <thread>
 
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+using namespace nanobind::literals;
+
+namespace nanobind::detail {
+
+// The one place that reads Python's RunOptions: all of them, or what a run records.
+constexpr auto run_options = const_name("pin_nonideal.runs.options.RunOptions");
+
+template <>
+struct type_caster<pn::RecordOptions> {
+    NB_TYPE_CASTER(pn::RecordOptions, run_options)
+
+    bool from_python(handle from, uint32_t, cleanup_list*) noexcept {
+        try {
+            const auto wanted = [&](const char* key) { return nanobind::cast<bool>(from.attr(key)); };
+            value = {wanted("a"), wanted("forces"), wanted("energy"), wanted("power")};
+            return true;
+        } catch (const std::exception&) {
+            return false;
+        }
+    }
+};
+
+template <>
+struct type_caster<pn::Options> {
+    NB_TYPE_CASTER(pn::Options, run_options)
+
+    bool from_python(handle from, uint32_t, cleanup_list*) noexcept {
+        try {
+            const auto number = [&](const char* key) { return nanobind::cast<double>(from.attr(key)); };
+            value.method = pn::method_named(nanobind::cast<std::string>(from.attr("method")));
+            value.t0 = number("t0");
+            value.duration = number("duration");
+            value.rtol = number("rtol");
+            value.dt = number("dt");
+            value.output_dt = number("output_dt");
+            pn::read_into(from.attr("atol"), value.atol);
+            value.record = nanobind::cast<pn::RecordOptions>(from);
+            return true;
+        } catch (const std::exception&) {
+            return false;
+        }
+    }
+};
+
+}  // namespace nanobind::detail
 
 #include "constraints/projection.hpp"
 
@@ -17,98 +66,76 @@ namespace pn {
 
 namespace {
 
-Options read_options(const nb::dict& d) {
-    Options o;
-    o.method = method_named(nb::cast<std::string>(d["method"]));
-    o.t0 = nb::cast<double>(d["t0"]);
-    o.duration = nb::cast<double>(d["duration"]);
-    o.rtol = nb::cast<double>(d["rtol"]);
-    o.dt = nb::cast<double>(d["dt"]);
-    o.output_dt = nb::cast<double>(d["output_dt"]);
-    read_into(nb::cast<nb::object>(d["atol"]), o.atol);
-    o.record = read_record(d);
-    const nb::object tick = nb::cast<nb::object>(d["tick"]);
+using Tick = Function<void(double)>;     // with the time
+using Save = Function<void(nb::bytes)>;  // with the state of a checkpoint
+
+// Now and then between two steps: Python's signals, and progress.
+void watch(Options& o, const Tick& tick) {
     o.tick = [tick, last = std::chrono::steady_clock::now()](double t) mutable {
         const auto now = std::chrono::steady_clock::now();
         if (now - last < std::chrono::milliseconds(50)) return;
         last = now;
         nb::gil_scoped_acquire gil;
         if (PyErr_CheckSignals() != 0) throw nb::python_error();
-        if (!tick.is_none()) tick(t);
+        if (tick) (*tick)(t);
     };
-    const nb::object save = nb::cast<nb::object>(d["save"]);
-    if (save.is_none()) return o;
+}
+
+void keep(Options& o, const Save& save, double interval) {
+    if (!save) return;
     o.save = [save](const std::string& state) {
         nb::gil_scoped_acquire gil;
-        save(nb::bytes(state.data(), state.size()));
+        (*save)(nb::bytes(state.data(), state.size()));
     };
-    o.save_interval = std::chrono::duration_cast<Clock::duration>(
-        std::chrono::duration<double>(nb::cast<double>(d["save_interval"])));
-    return o;
+    o.save_interval = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(interval));
+}
+
+// What stopped a run: a failure of the core, what a function of the user raised, or None.
+nb::object stopped(const Outcome& outcome) {
+    const Recording& r = outcome.recording;
+    if (r.failure) return failure_object(*r.failure);
+    if (!r.error) return nb::none();
+    try {
+        std::rethrow_exception(r.error);
+    } catch (nb::python_error& e) {
+        return nb::borrow(e.value());
+    } catch (const std::exception& e) {
+        return nb::handle(PyExc_RuntimeError)(e.what());
+    }
+}
+
+// Recorded numbers as an array that keeps their run alive; empty when they were not recorded.
+template <auto field>
+auto recorded(nb::handle_t<Outcome> run) {
+    auto& numbers = nb::cast<Outcome&>(run).recording.*field;
+    numbers.reserve(1);  // an array has an address, one without numbers too
+    using Number = typename std::decay_t<decltype(numbers)>::value_type;
+    return nb::ndarray<nb::numpy, Number, nb::ndim<1>>(numbers.data(), {numbers.size()}, run);
 }
 
 }  // namespace
 
-RecordOptions read_record(const nb::dict& d) {
-    const auto wanted = [&](const char* key) { return nb::cast<bool>(d[key]); };
-    return {wanted("a"), wanted("forces"), wanted("energy"), wanted("power")};
-}
-
-nb::dict Outcome::hand_over() {
-    nb::dict out;
-    Recording& r = recording;
-    const std::pair<const char*, std::vector<double>*> fields[] = {
-        {"t", &r.t}, {"q", &r.q}, {"v", &r.v}, {"violation", &r.violation}, {"violation_rate", &r.violation_rate},
-        {"a", &r.a}, {"F_ideal", &r.F_ideal}, {"F_nonideal", &r.F_nonideal}, {"lam", &r.lam},
-        {"lam_ideal", &r.lam_ideal}, {"energy", &r.energy}, {"power", &r.power}, {"z", &r.z}};
-    double largest_violation = 0.0;
-    for (const double gap : r.violation) largest_violation = std::fmax(largest_violation, gap);
-    for (const auto& [name, values] : fields)
-        if (!values->empty()) out[name] = to_numpy(std::move(*values));
-    if (!r.modes.empty()) out["modes"] = to_numpy(std::vector<double>(r.modes.begin(), r.modes.end()));
-    nb::list events;
-    for (const Event& e : r.events) events.append(nb::make_tuple(e.time, static_cast<int>(e.kind), e.element));
-    out["events"] = events;
-    out["largest_violation"] = largest_violation;
-    out["counters"] = nb::make_tuple(r.steps, r.rejected, counters.evaluations, counters.factorizations,
-                                     counters.projections, counters.iterations);
-    out["failure"] = r.failure ? failure_object(*r.failure) : nb::none();
-    out["error"] = nb::none();
-    if (r.error) {
-        try {
-            std::rethrow_exception(r.error);
-        } catch (nb::python_error& e) {
-            out["error"] = nb::borrow(e.value());
-        } catch (const std::exception& e) {
-            out["error"] = nb::cast(std::string(e.what()));
-        }
-    }
-    return out;
-}
-
-nb::dict Runner::simulate(const Array& q_in, const Array& v_in, const Array& z, const nb::dict& options) {
-    const Options o = read_options(options);
+Outcome Runner::simulate(const Array& q_in, const Array& v_in, const Options& options) {
     const VecX q0 = map(q_in), v0 = map(v_in);
-    w->state.z = map(z);
+    w->state.z = VecX::Zero(p->states);
     w->now.has_override = false;
     Recording recording;
     {
         nb::gil_scoped_release release;
-        pn::simulate(*p, *w, q0, v0, o, recording);
+        pn::simulate(*p, *w, q0, v0, options, recording);
     }
-    return Outcome{w->counters, std::move(recording)}.hand_over();
+    return {w->counters, std::move(recording)};
 }
 
-nb::dict Runner::resume(const nb::bytes& state, const nb::dict& options) {
-    const Options o = read_options(options);
+Outcome Runner::resume(const nb::bytes& state, const Options& options) {
     const std::string bytes(static_cast<const char*>(state.data()), state.size());
     Recording recording;
     w = std::make_unique<Workspace>(*p);
     {
         nb::gil_scoped_release release;
-        pn::resume(*p, *w, bytes, o, recording);
+        pn::resume(*p, *w, bytes, options, recording);
     }
-    return Outcome{w->counters, std::move(recording)}.hand_over();
+    return {w->counters, std::move(recording)};
 }
 
 static int useful_threads(size_t count, int threads) { return static_cast<int>(std::min<size_t>(threads, count)); }
@@ -168,16 +195,20 @@ static void share_out(size_t count, int threads, std::atomic<bool>& stopped, Wor
     if (error) std::rethrow_exception(error);
 }
 
-nb::tuple nearest_states(const Builder& b, const Array2& q_in, const Array2& v_in, double t, double far, int threads) {
+// q and v of many states on the constraints, by rows, and the largest residual and rate of each afterwards: NaN where
+// the state could not be taken. On several threads, each state as by Runner::project.
+static std::tuple<Numbers, Numbers, Numbers, Numbers> nearest_states(const Program& p, const Array2& q_in,
+                                                                     const Array2& v_in, double t, double far,
+                                                                     int threads) {
     RowMajor q = map(q_in), v = map(v_in);
     VecX after = VecX::Constant(q.rows(), NAN), rate = after;
     std::vector<std::unique_ptr<Workspace>> spaces(useful_threads(q.rows(), threads));
     std::atomic<bool> stopped{false};
     share_out(q.rows(), threads, stopped, [&](size_t i, int k) {
-        if (!spaces[k]) spaces[k] = std::make_unique<Workspace>(*b.p);
+        if (!spaces[k]) spaces[k] = std::make_unique<Workspace>(p);
         VecX q_one = q.row(i), v_one = v.row(i);
         try {
-            const Closure found = close(*b.p, *spaces[k], t, q_one, v_one, far);
+            const Closure found = close(p, *spaces[k], t, q_one, v_one, far);
             after[i] = found.after;
             rate[i] = found.rate;
             q.row(i) = q_one;
@@ -186,7 +217,7 @@ nb::tuple nearest_states(const Builder& b, const Array2& q_in, const Array2& v_i
             // Told where the state is taken alone.
         }
     });
-    return nb::make_tuple(to_numpy(q.data(), q.size()), to_numpy(v.data(), v.size()), to_numpy(after), to_numpy(rate));
+    return {to_numpy(q.data(), q.size()), to_numpy(v.data(), v.size()), to_numpy(after), to_numpy(rate)};
 }
 
 static bool is_interrupt(const std::exception_ptr& error) {
@@ -201,30 +232,28 @@ static bool is_interrupt(const std::exception_ptr& error) {
     }
 }
 
-// Every run has a workspace of its own.
-nb::list rollout(const Builder& b, const Array2& q, const Array2& v, const Array& z, const nb::dict& options,
-                 int threads) {
+// Outcomes of runs from many states, on several threads, each with a workspace of its own. Where one is interrupted
+// all stop, and those not begun are None.
+static nb::typed<nb::list, std::optional<Outcome>> rollout(const Program& p, const Array2& q, const Array2& v, Options options, int threads) {
     const size_t count = q.shape(0);
     std::vector<std::optional<Outcome>> outcomes(count);
     std::atomic<bool> stopped{false};
     const auto stop = [&stopped](double t) {
         if (stopped) throw Failure(Failure::Kind::interrupted, t);
     };
-    // Read here and not in the threads: options hold Python's objects, whose counts need the lock.
-    Options own = read_options(options), others = own;
-    others.tick = stop;  // Python tells its signals to the caller's thread
+    Options own = options;  // of the caller's thread, to which Python tells its signals
+    watch(own, {});
     own.tick = [stop, signals = own.tick](double t) {
         stop(t);
         signals(t);
     };
-    const VecX z0 = map(z);
+    options.tick = stop;
     const auto q_all = map(q), v_all = map(v);
     try {
         share_out(count, threads, stopped, [&](size_t i, int k) {
-            Workspace space(*b.p);
-            space.state.z = z0;
+            Workspace space(p);
             Recording mine;  // neighbors in one array would share lines of cache between the threads
-            simulate(*b.p, space, q_all.row(i), v_all.row(i), k == 0 ? own : others, mine);
+            simulate(p, space, q_all.row(i), v_all.row(i), k == 0 ? own : options, mine);
             if (is_interrupt(mine.error)) stopped = true;
             outcomes[i] = Outcome{space.counters, std::move(mine)};
         });
@@ -235,9 +264,70 @@ nb::list rollout(const Builder& b, const Array2& q, const Array2& v, const Array
         };
         if (!is_interrupt(std::current_exception()) || std::none_of(outcomes.begin(), outcomes.end(), tells)) throw;
     }
-    nb::list out;
+    nb::typed<nb::list, std::optional<Outcome>> out;
     for (std::optional<Outcome>& one : outcomes) out.append(one ? nb::cast(std::move(*one)) : nb::none());
     return out;
+}
+
+static void bind_outcome(nb::module_& m) {
+    using R = Recording;
+    nb::enum_<Event::Kind>(m, "EventKind", "What happened between two smooth stretches of a run.")
+        .value("stick", Event::Kind::stick)
+        .value("slip", Event::Kind::slip)
+        .value("reverse", Event::Kind::reverse)
+        .value("pull", Event::Kind::pull)
+        .value("chatter", Event::Kind::chatter);
+    nb::class_<Event>(m, "Event")
+        .def_ro("time", &Event::time)
+        .def_ro("kind", &Event::kind)
+        .def_ro("element", &Event::element);
+    nb::class_<Outcome>(m, "Outcome")
+        .def_prop_ro("t", recorded<&R::t>)
+        .def_prop_ro("q", recorded<&R::q>)
+        .def_prop_ro("v", recorded<&R::v>)
+        .def_prop_ro("violation", recorded<&R::violation>)
+        .def_prop_ro("violation_rate", recorded<&R::violation_rate>)
+        .def_prop_ro("a", recorded<&R::a>)
+        .def_prop_ro("F_ideal", recorded<&R::F_ideal>)
+        .def_prop_ro("F_nonideal", recorded<&R::F_nonideal>)
+        .def_prop_ro("lam", recorded<&R::lam>)
+        .def_prop_ro("lam_ideal", recorded<&R::lam_ideal>)
+        .def_prop_ro("energy", recorded<&R::energy>)
+        .def_prop_ro("power", recorded<&R::power>)
+        .def_prop_ro("z", recorded<&R::z>)
+        .def_prop_ro("modes", recorded<&R::modes>)
+        .def_prop_ro("events", [](const Outcome& o) { return o.recording.events; })
+        .def_prop_ro("steps", [](const Outcome& o) { return o.recording.steps; })
+        .def_prop_ro("rejected", [](const Outcome& o) { return o.recording.rejected; })
+        .def_prop_ro("evaluations", [](const Outcome& o) { return o.counters.evaluations; })
+        .def_prop_ro("factorizations", [](const Outcome& o) { return o.counters.factorizations; })
+        .def_prop_ro("projections", [](const Outcome& o) { return o.counters.projections; })
+        .def_prop_ro("iterations", [](const Outcome& o) { return o.counters.iterations; })
+        .def_prop_ro("stopped", stopped, nb::for_getter(nb::sig("def stopped(self) -> BaseException | None")));
+}
+
+void bind_runs(nb::module_& m, nb::class_<Runner>& runner) {
+    nb::class_<Method>(m, "Method")
+        .def_prop_ro("name", [](const Method& method) { return std::string(method.name); })
+        .def_prop_ro("adaptive", &Method::adaptive);
+    m.def("methods", [] { return methods(); });
+    bind_outcome(m);
+    runner
+        .def("simulate", [](Runner& r, const Array& q, const Array& v, Options options, const Tick& tick,
+                            const Save& save, double save_interval) {
+            watch(options, tick);
+            keep(options, save, save_interval);
+            return r.simulate(q, v, options);
+        }, "q"_a, "v"_a, "options"_a, "tick"_a = nb::none(), "save"_a = nb::none(), "save_interval"_a = 0.0)
+        .def("resume", [](Runner& r, const nb::bytes& state, Options options, const Tick& tick, const Save& save,
+                          double save_interval) {
+            watch(options, tick);
+            keep(options, save, save_interval);
+            return r.resume(state, options);
+        }, "state"_a, "options"_a, "tick"_a = nb::none(), "save"_a = nb::none(), "save_interval"_a = 0.0)
+        .def("record", &Runner::record, "times"_a, "states"_a, "moved"_a, "options"_a, "steps"_a);
+    m.def("nearest_states", &nearest_states, "program"_a, "q"_a, "v"_a, "t"_a, "far"_a, "threads"_a);
+    m.def("rollout", &rollout, "program"_a, "q"_a, "v"_a, "options"_a, "threads"_a);
 }
 
 }  // namespace pn

@@ -1,0 +1,349 @@
+from collections.abc import Callable, Sequence
+import enum
+from typing import Annotated, overload
+
+import numpy
+from numpy.typing import NDArray
+
+import pin_nonideal.runs.options
+
+
+pinocchio_version: str
+
+state_layout: str
+
+class FailureKind(enum.Enum):
+    """Why an evaluation or a run could not go on."""
+
+    singular_mass = 0
+    """elements: the degree of freedom"""
+
+    inconsistent = 1
+    """elements: blocks of rows; value: residual"""
+
+    not_finite = 2
+
+    paradox = 3
+    """elements: frictional elements; value: determinant"""
+
+    closure = 4
+    """elements: the block of rows; value: gap"""
+
+    step_size = 5
+    """value: number of steps so far, when it would never end"""
+
+    interrupted = 6
+
+class CoreFailure(Exception):
+    kind: FailureKind
+    time: float
+    elements: list[int]
+    value: float
+
+class ReactionView:
+    @property
+    def lam(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    def of_joint(self, joint: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    def of_block(self, block: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+class Load(enum.Enum):
+    """What loads the bearing that rubs."""
+
+    none = 0
+
+    revolute = 1
+
+    prismatic = 2
+
+    spherical = 3
+
+    contact = 4
+
+    user = 5
+
+class Reaction(enum.Enum):
+    """Of which motion a law reads the reactions."""
+
+    none = 0
+
+    ideal = 1
+
+    total = 2
+
+class ConstraintRows:
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def first(self) -> int: ...
+
+    @property
+    def count(self) -> int: ...
+
+    @property
+    def holonomic(self) -> list[bool]: ...
+
+    @property
+    def moves_in_time(self) -> bool: ...
+
+class Program:
+    @property
+    def constraints(self) -> list[ConstraintRows]: ...
+
+    @property
+    def rows(self) -> int: ...
+
+    @property
+    def states(self) -> int: ...
+
+    @property
+    def law_names(self) -> list[str]: ...
+
+    @property
+    def element_names(self) -> list[str]: ...
+
+    def runner(self) -> Runner: ...
+
+class Builder:
+    def __init__(self, model: object, pinocchio_terms: bool = False) -> None: ...
+
+    def keep_rows(self, block: int, rows: Sequence[int]) -> None: ...
+
+    @property
+    def constraints(self) -> list[ConstraintRows]: ...
+
+    def finish(self) -> Program: ...
+
+    def add_point(self, arg0: str, arg1: tuple[int, Sequence[float], Sequence[float]], arg2: tuple[int, Sequence[float], Sequence[float]], arg3: Sequence[int], /) -> int: ...
+
+    def add_contact(self, arg0: str, arg1: tuple[int, Sequence[float], Sequence[float]], arg2: tuple[int, Sequence[float], Sequence[float]], arg3: Sequence[float], arg4: float, /) -> int: ...
+
+    def add_frame(self, arg0: str, arg1: tuple[int, Sequence[float], Sequence[float]], arg2: tuple[int, Sequence[float], Sequence[float]], /) -> int: ...
+
+    def add_hinge(self, arg0: str, arg1: tuple[int, Sequence[float], Sequence[float]], arg2: tuple[int, Sequence[float], Sequence[float]], arg3: Sequence[float], arg4: Sequence[float], arg5: Sequence[float], /) -> int: ...
+
+    def add_distance(self, arg0: str, arg1: tuple[int, Sequence[float], Sequence[float]], arg2: tuple[int, Sequence[float], Sequence[float]], arg3: object, /) -> int: ...
+
+    def add_knife(self, arg0: str, arg1: tuple[int, Sequence[float], Sequence[float]], arg2: Sequence[float], /) -> int: ...
+
+    def add_rolling(self, arg0: str, arg1: tuple[int, Sequence[float], Sequence[float]], arg2: tuple[int, Sequence[float], Sequence[float]], arg3: float, arg4: bool, arg5: Sequence[float], arg6: Sequence[float], arg7: Sequence[float], arg8: Sequence[float], /) -> int: ...
+
+    def add_coupling(self, arg0: str, arg1: int, arg2: int, arg3: float, arg4: float, arg5: float, arg6: bool, /) -> int: ...
+
+    def add_motion(self, arg0: str, arg1: int, arg2: object, arg3: float, /) -> int: ...
+
+    def add_user(self, name: str, size: int, rows: object, residual: object | None, rate: object | None) -> int: ...
+
+    def add_dof_slip(self, arg0: str, arg1: int, arg2: int, /) -> int: ...
+
+    def add_hinge_slip(self, arg0: str, arg1: tuple[int, Sequence[float], Sequence[float]], arg2: tuple[int, Sequence[float], Sequence[float]], arg3: Sequence[float], /) -> int: ...
+
+    def add_contact_slip(self, arg0: str, arg1: tuple[int, Sequence[float], Sequence[float]], arg2: tuple[int, Sequence[float], Sequence[float]], arg3: float, arg4: Sequence[float], arg5: Sequence[float], arg6: Sequence[float], /) -> int: ...
+
+    def add_user_slip(self, arg0: str, arg1: object, /) -> int: ...
+
+    def add_friction(self, law: int, block: int, *, load: Load = Load.none, reaction: Reaction = Reaction.none, joint: int = -1, anchor: int = -1, axis: Sequence[float] = [0.0, 0.0, 1.0], constant: float = 0.0, mu: float = 0.0, radius: float = 0.0, axial_radius: float = 0.0, inverse_span: float = 0.0, static_ratio: float = 1.0, stribeck_velocity: float = 0.0, user_limit: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], ReactionView], float] | None = None) -> None: ...
+
+    def add_law(self, name: str) -> int: ...
+
+    def add_viscous(self, law: int, coefficient: float, *, dof: int = -1, count: int = 1, block: int = -1) -> None: ...
+
+    def add_drag(self, law: int, frame: tuple[int, Sequence[float], Sequence[float]], coefficient: float, exponent: float) -> None: ...
+
+    def add_sigmoid(self, law: int, dof: int, phi1: float, phi2: float, phi3: float) -> None: ...
+
+    def add_lugre(self, law: int, dof: int, stiffness: float, damping: float, viscous: float, coulomb: float, stiction: float, stribeck_velocity: float) -> None: ...
+
+    def add_user_law(self, law: int, states: int, reaction: Reaction, function: Callable[..., object]) -> None: ...
+
+    def add_spring_damper(self, frame1: tuple[int, Sequence[float], Sequence[float]], frame2: tuple[int, Sequence[float], Sequence[float]], stiffness: float, damping: float, rest_length: float) -> None: ...
+
+    def add_joint_spring(self, joint: int, stiffness: float, rest: float, damping: float) -> None: ...
+
+    @overload
+    def add_wrench(self, frame: tuple[int, Sequence[float], Sequence[float]], value: Sequence[float]) -> None: ...
+
+    @overload
+    def add_wrench(self, frame: tuple[int, Sequence[float], Sequence[float]], function: Callable[[float], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]) -> None: ...
+
+    def add_user_force(self, function: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]) -> None: ...
+
+    def set_constant_torque(self, tau: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None: ...
+
+    def set_torque_function(self, function: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]) -> None: ...
+
+    def set_sampled_torque(self, function: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]], Annotated[NDArray[numpy.float64], dict(shape=(None,))]], period: float) -> None: ...
+
+    def set_hold_position(self, kp: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], kd: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None: ...
+
+    def set_torque_table(self, times: Sequence[float], values: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> None: ...
+
+class Instant:
+    @property
+    def a(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def F_ideal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def F_nonideal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def C(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def F(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def lam(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def lam_ideal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def rank(self) -> int: ...
+
+    @property
+    def modes(self) -> list[int]: ...
+
+    @property
+    def friction(self) -> list[Annotated[NDArray[numpy.float64], dict(shape=(None,))]]: ...
+
+    @property
+    def limits(self) -> list[float]: ...
+
+class Runner:
+    def acceleration(self, q: object, v: object, t: float, tau: object | None, out: object) -> None: ...
+
+    def solve(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], t: float = 0.0, tau: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, modes: Sequence[int] | None = None) -> Instant: ...
+
+    def rows(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], t: float) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]: ...
+
+    def terms(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]: ...
+
+    def project(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], t: float, far: float) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], float, float, float]: ...
+
+    def derivative(self, t: float, y: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], energy: bool) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    def project_outside(self, t: float, y: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], energy: bool) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], float]: ...
+
+    def time_evaluations(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], t: float, count: int) -> float: ...
+
+    @property
+    def rank(self) -> int: ...
+
+    @property
+    def factorization(self) -> tuple[float, bool, bool, bool]: ...
+
+    def simulate(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], options: pin_nonideal.runs.options.RunOptions, tick: Callable[[float], None] | None = None, save: Callable[[bytes], None] | None = None, save_interval: float = 0.0) -> Outcome: ...
+
+    def resume(self, state: bytes, options: pin_nonideal.runs.options.RunOptions, tick: Callable[[float], None] | None = None, save: Callable[[bytes], None] | None = None, save_interval: float = 0.0) -> Outcome: ...
+
+    def record(self, times: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], states: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], moved: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], options: pin_nonideal.runs.options.RunOptions, steps: int) -> Outcome: ...
+
+class Method:
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def adaptive(self) -> bool: ...
+
+def methods() -> list[Method]: ...
+
+class EventKind(enum.Enum):
+    """What happened between two smooth stretches of a run."""
+
+    stick = 0
+
+    slip = 1
+
+    reverse = 2
+
+    pull = 3
+
+    chatter = 4
+
+class Event:
+    @property
+    def time(self) -> float: ...
+
+    @property
+    def kind(self) -> EventKind: ...
+
+    @property
+    def element(self) -> int: ...
+
+class Outcome:
+    @property
+    def t(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def q(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def v(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def violation(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def violation_rate(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def a(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def F_ideal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def F_nonideal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def lam(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def lam_ideal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def energy(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def power(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def z(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def modes(self) -> Annotated[NDArray[numpy.int8], dict(shape=(None,))]: ...
+
+    @property
+    def events(self) -> list[Event]: ...
+
+    @property
+    def steps(self) -> int: ...
+
+    @property
+    def rejected(self) -> int: ...
+
+    @property
+    def evaluations(self) -> int: ...
+
+    @property
+    def factorizations(self) -> int: ...
+
+    @property
+    def projections(self) -> int: ...
+
+    @property
+    def iterations(self) -> int: ...
+
+    @property
+    def stopped(self) -> BaseException | None: ...
+
+def nearest_states(program: Program, q: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], t: float, far: float, threads: int) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]: ...
+
+def rollout(program: Program, q: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], options: pin_nonideal.runs.options.RunOptions, threads: int) -> list[Outcome | None]: ...
+
+def friction_program(W: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], alpha0: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], dims: Sequence[int], limits: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...

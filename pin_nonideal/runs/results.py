@@ -1,0 +1,158 @@
+"""What the core hands over as a Trajectory; what stopped the run as an exception that holds it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pin_nonideal.compilation.failures import opened
+from pin_nonideal.core import core
+from pin_nonideal.errors import OutputError, RunError, RunInterrupted, UserFunctionError
+from pin_nonideal.scene import Scene
+from pin_nonideal.states.rows import rows_at
+from pin_nonideal.trajectory import Event, Stats, Trajectory
+from pin_nonideal.types import Array
+
+from .options import RunOptions
+
+# A sample with a larger gap than this [m or rad] has left the constraints: after every step projection comes
+# down to rounding, and in singular positions to the square root of it.
+LEFT = 1e-6
+KEPT = "the trajectory up to there is in error.trajectory"
+
+
+def finish(
+    scene: Scene, outcome: core.Outcome, stopped: BaseException | None, options: RunOptions, wall: float
+) -> Trajectory:
+    """The trajectory of a run; raises what stopped it, with the trajectory attached.
+
+    Args:
+        scene: the scene that ran.
+        outcome: of the core.
+        stopped: a failure of the core, what a function of the user raised, an interrupt, or None.
+        options: what was asked for.
+        wall: wall time [s].
+
+    Raises:
+        RunError: the run stopped early.
+        OutputError: its first checkpoint could not be written.
+    """
+    trajectory = shaped(scene, outcome, options, wall)
+    if stopped is None or isinstance(stopped, core.CoreFailure):
+        _check_closed(scene, trajectory)
+    if stopped is None:
+        return trajectory
+    if isinstance(stopped, OutputError):
+        raise stopped
+    last = float(trajectory.t[-1]) if len(trajectory) else options.t0
+    cause: BaseException | None = None
+    if isinstance(stopped, core.CoreFailure):
+        error = scene._compiled.named(stopped)
+        error.args = (f"{error}; {KEPT}", *error.args[1:])
+    elif isinstance(stopped, KeyboardInterrupt):
+        error = RunInterrupted(f"the run was interrupted at t = {last:.4g} s; {KEPT}", time=last)
+    elif isinstance(stopped, RunError):
+        error, cause = stopped, stopped.__cause__
+    else:
+        error = UserFunctionError(f"a function of the scene failed at t = {last:.4g} s: {stopped}", time=last)
+        cause = stopped
+    error.time = last if error.time is None else error.time
+    error.trajectory = trajectory
+    raise error from cause
+
+
+def _check_closed(scene: Scene, trajectory: Trajectory) -> None:
+    """Raises when a run has left its constraints, as it must when a drive pulls a loop apart.
+
+    Raises:
+        LoopClosureError: with the samples before.
+    """
+    left = trajectory.violation > LEFT
+    if not left.any():
+        return
+    k = int(left.argmax())
+    t = float(trajectory.t[k])
+    runner = scene._compiled.program.runner()
+    residual = np.abs(rows_at(runner, trajectory.q[k], trajectory.v[k], t)[2])
+    gaps = {key: float(residual[rows].max()) for key, rows in scene.constraint_slices.items()}
+    stopped = opened(max(gaps, key=lambda key: gaps[key]), gaps, t, f"; {KEPT}")
+    stopped.trajectory = trajectory.first(k)
+    raise stopped
+
+
+def shaped(scene: Scene, outcome: core.Outcome, options: RunOptions, wall: float) -> Trajectory:
+    """A Trajectory from the core's flat arrays.
+
+    Args:
+        scene: the scene that ran.
+        outcome: of the core.
+        options: what was asked for.
+        wall: wall time [s].
+    """
+    nt, nq, nv, program = len(outcome.t), scene.q0.size, scene.v0.size, scene._compiled.program
+    fields: dict[str, Any] = {}
+    if options.a:
+        fields["a"] = outcome.a.reshape(nt, nv)
+    if options.forces:
+        fields["F_ideal"] = outcome.F_ideal.reshape(nt, nv)
+        fields["F_nonideal"] = outcome.F_nonideal.reshape(nt, nv)
+        fields["lam"] = outcome.lam.reshape(nt, program.rows)
+        fields["lam_ideal"] = outcome.lam_ideal.reshape(nt, program.rows)
+    columns = ["actuation", "forces", "constraints", *_columns(scene.law_names)]
+    if options.power:
+        power = outcome.power.reshape(nt, len(columns))
+        fields["power"] = dict(zip(columns, power.T, strict=True))
+    if options.energy:
+        fields["energy"] = _ledger(columns, outcome.energy.reshape(nt, len(columns) + 3))
+    if program.states:
+        fields["z"] = outcome.z.reshape(nt, program.states)
+    elements = scene.element_names
+    if elements:
+        fields["modes"] = outcome.modes.reshape(nt, len(elements))
+    return Trajectory(
+        t=outcome.t,
+        q=outcome.q.reshape(nt, nq),
+        v=outcome.v.reshape(nt, nv),
+        violation=outcome.violation,
+        violation_rate=outcome.violation_rate,
+        events=[_event(scene, event) for event in outcome.events],
+        stats=Stats(
+            outcome.steps,
+            outcome.rejected,
+            outcome.evaluations,
+            outcome.factorizations,
+            outcome.projections,
+            outcome.iterations,
+            wall,
+        ),
+        scene=scene,
+        element_names=list(elements),
+        name=scene.name,
+        **fields,
+    )
+
+
+def _event(scene: Scene, event: core.Event) -> Event:
+    """An event with the name of its frictional element, or of the contact that pulls."""
+    names = list(scene.constraint_slices) if event.kind is core.EventKind.pull else scene.element_names
+    return Event(event.time, event.kind.name, names[event.element])
+
+
+def _ledger(columns: Sequence[str], numbers: Array) -> dict[str, Array]:
+    ledger = {
+        "kinetic": numbers[:, 0],
+        "potential": numbers[:, 1],
+        "total": numbers[:, 0] + numbers[:, 1],
+    }
+    ledger |= dict(zip([*columns, "projection"], numbers[:, 2:].T, strict=True))
+    done = numbers[:, 2:].sum(axis=1)
+    ledger["balance"] = ledger["total"] - ledger["total"][:1] - done
+    return ledger
+
+
+def _columns(laws: Sequence[str]) -> list[str]:
+    """Law names as ledger columns that no other column bears."""
+    taken = {"kinetic", "potential", "total", "actuation", "forces", "constraints", "projection", "balance"}
+    return [f"law {name}" if name in taken else name for name in laws]

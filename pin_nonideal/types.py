@@ -1,0 +1,17 @@
+"""Types that signatures name: arrays of floats, and Pinocchio's objects, which have no types of their own."""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+
+Model: TypeAlias = Any  # pinocchio.Model
+JointModel: TypeAlias = Any  # pinocchio.JointModel
+GeometryModel: TypeAlias = Any  # pinocchio.GeometryModel
+GeometryObject: TypeAlias = Any  # pinocchio.GeometryObject
+Placement: TypeAlias = Any  # pinocchio.SE3
+Inertia: TypeAlias = Any  # pinocchio.Inertia

@@ -1,0 +1,95 @@
+"""Rooms: a module imports only from those above it, so that no circle exists; the compiled core is typed."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "pin_nonideal"
+
+# All modules from the top down, a line a room. CONTRIBUTING shows the same order.
+ORDER = """
+errors types checks files equation
+timefunctions constraints laws contacts forces actuation
+_core core
+states: placements configurations closure rows projection
+compilation: failures callbacks names constraints laws forces lowering analysis scene report
+scene trajectory
+formats: xml mjcf_text model_edit inertia urdf_checks urdf generators mjcf_equality mjcf robot_yaml assembly
+loading
+runs: options progress results checkpoint scipy_methods resume
+simulation sweep
+page: geometry motion forces signals payload
+replay plotting pin_nonideal cli
+"""
+
+
+def modules_in_order() -> list[str]:
+    """Dotted names below the package, whose own name is empty."""
+    found = []
+    for line in ORDER.strip().splitlines():
+        room, _, names = line.rpartition(":")
+        found += [room] * bool(room) + [f"{room}.{name}".lstrip(".") for name in names.split()]
+    return [name.removeprefix("pin_nonideal") for name in found]
+
+
+def path_of(name: str) -> Path:
+    path = PACKAGE / name.replace(".", "/")
+    return path / "__init__.py" if path.is_dir() and name != "_core" else path.with_suffix(".py")
+
+
+def imports_of(name: str, known: list[str]) -> set[str]:
+    """Modules of the package that a module imports anywhere: in functions and for type checkers too."""
+    home = ["pin_nonideal", *name.split(".")] if name else ["pin_nonideal"]
+    home = home if path_of(name).name == "__init__.py" else home[:-1]
+    found = set()
+    for node in ast.walk(ast.parse(path_of(name).read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            targets = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = home[: len(home) + 1 - node.level] if node.level else []
+            source = ".".join([*base, *([node.module] if node.module else [])])
+            targets = [f"{source}.{alias.name}" for alias in node.names]
+        else:
+            continue
+        for target in targets:
+            inside = target.removeprefix("pin_nonideal").removeprefix(".")
+            if target.split(".")[0] == "pin_nonideal":
+                found.add(inside if inside in known else inside.rpartition(".")[0])
+    return found
+
+
+def test_every_module_has_its_place() -> None:
+    names = {
+        ".".join(path.relative_to(PACKAGE).with_suffix("").parts).removesuffix("__init__").removesuffix(".")
+        for path in PACKAGE.rglob("*.py")
+    }
+    assert sorted(names | {"_core"}) == sorted(modules_in_order())
+
+
+@pytest.mark.parametrize("name", [n for n in modules_in_order() if n != "_core"])
+def test_imports_go_upward(name: str) -> None:
+    order = modules_in_order()
+    above = order[: order.index(name)]
+    assert sorted(imports_of(name, order) - set(above)) == []
+
+
+def test_contributing_shows_the_order() -> None:
+    text = " ".join((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").split())
+    shown = [re.sub(r"^(\w+): (.*)$", r"\1/ (\2)", line) for line in ORDER.strip().splitlines()]
+    assert "; ".join(line.replace(" ", ", ").replace("/, (", "/ (") for line in shown) in text
+
+
+def test_stub_is_the_core(tmp_path: Path) -> None:
+    """`_core.pyi`, which type checkers read, is what nanobind generates of the compiled core."""
+    generated = tmp_path / "_core.pyi"
+    patterns = PACKAGE / "_core" / "python" / "stub.txt"
+    command = ["-m", "nanobind.stubgen", "-q", "-m", "pin_nonideal._core", "-p", patterns, "-o", generated]
+    subprocess.run([sys.executable, *command], check=True, cwd=tmp_path)
+    assert generated.read_text(encoding="utf-8") == (PACKAGE / "_core.pyi").read_text(encoding="utf-8")
