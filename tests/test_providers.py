@@ -33,7 +33,7 @@ def assert_close(found, expected, tolerance, size=0.0, what=""):
 
 def assert_same_evaluation(scene, q, v):
     other = again(scene, terms="pinocchio")
-    one, two = scene._compiled.program.runner(), other.new_runner()
+    one, two = scene._compiled.program.runner(), other._compiled.program.runner()
     still = np.abs(one.terms(q, np.zeros_like(v))[1]).max(initial=0.0)
     for x, y, size in zip(two.terms(q, v), one.terms(q, v), (0.0, still), strict=True):
         assert_close(x, y, ROUNDING, size)

@@ -55,7 +55,7 @@ def check(seed):
     compared = 0
     for terms in ("core", "pinocchio"):
         free = pn.Scene(model, q0=q, terms=terms)
-        found = free.new_runner().terms(q, v)
+        found = free._compiled.program.runner().terms(q, v)
         np.testing.assert_allclose(found[0].reshape(M.shape), M, rtol=0, atol=ROUNDING * np.abs(M).max())
         size = np.abs(bias).max() + np.abs(still).max()
         np.testing.assert_allclose(found[1], bias, rtol=0, atol=ROUNDING * size)
