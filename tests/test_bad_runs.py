@@ -28,6 +28,10 @@ RUNS = {
     "rtol": ({"rtol": -1e-6}, "simulate: rtol must not be negative; got -1e-06"),
     "rtol nan": ({"rtol": NAN}, "simulate: rtol must be finite; got nan"),
     "atol": ({"atol": -1.0}, "simulate: atol must not be negative; got -1"),
+    "atol bytes": (
+        {"atol": ["", b"\x80"]},
+        "simulate: atol must be an array of numbers of shape (24,); got ['', b'\\x80']",
+    ),
     "atol shape": ({"atol": [1e-9]}, "simulate: atol must have shape (24,); got shape (1,)"),
     "atol entries": ({"atol": np.full(24, -2.0)}, "simulate: atol must not be negative; got -2"),
     "both zero": (

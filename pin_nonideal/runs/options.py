@@ -103,8 +103,7 @@ def run_options(
         raise InputError(f'simulate: "{scene.name}" has no joint that moves; there is nothing to simulate')
     tolerance = np.full(2 * nv + scene._compiled.program.states, DEFAULT_ATOL)
     if atol is not None:
-        given = np.asarray(atol)
-        if given.ndim == 0:
+        if np.asarray(atol, dtype=object).ndim == 0:
             tolerance[:] = nonnegative("simulate: atol", atol)
         else:
             tolerance[: 2 * nv] = array("simulate: atol", atol, (2 * nv,))
