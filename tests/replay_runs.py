@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from pin_nonideal.compilation.constraints import lower_constraint, lower_contact
+from pin_nonideal.compilation.names import Resolution
 from pin_nonideal.constraints import PointAnchor
+from pin_nonideal.core import core
 from pin_nonideal.trajectory import Stats
 
 STEP = 1e-6  # for rates by central differences: their error is near 1e-9
@@ -35,6 +38,7 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
         v0=np.asarray(rates[0]),
         constraint_slices=fields.pop("constraint_slices", dict.fromkeys(names, slice(0, 0))),
     )
+    scene._compiled = SimpleNamespace(program=_program(scene))
     values: dict[str, Any] = {
         "t": t,
         "q": configurations,
@@ -50,6 +54,16 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
     }
     values |= dict.fromkeys(("a", "F_ideal", "F_nonideal", "lam", "lam_ideal", "energy", "power", "z"))
     return SimpleNamespace(**values | fields)
+
+
+def _program(scene: Any) -> Any:
+    """What the core knows of the constraints and contacts of a scene that nobody analysed."""
+    builder, where = core.Builder(scene.model), Resolution(scene.model, scene.q0)
+    for name, c in zip("abcdef", scene.constraints, strict=False):
+        lower_constraint(c, name, builder, where)
+    for name, c in zip("uvwxyz", scene.contacts, strict=False):
+        lower_contact(c, name, builder, where)
+    return builder
 
 
 def jointed(*joints: Any, name: str = "chain", lever: float = 0.2) -> pin.Model:

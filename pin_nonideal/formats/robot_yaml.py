@@ -10,7 +10,7 @@ import dataclasses
 import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pin_nonideal import actuation, constraints, contacts, forces, laws, timefunctions
 from pin_nonideal.checks import number
@@ -45,19 +45,7 @@ MODEL_KEYS = (
 )
 
 Table = dict[str, Any]
-CONSTRAINTS = {
-    c.__name__: c
-    for c in (
-        constraints.PointAnchor,
-        constraints.FrameAnchor,
-        constraints.HingeAnchor,
-        constraints.Distance,
-        constraints.JointCoupling,
-        constraints.PrescribedMotion,
-        constraints.KnifeEdge,
-        constraints.Rolling,
-    )
-}
+CONSTRAINTS = {c.__name__: c for c in get_args(constraints.Constraint) if not c.__name__.startswith("User")}
 LAWS = {c.__name__: c for c in (laws.JointFriction, laws.SigmoidFriction, laws.LuGre, laws.Drag)}
 CONTACTS = {"PointContact": contacts.PointContact}
 FORCES = {c.__name__: c for c in (forces.SpringDamper, forces.JointSpring, forces.Wrench)}

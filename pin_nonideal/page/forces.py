@@ -15,17 +15,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.checks import axis_triad, unit_axis
-from pin_nonideal.constraints import (
-    Distance,
-    FrameAnchor,
-    HingeAnchor,
-    JointCoupling,
-    KnifeEdge,
-    PointAnchor,
-    PrescribedMotion,
-    Rolling,
-)
-from pin_nonideal.contacts import PointContact
+from pin_nonideal.core import core
 from pin_nonideal.forces import SpringDamper
 from pin_nonideal.states.placements import frame_on_joint, joint_placements
 
@@ -105,44 +95,41 @@ class _Side:
 
 def marks_of(scene: Scene) -> list[Mark]:
     """Marks of all anchors, rods, contacts and springs of a scene."""
-    springs = [
-        (item.name or f"spring {item.frame1}", item)
-        for item in scene.forces
-        if isinstance(item, SpringDamper)
-    ]
     marks = []
-    for name, item in [*_constraints(scene), *springs]:
-        if isinstance(item, PointContact):
+    for name, item, shown in _constraints(scene):
+        if shown == core.Shown.contact:
             side = _side(scene.model, item.frame)
             marks.append(Mark(name, "contact", side.joint, side.point, side.joint, side.point))
-            continue
-        sides = _sides(scene, item)
-        if sides is not None:
-            kind = {Distance: "rod", SpringDamper: "spring"}.get(type(item), "anchor")
-            first, second = sides
-            marks.append(Mark(name, kind, first.joint, first.point, second.joint, second.point))
-    return marks
+        elif shown in (core.Shown.anchor, core.Shown.rod):
+            marks.append(_tie(scene, name, shown.name, item))
+    springs = [item for item in scene.forces if isinstance(item, SpringDamper)]
+    return marks + [_tie(scene, item.name or f"spring {item.frame1}", "spring", item) for item in springs]
 
 
-def _constraints(scene: Scene) -> list[tuple[str, Any]]:
-    """Constraints and contacts with the names of their rows."""
-    return list(zip(scene.constraint_slices, [*scene.constraints, *scene.contacts], strict=True))
+def _tie(scene: Scene, name: str, kind: str, item: Any) -> Mark:
+    """The mark of what ties two frames."""
+    first, second = _sides(scene, item)
+    return Mark(name, kind, first.joint, first.point, second.joint, second.point)
+
+
+def _constraints(scene: Scene) -> list[tuple[str, Any, core.Shown]]:
+    """Constraints and contacts with the names of their rows, and what the core says is shown of them."""
+    known = [c.shown for c in scene._compiled.program.constraints]
+    return list(zip(scene.constraint_slices, [*scene.constraints, *scene.contacts], known, strict=True))
 
 
 def _side(model: pin.Model, frame: str) -> _Side:
     return _Side(*frame_on_joint(model, frame))
 
 
-def _sides(scene: Scene, item: Any) -> tuple[_Side, _Side] | None:
-    """Both sides of what ties two frames; None for other constraints."""
+def _sides(scene: Scene, item: Any) -> tuple[_Side, _Side]:
+    """Both sides of what ties two frames."""
     model = scene.model
     if hasattr(item, "joint1_placement"):  # a constraint model of Pinocchio
         return (
             _Side(int(item.joint1_id), item.joint1_placement),
             _Side(int(item.joint2_id), item.joint2_placement),
         )
-    if not isinstance(item, (PointAnchor, FrameAnchor, HingeAnchor, Distance, SpringDamper)):
-        return None
     first = _side(model, item.frame1)
     if item.frame2 is not None:
         return first, _side(model, item.frame2)
@@ -154,7 +141,7 @@ def arrows_of(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]
     """Arrows of the forces that the run recorded; none without record "forces"."""
     arrows: list[Arrow] = []
     if run.lam is not None:
-        for name, item in _constraints(run.scene):
+        for name, item, shown in _constraints(run.scene):
             rows = run.scene.constraint_slices[name]
             parts = {"total": motion.of(run.lam[:, rows])}
             if run.lam_ideal is not None:
@@ -163,7 +150,7 @@ def arrows_of(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]
                 acts = np.abs(rest).max(initial=0.0) > SMALLEST * np.abs(ideal).max(initial=0.0)
                 parts = {"ideal": ideal} | ({"nonideal": rest} if acts else {})
             for kind, lam in parts.items():
-                arrows += _reaction(run.scene, motion, name, kind, item, lam)
+                arrows += _reaction(run.scene, motion, name, kind, item, shown, lam)
     drawn = [("nonideal", run.F_nonideal)]
     if not arrows:
         drawn.append(("ideal", run.F_ideal))
@@ -179,39 +166,41 @@ def arrows_of(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]
     return arrows
 
 
-def _reaction(scene: Scene, motion: Motion, name: str, kind: str, item: Any, lam: Array) -> list[Arrow]:
+def _reaction(
+    scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.Shown, lam: Array
+) -> list[Arrow]:
     """Arrows of one constraint: the force on its first body, or the force on its joints."""
     model = scene.model
-    sides = _sides(scene, item)
-    if sides is not None:
-        first, second = sides
-        origin = motion.point(first.joint, first.point)
-        if isinstance(item, Distance):
-            force = lam[:, :1] * _unit(origin - motion.point(second.joint, second.point))
-        else:
-            axes = ["xyz".index(axis) for axis in getattr(item, "axes", "xyz")]
-            local = np.zeros((len(lam), 3))
-            local[:, axes] = lam[:, : len(axes)]
-            force = second.turned(motion, local)
-        return [Arrow(name, kind, "N", force, origin)]
-    if isinstance(item, (Rolling, PointContact)):
+    if shown in (core.Shown.anchor, core.Shown.rod):
+        return [Arrow(name, kind, "N", *_between(scene, motion, item, shown, lam))]
+    if shown in (core.Shown.rolling, core.Shown.contact):
         return [Arrow(name, kind, "N", *_on_plane(model, motion, item, lam))]
-    if isinstance(item, KnifeEdge):
+    if shown == core.Shown.edge:
         edge = _side(model, item.frame)
         force = edge.turned(motion, lam[:, :1] * np.array(unit_axis("axis", item.axis)))
         return [Arrow(name, kind, "N", force, motion.point(edge.joint, edge.point))]
-    if isinstance(item, PrescribedMotion):
+    if shown == core.Shown.drive:
         return _at_joint(model, motion, name, kind, model.getJointId(item.joint), lam[:, 0])
-    if isinstance(item, JointCoupling):
+    if shown == core.Shown.gear:
         driven = _at_joint(model, motion, name, kind, model.getJointId(item.joint1), lam[:, 0])
         leading = _at_joint(model, motion, name, kind, model.getJointId(item.joint2), -item.ratio * lam[:, 0])
         return driven + leading
     return []
 
 
-def _on_plane(
-    model: pin.Model, motion: Motion, item: Rolling | PointContact, lam: Array
-) -> tuple[Array, Array]:
+def _between(scene: Scene, motion: Motion, item: Any, shown: core.Shown, lam: Array) -> tuple[Array, Array]:
+    """Force on the first of two frames that are tied, and the place of that frame, (n, 3) each."""
+    first, second = _sides(scene, item)
+    origin = motion.point(first.joint, first.point)
+    if shown == core.Shown.rod:
+        return lam[:, :1] * _unit(origin - motion.point(second.joint, second.point)), origin
+    axes = ["xyz".index(axis) for axis in getattr(item, "axes", "xyz")]
+    local = np.zeros((len(lam), 3))
+    local[:, axes] = lam[:, : len(axes)]
+    return second.turned(motion, local), origin
+
+
+def _on_plane(model: pin.Model, motion: Motion, item: Any, lam: Array) -> tuple[Array, Array]:
     """Force on what touches a plane, and the place where it touches, (n, 3) each."""
     t1, t2, normal = (np.array(axis) for axis in axis_triad(unit_axis("normal", item.normal)))
     local = lam[:, -1:] * normal
@@ -220,7 +209,7 @@ def _on_plane(
     body = _side(model, item.frame)
     plane = _Side(0, pin.SE3.Identity()) if item.plane is None else _side(model, item.plane)
     up = plane.turned(motion, np.tile(normal, (len(lam), 1)))
-    if isinstance(item, Rolling) and item.axis is not None:  # a disk: its lowest point
+    if getattr(item, "axis", None) is not None:  # a disk: its lowest point
         axis = body.turned(motion, np.tile(unit_axis("axis", item.axis), (len(lam), 1)))
         up = _unit(up - np.sum(up * axis, axis=1, keepdims=True) * axis)
     return plane.turned(motion, local), motion.point(body.joint, body.point) - item.radius * up

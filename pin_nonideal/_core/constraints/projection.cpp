@@ -13,6 +13,15 @@ namespace pn {
 
 namespace {
 
+// After its first steps an iteration that leaves more than this part of the largest residual is at its end: the rest is
+// rounding. Newton's method halves each time near the constraints; the first steps may come from afar.
+constexpr double stalled_part = 0.5;
+constexpr int sure_position_steps = 3, sure_velocity_steps = 1;
+// Factors of the new place cost less than this many iterations.
+constexpr double iterations_for_factors = 3.0;
+// Near a singular position no residual is small enough, and the count ends at unit roundoff.
+constexpr double no_floor = 1e-16;
+
 // x := R^-T B^T (B B^T)^-1 r, the least move in the metric of M that changes A x by r.
 void least_move(const Program& p, Workspace& w, VecX& x) {
     solve_rows(p.layout, w.now.rows, w.scratch.r, w.now.lam);
@@ -36,29 +45,30 @@ double gather(const Program& p, Workspace& w, Value value) {
     return largest;
 }
 
-double gather_gaps(const Program& p, Workspace& w) {
+double gather_residuals(const Program& p, Workspace& w) {
     return gather(p, w, [&](int i, int k) { return w.now.values[i].residual[p.blocks[i].kept[k]]; });
 }
 
-// A v + phi_t by the rows in the workspace, which needs no look at the motion; a user's rate is his own function.
+// A v + phi_t by the rows in the workspace, which needs no motion of the bodies; a user's rate is his own function.
 double gather_rates(const Program& p, Workspace& w, double t, const VecX& v) {
     const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
     for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
-        if (std::holds_alternative<UserRows>(block.kind)) evaluate(block.kind, state, Part::motion, w.now.values[i]);
-        else multiply(block, w.now.A, v, w.scratch.miss);
+        if (block.affine_rate) multiply(block, w.now.A, v, w.scratch.residual);
+        else evaluate(block.kind, state, Part::motion, w.now.values[i]);
     }
     return gather(p, w, [&](int i, int k) {
         const Block& block = p.blocks[i];
         const RowValues& values = w.now.values[i];
-        if (std::holds_alternative<UserRows>(block.kind)) return values.rate[block.kept[k]];
-        return w.scratch.miss[block.row + k] + values.phi_t[block.kept[k]];
+        if (!block.affine_rate) return values.rate[block.kept[k]];
+        return w.scratch.residual[block.row + k] + values.phi_t[block.kept[k]];
     });
 }
 
-// Iterations left when each takes as much as the last one did; factors of the new place cost less than three of them.
-double left_at_this_rate(double before, double now, double floor) {
-    return now < before ? std::log(now / std::max(floor, 1e-16)) / std::log(before / now) : HUGE_VAL;
+// Whether factors of the new place are worth their cost when each iteration goes on to take as much as the last did.
+bool wants_new_factors(double before, double now, double floor) {
+    if (!(now < before)) return true;
+    return std::log(now / std::max(floor, no_floor)) / std::log(before / now) > iterations_for_factors;
 }
 
 // Product of multipliers of rows of unit length.
@@ -70,27 +80,27 @@ double product(const Workspace& w, const VecX& x, const VecX& y) {
 }
 
 // Next step of the multipliers, s := (B B^T)^-1 r with Broyden's corrections: the factors are those of the place where
-// the move started, and each step has shown what they miss. [Kelley, Solving Nonlinear Equations with Newton's Method,
-// 2003, sec. 4.3.]
+// the move started, and each step has shown how the rows have changed. [Kelley, Solving Nonlinear Equations with
+// Newton's Method, 2003, sec. 4.3.]
 void broyden_step(const Program& p, Workspace& w, int count) {
-    VecX& step = w.scratch.shift_steps[count];
+    VecX& step = w.scratch.position_lam_steps[count];
     solve_rows(p.layout, w.now.rows, w.scratch.r, step);
     for (int j = 0; j < count; ++j) {
-        const VecX& known = w.scratch.shift_steps[j];
+        const VecX& known = w.scratch.position_lam_steps[j];
         const double part = product(w, known, step) / product(w, known, known);
         if (!(std::abs(part) < broyden_limit)) return;  // rounding, or far from where the factors serve
-        if (j + 1 < count) step += part * w.scratch.shift_steps[j + 1];
+        if (j + 1 < count) step += part * w.scratch.position_lam_steps[j + 1];
         else step /= 1.0 - part;
     }
 }
 
-// q := shift_start moved by R^-T B^T shift, on the given dofs.
+// q := position_start moved by R^-T B^T position_lam, on the given dofs.
 template <class... Dofs>
-void shift_position(const Program& p, Workspace& w, VecX& q, const Dofs&... dofs) {
+void move_position(const Program& p, Workspace& w, VecX& q, const Dofs&... dofs) {
     w.scratch.scaled.setZero();
-    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.scratch.shift, w.scratch.scaled);
+    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.scratch.position_lam, w.scratch.scaled);
     solve_Rt(p.mechanism, w.now.terms, dofs..., w.scratch.scaled);
-    retract(p.mechanism, w.scratch.shift_start.data(), w.scratch.scaled.data(), q.data());
+    retract(p.mechanism, w.scratch.position_start.data(), w.scratch.scaled.data(), q.data());
 }
 
 // What is rounding: near a singular position it would come back magnified, there every bit counts.
@@ -100,7 +110,10 @@ double rounding_part(const Workspace& w) { return w.now.rows.distance < near_sin
 
 double scene_size(const Program& p, const Workspace& w) {
     double square = 1.0;
-    for (int i : p.touched_joints) square = std::max(square, (w.now.terms.body[i].ref + w.now.terms.body[i].p).squaredNorm());
+    for (int i : p.constrained_joints) {
+        const Body& body = w.now.terms.body[i];
+        square = std::max(square, (body.ref + body.p).squaredNorm());
+    }
     return std::sqrt(square);
 }
 
@@ -138,59 +151,60 @@ void follow_constraints(const Program& p, Workspace& w, double h, VecX& move) {
         for (size_t k = 0; k < block.kept.size(); ++k)
             if (block.holonomic[k]) w.scratch.r[block.row + k] = -0.5 * h * h * w.now.b[block.row + k];
     }
-    solve_rows(p.layout, w.now.rows, w.scratch.r, w.scratch.shift);
+    solve_rows(p.layout, w.now.rows, w.scratch.r, w.scratch.position_lam);
     // Terms of a series that do not fall predict nothing: close to a singular position, at great speed.
-    const double cube = h * h * h, second = product(w, w.scratch.shift, w.scratch.shift);
-    if (cube * cube * product(w, w.state.shift_third, w.state.shift_third) < falling_square * second) w.scratch.shift += cube * w.state.shift_third;
-    else w.state.shift_third.setZero();
+    const double cube = h * h * h, second = product(w, w.scratch.position_lam, w.scratch.position_lam);
+    const double third = product(w, w.state.third_order_lam, w.state.third_order_lam);
+    if (cube * cube * third < falling_square * second) w.scratch.position_lam += cube * w.state.third_order_lam;
+    else w.state.third_order_lam.setZero();
     w.scratch.scaled.setZero();
-    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.scratch.shift, w.scratch.scaled);
+    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.scratch.position_lam, w.scratch.scaled);
     solve_Rt(p.mechanism, w.now.terms, w.scratch.scaled);
     move += w.scratch.scaled;
 }
 
-void learn_third_order(Workspace& w, double h) { w.state.shift_third += w.scratch.shift_sum / (h * h * h); }
+void learn_third_order(Workspace& w, double h) { w.state.third_order_lam += w.scratch.position_lam_sum / (h * h * h); }
 
 bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
-    w.scratch.shift_sum.setZero();
-    double gap = 0.0, floor = 0.0;
+    w.scratch.position_lam_sum.setZero();
+    double largest = 0.0, floor = 0.0;
     if (!w.now.rows.blocks.empty()) {
         evaluate_residuals(p, w, t, q, v);
-        gap = gather_gaps(p, w);
+        largest = gather_residuals(p, w);
         floor = rounding_part(w) * scene_size(p, w);
     }
-    const bool moves = gap > floor;
+    const bool moves = largest > floor;
     bool configured = false;
     int count = 0;      // steps since the factors were taken
-    double rate = 1.0;  // of the gap, by the last of them
-    for (int it = 0; it < projection_limit && gap > floor; ++it) {
+    double rate = 1.0;  // of the largest residual, by the last of them
+    for (int it = 0; it < projection_limit && largest > floor; ++it) {
         if (count == 0) {
-            w.scratch.shift_start = q;
-            w.scratch.shift.setZero();
+            w.scratch.position_start = q;
+            w.scratch.position_lam.setZero();
         }
         broyden_step(p, w, count);
-        w.scratch.shift += w.scratch.shift_steps[count];
-        w.scratch.shift_sum += w.scratch.shift_steps[count++];
-        // A gap that goes on as it did, and so ends below rounding, is looked at where the step's end is configured.
-        configured = count > 1 && gap * rate < trusted_part * floor;
-        double now = gap;
+        w.scratch.position_lam += w.scratch.position_lam_steps[count];
+        w.scratch.position_lam_sum += w.scratch.position_lam_steps[count++];
+        // One that goes on falling so, and ends below rounding, is evaluated where the step's end is configured.
+        configured = count > 1 && largest * rate < trusted_part * floor;
+        double now = largest;
         if (!configured) {
-            shift_position(p, w, q, p.touched_dofs);  // the others move no gap
+            move_position(p, w, q, p.constrained_dofs);  // the others move no row
             evaluate_residuals(p, w, t, q, v);
-            now = gather_gaps(p, w);
-            configured = now > floor && left_at_this_rate(gap, now, floor) > 3.0;
+            now = gather_residuals(p, w);
+            configured = now > floor && wants_new_factors(largest, now, floor);
         }
         if (configured) {
-            shift_position(p, w, q);
+            move_position(p, w, q);
             configure(p, w, t, q, v);
-            now = gather_gaps(p, w);
+            now = gather_residuals(p, w);
             count = 0;
         }
-        if (it > 3 && now > 0.5 * gap) break;  // as good as rounding allows
-        rate = now / gap;
-        gap = now;
+        if (it > sure_position_steps && now > stalled_part * largest) break;  // as good as rounding allows
+        rate = now / largest;
+        largest = now;
     }
-    if (count > 0 && static_cast<int>(p.touched_dofs.size()) < p.mechanism.nv) shift_position(p, w, q);
+    if (count > 0 && static_cast<int>(p.constrained_dofs.size()) < p.mechanism.nv) move_position(p, w, q);
     if (!configured) configure(p, w, t, q, v);
     if (moves) ++w.counters.projections;
     return moves;
@@ -224,7 +238,7 @@ bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
         moved = true;
         configure_velocity(p, w, t, v);
         const double now = gather_rates(p, w, t, v);
-        if (it > 1 && now > 0.5 * last) break;
+        if (it > sure_velocity_steps && now > stalled_part * last) break;
         last = now;
     }
     rest_alone(p, w, v);

@@ -12,9 +12,10 @@ constexpr int projection_limit = 12;
 // A pivot of the rows' unit-diagonal factor below this is near a singular position: the square of the sine at which
 // the nearest row stands to the others.
 constexpr double near_singular = 2.5e-3;
-// A step of the iteration that keeps more than this part of an earlier one says nothing of what the factors miss.
+// A step of the iteration that keeps more than this part of an earlier one says nothing of how the rows have changed
+// since their factors were taken.
 constexpr double broyden_limit = 0.3;
-// A step after which the gap should be below this part of rounding needs no look of its own.
+// A step after which the residual should be below this part of rounding is not evaluated by itself.
 constexpr double trusted_part = 0.5;
 // The third-order part of a step's move counts where its square is less than this part of that of the second.
 constexpr double falling_square = 0.01;
@@ -51,7 +52,7 @@ void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 struct Closure { double before, after, rate; };
 Closure close(const Program& p, Workspace& w, double t, VecX& q, VecX& v, double far);
 
-// Throws where a row's residual at the last look is open.
+// Throws where a row's residual, as last evaluated, is open.
 void require_closed(const Program& p, const Workspace& w, double t);
 
 // Size of the scene: the largest distance of a body that the constraints touch from the world's origin, at least 1 m.

@@ -25,9 +25,9 @@ static void factor_mass(const Program& p, Workspace& w, double t) {
 }
 
 void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    place_bodies(p.mechanism, w.now.terms, q, p.touched_joints, p.touched_angles);
+    place_bodies(p.mechanism, w.now.terms, q, p.constrained_joints, p.constrained_angles);
     const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
-    for (int i = 0; i < p.constraints; ++i) evaluate(p.blocks[i].kind, state, Part::gap, w.now.values[i]);
+    for (int i = 0; i < p.constraints; ++i) evaluate(p.blocks[i].kind, state, Part::residual, w.now.values[i]);
 }
 
 // Residuals and A, Eq. (3); and the users' own b.

@@ -5,7 +5,7 @@
 #include <variant>
 #include <vector>
 
-#include "constraints/constraints.hpp"
+#include "constraints/geometry.hpp"
 
 namespace pn {
 

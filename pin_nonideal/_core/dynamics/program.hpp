@@ -6,7 +6,7 @@
 #include <variant>
 #include <vector>
 
-#include "constraints/equation.hpp"
+#include "constraints/row_layout.hpp"
 #include "dynamics/failure.hpp"
 #include "dynamics/given_forces.hpp"
 #include "friction/friction.hpp"
@@ -39,10 +39,10 @@ struct Program {
     bool has_body_forces = false;        // given forces that act on bodies
     bool moves_in_time = false;          // some constraint moves by itself
     bool asks_functions = false;         // of the user's, for forces that may change while nothing moves
-    bool affine_rates = true;            // A does not depend on v; a user's own rows may
-    std::vector<int> touched_joints;     // whose bodies the constraints touch, and all before them in the tree
-    std::vector<Angle> touched_angles;   // of these joints
-    std::vector<int> touched_dofs;       // in the supports of the rows, ascending
+    bool affine_rates = true;            // the rate of every row is A(q, t) v + phi_t
+    std::vector<int> constrained_joints;     // whose bodies the constraints tie, and all before them in the tree
+    std::vector<Angle> constrained_angles;   // of these joints
+    std::vector<int> constrained_dofs;       // in the supports of the rows, ascending
 
     // Of the implicit reaction equation at most: a limit for each element, a force for each of the user's laws.
     size_t unknowns() const { return frictions.size() + static_cast<size_t>(user_laws) * mechanism.nv; }

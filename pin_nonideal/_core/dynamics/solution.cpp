@@ -36,12 +36,12 @@ void solve_acceleration(const Program& p, Workspace& w, const VecX& force, const
     a = force;
     constrained_solve(p, w, a, b, lam);
     if (now.rows.blocks.empty() || !now.rows.refine) return;
-    for (int pass = 0; pass < refinement_passes; ++pass) {  // what the equations still miss is solved for again
+    for (int pass = 0; pass < refinement_passes; ++pass) {  // their residual is solved for again
         multiply_M(p.mechanism, now.terms, a, scratch.scaled);
         scratch.scaled_free = force - scratch.scaled;
         for (int i : now.rows.blocks) add_transpose(p.blocks[i], now.A, lam, scratch.scaled_free);
-        row_residuals(p, now, now.A, a, b, scratch.miss);
-        constrained_solve(p, w, scratch.scaled_free, scratch.miss, scratch.lam_step);
+        row_residuals(p, now, now.A, a, b, scratch.residual);
+        constrained_solve(p, w, scratch.scaled_free, scratch.residual, scratch.lam_step);
         a += scratch.scaled_free;
         lam += scratch.lam_step;
     }

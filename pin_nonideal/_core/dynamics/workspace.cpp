@@ -14,7 +14,7 @@ static void size(const Program& p, RunState& state) {
     state.z = VecX::Zero(p.states);
     state.held_torque = VecX::Zero(p.mechanism.nv);
     state.unknown = VecX::Zero(p.unknowns());
-    state.shift_third = VecX::Zero(p.layout.rows);
+    state.third_order_lam = VecX::Zero(p.layout.rows);
 }
 
 static void size(const Program& p, Evaluation& now) {
@@ -26,10 +26,7 @@ static void size(const Program& p, Evaluation& now) {
                     &now.override_torque})
         *x = VecX::Zero(nv);
     now.values.resize(p.blocks.size());
-    for (size_t i = 0; i < p.blocks.size(); ++i) {
-        now.values[i].resize(p.blocks[i].total, nv, is_geometric(p.blocks[i].kind));
-        now.values[i].constant_A = has_constant_rows(p.blocks[i].kind);
-    }
+    for (size_t i = 0; i < p.blocks.size(); ++i) now.values[i].resize(p.blocks[i].kind, nv);
     now.A.assign(p.entries, 0.0);
     now.B.assign(p.entries, 0.0);
     for (VecX* x : {&now.b, &now.lam, &now.reactions.lam}) *x = VecX::Zero(p.layout.rows);
@@ -48,10 +45,10 @@ static void size(const Program& p, Evaluation& now) {
 static void size(const Program& p, const Evaluation& now, Scratch& scratch) {
     const int nv = p.mechanism.nv;
     for (VecX* x : {&scratch.scaled, &scratch.scaled_free, &scratch.trial, &scratch.work}) *x = VecX::Zero(nv);
-    for (VecX* x : {&scratch.r, &scratch.miss, &scratch.lam_step, &scratch.shift, &scratch.shift_sum})
+    for (VecX* x : {&scratch.r, &scratch.residual, &scratch.lam_step, &scratch.position_lam, &scratch.position_lam_sum})
         *x = VecX::Zero(p.layout.rows);
-    scratch.shift_start = VecX::Zero(p.mechanism.nq);
-    scratch.shift_steps.assign(projection_limit, scratch.shift);
+    scratch.position_start = VecX::Zero(p.mechanism.nq);
+    scratch.position_lam_steps.assign(projection_limit, scratch.position_lam);
     scratch.ideal_rows = now.rows;
     scratch.ideal_locked.assign(nv, 0);
     scratch.unknown = scratch.image = VecX::Zero(p.unknowns());

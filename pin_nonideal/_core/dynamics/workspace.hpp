@@ -2,6 +2,7 @@
 // last evaluation found, Scratch means nothing after the call that wrote it.
 #pragma once
 
+#include "constraints/rank.hpp"
 #include "dynamics/program.hpp"
 
 namespace pn {
@@ -21,7 +22,7 @@ struct RunState {
     bool has_held = false;
     VecX unknown;                 // of the implicit reaction equation, by element and law: where its next solution starts
     bool warm = false;
-    VecX shift_third;             // multipliers of third order in the step, over its cube
+    VecX third_order_lam;         // multipliers of third order in the step, over its cube
     bool ideal_decided = false;   // which rows are independent without what sticks, over this step
 };
 
@@ -63,13 +64,13 @@ struct Evaluation {
 };
 
 struct Scratch {
-    VecX scaled, scaled_free, trial, work, r, miss, lam_step;
+    VecX scaled, scaled_free, trial, work, r, residual, lam_step;
     RowSystem ideal_rows;  // of the constraints without what sticks; IdealMotion swaps them in
     std::vector<char> ideal_locked;
     // Of the projection of a position: where its factors were taken, the multipliers from there and in all, and the
     // steps that they took.
-    VecX shift_start, shift, shift_sum;
-    std::vector<VecX> shift_steps;
+    VecX position_start, position_lam, position_lam_sum;
+    std::vector<VecX> position_lam_steps;
     VecX unknown, image;  // of the implicit reaction equation
     MatX jacobian;
     std::vector<Force> subtree_force;

@@ -30,7 +30,7 @@ double load_limit(const Program& p, Workspace& w, const Friction& f, double t, c
         axis = w.now.terms.body[f.joint].R * f.axis;
     } else {
         r = anchor_wrench(p, w, f.anchor);
-        const Frame& frame = *frame1(p.blocks[f.anchor].kind);
+        const Frame& frame = *frames(p.blocks[f.anchor].kind).first;
         axis = w.now.terms.body[frame.joint].R * (frame.R * f.axis);
     }
     if (f.load == Load::spherical) return f.constant + f.mu * f.radius * r.lin.norm();

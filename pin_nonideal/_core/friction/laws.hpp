@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "constraints/constraints.hpp"
+#include "constraints/block.hpp"
 
 namespace pn {
 

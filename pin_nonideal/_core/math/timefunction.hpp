@@ -49,6 +49,11 @@ struct Spline {  // piecewise polynomials of (t - break); the end values are hel
 
 using TimeFunction = std::variant<Polynomial, Sinusoid, Spline, std::function<Jet(double)>>;
 
+inline bool is_constant(const TimeFunction& f) {
+    const auto* polynomial = std::get_if<Polynomial>(&f);
+    return polynomial && polynomial->coefficients.size() <= 1;
+}
+
 inline Jet evaluate(const TimeFunction& f, double t) {
     return std::visit([t](const auto& g) { return g(t); }, f);
 }

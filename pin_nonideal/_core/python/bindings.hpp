@@ -64,8 +64,9 @@ struct Builder {
 
     // M and the bias forces by Pinocchio's algorithms, or by the core's own pass.
     Builder(nb::object model, bool pinocchio_terms);
-    // Return the index of the new block or law.
-    int add(const std::string& name, Kind kind, bool constraint, int user_size = 0);
+    // Return the index of the new block or law. Directions of friction follow all constraints.
+    int add_constraint(const std::string& name, Kind kind);
+    int add_direction(const std::string& name, Kind kind);
     int add_law(const std::string& name);
     // A program of its own, which nothing that is added later changes.
     std::shared_ptr<const Program> finish() const;
@@ -75,8 +76,9 @@ struct Builder {
 struct ConstraintRows {
     std::string name;
     int first, count;             // among the rows of all descriptions
-    std::vector<bool> holonomic;  // each of them: has a residual
+    std::vector<bool> holonomic;  // each of them: a position stands behind it
     bool moves_in_time;           // by itself, or a function of the user says how
+    Shown shown;                  // what a replay shows of it
 };
 std::vector<ConstraintRows> constraint_rows(const Program& p);
 
@@ -146,7 +148,6 @@ void bind_failures(nb::module_& m);
 void bind_reactions(nb::module_& m);
 void bind_builder(nb::module_& m);
 void bind_constraints(nb::class_<Builder>& builder);
-void bind_slip_directions(nb::class_<Builder>& builder);
 void bind_runner(nb::module_& m);
 void bind_runs(nb::module_& m, nb::class_<Runner>& runner);
 

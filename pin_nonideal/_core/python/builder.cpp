@@ -16,23 +16,6 @@ Builder::Builder(nb::object model, bool pinocchio_terms) {
     p->mechanism = read_mechanism(model_pointer(model.ptr()), pinocchio_terms ? Provider::pinocchio : Provider::core);
 }
 
-int Builder::add(const std::string& name, Kind kind, bool constraint, int user_size) {
-    Block block;
-    block.name = name;
-    block.total = row_count(kind, user_size);
-    if (const Frame* f = frame1(kind)) block.joint1 = f->joint;
-    if (const Frame* f = frame2(kind)) block.joint2 = f->joint;
-    block.kind = std::move(kind);
-    for (int k = 0; k < block.total; ++k) block.kept.push_back(k);
-    if (constraint) {
-        block.user_row = p->user_rows;
-        p->user_rows += block.total;
-        p->constraints = static_cast<int>(p->blocks.size()) + 1;
-    }
-    p->blocks.push_back(std::move(block));
-    return static_cast<int>(p->blocks.size()) - 1;
-}
-
 int Builder::add_law(const std::string& name) {
     p->law_names.push_back(name);
     return static_cast<int>(p->law_names.size()) - 1;
@@ -42,17 +25,6 @@ std::shared_ptr<const Program> Builder::finish() const {
     auto finished = std::make_shared<Program>(*p);
     finished->finish();
     return finished;
-}
-
-std::vector<ConstraintRows> constraint_rows(const Program& p) {
-    std::vector<ConstraintRows> out;
-    for (int i = 0; i < p.constraints; ++i) {
-        const Block& block = p.blocks[i];
-        ConstraintRows rows{block.name, block.user_row, block.total, {}, moves_in_time(block.kind)};
-        for (int k = 0; k < block.total; ++k) rows.holonomic.push_back(has_residual(block.kind, k));
-        out.push_back(std::move(rows));
-    }
-    return out;
 }
 
 namespace {
@@ -173,6 +145,15 @@ void bind_enums(nb::module_& m) {
         .value("spherical", Load::spherical)
         .value("contact", Load::contact)
         .value("user", Load::user);
+    nb::enum_<Shown>(m, "Shown", "What a replay shows of a constraint.")
+        .value("nothing", Shown::nothing)
+        .value("anchor", Shown::anchor)
+        .value("rod", Shown::rod)
+        .value("contact", Shown::contact)
+        .value("rolling", Shown::rolling)
+        .value("edge", Shown::edge)
+        .value("drive", Shown::drive)
+        .value("gear", Shown::gear);
     nb::enum_<Reaction>(m, "Reaction", "Of which motion a law reads the reactions.")
         .value("none", Reaction::none)
         .value("ideal", Reaction::ideal)
@@ -185,7 +166,8 @@ void bind_program(nb::module_& m) {
         .def_ro("first", &ConstraintRows::first)
         .def_ro("count", &ConstraintRows::count)
         .def_ro("holonomic", &ConstraintRows::holonomic)
-        .def_ro("moves_in_time", &ConstraintRows::moves_in_time);
+        .def_ro("moves_in_time", &ConstraintRows::moves_in_time)
+        .def_ro("shown", &ConstraintRows::shown);
     nb::class_<Program>(m, "Program")
         .def_prop_ro("constraints", &constraint_rows)
         .def_prop_ro("rows", [](const Program& p) { return p.user_rows; })
@@ -212,7 +194,6 @@ void bind_builder(nb::module_& m) {
         .def_prop_ro("constraints", [](const Builder& b) { return constraint_rows(*b.p); })
         .def("finish", &Builder::finish);
     bind_constraints(builder);
-    bind_slip_directions(builder);
     bind_friction(builder);
     bind_laws(builder);
     bind_forces(builder);

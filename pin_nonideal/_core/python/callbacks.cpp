@@ -30,7 +30,7 @@ static Numbers six(const Force& f, const Mat3& R) {
 Numbers ReactionView::of_joint(int joint) const { return six(joint_wrench(*p, *w, joint), w->now.terms.body[joint].R); }
 
 Numbers ReactionView::of_block(int block) const {
-    const Frame& f = *frame2(p->blocks[block].kind);
+    const Frame& f = *frames(p->blocks[block].kind).second;
     return six(anchor_wrench(*p, *w, block), w->now.terms.body[f.joint].R * f.R);
 }
 
@@ -65,22 +65,23 @@ std::function<void(double, double*)> wrench_function(nb::object f) {
     };
 }
 
-UserRows user_rows(nb::object rows, nb::object residual, nb::object rate) {
+UserRows user_rows(int count, nb::object rows, nb::object residual, nb::object rate) {
     UserRows user;
-    user.rows = [rows](double t, const VecX& q, const VecX& v, MatX& A, VecX& rhs) {
+    user.count = count;
+    user.function = [rows](double t, const VecX& q, const VecX& v, MatX& A, VecX& rhs) {
         nb::gil_scoped_acquire gil;
         const auto [A_out, b_out] = nb::cast<std::pair<Array2, Array>>(rows(t, to_numpy(q), to_numpy(v)));
         A = map(A_out);
         rhs.head(A.rows()) = map(b_out);
     };
     if (!residual.is_none())
-        user.residual = [residual](double t, const VecX& q, VecX& phi) {
+        user.residual_function = [residual](double t, const VecX& q, VecX& phi) {
             nb::gil_scoped_acquire gil;
             const Array value = nb::cast<Array>(residual(t, to_numpy(q)));
             phi.head(value.shape(0)) = map(value);
         };
     if (!rate.is_none())
-        user.rate = [rate](double t, const VecX& q, const VecX& v, VecX& out) {
+        user.rate_function = [rate](double t, const VecX& q, const VecX& v, VecX& out) {
             nb::gil_scoped_acquire gil;
             const Array value = nb::cast<Array>(rate(t, to_numpy(q), to_numpy(v)));
             out.head(value.shape(0)) = map(value);

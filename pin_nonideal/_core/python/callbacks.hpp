@@ -25,7 +25,7 @@ std::function<void(double, const VecX&, const VecX&, VecX&)> torque_function(nb:
 std::function<void(double, double*)> wrench_function(nb::object f);
 
 // Rows A and right-hand side, residual and rate of a constraint; the last two may be None.
-UserRows user_rows(nb::object rows, nb::object residual, nb::object rate);
+UserRows user_rows(int count, nb::object rows, nb::object residual, nb::object rate);
 UserSlipRow slip_row(nb::object direction);
 
 // Limit of friction, and force of a law; both may ask about the reactions.

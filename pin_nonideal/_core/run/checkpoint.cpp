@@ -20,9 +20,9 @@ void fields(Archive& a, Modes& x) {
 }
 
 static void fields(Archive& a, RunState& x) {
-    auto& [mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm, shift_third,
-           ideal_decided] = x;
-    a(mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm, shift_third,
+    auto& [mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm,
+           third_order_lam, ideal_decided] = x;
+    a(mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm, third_order_lam,
       ideal_decided);
 }
 

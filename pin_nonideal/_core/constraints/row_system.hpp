@@ -1,4 +1,5 @@
-// Eq. (40) in factor form. With M = R R^T, B = A R^-T and a_s' = R^-1 (F + C):
+// Rows in the metric of M, and the solution for their multipliers: Eq. (40) in factor form. With M = R R^T, B = A R^-T
+// and a_s' = R^-1 (F + C):
 //     B B^T lam = b - B a_s',   a_s = a_s' + B^T lam,   a = R^-T a_s,
 // for the rows in use, which are independent: copies and vanishing rows were dropped before the run, other redundancy
 // is decided at each step's start (decide_rows) and held over the step.
@@ -6,36 +7,13 @@
 
 #include <vector>
 
-#include "constraints/constraints.hpp"
+#include "constraints/row_layout.hpp"
 
 namespace pn {
 
-// Rank tolerance on the pivots of B^T with rows of unit length: rounding and the constraints' own violation reach
-// about 1e-12 on the manifold, true directions of light mechanisms lie above 1e-7.
-constexpr double rank_tolerance = 1e-10;
-// The same while elements stick. What they hold by a smaller part of their forces than this they do not hold: it is the
-// square root of the threshold on responses in the program that finds the modes (rank_threshold).
-constexpr double rank_tolerance_sticking = 3e-7;
 // Smallest pivot of the Cholesky factor of the unit-diagonal B B^T that is trusted: its relative error stays below
 // the machine precision divided by this; below it the orthogonal factorization of B^T takes over.
 constexpr double safe_pivot = 1e-5;
-
-// Rows stored so that row i of the symmetric matrix keeps columns first[i] .. i (an envelope): blocks that share no
-// dof leave no entry, and the Cholesky factor stays inside.
-struct RowLayout {
-    int rows = 0;
-    std::vector<int> position;  // of each kept row in elimination order
-    std::vector<int> row_at;    // inverse of position
-    std::vector<int> first, start;
-    size_t entries = 0;
-    struct Pair {  // blocks with common dofs, and where these stand in the two supports
-        int block1, block2;
-        std::vector<std::pair<int, int>> common;
-    };
-    std::vector<Pair> pairs;
-};
-
-RowLayout layout_rows(const std::vector<Block>& blocks, int nv);
 
 struct RowSystem {
     std::vector<double> G, factor;  // B B^T and its Cholesky factor, in the envelope
@@ -66,14 +44,11 @@ struct RowSystem {
 // B B^T and its factor for the active rows; falls back to the orthogonal factorization.
 void factor_rows(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
                  RowSystem& s);
-// Rank and independent subset of the wanted rows, by column-pivoted QR of B^T.
-void decide_rows(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
-                 RowSystem& s, double tolerance = rank_tolerance);
 // lam with (B B^T) lam = r on the active rows (zero on the others); r and lam by kept row.
 void solve_rows(const RowLayout& layout, RowSystem& s, const VecX& r, VecX& lam);
 
-// y += B^T lam and r = B x for one block; the same functions serve A with the array A.
-void add_transpose(const Block& block, const std::vector<double>& B, const VecX& lam, VecX& y);
-void multiply(const Block& block, const std::vector<double>& B, const VecX& x, VecX& r);
+// The two steps before a factorization: G = B B^T, and the lengths of its rows.
+void delassus(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s);
+void scale_to_unit_length(const RowLayout& layout, const std::vector<char>& use, RowSystem& s);
 
 }  // namespace pn

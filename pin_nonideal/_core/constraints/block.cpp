@@ -1,0 +1,107 @@
+#include "constraints/block.hpp"
+
+#include <algorithm>
+
+#include "math/unrolled.hpp"
+
+namespace pn {
+
+Block::Block(std::string its_name, Kind what)
+    : name(std::move(its_name)),
+      kind(std::move(what)),
+      total(size(kind)),
+      comparable_rows(has_comparable_rows(kind)),
+      affine_rate(has_affine_rate(kind)) {
+    const auto [frame1, frame2] = frames(kind);
+    if (frame1) {
+        joint1 = frame1->joint;
+        joint2 = frame2->joint;
+    }
+    for (int k = 0; k < total; ++k) kept.push_back(k);
+}
+
+void Block::lay_out(const Mechanism& m) {
+    support.clear();
+    parent.clear();
+    entries.clear();
+    holonomic.clear();
+    for (int k : kept) holonomic.push_back(is_holonomic(kind, k));
+    std::vector<char> in(m.nv, 0);
+    for (int dof : dofs(kind, m))
+        for (int d = dof; d >= 0 && !in[d]; d = m.dof_parent[d]) in[d] = 1;
+    std::vector<int> place(m.nv, -1);
+    for (int d = m.nv - 1; d >= 0; --d)
+        if (in[d]) {
+            place[d] = static_cast<int>(support.size());
+            support.push_back(d);
+        }
+    for (int d : support) parent.push_back(m.dof_parent[d] < 0 ? -1 : place[m.dof_parent[d]]);
+    if (!frames(kind).first) return;
+    // A differs from zero only on dofs that move one body and not the other.
+    const std::vector<int> d1 = m.dofs_of(joint1), d2 = m.dofs_of(joint2);
+    for (int d : d1)
+        if (std::find(d2.begin(), d2.end(), d) == d2.end()) entries.push_back({place[d], d, 1.0});
+    for (int d : d2)
+        if (std::find(d1.begin(), d1.end(), d) == d1.end()) entries.push_back({place[d], d, -1.0});
+}
+
+PN_WIDE void fill_A(const Block& block, const Terms& terms, const RowValues& values, double* A) {
+    const int r = static_cast<int>(block.kept.size()), n = static_cast<int>(block.support.size());
+    if (!values.geometric) {
+        for (int l = 0; l < n; ++l)
+            for (int k = 0; k < r; ++k) A[l * r + k] = values.A(block.kept[k], block.support[l]);  // Eq. (3)
+        return;
+    }
+    std::fill(A, A + static_cast<size_t>(r) * n, 0.0);
+    for (int k = 0; k < r; ++k) {
+        const Wrench& w = values.wrench[block.kept[k]];
+        // About the reference points of the two bodies (they differ when the bodies belong to different trees).
+        const Force f1{w.force, w.couple + (w.point - terms.body[block.joint1].ref).cross(w.force)};
+        const Force f2{w.force, w.couple + (w.point - terms.body[block.joint2].ref).cross(w.force)};
+        for (const Block::Entry& e : block.entries)
+            A[e.place * r + k] = e.sign > 0.0 ? dot(terms.J[e.dof], f1) : -dot(terms.J[e.dof], f2);  // Eq. (3)
+    }
+}
+
+void scale_rows(const Mechanism& m, const Terms& terms, const Block& block, const double* A, double* B) {
+    const int n = static_cast<int>(block.support.size());
+    std::copy(A, A + block.kept.size() * n, B);
+    with_rows(static_cast<int>(block.kept.size()), [&](auto r) {
+        for (int l = 0; l < n; ++l) {
+            const int dof = block.support[l];
+            const double* row = terms.L.data() + m.row_offset[dof];
+            double* __restrict x = B + l * r;
+            for (int p = block.parent[l], s = 1; p >= 0; p = block.parent[p], ++s) {
+                double* __restrict y = B + p * r;  // of an ancestor
+                for (int k = 0; k < r; ++k) y[k] -= row[s] * x[k];
+            }
+            const double d = terms.inv_sqrt_D[dof];
+            for (int k = 0; k < r; ++k) x[k] *= d;  // Eq. (7)
+        }
+    });
+}
+
+void add_transpose(const Block& block, const std::vector<double>& B, const VecX& lam, VecX& y) {
+    with_rows(static_cast<int>(block.kept.size()), [&](auto r) {
+        const double *x = B.data() + block.offset, *l = lam.data() + block.row;
+        for (size_t p = 0; p < block.support.size(); ++p, x += r) {
+            double sum = 0.0;
+            for (int k = 0; k < r; ++k) sum += x[k] * l[k];
+            y[block.support[p]] += sum;
+        }
+    });
+}
+
+void multiply(const Block& block, const std::vector<double>& B, const VecX& x, VecX& r) {
+    with_rows(static_cast<int>(block.kept.size()), [&](auto n) {
+        const double* a = B.data() + block.offset;
+        double* __restrict out = r.data() + block.row;
+        for (int k = 0; k < n; ++k) out[k] = 0.0;
+        for (size_t p = 0; p < block.support.size(); ++p, a += n) {
+            const double xp = x[block.support[p]];
+            for (int k = 0; k < n; ++k) out[k] += a[k] * xp;
+        }
+    });
+}
+
+}  // namespace pn

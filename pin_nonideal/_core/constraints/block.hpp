@@ -1,0 +1,44 @@
+// A constraint, or a direction of friction, with its place among the rows of the scene.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "constraints/kind.hpp"
+
+namespace pn {
+
+struct Block {
+    std::string name;
+    Kind kind;
+    int joint1 = 0, joint2 = 0;    // bodies of a geometric kind
+    int total = 0;                 // rows of the description
+    std::vector<int> kept;         // rows that act
+    std::vector<char> holonomic;   // of the kept rows
+    bool comparable_rows = false;  // rows are components of one vector, of one unit
+    bool affine_rate = true;       // its rate is A(q, t) v + phi_t; a user's own may be another function of v
+    int user_row = 0;              // first row in the user's numbering
+    int row = 0;                   // first row among the kept rows of the scene
+    std::vector<int> support;      // dofs that the scaled rows reach, descending and closed under ancestors
+    std::vector<int> parent;       // place in support of each dof's parent, or -1
+    struct Entry { int place, dof; double sign; };
+    std::vector<Entry> entries;    // where A of a geometric kind may differ from zero
+    int offset = 0;                // of its support.size() x kept.size() entries in Evaluation::A and ::B
+
+    Block() = default;
+    // All its rows act.
+    Block(std::string its_name, Kind what);
+    // Support and entries, and what follows from the rows that are kept.
+    void lay_out(const Mechanism& m);
+};
+
+// A on the block's support from the wrenches or the dense rows; dof-major.
+void fill_A(const Block& block, const Terms& terms, const RowValues& values, double* A);
+// B = A R^-T on it, that is B^T = D^-1/2 L^-T A^T.
+void scale_rows(const Mechanism& m, const Terms& terms, const Block& block, const double* A, double* B);
+
+// y += B^T lam and r = B x, with lam and r by kept row of the scene; the same functions serve A with the array A.
+void add_transpose(const Block& block, const std::vector<double>& B, const VecX& lam, VecX& y);
+void multiply(const Block& block, const std::vector<double>& B, const VecX& x, VecX& r);
+
+}  // namespace pn

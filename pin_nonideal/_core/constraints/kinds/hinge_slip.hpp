@@ -1,0 +1,34 @@
+// Direction of friction: turning about the common axis of a hinge anchor.
+#pragma once
+
+#include "constraints/geometry.hpp"
+#include "constraints/kinds/shown.hpp"
+
+namespace pn {
+
+struct HingeSlipRows {
+    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
+    static constexpr Shown shown = Shown::nothing;
+
+    Frame frame1, frame2;
+    Vec3 axis;
+
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return false; }
+    bool moves_in_time() const { return false; }
+
+    template <class Sides, class Out>
+    PN_INLINE void residual(const Sides&, Out&) const {}
+    template <class Sides, class Out>
+    PN_INLINE void rows(const Sides& s, Out& out) const {
+        out.wrench[0] = couple_at(s.a.x, s.a.R * axis);
+    }
+    template <class Sides, class Out>
+    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+        const auto e = s.a.R * axis, omega = s.a.omega() - s.b.omega();
+        out.rate[0] = e.dot(omega);
+        out.drift[0] = e.dot(s.a.alpha() - s.b.alpha()) + s.a.omega().cross(e).dot(omega);
+    }
+};
+
+}  // namespace pn

@@ -1,0 +1,28 @@
+// Where the rows of all blocks stand in the symmetric matrix B B^T, and which of its entries are stored.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "constraints/block.hpp"
+
+namespace pn {
+
+// Rows stored so that row i of the symmetric matrix keeps columns first[i] .. i (an envelope): blocks that share no
+// dof leave no entry, and the Cholesky factor stays inside.
+struct RowLayout {
+    int rows = 0;
+    std::vector<int> position;  // of each kept row in elimination order
+    std::vector<int> row_at;    // inverse of position
+    std::vector<int> first, start;
+    size_t entries = 0;
+    struct Pair {  // blocks with common dofs, and where these stand in the two supports
+        int block1, block2;
+        std::vector<std::pair<int, int>> common;
+    };
+    std::vector<Pair> pairs;
+};
+
+RowLayout layout_rows(const std::vector<Block>& blocks, int nv);
+
+}  // namespace pn
