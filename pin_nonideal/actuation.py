@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .checks import array, function, label, optional_text, positive
 from .errors import InputError
+from .types import Array
 
 Gain = float | Sequence[float] | NDArray[np.float64]
 
@@ -29,7 +29,7 @@ class SampledControl:
         name: used in messages and results.
     """
 
-    function: Callable[..., Any]
+    function: Callable[..., object]
     period: float
     name: str | None = None
 
@@ -104,4 +104,4 @@ class Table:
         object.__setattr__(self, "values", array(f"{who}: values", self.values, (times.size, None)))
 
 
-Actuation = SampledControl | HoldPosition | Table | Callable[..., Any] | Sequence[float] | NDArray[np.float64]
+Actuation = SampledControl | HoldPosition | Table | Callable[..., object] | Sequence[float] | Array

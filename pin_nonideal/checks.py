@@ -32,7 +32,7 @@ def label(description: Any) -> str:
     return f'{kind} "{name}"' if isinstance(name, str) and name else kind
 
 
-def number(what: str, value: Any) -> float:
+def number(what: str, value: object) -> float:
     """A finite real number as a float.
 
     Raises:
@@ -50,7 +50,7 @@ def number(what: str, value: Any) -> float:
     return result
 
 
-def nonnegative(what: str, value: Any) -> float:
+def nonnegative(what: str, value: object) -> float:
     """A finite number >= 0.
 
     Raises:
@@ -62,7 +62,7 @@ def nonnegative(what: str, value: Any) -> float:
     return result
 
 
-def positive(what: str, value: Any) -> float:
+def positive(what: str, value: object) -> float:
     """A finite number > 0.
 
     Raises:
@@ -74,7 +74,7 @@ def positive(what: str, value: Any) -> float:
     return result
 
 
-def count(what: str, value: Any, *, least: int = 0, most: int = 1_000_000_000) -> int:
+def count(what: str, value: object, *, least: int = 0, most: int = 1_000_000_000) -> int:
     """An integer from `least` to `most`.
 
     Raises:
@@ -89,7 +89,7 @@ def count(what: str, value: Any, *, least: int = 0, most: int = 1_000_000_000) -
     return int(value)
 
 
-def text(what: str, value: Any) -> str:
+def text(what: str, value: object) -> str:
     """A name: a string that is not empty.
 
     Raises:
@@ -102,7 +102,7 @@ def text(what: str, value: Any) -> str:
     return value
 
 
-def optional_text(what: str, value: Any) -> str | None:
+def optional_text(what: str, value: object) -> str | None:
     """A name or None.
 
     Raises:
@@ -111,7 +111,7 @@ def optional_text(what: str, value: Any) -> str | None:
     return None if value is None else text(what, value)
 
 
-def choice(what: str, value: Any, allowed: Sequence[Any]) -> Any:
+def choice(what: str, value: object, allowed: Sequence[Any]) -> Any:
     """One of `allowed`.
 
     Raises:
@@ -126,7 +126,7 @@ def choice(what: str, value: Any, allowed: Sequence[Any]) -> Any:
     return value
 
 
-def sequence(what: str, value: Any) -> tuple[Any, ...]:
+def sequence(what: str, value: object) -> tuple[Any, ...]:
     """A list or tuple, as a tuple.
 
     Raises:
@@ -137,7 +137,7 @@ def sequence(what: str, value: Any) -> tuple[Any, ...]:
     return tuple(value)
 
 
-def array(what: str, value: Any, shape: Sequence[int | None]) -> NDArray[np.float64]:
+def array(what: str, value: object, shape: Sequence[int | None]) -> NDArray[np.float64]:
     """A finite array of the given shape, copied and read-only.
 
     Args:
@@ -170,7 +170,7 @@ def array(what: str, value: Any, shape: Sequence[int | None]) -> NDArray[np.floa
     return result
 
 
-def function(what: str, value: Any, signature: str) -> Callable[..., Any]:
+def function(what: str, value: object, signature: str) -> Callable[..., Any]:
     """Something that can be called.
 
     Args:
@@ -187,7 +187,7 @@ def function(what: str, value: Any, signature: str) -> Callable[..., Any]:
     return result
 
 
-def unit_axis(what: str, value: Any) -> Vector3:
+def unit_axis(what: str, value: object) -> Vector3:
     """An axis as a unit vector.
 
     Args:

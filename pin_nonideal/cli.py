@@ -12,13 +12,14 @@ import runpy
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import pin_nonideal as pn
 
 from .errors import InputError, OutputError, PinNonidealError, RunError, RunInterrupted
 from .loading import robots
 from .plotting import picture_format
+from .trajectory import Trajectory
+from .types import Table
 
 EXIT_ERROR = 2
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
@@ -133,7 +134,7 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _simulation_settings(options: argparse.Namespace) -> dict[str, Any]:
+def _simulation_settings(options: argparse.Namespace) -> Table:
     """Keyword arguments of `simulate`: what was given on the command line, and the defaults of pictures."""
     given = {key: getattr(options, key) for key in ("method", "rtol", "atol", "dt", "output_dt")}
     settings = {key: value for key, value in given.items() if value is not None}
@@ -147,11 +148,11 @@ def _simulation_settings(options: argparse.Namespace) -> dict[str, Any]:
     return settings
 
 
-def _writers(options: argparse.Namespace) -> list[tuple[Path, Callable[[Any, Path], Path]]]:
+def _writers(options: argparse.Namespace) -> list[tuple[Path, Callable[[Trajectory, Path], Path]]]:
     """Files to write and what writes them; they are checked now, because a run may take long."""
     if options.plot is not None:
         picture_format(options.plot)
-    asked: list[tuple[Path | None, Callable[[Any, Path], Path]]] = [
+    asked: list[tuple[Path | None, Callable[[Trajectory, Path], Path]]] = [
         (options.save, lambda run, path: run.save(path)),
         (options.html, _write_replay),
         (options.plot, _write_figure),
@@ -168,24 +169,24 @@ def _writers(options: argparse.Namespace) -> list[tuple[Path, Callable[[Any, Pat
     return writers
 
 
-def _write(run: Any, writers: list[tuple[Path, Callable[[Any, Path], Path]]]) -> None:
+def _write(run: Trajectory, writers: list[tuple[Path, Callable[[Trajectory, Path], Path]]]) -> None:
     for path, writer in writers:
         print(f"wrote {writer(run, path)}")
 
 
-def _write_replay(run: Any, path: Path) -> Path:
+def _write_replay(run: Trajectory, path: Path) -> Path:
     pn.replay(run, path)
     return path
 
 
-def _write_figure(run: Any, path: Path) -> Path:
+def _write_figure(run: Trajectory, path: Path) -> Path:
     pn.plot(run, path)
     return path
 
 
-def _parameters(settings: Sequence[str]) -> dict[str, Any]:
+def _parameters(settings: Sequence[str]) -> Table:
     """KEY=VALUE words as keyword arguments."""
-    parameters: dict[str, Any] = {}
+    parameters: Table = {}
     for word in settings:
         key, separator, text = word.partition("=")
         if not separator or not key.isidentifier():

@@ -316,10 +316,10 @@ class UserConstraint:
         name: used in messages and results.
     """
 
-    function: Callable[..., Any]
+    function: Callable[..., object]
     size: int
-    residual: Callable[..., Any] | None = None
-    rate: Callable[..., Any] | None = None
+    residual: Callable[..., object] | None = None
+    rate: Callable[..., object] | None = None
     name: str | None = None
 
     def __post_init__(self) -> None:

@@ -7,12 +7,12 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from .errors import InputError, OutputError
 
 
-def file_path(what: str, value: Any) -> Path:
+def file_path(what: str, value: object) -> Path:
     """The name of a file as a Path.
 
     Args:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from .checks import array, function, label, nonnegative, number, optional_text, text
 from .errors import InputError
@@ -92,7 +91,7 @@ class Wrench:
     """
 
     frame: str
-    value: Sequence[float] | Callable[[float], Any]
+    value: Sequence[float] | Callable[[float], object]
     name: str | None = None
 
     def __post_init__(self) -> None:
@@ -113,7 +112,7 @@ class UserForce:
         name: used in messages and results.
     """
 
-    function: Callable[..., Any]
+    function: Callable[..., object]
     name: str | None = None
 
     def __post_init__(self) -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from .checks import choice, count, function, label, nonnegative, number, optional_text, positive, text
 from .errors import InputError
@@ -202,7 +201,7 @@ class UserLaw:
         name: used in messages and results.
     """
 
-    function: Callable[..., Any]
+    function: Callable[..., object]
     reaction: str | None = "total"
     states: int = 0
     name: str | None = None
@@ -230,8 +229,8 @@ class UserFriction:
         name: used in messages and results.
     """
 
-    direction: Callable[..., Any]
-    limit: Callable[..., Any]
+    direction: Callable[..., object]
+    limit: Callable[..., object]
     static_ratio: float = 1.0
     name: str | None = None
 
@@ -243,7 +242,7 @@ class UserFriction:
         object.__setattr__(self, "static_ratio", static_ratio(who, self.static_ratio))
 
 
-def static_ratio(who: str, value: Any) -> float:
+def static_ratio(who: str, value: object) -> float:
     """Static over kinetic friction, checked to be at least 1.
 
     Raises:

@@ -15,9 +15,10 @@ from .errors import InputError, LoadingError, UnknownNameError, nearest
 from .formats.assembly import scene_arguments
 from .formats.generators import GENERATORS
 from .formats.mjcf import read_mjcf
-from .formats.robot_yaml import MODEL_KEYS, Table, check_keys, optional_string, read_yaml
+from .formats.robot_yaml import MODEL_KEYS, check_keys, optional_string, read_yaml
 from .formats.urdf import RobotFile, read_mimics, read_urdf
 from .scene import Scene, loaded
+from .types import Model, Table
 
 FILE_PARAMETERS = ("free_flyer", "package_dirs", "merge_ball_joints")
 
@@ -55,11 +56,11 @@ def load(name: str | os.PathLike[str], *, terms: str = "core", **parameters: Any
     text = os.fspath(name) if isinstance(name, (str, os.PathLike)) else None
     if not isinstance(text, str) or not text or "\0" in text:
         raise InputError(f"name must be the name of a robot or a path; got {name!r}")
-    origin = _origin(text, parameters if terms == "core" else {**parameters, "terms": terms})
-    return loaded(Scene(**_load(name, text, parameters), terms=terms), origin)
+    scene = Scene(**_load(name, text, parameters), terms=terms)
+    return loaded(scene, _origin(text, parameters if terms == "core" else {**parameters, "terms": terms}))
 
 
-def _origin(text: str, parameters: dict[str, Any]) -> dict[str, Any] | None:
+def _origin(text: str, parameters: Table) -> Table | None:
     """Name and parameters that load the same scene from any folder; None when a file cannot hold them."""
     kept, path = dict(parameters), Path(text).expanduser()
     folders = kept.get("package_dirs")
@@ -75,7 +76,7 @@ def _origin(text: str, parameters: dict[str, Any]) -> dict[str, Any] | None:
         return None
 
 
-def _load(name: str | os.PathLike[str], text: str, parameters: dict[str, Any]) -> dict[str, Any]:
+def _load(name: str | os.PathLike[str], text: str, parameters: Table) -> Table:
     path = Path(text).expanduser()
     folders = robot_folders()
     if text in folders:
@@ -110,7 +111,7 @@ def robot_folders() -> dict[str, Path]:
     return {}
 
 
-def check_parameters(parameters: dict[str, Any], known: tuple[str, ...], name: str) -> None:
+def check_parameters(parameters: Table, known: tuple[str, ...], name: str) -> None:
     """Raises on a parameter that the robot does not take.
 
     Raises:
@@ -121,7 +122,7 @@ def check_parameters(parameters: dict[str, Any], known: tuple[str, ...], name: s
             raise InputError(f'robot "{name}" takes no parameter "{key}"{nearest(key, known)}')
 
 
-def _file_options(parameters: dict[str, Any], name: str) -> tuple[dict[str, Any], bool]:
+def _file_options(parameters: Table, name: str) -> tuple[Table, bool]:
     check_parameters(parameters, FILE_PARAMETERS, name)
     for key in ("free_flyer", "merge_ball_joints"):
         if not isinstance(parameters.get(key, False), bool):
@@ -135,7 +136,7 @@ def _file_options(parameters: dict[str, Any], name: str) -> tuple[dict[str, Any]
     return options, parameters.get("merge_ball_joints", True)
 
 
-def _load_file(path: Path, parameters: dict[str, Any]) -> dict[str, Any]:
+def _load_file(path: Path, parameters: Table) -> Table:
     if not path.is_file():
         raise LoadingError(f'no file or folder "{path}"; give a path that exists, or the name of a robot')
     if path.suffix == ".urdf":
@@ -149,7 +150,7 @@ def _load_file(path: Path, parameters: dict[str, Any]) -> dict[str, Any]:
     )
 
 
-def _load_folder(folder: Path, parameters: dict[str, Any]) -> dict[str, Any]:
+def _load_folder(folder: Path, parameters: Table) -> Table:
     """A folder with robot.yaml, robot.urdf, or both."""
     name = folder.resolve().name
     yaml_path = folder / "robot.yaml"
@@ -177,9 +178,7 @@ def _load_folder(folder: Path, parameters: dict[str, Any]) -> dict[str, Any]:
     return _from_urdf(folder, entry, table, parameters, name)
 
 
-def _from_urdf(
-    folder: Path, entry: Table, table: Table, parameters: dict[str, Any], name: str
-) -> dict[str, Any]:
+def _from_urdf(folder: Path, entry: Table, table: Table, parameters: Table, name: str) -> Table:
     urdf = folder / entry.get("urdf", "robot.urdf")
     if not urdf.resolve().is_relative_to(folder.resolve()):
         raise LoadingError(f'model: urdf must lie in the folder "{folder}"; got "{entry["urdf"]}"')
@@ -199,9 +198,7 @@ def _flag(entry: Table, key: str, name: str) -> bool:
     return value
 
 
-def _generated(
-    entry: Table, table: Table, parameters: dict[str, Any], name: str, path: Path
-) -> dict[str, Any]:
+def _generated(entry: Table, table: Table, parameters: Table, name: str, path: Path) -> Table:
     """A robot that a function of this package builds from parameters."""
     key = entry["generator"]
     if key not in GENERATORS:
@@ -250,6 +247,6 @@ def _example_robot(name: str, others: list[str]) -> RobotFile:
     return RobotFile(robot.model, robot.visual_model, robot.collision_model, constraints, notes=notes, q0=q0)
 
 
-def _has_joints(model: Any, constraint: Any) -> bool:
+def _has_joints(model: Model, constraint: Any) -> bool:
     names = [getattr(constraint, key, None) for key in ("joint", "joint1", "joint2")]
     return all(model.existJointName(n) for n in names if n is not None)

@@ -22,7 +22,7 @@ from .errors import InputError
 from .forces import Force
 from .laws import Law
 from .states.configurations import configuration, require_resolved, unit_parts
-from .types import Array, GeometryModel, Model
+from .types import Array, GeometryModel, Model, Table
 
 Rest = ParamSpec("Rest")
 Result = TypeVar("Result")
@@ -123,7 +123,7 @@ class Scene:
         self._runner = self._compiled.program.runner()
         self._nv = int(model.nv)
         self._closed: tuple[Array, Array] | None = None
-        self._origin: dict[str, Any] | None = None  # what `load` made the scene from
+        self._origin: Table | None = None  # what `load` made the scene from
 
     def __repr__(self) -> str:
         return (
@@ -280,7 +280,7 @@ class Scene:
         return report(self._compiled, self.name, self._runner.rank, notes)
 
 
-def loaded(scene: Scene, origin: dict[str, Any] | None) -> Scene:
+def loaded(scene: Scene, origin: Table | None) -> Scene:
     """The scene, which remembers what `load` made it from, so that `resume` can load it again.
 
     Args:

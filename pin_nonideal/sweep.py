@@ -10,6 +10,7 @@ from .errors import InputError
 from .scene import Scene
 from .simulation import simulate
 from .trajectory import Trajectory
+from .types import Table
 
 MOST_JOBS = 100_000  # also of negative numbers: -n leaves n - 1 processors free
 
@@ -59,7 +60,5 @@ def sweep(
     return runs
 
 
-def _one(
-    make: Callable[..., Scene], entry: dict[str, Any], duration: float, options: dict[str, Any]
-) -> Trajectory:
+def _one(make: Callable[..., Scene], entry: Table, duration: float, options: Table) -> Trajectory:
     return simulate(make(**entry), duration, **options)

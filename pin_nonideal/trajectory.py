@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from .errors import LoadingError
 from .files import file_path, whole_file
-
-Array = NDArray[np.float64]
+from .types import Array, Table
 
 FORMAT = 1
 # What NumPy, zip archives and JSON raise on files that are damaged or something else.
@@ -116,7 +115,7 @@ class Trajectory:
     element_names: list[str] = field(default_factory=list)
     name: str = ""
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> Table:
         return {**self.__dict__, "scene": None}  # a scene holds compiled state and stays in its process
 
     def __len__(self) -> int:
@@ -179,7 +178,7 @@ class Trajectory:
         target = file_path("Trajectory.save: path", path)
         if target.suffix != ".npz":
             target = target.with_name(target.name + ".npz")
-        arrays: dict[str, Any] = {key: getattr(self, key) for key in REQUIRED}
+        arrays: Table = {key: getattr(self, key) for key in REQUIRED}
         arrays |= {key: getattr(self, key) for key in OPTIONAL if getattr(self, key) is not None}
         for group in ("energy", "power"):
             table = getattr(self, group)
@@ -224,7 +223,7 @@ class Trajectory:
             if missing:
                 raise LoadingError(f'"{source}" is no complete trajectory: {", ".join(missing)} missing')
             _check_arrays(arrays, source)
-            fields: dict[str, Any] = {key: arrays.get(key) for key in (*REQUIRED, *OPTIONAL)}
+            fields: Table = {key: arrays.get(key) for key in (*REQUIRED, *OPTIONAL)}
             for group in ("energy", "power"):
                 if header[group] is not None:
                     if group == "energy":
@@ -258,7 +257,7 @@ def _check_ledger(names: Sequence[str], source: Path) -> None:
         raise LoadingError(f'"{source}" is no trajectory: its energy has no {", ".join(missing)}')
 
 
-def _check_arrays(arrays: dict[str, Any], source: Path) -> None:
+def _check_arrays(arrays: Table, source: Path) -> None:
     """Raises unless every array holds numbers and has a row for each sample.
 
     Raises:

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
+Table: TypeAlias = dict[str, Any]  # names to values of files and options
 
 Model: TypeAlias = Any  # pinocchio.Model
 JointModel: TypeAlias = Any  # pinocchio.JointModel
 GeometryModel: TypeAlias = Any  # pinocchio.GeometryModel
 GeometryObject: TypeAlias = Any  # pinocchio.GeometryObject
 Placement: TypeAlias = Any  # pinocchio.SE3
-Inertia: TypeAlias = Any  # pinocchio.Inertia

@@ -20,6 +20,7 @@ from pin_nonideal.constraints import JointCoupling, PrescribedMotion
 from pin_nonideal.errors import InputError, LoadingError, nearest
 from pin_nonideal.laws import JointFriction
 from pin_nonideal.states.configurations import CIRCLES, unit_parts
+from pin_nonideal.types import Model, Table
 
 from .inertia import require_positive_mass
 from .model_edit import ball_chains, edit_joints
@@ -29,7 +30,6 @@ from .robot_yaml import (
     CONTACTS,
     FORCES,
     LAWS,
-    Table,
     build,
     check_keys,
     descriptions,
@@ -47,7 +47,7 @@ from .urdf import RobotFile
 UNIT_TOLERANCE = 1e-3
 
 
-def scene_arguments(robot: RobotFile, table: Table, name: str, *, merge: bool = True) -> dict[str, Any]:
+def scene_arguments(robot: RobotFile, table: Table, name: str, *, merge: bool = True) -> Table:
     """Keyword arguments of Scene.
 
     Args:
@@ -101,7 +101,7 @@ def scene_arguments(robot: RobotFile, table: Table, name: str, *, merge: bool = 
 
 
 def dissipation(
-    model: Any, taken: Sequence[Any], couplings: Sequence[Any], notes: list[str]
+    model: Model, taken: Sequence[Any], couplings: Sequence[Any], notes: list[str]
 ) -> list[JointFriction]:
     """Joint friction that the robot's file states, as laws.
 
@@ -198,7 +198,7 @@ def _place_base(robot: RobotFile, table: Table, where: str) -> None:
                 shape.placement = base * shape.placement
 
 
-def _joint(model: Any, name: Any, where: str) -> int:
+def _joint(model: Model, name: Any, where: str) -> int:
     if not isinstance(name, str) or not model.existJointName(name):
         raise LoadingError(f'{where}: no joint "{name}"{nearest(str(name), list(model.names)[1:])}')
     return int(model.getJointId(name))
@@ -243,7 +243,7 @@ def _initial(robot: RobotFile, initial: Any, where: str) -> tuple[NDArray[np.flo
     return _with_unit_quaternions(model, q0, where), v0
 
 
-def _joint_value(model: Any, j: int, key: str, value: Any, where: str) -> list[float]:
+def _joint_value(model: Model, j: int, key: str, value: Any, where: str) -> list[float]:
     """Values of one joint; an angle may stand for its cosine and sine."""
     size = model.nqs[j] if key == "q" else model.nvs[j]
     values = list(value) if isinstance(value, (list, tuple)) else [value]
@@ -257,7 +257,7 @@ def _joint_value(model: Any, j: int, key: str, value: Any, where: str) -> list[f
     return _vector(values, size, where)
 
 
-def _with_unit_quaternions(model: Any, q: NDArray[np.float64], where: str) -> NDArray[np.float64]:
+def _with_unit_quaternions(model: Model, q: NDArray[np.float64], where: str) -> NDArray[np.float64]:
     """Quaternions (and cosine-sine pairs) of unit length.
 
     Raises:
@@ -292,7 +292,7 @@ def _lock(
     return q, v
 
 
-def _still_moves(model: Any, constraint: Any, where: str) -> bool:
+def _still_moves(model: Model, constraint: Any, where: str) -> bool:
     """Whether a constraint of the robot's file still has its joints; without them it is met already.
 
     Raises:
@@ -309,7 +309,7 @@ def _still_moves(model: Any, constraint: Any, where: str) -> bool:
     return not gone
 
 
-def _actuation(model: Any, entry: Any, motors: Sequence[str], where: str) -> Any:
+def _actuation(model: Model, entry: Any, motors: Sequence[str], where: str) -> Any:
     """Torques from the table: `torques` by joint name, HoldPosition or Table."""
     if entry is None:
         return None
@@ -331,7 +331,7 @@ def _actuation(model: Any, entry: Any, motors: Sequence[str], where: str) -> Any
     return build(ACTUATION[kind], values, where)
 
 
-def _gain(model: Any, gain: Any, motors: Sequence[str], where: str) -> Any:
+def _gain(model: Model, gain: Any, motors: Sequence[str], where: str) -> Any:
     """A gain by joint name, or one number for the motors (for all joints when no motor is named)."""
     if isinstance(gain, dict):
         return _by_joint(model, gain, where, signed=False)
@@ -340,7 +340,7 @@ def _gain(model: Any, gain: Any, motors: Sequence[str], where: str) -> Any:
     return gain
 
 
-def _by_joint(model: Any, table: Mapping[Any, Any], where: str, *, signed: bool) -> NDArray[np.float64]:
+def _by_joint(model: Model, table: Mapping[Any, Any], where: str, *, signed: bool) -> NDArray[np.float64]:
     """An array of shape (nv,) from values by joint name."""
     result = np.zeros(model.nv)
     for name, value in table.items():

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.checks import count, nonnegative, number, positive
 from pin_nonideal.constraints import PointAnchor
+from pin_nonideal.types import GeometryModel, Model, Placement
 
 from .urdf import RobotFile
 
@@ -61,7 +61,14 @@ def n_four_bar(
 
 
 def _rod(
-    model: Any, visual: Any, parent: int, name: str, place: Any, direction: str, m: float, L: float
+    model: Model,
+    visual: GeometryModel,
+    parent: int,
+    name: str,
+    place: Placement,
+    direction: str,
+    m: float,
+    L: float,
 ) -> int:
     """Adds a uniform rod along its own x or z axis, hinged about y at `place`, and returns its joint."""
     import coal

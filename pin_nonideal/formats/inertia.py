@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from pin_nonideal.core import core
 from pin_nonideal.errors import SingularMassError
+from pin_nonideal.types import Model
 
 # Rounding in M is a few units in the last place of the largest term of each entry; once rows and columns
 # are scaled to a unit diagonal, an eigenvalue below this many units cannot be told from zero.
 SINGULAR = 16.0 * float(np.finfo(float).eps)
 
 
-def mass_diagnosis(model: Any, q: Any = None) -> str | None:
+def mass_diagnosis(model: Model, q: ArrayLike | None = None) -> str | None:
     """Tells what makes M(q) singular or indefinite.
 
     M is scaled to a unit diagonal first, so that light links beside heavy ones are no fault.
@@ -62,7 +63,7 @@ def mass_diagnosis(model: Any, q: Any = None) -> str | None:
     )
 
 
-def require_positive_mass(model: Any, q: Any, name: str | None) -> None:
+def require_positive_mass(model: Model, q: ArrayLike | None, name: str | None) -> None:
     """Raises unless M(q) is positive definite.
 
     Args:
@@ -78,7 +79,7 @@ def require_positive_mass(model: Any, q: Any, name: str | None) -> None:
         raise SingularMassError(f'mass matrix of "{name or model.name}" must be positive definite; {fault}')
 
 
-def _joints_of(model: Any, dofs: Sequence[int]) -> list[int]:
+def _joints_of(model: Model, dofs: Sequence[int]) -> list[int]:
     """Joints that own the given degrees of freedom."""
     return [
         j
@@ -87,13 +88,13 @@ def _joints_of(model: Any, dofs: Sequence[int]) -> list[int]:
     ]
 
 
-def _links_beyond(model: Any, joints: Sequence[int]) -> list[str]:
+def _links_beyond(model: Model, joints: Sequence[int]) -> list[str]:
     """Names of the links that the joints carry directly; of the joints when they carry no named link."""
     links = [f.name for f in model.frames if f.type == pin.FrameType.BODY and f.parentJoint in joints]
     return links or [model.names[j] for j in joints]
 
 
-def _light_links(model: Any, joints: Sequence[int]) -> list[str]:
+def _light_links(model: Model, joints: Sequence[int]) -> list[str]:
     """Links on the joints without mass, or without moment of inertia."""
     light = [
         j

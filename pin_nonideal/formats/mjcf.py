@@ -8,8 +8,8 @@ it reads in full, and equalities become constraints; what cannot be honored is a
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Collection
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -17,6 +17,7 @@ import pinocchio as pin
 
 from pin_nonideal.errors import LoadingError
 from pin_nonideal.forces import JointSpring
+from pin_nonideal.types import GeometryModel, Model
 
 from .mjcf_equality import equality_constraints
 from .mjcf_text import Defaults, degrees_to_radians
@@ -114,7 +115,7 @@ def _prepare_bodies(world: ElementTree.Element, where: str) -> dict[str, Element
     return joints
 
 
-def _free_name(wanted: str, taken: Any) -> str:
+def _free_name(wanted: str, taken: Collection[str | None]) -> str:
     name, i = wanted, 1
     while name in taken:
         i += 1
@@ -180,7 +181,7 @@ def _absolute_meshes(root: ElementTree.Element, path: Path, where: str) -> list[
     return notes
 
 
-def _build(root: ElementTree.Element, where: str) -> tuple[Any, Any, Any]:
+def _build(root: ElementTree.Element, where: str) -> tuple[Model, GeometryModel, GeometryModel]:
     """Pinocchio's reader on the prepared file."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "robot.xml"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -19,6 +18,7 @@ from pin_nonideal.constraints import (
 from pin_nonideal.errors import LoadingError, nearest
 from pin_nonideal.states.placements import joint_placements
 from pin_nonideal.timefunctions import Constant
+from pin_nonideal.types import Array, Model, Placement
 
 from .mjcf_text import Defaults
 from .xml import numbers
@@ -29,14 +29,14 @@ KINDS = ("connect", "weld", "joint", "distance")
 class _Reader:
     """What every kind of equality needs: the model at its reference configuration, and new frames on it."""
 
-    def __init__(self, root: ElementTree.Element, defaults: Defaults, model: Any, q0: Any) -> None:
+    def __init__(self, root: ElementTree.Element, defaults: Defaults, model: Model, q0: Array) -> None:
         self.root = root
         self.defaults = defaults
         self.model = model
         self.q0 = q0
         self.placements = joint_placements(model, q0)
 
-    def body(self, name: str | None, where: str) -> tuple[int, Any, Any]:
+    def body(self, name: str | None, where: str) -> tuple[int, Placement, Placement]:
         """(parent joint, placement on that joint, placement in the world) of a body; the world for None."""
         if name is None or name == "world":
             return 0, pin.SE3.Identity(), pin.SE3.Identity()
@@ -66,7 +66,7 @@ class _Reader:
             )
         return float(self.q0[self.model.idx_qs[j]])
 
-    def frame(self, name: str, joint: int, placement: Any) -> str:
+    def frame(self, name: str, joint: int, placement: Placement) -> str:
         """Adds a frame to the model and returns its name."""
         self.model.addFrame(pin.Frame(name, joint, 0, placement, pin.FrameType.OP_FRAME), False)
         return name
@@ -76,8 +76,8 @@ def equality_constraints(
     section: ElementTree.Element,
     root: ElementTree.Element,
     defaults: Defaults,
-    model: Any,
-    q0: Any,
+    model: Model,
+    q0: Array,
     where: str,
     notes: list[str],
 ) -> list[Constraint]:

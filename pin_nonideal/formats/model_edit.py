@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.errors import LoadingError
+from pin_nonideal.types import Array, GeometryModel, JointModel, Model, Placement
 
 # Links between the axes of a ball joint carry at most this part of the mass behind them.
 MASSLESS = 1e-6
@@ -46,10 +46,10 @@ class BallChain:
 
     joints: tuple[int, int, int]
     name: str
-    center: Any
+    center: Array
 
 
-def ball_chains(model: Any, keep: Collection[str] = ()) -> list[BallChain]:
+def ball_chains(model: Model, keep: Collection[str] = ()) -> list[BallChain]:
     """Finds the chains of three revolutes that are ball joints.
 
     Their axes meet in one point, consecutive ones at right angles; the two links in between carry no mass and
@@ -92,7 +92,7 @@ def _only_child(children: Mapping[int, Sequence[int]], joint: int | None) -> int
     return following[0] if len(following) == 1 else None
 
 
-def revolute_axis(model: Any, joint: int) -> Any | None:
+def revolute_axis(model: Model, joint: int) -> Array | None:
     """Unit axis of a revolute joint in its own frame, shape (3,), or None for any other joint."""
     j = model.joints[joint]
     if (
@@ -106,7 +106,7 @@ def revolute_axis(model: Any, joint: int) -> Any | None:
     return np.array(data.S).reshape(6)[3:]
 
 
-def _plain_revolute(model: Any, joint: int) -> bool:
+def _plain_revolute(model: Model, joint: int) -> bool:
     """Whether a joint is a revolute without range, armature or friction: nothing a ball joint would lose."""
     if revolute_axis(model, joint) is None:
         return False
@@ -119,7 +119,7 @@ def _plain_revolute(model: Any, joint: int) -> bool:
     )
 
 
-def _common_point(model: Any, a: int, b: int, c: int) -> Any | None:
+def _common_point(model: Model, a: int, b: int, c: int) -> Array | None:
     """The point where three axes meet, in c's frame at zero angles; None when they make no ball joint."""
     b_in_c = model.jointPlacements[c].inverse()
     a_in_c = b_in_c * model.jointPlacements[b].inverse()
@@ -139,7 +139,7 @@ def _common_point(model: Any, a: int, b: int, c: int) -> Any | None:
     return point if gap <= ALIGNED else None
 
 
-def _ball_name(model: Any, joints: tuple[int, int, int]) -> str:
+def _ball_name(model: Model, joints: tuple[int, int, int]) -> str:
     """What the three names share, or the last name when that is nothing or taken."""
     first, last = (f([model.names[j] for j in joints]) for f in (min, max))
     shared = "".join(a for a, _ in takewhile(lambda pair: pair[0] == pair[1], zip(first, last, strict=False)))
@@ -148,12 +148,12 @@ def _ball_name(model: Any, joints: tuple[int, int, int]) -> str:
 
 
 def edit_joints(
-    model: Any,
-    geometries: Sequence[Any],
+    model: Model,
+    geometries: Sequence[GeometryModel],
     chains: Sequence[BallChain],
     types: Mapping[str, str],
     pitches: Mapping[str, float] | None = None,
-) -> tuple[Any, list[Any]]:
+) -> tuple[Model, list[GeometryModel]]:
     """Builds the model anew with other joints.
 
     Args:
@@ -183,7 +183,7 @@ def edit_joints(
     new = pin.Model()
     new.name, new.gravity = model.name, model.gravity
     # For each old joint: its index in the new model and where its frame lies there (dropped: at zero angle).
-    place: dict[int, tuple[int, Any]] = {0: (0, pin.SE3.Identity())}
+    place: dict[int, tuple[int, Placement]] = {0: (0, pin.SE3.Identity())}
     for j in range(1, model.njoints):
         parent, offset = place[model.parents[j]]
         placement = offset * model.jointPlacements[j]
@@ -218,7 +218,7 @@ def edit_joints(
     return new, list(copies)
 
 
-def _screw(model: Any, name: str, pitch: float) -> Any:
+def _screw(model: Model, name: str, pitch: float) -> JointModel:
     """A helical joint about the axis of a revolute joint."""
     if not model.existJointName(name):
         raise LoadingError(f'model: helical: no joint "{name}" in the robot')
@@ -231,11 +231,11 @@ def _screw(model: Any, name: str, pitch: float) -> Any:
     return pin.JointModelHelicalUnaligned(axis, pitch)
 
 
-def _revolute(axis: str) -> Any:
+def _revolute(axis: str) -> JointModel:
     return {"X": pin.JointModelRX, "Y": pin.JointModelRY, "Z": pin.JointModelRZ}[axis]()
 
 
-def _copy_limits(model: Any, j: int, new: Any, index: int) -> None:
+def _copy_limits(model: Model, j: int, new: Model, index: int) -> None:
     """Limits, armature and dissipation of a joint that keeps its size; a joint of another size keeps none."""
     if model.nvs[j] != new.nvs[index] or model.nqs[j] != new.nqs[index]:
         return
@@ -259,9 +259,9 @@ def _copy_limits(model: Any, j: int, new: Any, index: int) -> None:
 
 
 def _copy_frames(
-    model: Any,
-    new: Any,
-    place: Mapping[int, tuple[int, Any]],
+    model: Model,
+    new: Model,
+    place: Mapping[int, tuple[int, Placement]],
     dropped: Collection[int],
     renamed: Mapping[str, str],
 ) -> None:
@@ -281,7 +281,9 @@ def _copy_frames(
         index[i] = new.addFrame(copy, False)
 
 
-def _move_geometry(model: Any, new: Any, geometry: Any, place: Mapping[int, tuple[int, Any]]) -> Any:
+def _move_geometry(
+    model: Model, new: Model, geometry: GeometryModel, place: Mapping[int, tuple[int, Placement]]
+) -> GeometryModel:
     """The same shapes on the new joints."""
     result = pin.GeometryModel()
     for shape in geometry.geometryObjects:

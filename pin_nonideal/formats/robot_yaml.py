@@ -15,6 +15,7 @@ from typing import Any, get_args
 from pin_nonideal import actuation, constraints, contacts, forces, laws, timefunctions
 from pin_nonideal.checks import number
 from pin_nonideal.errors import InputError, LoadingError, nearest
+from pin_nonideal.types import Table
 
 from .xml import read_text
 
@@ -44,7 +45,6 @@ MODEL_KEYS = (
     "parameters",
 )
 
-Table = dict[str, Any]
 CONSTRAINTS = {c.__name__: c for c in get_args(constraints.Constraint) if not c.__name__.startswith("User")}
 LAWS = {c.__name__: c for c in (laws.JointFriction, laws.SigmoidFriction, laws.LuGre, laws.Drag)}
 CONTACTS = {"PointContact": contacts.PointContact}
@@ -109,7 +109,7 @@ def _one_line(error: Exception) -> str:
     return " ".join(str(error).split())
 
 
-def _kind(value: Any) -> str:
+def _kind(value: object) -> str:
     return "nothing" if value is None else f"a {type(value).__name__}"
 
 
@@ -302,7 +302,7 @@ def pitches(table: Table, where: str) -> dict[str, float]:
     return result
 
 
-def names_in(value: Any) -> set[str]:
+def names_in(value: object) -> set[str]:
     """Every text anywhere in a table: what the file may refer to."""
     if isinstance(value, str):
         return {value}

@@ -18,6 +18,7 @@ import pinocchio as pin
 from pin_nonideal.constraints import Constraint, JointCoupling, PrescribedMotion
 from pin_nonideal.errors import LoadingError, nearest
 from pin_nonideal.timefunctions import Constant
+from pin_nonideal.types import Array, GeometryModel, Model
 
 from .urdf_checks import check_urdf
 from .xml import numbers, parse_xml, read_text
@@ -39,15 +40,15 @@ class RobotFile:
         v0: initial velocity that the file states, shape (nv,), or None.
     """
 
-    model: Any
-    visual: Any = None
-    collision: Any = None
+    model: Model
+    visual: GeometryModel | None = None
+    collision: GeometryModel | None = None
     constraints: list[Constraint] = field(default_factory=list)
     forces: list[Any] = field(default_factory=list)
     motors: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    q0: Any = None
-    v0: Any = None
+    q0: Array | None = None
+    v0: Array | None = None
 
 
 def read_urdf(path: Path, *, free_flyer: bool = False, package_dirs: Sequence[str | Path] = ()) -> RobotFile:
@@ -159,7 +160,7 @@ def find_mesh(filename: str, folder: Path, package_dirs: Sequence[str | Path] = 
     return next((c.resolve() for c in candidates if c.is_file()), None)
 
 
-def _geometry(model: Any, root: ElementTree.Element, path: Path, kind: str, notes: list[str]) -> Any:
+def _geometry(model: Model, root: ElementTree.Element, path: Path, kind: str, notes: list[str]) -> Any:
     """Geometry of one kind, without the meshes that the mesh reader refuses (each leaves a note)."""
     geometry_type = pin.GeometryType.VISUAL if kind == "visual" else pin.GeometryType.COLLISION
     try:

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from pin_nonideal.checks import axis_triad, unit_axis
 from pin_nonideal.core import core
 from pin_nonideal.forces import SpringDamper
 from pin_nonideal.states.placements import frame_on_joint, joint_placements
+from pin_nonideal.types import Array
 
 from .geometry import joint_axis
 from .motion import Motion
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from pin_nonideal.scene import Scene
     from pin_nonideal.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 
 # A generalized force below this part of the largest one is rounding and gets no arrow.
 SMALLEST = 1e-9

@@ -17,7 +17,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from pin_nonideal.types import Array, GeometryObject
+
 Indices = NDArray[np.int64]
 Color = tuple[float, float, float, float]
 
@@ -102,7 +103,7 @@ def visuals_of(geometry_model: pin.GeometryModel) -> list[Visual]:
     return visuals
 
 
-def shape_of(geometry: Any, mesh_path: str | None = None) -> tuple[Shape, pin.SE3]:
+def shape_of(geometry: GeometryObject, mesh_path: str | None = None) -> tuple[Shape, pin.SE3]:
     """The shape of a coal geometry, with the placement of the shape's axes in the geometry's.
 
     Args:

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from pin_nonideal.errors import InputError
 from pin_nonideal.states.placements import joint_placements
+from pin_nonideal.types import Array
 
 from .geometry import Visual
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 
 # More frames than this make a page that no browser opens: an hour at 50 frames a second.
 MAX_FRAMES = 200_000

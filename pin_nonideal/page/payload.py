@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from pin_nonideal.states.placements import joint_placements
+from pin_nonideal.types import Array, Table
 
 from .forces import Arrow, arrows_of, marks_of
 from .geometry import Shape, Visual, sticks, visuals_of
@@ -18,8 +18,6 @@ from .signals import Chosen, mode_bands, plots_of
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 
 class Payload:
@@ -42,7 +40,7 @@ class Payload:
         self._length += len(chunk)
         return reference
 
-    def bytes(self, header: dict[str, Any]) -> bytes:
+    def bytes(self, header: Table) -> bytes:
         """Length of the header as four bytes, header, arrays."""
         text = json.dumps(header, allow_nan=False, separators=(",", ":")).encode()
         return b"".join([len(text).to_bytes(4, "little"), text, *self._chunks])
@@ -100,12 +98,12 @@ def packed_run(run: Trajectory, fps: float, title: str, plots: Chosen | None, fo
     return payload.bytes(header)
 
 
-def _plain(item: Any) -> dict[str, Any]:
+def _plain(item: Any) -> Table:
     """The fields of a dataclass, arrays as lists."""
     return {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in vars(item).items()}
 
 
-def _stored_arrow(payload: Payload, arrow: Arrow) -> dict[str, Any]:
+def _stored_arrow(payload: Payload, arrow: Arrow) -> Table:
     stored = _plain(arrow)
     stored["values"] = payload.add(arrow.values)
     if arrow.origin is not None:
@@ -130,11 +128,11 @@ def _skeleton_size(model: pin.Model, q: Array) -> float:
     return size if size > 1e-6 else 1.0
 
 
-def _shapes(payload: Payload, visuals: list[Visual]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+def _shapes(payload: Payload, visuals: list[Visual]) -> tuple[list[Table], list[Table]]:
     """Shapes, equal ones once, and the visuals that refer to them by number."""
     known: dict[bytes, int] = {}
-    shapes: list[dict[str, Any]] = []
-    drawn: list[dict[str, Any]] = []
+    shapes: list[Table] = []
+    drawn: list[Table] = []
     for visual in visuals:
         key = _fingerprint(visual.shape)
         if key not in known:
@@ -158,8 +156,8 @@ def _fingerprint(shape: Shape) -> bytes:
     return b"|".join([words, shape.vertices.tobytes(), shape.triangles.tobytes()])
 
 
-def _stored(payload: Payload, shape: Shape) -> dict[str, Any]:
-    stored: dict[str, Any] = {"kind": shape.kind, "size": list(shape.size)}
+def _stored(payload: Payload, shape: Shape) -> Table:
+    stored: Table = {"kind": shape.kind, "size": list(shape.size)}
     if shape.kind == "mesh":
         stored["vertices"] = payload.add(shape.vertices)
         stored["triangles"] = payload.add(shape.triangles, "u2" if len(shape.vertices) <= 0xFFFF else "u4")
@@ -167,7 +165,7 @@ def _stored(payload: Payload, shape: Shape) -> dict[str, Any]:
     return stored
 
 
-def _modes(run: Trajectory) -> list[dict[str, Any]]:
+def _modes(run: Trajectory) -> list[Table]:
     """Bands of the elements that stick or slip, with their names."""
     if run.modes is None:
         return []

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from pin_nonideal.checks import sequence
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.types import Array
 
 from .geometry import joint_axis
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 
 # Plots by name, or by a title "what [unit]" and curves by label, (nt,) each.
 Chosen = str | Sequence[str | tuple[str, Mapping[str, Array]]]

@@ -27,6 +27,7 @@ from pin_nonideal.errors import InputError, LoadingError, OutputError
 from pin_nonideal.files import file_path, whole_file
 from pin_nonideal.scene import Scene
 from pin_nonideal.trajectory import UNREADABLE
+from pin_nonideal.types import Table
 
 from .options import RunOptions
 
@@ -50,7 +51,7 @@ class Checkpoint:
     """
 
     scene: str
-    origin: dict[str, Any] | None
+    origin: Table | None
     fingerprint: str
     options: RunOptions
     interval: float
@@ -102,7 +103,7 @@ class Saver:
         """
         wall = self._wall + time.perf_counter()
         header = {**self._header, "wall_s": wall, "digest": hashlib.sha256(state).hexdigest()}
-        arrays: dict[str, Any] = {
+        arrays: Table = {
             "header": np.array(json.dumps(header)),
             "state": np.frombuffer(state, dtype=np.uint8),
         }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from pin_nonideal.errors import OutputError, RunError, RunInterrupted, UserFunct
 from pin_nonideal.scene import Scene
 from pin_nonideal.states.rows import rows_at
 from pin_nonideal.trajectory import Event, Stats, Trajectory
-from pin_nonideal.types import Array
+from pin_nonideal.types import Array, Table
 
 from .options import RunOptions
 
@@ -92,7 +91,7 @@ def shaped(scene: Scene, outcome: core.Outcome, options: RunOptions, wall: float
         wall: wall time [s].
     """
     nt, nq, nv, program = len(outcome.t), scene.q0.size, scene.v0.size, scene._compiled.program
-    fields: dict[str, Any] = {}
+    fields: Table = {}
     if options.a:
         fields["a"] = outcome.a.reshape(nt, nv)
     if options.forces:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from pin_nonideal.types import Array, Model
 
 # A gap below this [m or rad] is left to Newton's method, which squares it each time.
 CLOSED = 1e-9
@@ -24,7 +22,7 @@ WELL_CONDITIONED = 1e-10
 
 @np.errstate(over="ignore", invalid="ignore")
 def close_loops(
-    model: Any, rows: Callable[[Array], tuple[Array, Array]], mass: Callable[[Array], Array], q: Array
+    model: Model, rows: Callable[[Array], tuple[Array, Array]], mass: Callable[[Array], Array], q: Array
 ) -> tuple[Array, float]:
     """Configuration near q that satisfies the holonomic constraints.
 
@@ -56,7 +54,7 @@ def close_loops(
     return fallback or (best, best_gap)
 
 
-def _descend(model: Any, rows: Callable[[Array], tuple[Array, Array]], q: Array) -> tuple[Array, float]:
+def _descend(model: Model, rows: Callable[[Array], tuple[Array, Array]], q: Array) -> tuple[Array, float]:
     A, phi = rows(q)
     damping = 1e-3
     for _ in range(STEPS):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pin_nonideal.checks import array
 from pin_nonideal.errors import InputError
+from pin_nonideal.types import JointModel, Model
 
 # Lengths off by less than this are rounding of a file or a printout and are restored; more is an error.
 UNIT_TOLERANCE = 1e-6
@@ -24,7 +24,7 @@ COARSEST_SPACING = 1e-3
 CIRCLES = ("JointModelRUB", "JointModelRevoluteUnbounded", "JointModelPlanar")
 
 
-def unit_parts(model: Any) -> Iterator[tuple[str, slice]]:
+def unit_parts(model: Model) -> Iterator[tuple[str, slice]]:
     """Stretches of a configuration that must have length 1, with the joint's name.
 
     Args:
@@ -35,7 +35,7 @@ def unit_parts(model: Any) -> Iterator[tuple[str, slice]]:
             yield model.names[i], part
 
 
-def _parts(joint: Any) -> Iterator[slice]:
+def _parts(joint: JointModel) -> Iterator[slice]:
     kind = joint.shortname()
     if kind == "JointModelComposite":
         for part in joint.extract().joints:
@@ -46,7 +46,7 @@ def _parts(joint: Any) -> Iterator[slice]:
 
 
 def configuration(
-    model: Any, q: ArrayLike, what: str, parts: Sequence[tuple[str, slice]] | None = None
+    model: Model, q: ArrayLike, what: str, parts: Sequence[tuple[str, slice]] | None = None
 ) -> NDArray[np.float64]:
     """A configuration with unit quaternions and (cos, sin) pairs, (nq,).
 
@@ -73,7 +73,7 @@ def configuration(
     return np.asarray(pin.normalize(model, result))
 
 
-def require_resolved(model: Any, q: NDArray[np.float64]) -> None:
+def require_resolved(model: Model, q: NDArray[np.float64]) -> None:
     """Refuses initial states in which a joint cannot move by less than `COARSEST_SPACING`.
 
     Args:

@@ -5,13 +5,12 @@ Data holds tensors of nv^3 numbers, gigabytes from some five hundred degrees of 
 
 from __future__ import annotations
 
-from typing import Any
-
 import pinocchio as pin
-from numpy.typing import NDArray
+
+from pin_nonideal.types import Array, Model, Placement
 
 
-def joint_placements(model: Any, q: NDArray[Any]) -> list[Any]:
+def joint_placements(model: Model, q: Array) -> list[Placement]:
     """Frames of all joints in the world: oM_i = oM_parent  M_i  J_i(q), the universe's first.
 
     Args:
@@ -30,7 +29,7 @@ def joint_placements(model: Any, q: NDArray[Any]) -> list[Any]:
     return found
 
 
-def frame_on_joint(model: Any, name: str) -> tuple[int, Any]:
+def frame_on_joint(model: Model, name: str) -> tuple[int, Placement]:
     """The joint that carries a frame, and the frame's placement on it.
 
     A joint without a frame of its own, which a model built by hand may hold, is found by its name as well.
