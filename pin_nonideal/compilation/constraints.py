@@ -61,7 +61,7 @@ def lower_constraint(c: Any, name: str, out: core.Builder, where: Resolution) ->
     if kind == "PointAnchorConstraintModel" or (
         kind == "RigidConstraintModel" and c.type == pin.ContactType.CONTACT_3D
     ):
-        out.add_point(name, f1, f2, [0, 1, 2])
+        out.add_point(name, f1, f2, axes=[0, 1, 2])
     else:
         out.add_frame(name, f1, f2)
 
@@ -70,7 +70,7 @@ def lower_constraint(c: Any, name: str, out: core.Builder, where: Resolution) ->
 def _(c: PointAnchor, name: str, out: core.Builder, where: Resolution) -> None:
     f1, f2 = where.pair(c, words(c, name))
     axes = ["xyz".index(a) for a in c.axes]
-    out.add_point(name, f1, f2, axes)
+    out.add_point(name, f1, f2, axes=axes)
 
 
 @lower_constraint.register
@@ -85,7 +85,7 @@ def _(c: HingeAnchor, name: str, out: core.Builder, where: Resolution) -> None:
     f1, f2 = where.pair(c, who)
     t1, t2, u = axis_triad(where.hinge_axis(c, who))
     normal1 = [-x for x in t2]
-    out.add_hinge(name, f1, f2, u, normal1, t1)
+    out.add_hinge(name, f1, f2, axis=u, normal1=normal1, normal2=t1)
 
 
 @lower_constraint.register
@@ -100,7 +100,7 @@ def _(c: Distance, name: str, out: core.Builder, where: Resolution) -> None:
         length = Constant(gap)
     elif not callable(length):
         length = Constant(length)
-    out.add_distance(name, f1, f2, time_function(length, who))
+    out.add_distance(name, f1, f2, length=time_function(length, who))
 
 
 @lower_constraint.register
@@ -118,7 +118,7 @@ def _(c: JointCoupling, name: str, out: core.Builder, where: Resolution) -> None
         period = turn
     elif endless[1]:
         period = turn * abs(c.ratio)
-    out.add_coupling(name, j1, j2, c.ratio, c.offset, period, position)
+    out.add_coupling(name, j1, j2, ratio=c.ratio, offset=c.offset, period=period, position=position)
 
 
 @lower_constraint.register
@@ -126,14 +126,14 @@ def _(c: PrescribedMotion, name: str, out: core.Builder, where: Resolution) -> N
     who = words(c, name)
     joint = where.joint(c.joint, who)
     period = 2.0 * math.pi if where.model.joints[joint].nq == 2 else 0.0
-    out.add_motion(name, joint, time_function(c.function, who), period)
+    out.add_motion(name, joint, function=time_function(c.function, who), period=period)
 
 
 @lower_constraint.register
 def _(c: KnifeEdge, name: str, out: core.Builder, where: Resolution) -> None:
     who = words(c, name)
     frame = where.frame(c.frame, who)
-    out.add_knife(name, frame, list(unit_axis(who, c.axis)))
+    out.add_knife(name, frame, axis=unit_axis(who, c.axis))
 
 
 @lower_constraint.register
@@ -143,8 +143,18 @@ def _(c: Rolling, name: str, out: core.Builder, where: Resolution) -> None:
     frame = where.frame(c.frame, who)
     t1, t2, n = axis_triad(unit_axis(who, c.normal))
     sphere = c.axis is None
-    axle = [0.0, 0.0, 1.0] if c.axis is None else list(unit_axis(who, c.axis))
-    out.add_rolling(name, frame, plane, c.radius, sphere, axle, t1, t2, n)
+    axle = (0.0, 0.0, 1.0) if c.axis is None else unit_axis(who, c.axis)
+    out.add_rolling(
+        name,
+        frame,
+        plane,
+        radius=c.radius,
+        sphere=sphere,
+        axle=axle,
+        tangent1=t1,
+        tangent2=t2,
+        normal=n,
+    )
 
 
 @lower_constraint.register
@@ -173,7 +183,7 @@ def _(c: UserConstraint, name: str, out: core.Builder, where: Resolution) -> Non
             result: Array = rows(t, q, v)[0] @ v + moving
             return result
 
-    out.add_user(name, size, rows, residual, rate)
+    out.add_user(name, size, rows=rows, residual=residual, rate=rate)
 
 
 def lower_contact(c: Any, name: str, out: core.Builder, where: Resolution) -> None:
@@ -191,7 +201,7 @@ def lower_contact(c: Any, name: str, out: core.Builder, where: Resolution) -> No
     if not isinstance(c, PointContact):
         raise InputError(f"a contact must be a PointContact; got {c!r}")
     f1, f2, (_, _, normal) = where.contact(c, words(c, name))
-    out.add_contact(name, f1, f2, list(normal), c.radius)
+    out.add_contact(name, f1, f2, normal=normal, radius=c.radius)
 
 
 def anchor_frames(

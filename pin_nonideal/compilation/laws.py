@@ -157,7 +157,7 @@ def _joint_friction(law: JointFriction, name: str, out: core.Builder, around: Su
     if law.viscous:
         out.add_viscous(index, law.viscous, dof=dof, count=count)
     if _is_dry(law):
-        block = out.add_dof_slip(name, dof, count)
+        block = out.add_dof_slip(name, dof=dof, count=count)
         _dry_friction(law, out, index, block, load, axis, joint=joint)
 
 
@@ -172,7 +172,7 @@ def _anchor_friction(law: JointFriction, name: str, out: core.Builder, around: S
     _check_radius(law, who, core.Load.revolute)
     f1, f2 = around.where.pair(anchor, who)
     axis = list(around.where.hinge_axis(anchor, who))
-    block = out.add_hinge_slip(name, f1, f2, axis)
+    block = out.add_hinge_slip(name, f1, f2, axis=axis)
     index = out.add_law(name)
     if law.viscous:
         out.add_viscous(index, law.viscous, block=block)
@@ -238,7 +238,7 @@ def lower_contact_friction(c: PointContact, name: str, out: core.Builder, around
         return
     f1, f2, (t1, t2, n) = around.where.contact(c, words(c, name))
     law = out.add_law(name)
-    block = out.add_contact_slip(name, f1, f2, c.radius, t1, t2, n)
+    block = out.add_contact_slip(name, f1, f2, radius=c.radius, tangent1=t1, tangent2=t2, normal=n)
     out.add_friction(
         law,
         block,
