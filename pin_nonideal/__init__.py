@@ -50,8 +50,7 @@ from .simulation import rollout, simulate
 from .sweep import sweep
 from .timefunctions import constant, polynomial, sinusoid, spline
 from .trajectory import Event, Stats, Trajectory
-
-__version__ = "0.1.0"
+from .version import __version__ as __version__
 
 __all__ = [
     "Distance",

@@ -314,6 +314,9 @@ class Outcome:
     def violation_rate(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
 
     @property
+    def largest_violation(self) -> float: ...
+
+    @property
     def a(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
 
     @property

@@ -15,7 +15,7 @@ PACKAGE = ROOT / "pin_nonideal"
 
 # All modules from the top down, a line a room. CONTRIBUTING shows the same order.
 ORDER = """
-errors types checks files equation
+version errors types checks files equation
 timefunctions constraints laws contacts forces actuation
 _core core
 states: placements configurations closure rows projection

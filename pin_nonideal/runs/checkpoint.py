@@ -13,7 +13,6 @@ import time
 import warnings
 from dataclasses import dataclass
 from enum import Enum
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +27,7 @@ from pin_nonideal.files import file_path, whole_file
 from pin_nonideal.scene import Scene
 from pin_nonideal.trajectory import UNREADABLE
 from pin_nonideal.types import Table
+from pin_nonideal.version import __version__
 
 from .options import RunOptions
 
@@ -159,7 +159,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
 
 def _version() -> list[str]:
     """Of the package and of what its core keeps of a run: another one steps differently in the last bits."""
-    return [metadata.version("pin-nonideal"), core.state_layout]
+    return [__version__, core.state_layout]
 
 
 def fingerprint(scene: Scene) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from pin_nonideal.compilation.failures import opened
 from pin_nonideal.core import core
-from pin_nonideal.errors import OutputError, RunError, RunInterrupted, UserFunctionError
+from pin_nonideal.errors import LoopClosureError, OutputError, RunError, RunInterrupted, UserFunctionError
 from pin_nonideal.scene import Scene
 from pin_nonideal.states.rows import rows_at
 from pin_nonideal.trajectory import Event, Stats, Trajectory
@@ -39,8 +39,8 @@ def finish(
         OutputError: its first checkpoint could not be written.
     """
     trajectory = shaped(scene, outcome, options, wall)
-    if stopped is None or isinstance(stopped, core.CoreFailure):
-        _check_closed(scene, trajectory)
+    if outcome.largest_violation > LEFT and (stopped is None or isinstance(stopped, core.CoreFailure)):
+        raise _opened(scene, trajectory)
     if stopped is None:
         return trajectory
     if isinstance(stopped, OutputError):
@@ -62,23 +62,16 @@ def finish(
     raise error from cause
 
 
-def _check_closed(scene: Scene, trajectory: Trajectory) -> None:
-    """Raises when a run has left its constraints, as it must when a drive pulls a loop apart.
-
-    Raises:
-        LoopClosureError: with the samples before.
-    """
-    left = trajectory.violation > LEFT
-    if not left.any():
-        return
-    k = int(left.argmax())
+def _opened(scene: Scene, trajectory: Trajectory) -> LoopClosureError:
+    """A run has left its constraints, as it must when a drive pulls a loop apart; with the samples before."""
+    k = int((trajectory.violation > LEFT).argmax())
     t = float(trajectory.t[k])
     runner = scene._compiled.program.runner()
     residual = np.abs(rows_at(runner, trajectory.q[k], trajectory.v[k], t)[2])
     gaps = {key: float(residual[rows].max()) for key, rows in scene.constraint_slices.items()}
     stopped = opened(max(gaps, key=lambda key: gaps[key]), gaps, t, f"; {KEPT}")
     stopped.trajectory = trajectory.first(k)
-    raise stopped
+    return stopped
 
 
 def shaped(scene: Scene, outcome: core.Outcome, options: RunOptions, wall: float) -> Trajectory:
@@ -90,7 +83,8 @@ def shaped(scene: Scene, outcome: core.Outcome, options: RunOptions, wall: float
         options: what was asked for.
         wall: wall time [s].
     """
-    nt, nq, nv, program = len(outcome.t), scene.q0.size, scene.v0.size, scene._compiled.program
+    t, nq, nv, program = outcome.t, scene.q0.size, scene.v0.size, scene._compiled.program
+    nt = len(t)
     fields: Table = {}
     if options.a:
         fields["a"] = outcome.a.reshape(nt, nv)
@@ -99,7 +93,8 @@ def shaped(scene: Scene, outcome: core.Outcome, options: RunOptions, wall: float
         fields["F_nonideal"] = outcome.F_nonideal.reshape(nt, nv)
         fields["lam"] = outcome.lam.reshape(nt, program.rows)
         fields["lam_ideal"] = outcome.lam_ideal.reshape(nt, program.rows)
-    columns = ["actuation", "forces", "constraints", *_columns(scene.law_names)]
+    if options.power or options.energy:
+        columns = ["actuation", "forces", "constraints", *_columns(scene.law_names)]
     if options.power:
         power = outcome.power.reshape(nt, len(columns))
         fields["power"] = dict(zip(columns, power.T, strict=True))
@@ -111,7 +106,7 @@ def shaped(scene: Scene, outcome: core.Outcome, options: RunOptions, wall: float
     if elements:
         fields["modes"] = outcome.modes.reshape(nt, len(elements))
     return Trajectory(
-        t=outcome.t,
+        t=t,
         q=outcome.q.reshape(nt, nq),
         v=outcome.v.reshape(nt, nv),
         violation=outcome.violation,

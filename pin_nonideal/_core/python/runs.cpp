@@ -287,6 +287,11 @@ static void bind_outcome(nb::module_& m) {
         .def_prop_ro("v", recorded<&R::v>)
         .def_prop_ro("violation", recorded<&R::violation>)
         .def_prop_ro("violation_rate", recorded<&R::violation_rate>)
+        .def_prop_ro("largest_violation", [](const Outcome& o) {
+            double largest = 0.0;
+            for (const double gap : o.recording.violation) largest = std::fmax(largest, gap);
+            return largest;
+        })
         .def_prop_ro("a", recorded<&R::a>)
         .def_prop_ro("F_ideal", recorded<&R::F_ideal>)
         .def_prop_ro("F_nonideal", recorded<&R::F_nonideal>)
