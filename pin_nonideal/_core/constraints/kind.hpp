@@ -5,6 +5,7 @@
 // A_j = w . J_j, and the multiplier is the size of that wrench. The others act on dofs directly and write A.
 #pragma once
 
+#include <string>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -64,6 +65,8 @@ template <class K> using ConstantA = std::bool_constant<std::decay_t<K>::constan
 template <class K> using AffineRate = std::bool_constant<std::decay_t<K>::affine_rate>;
 template <class K> using ComparableRows = std::bool_constant<std::decay_t<K>::comparable_rows>;
 template <class K> using ShownAs = std::integral_constant<Shown, std::decay_t<K>::shown>;
+template <class K> using Called = decltype(std::string(std::decay_t<K>::name));
+template <class K> using RoleOf = std::integral_constant<Role, std::decay_t<K>::role>;
 // Something of a type, in questions that nobody asks.
 template <class T> T given();
 
@@ -71,6 +74,12 @@ template <class T> T given();
 template <class K>
 constexpr bool is_complete() {
     using At = std::conditional_t<is_geometric<K>, const Sides<Pose>&, const State&>;
+    static_assert(answers<K>([](const auto& k) -> Called<decltype(k)> { return {}; }),
+                  "a kind needs `static constexpr const char* name`: by which Python adds it");
+    static_assert(answers<K>([](const auto& k) -> RoleOf<decltype(k)> { return {}; }),
+                  "a kind needs `static constexpr Role role`: a constraint, a contact or a direction of friction");
+    static_assert(answers<K>([](const auto& k) -> decltype(k.data(), void()) {}),
+                  "a kind needs `static constexpr auto data()`: what it is made of, by name");
     static_assert(answers<K>([](const auto& k) -> decltype(int(k.size())) { return 0; }),
                   "a kind needs `int size() const`: its number of rows");
     static_assert(answers<K>([](const auto& k) -> decltype(bool(k.is_holonomic(0))) { return true; }),

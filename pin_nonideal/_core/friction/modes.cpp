@@ -189,9 +189,12 @@ void set_modes(const Program& p, Workspace& w, const std::vector<signed char>& m
     select_rows(p, w);
 }
 
-bool at_rest(const Program& p, const Workspace& w, int e, const VecX& v) {
-    if (w.state.mode[e] == sticking) return true;
+static bool hardly_slips(const Program& p, const Workspace& w, int e, const VecX& v) {
     return slip_velocity(w.now, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
+}
+
+bool at_rest(const Program& p, const Workspace& w, int e, const VecX& v) {
+    return w.state.mode[e] == sticking || hardly_slips(p, w, e, v);
 }
 
 void follow_velocity(const Program& p, Workspace& w, int e, ModeQuestion& question) {
@@ -210,11 +213,16 @@ ModeQuestion question(const Program& p, Workspace& w, const VecX& v, int also) {
 }
 
 ModeQuestion first_question(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    set_modes(p, w, std::vector<signed char>(p.frictions.size(), 1));
-    if (p.frictions.empty()) return {};
+    ModeQuestion asked{w.state.mode, {}, {}};
+    if (p.frictions.empty()) return asked;
     w.state.warm = false;
     update_kinematics(p, w, t, q, v);
-    return question(p, w, v);
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
+        asked.modes[e] = 1;
+        if (hardly_slips(p, w, e, v)) asked.at_rest.push_back(e);
+        else follow_velocity(p, w, e, asked);
+    }
+    return asked;
 }
 
 void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,

@@ -65,8 +65,7 @@ struct Builder {
     // M and the bias forces by Pinocchio's algorithms, or by the core's own pass.
     Builder(nb::object model, bool pinocchio_terms);
     // Return the index of the new block or law. Directions of friction follow all constraints.
-    int add_constraint(const std::string& name, Kind kind);
-    int add_direction(const std::string& name, Kind kind);
+    int add(const std::string& name, Kind kind, Role role);
     int add_law(const std::string& name);
     // A program of its own, which nothing that is added later changes.
     std::shared_ptr<const Program> finish() const;

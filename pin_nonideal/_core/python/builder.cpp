@@ -115,7 +115,7 @@ void bind_forces(nb::class_<Builder>& builder) {
             b.p->forces.emplace_back(FrameWrench{frame_of(frame), wrench_function(function), {}});
         }, "frame"_a, "function"_a)
         .def("add_user_force", [](Builder& b, const TorqueOfState& f) {
-            b.p->forces.emplace_back(UserForce{torque_function(f)});
+            b.p->forces.emplace_back(UserForce{user_function<OfState>(f)});
         }, "function"_a);
 }
 
@@ -123,10 +123,10 @@ void bind_actuation(nb::class_<Builder>& builder) {
     builder
         .def("set_constant_torque", [](Builder& b, Array tau) { b.p->actuation = ConstantTorque{map(tau)}; }, "tau"_a)
         .def("set_torque_function", [](Builder& b, const TorqueOfState& f) {
-            b.p->actuation = TorqueFunction{torque_function(f)};
+            b.p->actuation = TorqueFunction{user_function<OfState>(f)};
         }, "function"_a)
         .def("set_sampled_torque", [](Builder& b, const TorqueOfState& f, double period) {
-            b.p->actuation = SampledTorque{torque_function(f), period};
+            b.p->actuation = SampledTorque{user_function<OfState>(f), period};
         }, "function"_a, "period"_a)
         .def("set_hold_position", [](Builder& b, Array kp, Array kd, Array q) {
             b.p->actuation = HoldPosition{map(kp), map(kd), map(q)};

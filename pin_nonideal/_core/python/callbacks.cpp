@@ -50,10 +50,34 @@ TimeFunction time_function(const nb::object& f) {
     });
 }
 
-std::function<void(double, const VecX&, const VecX&, VecX&)> torque_function(nb::object f) {
+static void read_head(const nb::object& from, VecX& to) {
+    const Array value = nb::cast<Array>(from);
+    to.head(value.shape(0)) = map(value);
+}
+
+template <>
+std::function<OfState> user_function(nb::callable f) {
     return [f](double t, const VecX& q, const VecX& v, VecX& out) {
         nb::gil_scoped_acquire gil;
-        read_into(f(t, to_numpy(q), to_numpy(v)), out);
+        read_head(f(t, to_numpy(q), to_numpy(v)), out);
+    };
+}
+
+template <>
+std::function<OfPosition> user_function(nb::callable f) {
+    return [f](double t, const VecX& q, VecX& out) {
+        nb::gil_scoped_acquire gil;
+        read_head(f(t, to_numpy(q)), out);
+    };
+}
+
+template <>
+std::function<Rows> user_function(nb::callable f) {
+    return [f](double t, const VecX& q, const VecX& v, MatX& A, VecX& b) {
+        nb::gil_scoped_acquire gil;
+        const auto [A_out, b_out] = nb::cast<std::pair<Array2, Array>>(f(t, to_numpy(q), to_numpy(v)));
+        A = map(A_out);
+        b.head(A.rows()) = map(b_out);
     };
 }
 
@@ -63,37 +87,6 @@ std::function<void(double, double*)> wrench_function(nb::object f) {
         const Array value = nb::cast<Array>(f(t));
         std::copy(value.data(), value.data() + 6, out);
     };
-}
-
-UserRows user_rows(int count, nb::object rows, nb::object residual, nb::object rate) {
-    UserRows user;
-    user.count = count;
-    user.function = [rows](double t, const VecX& q, const VecX& v, MatX& A, VecX& rhs) {
-        nb::gil_scoped_acquire gil;
-        const auto [A_out, b_out] = nb::cast<std::pair<Array2, Array>>(rows(t, to_numpy(q), to_numpy(v)));
-        A = map(A_out);
-        rhs.head(A.rows()) = map(b_out);
-    };
-    if (!residual.is_none())
-        user.residual_function = [residual](double t, const VecX& q, VecX& phi) {
-            nb::gil_scoped_acquire gil;
-            const Array value = nb::cast<Array>(residual(t, to_numpy(q)));
-            phi.head(value.shape(0)) = map(value);
-        };
-    if (!rate.is_none())
-        user.rate_function = [rate](double t, const VecX& q, const VecX& v, VecX& out) {
-            nb::gil_scoped_acquire gil;
-            const Array value = nb::cast<Array>(rate(t, to_numpy(q), to_numpy(v)));
-            out.head(value.shape(0)) = map(value);
-        };
-    return user;
-}
-
-UserSlipRow slip_row(nb::object direction) {
-    return {[direction](double t, const VecX& q, VecX& row) {
-        nb::gil_scoped_acquire gil;
-        read_into(direction(t, to_numpy(q)), row);
-    }};
 }
 
 decltype(Friction::user_limit) limit_function(nb::object f) {

@@ -19,14 +19,20 @@ struct ReactionView {
 // ("polynomial", [c...]), ("sinusoid", [a, f, phase, offset]), ("spline", [breaks], [coefficients]) or a function.
 TimeFunction time_function(const nb::object& f);
 
-// f(t, q, v) -> torques or generalized forces.
-std::function<void(double, const VecX&, const VecX&, VecX&)> torque_function(nb::object f);
+// f(t, q, v) -> torques, generalized forces or rates; f(t, q) -> residuals or a direction; f(t, q, v) -> rows A and b.
+using OfState = void(double t, const VecX& q, const VecX& v, VecX& out);
+using OfPosition = void(double t, const VecX& q, VecX& out);
+using Rows = void(double t, const VecX& q, const VecX& v, MatX& A, VecX& b);
+template <class Signature>
+std::function<Signature> user_function(nb::callable f);
+template <>
+std::function<OfState> user_function(nb::callable f);
+template <>
+std::function<OfPosition> user_function(nb::callable f);
+template <>
+std::function<Rows> user_function(nb::callable f);
 // f(t) -> force and moment.
 std::function<void(double, double*)> wrench_function(nb::object f);
-
-// Rows A and right-hand side, residual and rate of a constraint; the last two may be None.
-UserRows user_rows(int count, nb::object rows, nb::object residual, nb::object rate);
-UserSlipRow slip_row(nb::object direction);
 
 // Limit of friction, and force of a law; both may ask about the reactions.
 decltype(Friction::user_limit) limit_function(nb::object f);

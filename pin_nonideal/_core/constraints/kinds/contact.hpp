@@ -1,12 +1,16 @@
 // Height of a sphere's (or point's) center over the plane of frame 2 equals its radius.
 #pragma once
 
+#include <tuple>
+
 #include "constraints/geometry.hpp"
-#include "constraints/kinds/shown.hpp"
+#include "constraints/kinds/facts.hpp"
 
 namespace pn {
 
 struct ContactRow {
+    static constexpr const char* name = "contact";
+    static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr Shown shown = Shown::contact;
 
@@ -14,6 +18,10 @@ struct ContactRow {
     Vec3 normal;
     double radius;
 
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame", &ContactRow::frame1}, Datum{"plane", &ContactRow::frame2},
+                          Datum{"normal", &ContactRow::normal}, Datum{"radius", &ContactRow::radius});
+    }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return false; }

@@ -1,12 +1,16 @@
 // Directions of friction: sliding of the contact point along the plane of frame 2.
 #pragma once
 
+#include <tuple>
+
 #include "constraints/geometry.hpp"
-#include "constraints/kinds/shown.hpp"
+#include "constraints/kinds/facts.hpp"
 
 namespace pn {
 
 struct ContactSlipRows {
+    static constexpr const char* name = "contact_slip";
+    static constexpr Role role = Role::direction;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr Shown shown = Shown::nothing;
 
@@ -14,6 +18,11 @@ struct ContactSlipRows {
     double radius;
     Vec3 tangent1, tangent2, normal;
 
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame", &ContactSlipRows::frame1}, Datum{"plane", &ContactSlipRows::frame2},
+                          Datum{"radius", &ContactSlipRows::radius}, Datum{"tangent1", &ContactSlipRows::tangent1},
+                          Datum{"tangent2", &ContactSlipRows::tangent2}, Datum{"normal", &ContactSlipRows::normal});
+    }
     int size() const { return 2; }
     bool is_holonomic(int) const { return false; }
     bool moves_in_time() const { return false; }

@@ -1,14 +1,17 @@
 // q1 = ratio q2 + offset: gears, belts.
 #pragma once
 
+#include <tuple>
 #include <vector>
 
 #include "constraints/coordinates.hpp"
-#include "constraints/kinds/shown.hpp"
+#include "constraints/kinds/facts.hpp"
 
 namespace pn {
 
 struct CouplingRows {
+    static constexpr const char* name = "coupling";
+    static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = true, affine_rate = true, comparable_rows = false;
     static constexpr Shown shown = Shown::gear;
 
@@ -16,6 +19,11 @@ struct CouplingRows {
     double ratio, offset, period;  // period of the residual for joints that turn without end; 0: none
     bool position;                 // false: no angle tells the residual, and only the rate is bound
 
+    static constexpr auto data() {
+        return std::tuple(Datum{"joint1", &CouplingRows::joint1}, Datum{"joint2", &CouplingRows::joint2},
+                          Datum{"ratio", &CouplingRows::ratio}, Datum{"offset", &CouplingRows::offset},
+                          Datum{"period", &CouplingRows::period}, Datum{"position", &CouplingRows::position});
+    }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return false; }

@@ -1,19 +1,27 @@
 // |x1 - x2| = length(t): a rod.
 #pragma once
 
+#include <tuple>
+
 #include "constraints/geometry.hpp"
-#include "constraints/kinds/shown.hpp"
+#include "constraints/kinds/facts.hpp"
 #include "math/timefunction.hpp"
 
 namespace pn {
 
 struct DistanceRows {
+    static constexpr const char* name = "distance";
+    static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr Shown shown = Shown::rod;
 
     Frame frame1, frame2;
     TimeFunction length;
 
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame1", &DistanceRows::frame1}, Datum{"frame2", &DistanceRows::frame2},
+                          Datum{"length", &DistanceRows::length});
+    }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return !is_constant(length); }

@@ -1,19 +1,23 @@
 // Direction of friction: velocity of one dof, or of the three of a ball joint.
 #pragma once
 
+#include <tuple>
 #include <vector>
 
 #include "constraints/coordinates.hpp"
-#include "constraints/kinds/shown.hpp"
+#include "constraints/kinds/facts.hpp"
 
 namespace pn {
 
 struct DofRows {
+    static constexpr const char* name = "dof_slip";
+    static constexpr Role role = Role::direction;
     static constexpr bool constant_A = true, affine_rate = true, comparable_rows = false;
     static constexpr Shown shown = Shown::nothing;
 
     int dof, count;
 
+    static constexpr auto data() { return std::tuple(Datum{"dof", &DofRows::dof}, Datum{"count", &DofRows::count}); }
     int size() const { return count; }
     bool is_holonomic(int) const { return false; }
     bool moves_in_time() const { return false; }

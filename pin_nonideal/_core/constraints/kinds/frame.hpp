@@ -1,10 +1,12 @@
 // Origins and axes of two frames coincide: a weld.
 #pragma once
 
+#include <tuple>
+
 #include <cmath>
 
 #include "constraints/geometry.hpp"
-#include "constraints/kinds/shown.hpp"
+#include "constraints/kinds/facts.hpp"
 
 namespace pn {
 
@@ -26,11 +28,16 @@ Vec logarithm(const Mat& R) {
 }
 
 struct FrameRows {
+    static constexpr const char* name = "frame";
+    static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr Shown shown = Shown::anchor;
 
     Frame frame1, frame2;
 
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame1", &FrameRows::frame1}, Datum{"frame2", &FrameRows::frame2});
+    }
     int size() const { return 6; }
     bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return false; }

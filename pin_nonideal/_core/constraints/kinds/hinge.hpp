@@ -1,10 +1,12 @@
 // Origins of two frames coincide, and the axis of frame 1 with that of frame 2.
 #pragma once
 
+#include <tuple>
+
 #include <cmath>
 
 #include "constraints/geometry.hpp"
-#include "constraints/kinds/shown.hpp"
+#include "constraints/kinds/facts.hpp"
 
 namespace pn {
 
@@ -12,12 +14,19 @@ namespace pn {
 constexpr double small_sine = 1e-9;
 
 struct HingeRows {
+    static constexpr const char* name = "hinge";
+    static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr Shown shown = Shown::anchor;
 
     Frame frame1, frame2;
     Vec3 axis, normal1, normal2;  // right-handed, in both frames
 
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame1", &HingeRows::frame1}, Datum{"frame2", &HingeRows::frame2},
+                          Datum{"axis", &HingeRows::axis}, Datum{"normal1", &HingeRows::normal1},
+                          Datum{"normal2", &HingeRows::normal2});
+    }
     int size() const { return 5; }
     bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return false; }

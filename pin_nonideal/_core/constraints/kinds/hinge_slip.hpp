@@ -1,18 +1,26 @@
 // Direction of friction: turning about the common axis of a hinge anchor.
 #pragma once
 
+#include <tuple>
+
 #include "constraints/geometry.hpp"
-#include "constraints/kinds/shown.hpp"
+#include "constraints/kinds/facts.hpp"
 
 namespace pn {
 
 struct HingeSlipRows {
+    static constexpr const char* name = "hinge_slip";
+    static constexpr Role role = Role::direction;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr Shown shown = Shown::nothing;
 
     Frame frame1, frame2;
     Vec3 axis;
 
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame1", &HingeSlipRows::frame1}, Datum{"frame2", &HingeSlipRows::frame2},
+                          Datum{"axis", &HingeSlipRows::axis});
+    }
     int size() const { return 1; }
     bool is_holonomic(int) const { return false; }
     bool moves_in_time() const { return false; }

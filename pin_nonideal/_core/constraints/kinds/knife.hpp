@@ -1,18 +1,25 @@
 // No velocity of a frame's origin along the frame's axis: a skate.
 #pragma once
 
+#include <tuple>
+
 #include "constraints/geometry.hpp"
-#include "constraints/kinds/shown.hpp"
+#include "constraints/kinds/facts.hpp"
 
 namespace pn {
 
 struct KnifeRows {
+    static constexpr const char* name = "knife";
+    static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr Shown shown = Shown::edge;
 
     Frame frame1, frame2;  // the latter is the world's
     Vec3 axis;
 
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame", &KnifeRows::frame1}, Datum{"axis", &KnifeRows::axis});
+    }
     int size() const { return 1; }
     bool is_holonomic(int) const { return false; }
     bool moves_in_time() const { return false; }

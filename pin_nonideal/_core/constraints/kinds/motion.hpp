@@ -1,15 +1,18 @@
 // q_joint = f(t): a prescribed motion.
 #pragma once
 
+#include <tuple>
 #include <vector>
 
 #include "constraints/coordinates.hpp"
-#include "constraints/kinds/shown.hpp"
+#include "constraints/kinds/facts.hpp"
 #include "math/timefunction.hpp"
 
 namespace pn {
 
 struct MotionRows {
+    static constexpr const char* name = "motion";
+    static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = true, affine_rate = true, comparable_rows = false;
     static constexpr Shown shown = Shown::drive;
 
@@ -17,6 +20,10 @@ struct MotionRows {
     TimeFunction function;
     double period;  // of the residual for a joint that turns without end; 0: none
 
+    static constexpr auto data() {
+        return std::tuple(Datum{"joint", &MotionRows::joint}, Datum{"function", &MotionRows::function},
+                          Datum{"period", &MotionRows::period});
+    }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return true; }

@@ -1,20 +1,27 @@
 // e . (x1 - x2) = 0 for axes e of frame 2: a ball joint, or part of it.
 #pragma once
 
+#include <tuple>
 #include <vector>
 
 #include "constraints/geometry.hpp"
-#include "constraints/kinds/shown.hpp"
+#include "constraints/kinds/facts.hpp"
 
 namespace pn {
 
 struct PointRows {
+    static constexpr const char* name = "point";
+    static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = true;
     static constexpr Shown shown = Shown::anchor;
 
     Frame frame1, frame2;
     std::vector<int> axes;
 
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame1", &PointRows::frame1}, Datum{"frame2", &PointRows::frame2},
+                          Datum{"axes", &PointRows::axes});
+    }
     int size() const { return static_cast<int>(axes.size()); }
     bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return false; }

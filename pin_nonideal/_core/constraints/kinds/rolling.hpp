@@ -1,12 +1,16 @@
 // A disk (or a sphere, without axle) rolls on the plane of frame 2 without slip and without lifting.
 #pragma once
 
+#include <tuple>
+
 #include "constraints/geometry.hpp"
-#include "constraints/kinds/shown.hpp"
+#include "constraints/kinds/facts.hpp"
 
 namespace pn {
 
 struct RollingRows {
+    static constexpr const char* name = "rolling";
+    static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr Shown shown = Shown::rolling;
 
@@ -16,6 +20,12 @@ struct RollingRows {
     Vec3 axle;
     Vec3 tangent1, tangent2, normal;  // in frame 2
 
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame", &RollingRows::frame1}, Datum{"plane", &RollingRows::frame2},
+                          Datum{"radius", &RollingRows::radius}, Datum{"sphere", &RollingRows::sphere},
+                          Datum{"axle", &RollingRows::axle}, Datum{"tangent1", &RollingRows::tangent1},
+                          Datum{"tangent2", &RollingRows::tangent2}, Datum{"normal", &RollingRows::normal});
+    }
     int size() const { return 3; }
     bool is_holonomic(int row) const { return row == 2; }
     bool moves_in_time() const { return false; }

@@ -2,14 +2,17 @@
 #pragma once
 
 #include <functional>
+#include <tuple>
 #include <vector>
 
 #include "constraints/coordinates.hpp"
-#include "constraints/kinds/shown.hpp"
+#include "constraints/kinds/facts.hpp"
 
 namespace pn {
 
 struct UserRows {
+    static constexpr const char* name = "user";
+    static constexpr Role role = Role::constraint;
     // A may depend on v, and then the rate is not A v + phi_t.
     static constexpr bool constant_A = false, affine_rate = false, comparable_rows = false;
     static constexpr Shown shown = Shown::nothing;
@@ -19,6 +22,10 @@ struct UserRows {
     std::function<void(double t, const VecX& q, VecX& phi)> residual_function;                // may be empty
     std::function<void(double t, const VecX& q, const VecX& v, VecX& rate)> rate_function;    // may be empty
 
+    static constexpr auto data() {
+        return std::tuple(Datum{"size", &UserRows::count}, Datum{"rows", &UserRows::function},
+                          Datum{"residual", &UserRows::residual_function}, Datum{"rate", &UserRows::rate_function});
+    }
     int size() const { return count; }
     bool is_holonomic(int) const { return static_cast<bool>(residual_function); }
     bool moves_in_time() const { return true; }

@@ -2,10 +2,11 @@
 #pragma once
 
 #include <functional>
+#include <tuple>
 #include <vector>
 
 #include "constraints/coordinates.hpp"
-#include "constraints/kinds/shown.hpp"
+#include "constraints/kinds/facts.hpp"
 #include "tree/liegroup.hpp"
 
 namespace pn {
@@ -14,11 +15,14 @@ namespace pn {
 constexpr double direction_step = 1e-6;
 
 struct UserSlipRow {
+    static constexpr const char* name = "user_slip";
+    static constexpr Role role = Role::direction;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr Shown shown = Shown::nothing;
 
     std::function<void(double t, const VecX& q, VecX& row)> direction;
 
+    static constexpr auto data() { return std::tuple(Datum{"direction", &UserSlipRow::direction}); }
     int size() const { return 1; }
     bool is_holonomic(int) const { return false; }
     bool moves_in_time() const { return true; }
