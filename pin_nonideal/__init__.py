@@ -9,19 +9,10 @@ Names and units follow Pinocchio and the paper; see docs/theory.md for both.
 
 from __future__ import annotations
 
-from .actuation import HoldPosition, SampledControl, Table
-from .constraints import (
-    Distance,
-    FrameAnchor,
-    HingeAnchor,
-    JointCoupling,
-    KnifeEdge,
-    PointAnchor,
-    PrescribedMotion,
-    Rolling,
-    UserConstraint,
-)
-from .contacts import PointContact
+from . import actuation, constraints, contacts, forces, laws
+from .actuation import *
+from .constraints import *
+from .contacts import *
 from .equation import Solution, solve
 from .errors import (
     FrictionParadoxError,
@@ -39,8 +30,8 @@ from .errors import (
     UnknownNameError,
     UserFunctionError,
 )
-from .forces import JointSpring, SpringDamper, UserForce, Wrench
-from .laws import Drag, JointFriction, LuGre, SigmoidFriction, UserFriction, UserLaw
+from .forces import *
+from .laws import *
 from .loading import load, robots
 from .plotting import plot
 from .replay import replay
@@ -53,48 +44,25 @@ from .trajectory import Event, Stats, Trajectory
 from .version import __version__ as __version__
 
 __all__ = [
-    "Distance",
-    "Drag",
     "Event",
-    "FrameAnchor",
     "FrictionParadoxError",
-    "HingeAnchor",
-    "HoldPosition",
     "InconsistentConstraintsError",
     "InputError",
-    "JointCoupling",
-    "JointFriction",
-    "JointSpring",
-    "KnifeEdge",
     "LoadingError",
     "LoopClosureError",
-    "LuGre",
     "NonFiniteError",
     "OutputError",
     "PinNonidealError",
-    "PointAnchor",
-    "PointContact",
-    "PrescribedMotion",
-    "Rolling",
     "RunError",
     "RunInterrupted",
-    "SampledControl",
     "Scene",
-    "SigmoidFriction",
     "SingularMassError",
     "Solution",
-    "SpringDamper",
     "Stats",
     "StepSizeError",
-    "Table",
     "Trajectory",
     "UnknownNameError",
-    "UserConstraint",
-    "UserForce",
-    "UserFriction",
     "UserFunctionError",
-    "UserLaw",
-    "Wrench",
     "constant",
     "load",
     "plot",
@@ -109,3 +77,8 @@ __all__ = [
     "spline",
     "sweep",
 ]
+__all__ += actuation.__all__
+__all__ += constraints.__all__
+__all__ += contacts.__all__
+__all__ += forces.__all__
+__all__ += laws.__all__

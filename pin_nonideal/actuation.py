@@ -16,6 +16,12 @@ from .checks import array, function, label, optional_text, positive
 from .errors import InputError
 from .types import Array
 
+__all__ = [
+    "HoldPosition",
+    "SampledControl",
+    "Table",
+]
+
 Gain = float | Sequence[float] | NDArray[np.float64]
 
 

@@ -19,6 +19,18 @@ from .checks import count, function, label, number, optional_text, positive, tex
 from .errors import InputError
 from .timefunctions import TimeFunction
 
+__all__ = [
+    "Distance",
+    "FrameAnchor",
+    "HingeAnchor",
+    "JointCoupling",
+    "KnifeEdge",
+    "PointAnchor",
+    "PrescribedMotion",
+    "Rolling",
+    "UserConstraint",
+]
+
 Axis = str | Sequence[float]
 TIME_FUNCTION = "t -> (value, rate, acceleration)"
 

@@ -9,6 +9,10 @@ from .constraints import Axis
 from .errors import InputError
 from .laws import static_ratio
 
+__all__ = [
+    "PointContact",
+]
+
 
 @dataclass(frozen=True)
 class PointContact:

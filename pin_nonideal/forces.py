@@ -8,6 +8,13 @@ from dataclasses import dataclass
 from .checks import array, function, label, nonnegative, number, optional_text, text
 from .errors import InputError
 
+__all__ = [
+    "JointSpring",
+    "SpringDamper",
+    "UserForce",
+    "Wrench",
+]
+
 
 @dataclass(frozen=True)
 class SpringDamper:

@@ -11,6 +11,15 @@ from dataclasses import dataclass
 from .checks import choice, count, function, label, nonnegative, number, optional_text, positive, text
 from .errors import InputError
 
+__all__ = [
+    "Drag",
+    "JointFriction",
+    "LuGre",
+    "SigmoidFriction",
+    "UserFriction",
+    "UserLaw",
+]
+
 
 @dataclass(frozen=True)
 class JointFriction:

@@ -25,6 +25,9 @@ KINDS = get_args(constraints.Constraint)
 HEADERS = sorted((CORE / "constraints" / "kinds").glob("*.hpp"))
 # What a kind's C++ struct must say of itself.
 MEMBERS = (
+    "static constexpr const char* name",
+    "static constexpr Role role",
+    "static constexpr auto data()",
     "int size() const",
     "bool is_holonomic(int row) const",
     "bool moves_in_time() const",

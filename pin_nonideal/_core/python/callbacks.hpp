@@ -23,6 +23,11 @@ TimeFunction time_function(const nb::object& f);
 using OfState = void(double t, const VecX& q, const VecX& v, VecX& out);
 using OfPosition = void(double t, const VecX& q, VecX& out);
 using Rows = void(double t, const VecX& q, const VecX& v, MatX& A, VecX& b);
+// The same as Python sees them.
+template <class Signature> struct Seen;
+template <> struct Seen<OfState> { using Type = Numbers(double, Numbers, Numbers); };
+template <> struct Seen<OfPosition> { using Type = Numbers(double, Numbers); };
+template <> struct Seen<Rows> { using Type = std::pair<Numbers, Numbers>(double, Numbers, Numbers); };
 template <class Signature>
 std::function<Signature> user_function(nb::callable f);
 template <>

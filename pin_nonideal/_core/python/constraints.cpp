@@ -3,6 +3,7 @@
 #include "python/callbacks.hpp"
 
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -58,7 +59,7 @@ struct From<TimeFunction> {
 };
 template <class Signature>
 struct From<std::function<Signature>> {  // a function of the user, or None where it may be left out
-    using Given = std::optional<nb::callable>;
+    using Given = Function<typename Seen<Signature>::Type>;
     static std::function<Signature> make(const Given& f) {
         return f ? user_function<Signature>(*f) : std::function<Signature>();
     }
