@@ -63,6 +63,15 @@ class Load(enum.Enum):
 
     user = 5
 
+class Mode(enum.IntEnum):
+    """How a frictional element moves: slip one way or the other, or rest."""
+
+    slip_minus = -1
+
+    sticking = 0
+
+    slip_plus = 1
+
 class Shown(enum.Enum):
     """What a replay shows of a constraint."""
 
@@ -228,7 +237,7 @@ class Instant:
     def rank(self) -> int: ...
 
     @property
-    def modes(self) -> list[int]: ...
+    def modes(self) -> list[Mode]: ...
 
     @property
     def friction(self) -> list[Annotated[NDArray[numpy.float64], dict(shape=(None,))]]: ...
@@ -239,7 +248,7 @@ class Instant:
 class Runner:
     def acceleration(self, q: object, v: object, t: float, tau: object | None, out: object) -> None: ...
 
-    def solve(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], t: float = 0.0, tau: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, modes: Sequence[int] | None = None) -> Instant: ...
+    def solve(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], t: float = 0.0, tau: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, modes: Sequence[Mode] | None = None) -> Instant: ...
 
     def rows(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], t: float) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]: ...
 

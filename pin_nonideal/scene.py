@@ -219,14 +219,16 @@ class Scene:
             InputError: wrong shapes or numbers.
             InconsistentConstraintsError, FrictionParadoxError, SingularMassError: there is no solution.
         """
+        given = None
         if modes is not None:
             asked = np.asarray(modes, dtype=object)
-            if asked.shape != (len(self.element_names),) or not np.isin(asked, (-1, 0, 1)).all():
+            known = [int(mode) for mode in core.Mode]
+            if asked.shape != (len(self.element_names),) or not np.isin(asked, known).all():
                 raise InputError(
                     f"modes must hold {len(self.element_names)} numbers out of -1, 0, 1; got {modes}"
                 )
-            modes = [int(m) for m in asked]
-        now = self._call(self._runner.solve, q, v, t, tau, modes)
+            given = [core.Mode(int(m)) for m in asked]
+        now = self._call(self._runner.solve, q, v, t, tau, given)
         used = np.array(now.modes, dtype=np.int8)
         return Solution(now.a, now.F_ideal, now.F_nonideal, now.lam, now.rank, used)
 
@@ -273,7 +275,7 @@ class Scene:
     def report(self) -> str:
         """What the scene is made of: joints, constraints, rows, rank, mobility, and what was left out."""
         q, v = self.initial_state()
-        self._runner.solve(q, v, 0.0, modes=[1] * len(self.element_names))
+        self._runner.solve(q, v, 0.0, modes=[core.Mode.slip_plus] * len(self.element_names))
         notes = [f"note: {n}" for n in self.notes]
         credits = {"source": self.source, "licence": self.licence}
         notes += [f"{key}: {value}" for key, value in credits.items() if value]

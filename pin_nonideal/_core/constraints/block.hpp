@@ -12,6 +12,7 @@ struct Block {
     std::string name;
     Kind kind;
     int joint1 = 0, joint2 = 0;    // bodies of a geometric kind
+    int dof = -1;                  // where each row is a dof itself: the first of them
     int total = 0;                 // rows of the description
     std::vector<int> kept;         // rows that act
     std::vector<char> holonomic;   // of the kept rows

@@ -259,7 +259,7 @@ void remove_normal_part(const Program& p, Workspace& w, Eigen::Ref<VecX> motion)
 }
 
 void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
-    set_modes(p, w, std::vector<signed char>(p.frictions.size(), 1));
+    set_modes(p, w, std::vector<Mode>(p.frictions.size(), slip_plus));
     configure(p, w, t, q, v);
     if (w.now.rows.blocks.empty()) return;
     if (w.now.rows.orthogonal) {  // their Cholesky factor does not show that they are independent

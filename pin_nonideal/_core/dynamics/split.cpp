@@ -34,7 +34,7 @@ void share_multipliers(const Program& p, Workspace& w, const VecX& lam, VecX& sh
 }
 
 IdealMotion::IdealMotion(const Program& program, Workspace& workspace) : p(program), w(workspace) {
-    for (signed char mode : w.state.mode) sticks |= mode == sticking;
+    for (Mode mode : w.state.mode) sticks |= mode == sticking;
     if (sticks) {
         w.now.terms.locked.swap(w.scratch.ideal_locked);
         factorize(p.mechanism, w.now.terms);

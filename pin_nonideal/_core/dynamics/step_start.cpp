@@ -18,8 +18,8 @@ void select_rows(const Program& p, Workspace& w) {
     for (size_t e = 0; e < p.frictions.size(); ++e) {
         const Block& block = p.blocks[p.frictions[e].block];
         if (w.state.mode[e] != sticking) continue;
-        if (const auto* d = std::get_if<DofRows>(&block.kind))
-            for (int k = 0; k < d->count; ++k) w.now.terms.locked[d->dof + k] = 1;
+        if (block.dof >= 0)
+            for (int k = 0; k < block.total; ++k) w.now.terms.locked[block.dof + k] = 1;
         else
             for (size_t k = 0; k < block.kept.size(); ++k) w.now.rows.wanted[block.row + k] = 1;
     }

@@ -62,8 +62,8 @@ Vec3 friction_force(const Program& p, Workspace& w, int e) {
     if (w.state.mode[e] != sticking) return w.now.slip_force[e];
     Vec3 force = Vec3::Zero();
     const Block& block = p.blocks[f.block];
-    if (const auto* d = std::get_if<DofRows>(&block.kind))
-        for (int k = 0; k < f.dim; ++k) force[k] = holding_forces(p, w)[d->dof + k];
+    if (block.dof >= 0)
+        for (int k = 0; k < f.dim; ++k) force[k] = holding_forces(p, w)[block.dof + k];
     else
         for (int k = 0; k < f.dim; ++k) force[k] = w.now.lam[block.row + k];
     return force;
@@ -86,8 +86,8 @@ void add_slip_force(const Program& p, Workspace& w, int e, VecX& C) {
     const Block& block = p.blocks[p.frictions[e].block];
     w.now.slip_force[e] = w.now.limit[e] * force_direction(p, w, e);
     w.now.reactions.current = false;
-    if (const auto* d = std::get_if<DofRows>(&block.kind))
-        for (int k = 0; k < d->count; ++k) C[d->dof + k] += w.now.slip_force[e][k];
+    if (block.dof >= 0)
+        for (int k = 0; k < block.total; ++k) C[block.dof + k] += w.now.slip_force[e][k];
     else
         add_along(block, w.now, w.now.slip_force[e], C);
 }

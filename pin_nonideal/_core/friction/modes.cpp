@@ -38,8 +38,8 @@ struct Search {
 
     bool breaks(size_t i, bool released) const { return released && contains(question.breaking, list[i]); }
 
-    void apply(const std::vector<signed char>& modes) {
-        std::vector<signed char> all = question.modes;
+    void apply(const std::vector<Mode>& modes) {
+        std::vector<Mode> all = question.modes;
         for (size_t i = 0; i < list.size(); ++i) all[list[i]] = modes[i];
         set_modes(p, w, all);
         w.state.warm = false;
@@ -53,7 +53,7 @@ struct Search {
 
     // Whether the motion under these modes, loads and all, keeps the conditions that they stand for; the workspace
     // ends evaluated there.
-    bool hold(const FrictionProblem& problem, const std::vector<signed char>& modes, bool released) {
+    bool hold(const FrictionProblem& problem, const std::vector<Mode>& modes, bool released) {
         try {
             clear_forces();
             apply(modes);
@@ -83,20 +83,21 @@ struct Search {
         if (n > most_enumerated || problem.rows != n) return false;
         int combinations = 1;
         for (int i = 0; i < n; ++i) combinations *= 3;
-        std::vector<signed char> modes(n);
+        constexpr Mode in_turn[] = {sticking, slip_plus, slip_minus};
+        std::vector<Mode> modes(n);
         for (int combination = 0; combination < combinations; ++combination) {
             for (int i = 0, rest = combination; i < n; ++i, rest /= 3)
-                modes[i] = rest % 3 == 2 ? -1 : static_cast<signed char>(rest % 3);
+                modes[i] = in_turn[rest % 3];
             if (hold(problem, modes, released)) return true;
         }
         return false;
     }
 
     // Modes that the forces f of the program mean: what is below its limit sticks.
-    std::vector<signed char> modes_of(const FrictionProblem& problem, const VecX& f, const VecX& limits, bool released) {
+    std::vector<Mode> modes_of(const FrictionProblem& problem, const VecX& f, const VecX& limits, bool released) {
         const VecX alpha = problem.alpha0 + problem.W * f;
         const double size = problem.alpha0.cwiseAbs().maxCoeff() + least_limit;
-        std::vector<signed char> modes(list.size(), sticking);
+        std::vector<Mode> modes(list.size(), sticking);
         for (size_t i = 0, at = 0; i < list.size(); at += problem.dims[i], ++i) {
             const int dim = problem.dims[i];
             const auto force = f.segment(at, dim), slip = alpha.segment(at, dim);
@@ -104,7 +105,7 @@ struct Search {
             const bool slides = force.norm() >= limits[i] * (1.0 - at_limit) && slip.norm() > no_acceleration * size;
             if (!gives_way && !slides) continue;
             const VecX direction = slides ? VecX(slip.normalized()) : VecX(-force.normalized());
-            modes[i] = dim > 1 || direction[0] > 0.0 ? 1 : -1;
+            modes[i] = dim > 1 || direction[0] > 0.0 ? slip_plus : slip_minus;
             if (dim == 1) continue;
             Vec3& along = w.state.slip_direction[list[i]];
             along = Vec3::Zero();
@@ -116,7 +117,7 @@ struct Search {
 
     // The motion under the forces f of the elements, and the limits that its loads give: the kinetic one for what
     // slips. Returns their largest relative change.
-    double follow(FrictionProblem& problem, const VecX& C_smooth, const VecX& f, const std::vector<signed char>& modes,
+    double follow(FrictionProblem& problem, const VecX& C_smooth, const VecX& f, const std::vector<Mode>& modes,
                   VecX& limits) {
         w.now.C_smooth = C_smooth;
         VecX push = VecX::Zero(p.mechanism.nv);
@@ -139,7 +140,7 @@ struct Search {
     }
 
     // The problem without any friction of the elements, and first limits from the load there.
-    FrictionProblem pose(const std::vector<signed char>& unloaded_modes, VecX& limits) {
+    FrictionProblem pose(const std::vector<Mode>& unloaded_modes, VecX& limits) {
         clear_forces();
         apply(unloaded_modes);
         FrictionProblem problem(p, w, list);
@@ -153,11 +154,11 @@ struct Search {
     }
 
     void run() {
-        const std::vector<signed char> unloaded_modes(list.size(), unloaded);
+        const std::vector<Mode> unloaded_modes(list.size(), unloaded);
         VecX limits(list.size());
         FrictionProblem problem = pose(unloaded_modes, limits);
         const VecX C_smooth = w.now.C_smooth;
-        std::vector<signed char> modes = unloaded_modes;
+        std::vector<Mode> modes = unloaded_modes;
         double change = 0.0;
         for (int it = 0; it < outer_limit; ++it) {
             const VecX f = friction_program(problem.W, problem.alpha0, problem.dims, limits);
@@ -183,7 +184,7 @@ struct Search {
 
 }  // namespace
 
-void set_modes(const Program& p, Workspace& w, const std::vector<signed char>& modes) {
+void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes) {
     w.state.mode.values_ = modes;
     w.now.renew();
     select_rows(p, w);
@@ -199,7 +200,7 @@ bool at_rest(const Program& p, const Workspace& w, int e, const VecX& v) {
 
 void follow_velocity(const Program& p, Workspace& w, int e, ModeQuestion& question) {
     const Vec3 u = slip_velocity(w.now, p.frictions[e]);
-    question.modes[e] = p.frictions[e].dim > 1 || u[0] > 0.0 ? 1 : -1;
+    question.modes[e] = p.frictions[e].dim > 1 || u[0] > 0.0 ? slip_plus : slip_minus;
     if (p.frictions[e].dim > 1) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
 }
 
@@ -218,7 +219,7 @@ ModeQuestion first_question(const Program& p, Workspace& w, double t, const VecX
     w.state.warm = false;
     update_kinematics(p, w, t, q, v);
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
-        asked.modes[e] = 1;
+        asked.modes[e] = slip_plus;
         if (hardly_slips(p, w, e, v)) asked.at_rest.push_back(e);
         else follow_velocity(p, w, e, asked);
     }

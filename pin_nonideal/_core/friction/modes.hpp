@@ -12,11 +12,11 @@ namespace pn {
 constexpr double rest_speed = 1e-11;
 
 // The one way to change modes: what hangs on them (rows that must hold, locked dofs, warm starts) follows.
-void set_modes(const Program& p, Workspace& w, const std::vector<signed char>& modes);
+void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes);
 
 // Modes to be found: those of elements that move are known, the others are at rest along their directions.
 struct ModeQuestion {
-    std::vector<signed char> modes;  // of all elements; what those at rest hold is no matter
+    std::vector<Mode> modes;  // of all elements; what those at rest hold is no matter
     std::vector<int> at_rest;
     std::vector<int> breaking;  // of those at rest: stuck until now and has just reached its limit, so that it slips as
                                 // soon as its force is at the limit, though its acceleration is still zero

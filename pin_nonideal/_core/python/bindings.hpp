@@ -85,7 +85,7 @@ std::vector<ConstraintRows> constraint_rows(const Program& p);
 struct Instant {
     Numbers a, F_ideal, F_nonideal, C, F, lam, lam_ideal;
     int rank;
-    std::vector<int> modes;
+    std::vector<Mode> modes;
     std::vector<Numbers> friction;  // force of each element along its directions
     std::vector<double> limits;
 };
@@ -107,7 +107,7 @@ struct Runner {
     // Writes the acceleration into `out`, an array of nv numbers; plain buffers, since this is called in tight loops.
     void acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle tau, nb::handle out);
     Instant solve(const Array& q_in, const Array& v_in, double t, const std::optional<Array>& tau,
-                  const std::optional<std::vector<int>>& modes);
+                  const std::optional<std::vector<Mode>>& modes);
     int constraint_rank() const;
     // All rows of all constraints, dropped ones too: A (by rows), b, residual, rate.
     std::tuple<Numbers, Numbers, Numbers, Numbers> rows(const Array& q_in, const Array& v_in, double t);
@@ -134,7 +134,7 @@ private:
     // What does not fit is refused here and explained in Python.
     void set(const Array& q_in, const Array& v_in, const std::optional<Array>& tau);
     // Modes by velocity, and at rest by the complementarity problem; or the ones given.
-    void choose_modes(double t, const std::optional<std::vector<int>>& modes);
+    void choose_modes(double t, const std::optional<std::vector<Mode>>& modes);
     // Such a y with the core's watch of sticking elements behind it.
     VecX read_state(const System& system, const VecX& outside);
     double energy();

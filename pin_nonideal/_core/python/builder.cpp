@@ -145,6 +145,10 @@ void bind_enums(nb::module_& m) {
         .value("spherical", Load::spherical)
         .value("contact", Load::contact)
         .value("user", Load::user);
+    nb::enum_<Mode>(m, "Mode", nb::is_arithmetic(), "How a frictional element moves: slip one way or the other, or rest.")
+        .value("slip_minus", slip_minus)
+        .value("sticking", sticking)
+        .value("slip_plus", slip_plus);
     nb::enum_<Shown>(m, "Shown", "What a replay shows of a constraint.")
         .value("nothing", Shown::nothing)
         .value("anchor", Shown::anchor)

@@ -69,9 +69,9 @@ void Runner::set(const Array& q_in, const Array& v_in, const std::optional<Array
     w->now.override_torque = map(*tau);
 }
 
-void Runner::choose_modes(double t, const std::optional<std::vector<int>>& modes) {
+void Runner::choose_modes(double t, const std::optional<std::vector<Mode>>& modes) {
     if (!modes) return resolve_modes(*p, *w, t, q, v, first_question(*p, *w, t, q, v));
-    set_modes(*p, *w, std::vector<signed char>(modes->begin(), modes->end()));
+    set_modes(*p, *w, *modes);
     w->state.warm = false;
     begin_step(*p, *w, t, q, v);
 }
@@ -92,13 +92,13 @@ void Runner::acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle
 }
 
 Instant Runner::solve(const Array& q_in, const Array& v_in, double t, const std::optional<Array>& tau,
-                      const std::optional<std::vector<int>>& modes) {
+                      const std::optional<std::vector<Mode>>& modes) {
     set(q_in, v_in, tau);
     choose_modes(t, modes);
     Instant out;
     for (size_t e = 0; e < p->frictions.size(); ++e) {
         const int element = static_cast<int>(e);
-        const signed char mode = w->state.mode[e];
+        const Mode mode = w->state.mode[e];
         Vec3 f = friction_force(*p, *w, element);
         out.friction.push_back(to_numpy(&f[0], p->frictions[e].dim));
         out.limits.push_back(mode == sticking ? static_limit(*p, *w, element, t, q, v) : w->now.limit[e]);

@@ -16,7 +16,7 @@ static void fields(Archive& a, Counters& x) {
 
 void fields(Archive& a, Modes& x) {
     a(x.values_);
-    for (signed char mode : x) a.require(slips(mode) || mode == sticking || mode == unloaded);
+    for (Mode mode : x) a.require(slips(mode) || mode == sticking || mode == unloaded);
 }
 
 static void fields(Archive& a, RunState& x) {

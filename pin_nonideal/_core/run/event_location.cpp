@@ -169,9 +169,9 @@ bool EventLocator::may_stop(int e) const {
 
 // A dip through zero and back: the cubic through both ends and their slopes tells, of an element on one dof.
 bool EventLocator::dips(int e, double noise) const {
-    const auto* dof = std::get_if<DofRows>(&p.blocks[p.frictions[e].block].kind);
-    if (!dof || dof->count != 1 || stepper_.method.order < 2) return false;
-    const int i = system_.nq + dof->dof;
+    const Block& block = p.blocks[p.frictions[e].block];
+    if (block.dof < 0 || block.total != 1 || stepper_.method.order < 2) return false;
+    const int i = system_.nq + block.dof;
     const double sign = w.state.mode[e], u0 = sign * stepper_.y0[i], u1 = sign * stepper_.y1[i];
     const double a0 = sign * stepper_.h * stepper_.rates.front()[i];
     const double a1 = sign * stepper_.h * stepper_.rates[stepper_.stages][i];
@@ -306,7 +306,7 @@ std::optional<FoundEvent> EventLocator::locate() {
 }
 
 // Whether all elements at rest at the step's end that stuck before it can stick on.
-bool EventLocator::can_hold(const std::vector<signed char>& modes, ModeQuestion& asked) {
+bool EventLocator::can_hold(const std::vector<Mode>& modes, ModeQuestion& asked) {
     const double t = stepper_.t0 + stepper_.h;
     system_.read(stepper_.y1);
     asked = {modes, {}, {}};
@@ -327,7 +327,7 @@ bool EventLocator::can_hold(const std::vector<signed char>& modes, ModeQuestion&
 std::optional<FoundEvent> EventLocator::release_together() {
     if (!w.state.indeterminate) return std::nullopt;
     const double full = stepper_.h;
-    const std::vector<signed char> modes = w.state.mode;
+    const std::vector<Mode> modes = w.state.mode;
     ModeQuestion asked;
     if (can_hold(modes, asked)) return std::nullopt;
     double low = 0.0, high = full;

@@ -64,7 +64,7 @@ private:
     void end_step_at(double size);
     void step_onto(const Watch& watch, double part);
 
-    bool can_hold(const std::vector<signed char>& modes, ModeQuestion& asked);
+    bool can_hold(const std::vector<Mode>& modes, ModeQuestion& asked);
     std::optional<FoundEvent> release_together();
 
     System& system_;

@@ -51,7 +51,7 @@ bool shares_load(System& system, double t, const std::vector<int>& resting, int 
 
 }  // namespace
 
-Event::Kind kind_of_change(signed char before, signed char after) {
+Event::Kind kind_of_change(Mode before, Mode after) {
     return after == sticking ? Event::Kind::stick : before == sticking ? Event::Kind::slip : Event::Kind::reverse;
 }
 
@@ -65,7 +65,7 @@ std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, con
         system.rate_of_evaluation(t, y, dy);
         return {};
     }
-    const std::vector<signed char> before = w.state.mode;
+    const std::vector<Mode> before = w.state.mode;
     const std::vector<Vec3> directions = w.state.slip_direction;
     ModeQuestion asked =
         event ? question(p, w, system.v, event->index) : first_question(p, w, t, system.q, system.v);

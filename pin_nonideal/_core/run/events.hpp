@@ -15,7 +15,7 @@ namespace pn {
 std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event);
 
 // Kind of the event in which the mode of an element changes so.
-Event::Kind kind_of_change(signed char before, signed char after);
+Event::Kind kind_of_change(Mode before, Mode after);
 
 // Keeps the slip directions at a step's end for the next step; the slip speeds go into `slip`.
 void remember_directions(System& system, std::vector<double>& slip);

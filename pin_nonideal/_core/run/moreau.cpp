@@ -46,7 +46,7 @@ void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
 
 // The motion without friction of the elements, constraints met at the end of the step.
 void Moreau::solve_without_friction(double t) {
-    set_modes(p, w, std::vector<signed char>(system_.ne, unloaded));
+    set_modes(p, w, std::vector<Mode>(system_.ne, unloaded));
     begin_step(p, w, t, q_mid_, v0_);
     for (int i = 0; i < p.constraints; ++i) {
         const Block& block = p.blocks[i];
@@ -111,15 +111,14 @@ void Moreau::solve_friction(const FrictionProblem& problem, double t) {
 // Velocity at the step's end, and the modes there: what stays below its limit sticks.
 void Moreau::end_velocity(const FrictionProblem& problem) {
     const VecX alpha = problem.alpha0 + problem.W * force_;
-    std::vector<signed char> modes(system_.ne);
+    std::vector<Mode> modes(system_.ne);
     v1_ = v0_ + h_ * (a_free_ + problem.response * force_);
     for (int e = 0, at = 0; e < system_.ne; at += problem.dims[e], ++e) {
         const int dim = problem.dims[e];
         const bool held = force_.segment(at, dim).norm() < force_limit_[e] * (1.0 - limit_rounding);
-        modes[e] = held ? sticking : dim > 1 || alpha[at] > 0.0 ? 1 : -1;
-        if (!held) continue;
-        if (const auto* dofs = std::get_if<DofRows>(&p.blocks[p.frictions[e].block].kind))
-            v1_.segment(dofs->dof, dofs->count).setZero();
+        modes[e] = held ? sticking : dim > 1 || alpha[at] > 0.0 ? slip_plus : slip_minus;
+        const Block& block = p.blocks[p.frictions[e].block];
+        if (held && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
     }
     set_modes(p, w, modes);
 }
