@@ -129,7 +129,7 @@ SCRIPT = """
     import sys
     import pin_nonideal as pn
     scene = pn.load("n_four_bar", N=3)
-    pn.simulate(scene, 6.0, record="energy", checkpoint=sys.argv[1], checkpoint_interval=0.0)
+    pn.simulate(scene, 60.0, record="energy", checkpoint=sys.argv[1], checkpoint_interval=0.0)
 """
 
 
@@ -144,7 +144,7 @@ def test_the_state_of_a_run_grows_no_faster_than_the_robot(tmp_path):
 
 
 def test_a_killed_process_leaves_a_file_to_go_on_from(tmp_path):
-    alone = pn.simulate(pn.load("n_four_bar", N=3), 6.0, record="energy")
+    alone = pn.simulate(pn.load("n_four_bar", N=3), 60.0, record="energy")
     generator = np.random.default_rng()
     part = 0
     for attempt in range(3):
