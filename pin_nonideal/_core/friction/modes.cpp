@@ -144,7 +144,7 @@ struct Search {
         clear_forces();
         apply(unloaded_modes);
         FrictionProblem problem(p, w, list);
-        problem.clean();
+        problem.clean(p, w);
         problem.alpha0 = problem.slip_accelerations(p, w);
         for (size_t i = 0; i < list.size(); ++i) limits[i] = static_limit(p, w, list[i], t, q, v);
         const double noise = no_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());

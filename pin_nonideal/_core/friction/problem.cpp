@@ -10,6 +10,23 @@ constexpr double least_response = 1e-13;
 
 static const Block& block_of(const Program& p, int element) { return p.blocks[p.frictions[element].block]; }
 
+// Calls act(column, force) with the generalized force of a unit of each friction force in turn, which it may change.
+template <class Act>
+static void each_unit_force(const Program& p, const Workspace& w, const std::vector<int>& elements, const Act& act) {
+    VecX force(p.mechanism.nv), unit = VecX::Zero(p.layout.rows);
+    int column = 0;
+    for (int e : elements) {
+        const Block& block = block_of(p, e);
+        for (size_t k = 0; k < block.kept.size(); ++k, ++column) {
+            force.setZero();
+            unit[block.row + k] = 1.0;
+            add_transpose(block, w.now.A, unit, force);
+            unit[block.row + k] = 0.0;
+            act(column, force);
+        }
+    }
+}
+
 FrictionProblem::FrictionProblem(const Program& p, Workspace& w, std::vector<int> list) : elements(std::move(list)) {
     for (int e : elements) {
         dims.push_back(p.frictions[e].dim);
@@ -19,25 +36,14 @@ FrictionProblem::FrictionProblem(const Program& p, Workspace& w, std::vector<int
     W.resize(rows, rows);
     response.resize(nv, rows);
     multipliers.resize(p.layout.rows, rows);
-    free.resize(rows);
     const VecX no_drift = VecX::Zero(p.layout.rows);
-    VecX force(nv), a(nv), lam = no_drift, unit = no_drift;
-    int column = 0;
-    for (int e : elements) {
-        const Block& block = block_of(p, e);
-        for (size_t k = 0; k < block.kept.size(); ++k, ++column) {
-            force.setZero();
-            unit[block.row + k] = 1.0;
-            add_transpose(block, w.now.A, unit, force);
-            unit[block.row + k] = 0.0;
-            solve_acceleration(p, w, force, no_drift, a, lam);
-            response.col(column) = a;
-            multipliers.col(column) = lam;
-            W.col(column) = along(p, w, a);
-            solve_R(p.mechanism, w.now.terms, force);
-            free[column] = force.squaredNorm();
-        }
-    }
+    VecX a(nv), lam = no_drift;
+    each_unit_force(p, w, elements, [&](int column, const VecX& force) {
+        solve_acceleration(p, w, force, no_drift, a, lam);
+        response.col(column) = a;
+        multipliers.col(column) = lam;
+        W.col(column) = along(p, w, a);
+    });
 }
 
 VecX FrictionProblem::along(const Program& p, Workspace& w, const VecX& x) const {
@@ -72,13 +78,15 @@ void FrictionProblem::add_forces(const Program& p, Workspace& w, const VecX& f, 
     w.now.reactions.current = false;
 }
 
-void FrictionProblem::clean() {
+void FrictionProblem::clean(const Program& p, Workspace& w) {
     W = (0.5 * (W + W.transpose())).eval();
-    for (int i = 0; i < rows; ++i) {
-        if (W(i, i) > least_response * free[i]) continue;
+    each_unit_force(p, w, elements, [&](int i, VecX& force) {
+        solve_R(p.mechanism, w.now.terms, force);
+        const double free = force.squaredNorm();  // what it would cause if no constraint held
+        if (W(i, i) > least_response * free) return;
         W.row(i).setZero();
         W.col(i).setZero();
-    }
+    });
 }
 
 }  // namespace pn

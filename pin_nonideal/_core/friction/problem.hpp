@@ -12,7 +12,6 @@ struct FrictionProblem {
     VecX alpha0;       // without any friction of these elements
     MatX W;            // alpha for a unit of each friction force
     MatX response, multipliers;  // a and lam for it
-    VecX free;         // alpha that it would cause if no constraint held
 
     // For the factors in the workspace, in which these elements do not stick; alpha0 is left to the caller.
     FrictionProblem(const Program& p, Workspace& w, std::vector<int> elements);
@@ -25,7 +24,7 @@ struct FrictionProblem {
     void add_forces(const Program& p, Workspace& w, const VecX& f, VecX& C) const;
     // W as theory has it: symmetric, and exactly zero for what the constraints alone decide, such as the friction of a
     // driven joint.
-    void clean();
+    void clean(const Program& p, Workspace& w);
 };
 
 }  // namespace pn
