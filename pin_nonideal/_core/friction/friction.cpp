@@ -41,6 +41,21 @@ double load_limit(const Program& p, Workspace& w, const Friction& f, double t, c
     return f.constant + f.mu * (f.radius * (radial + bending) + f.axial_radius * std::abs(axial));
 }
 
+double slip_along_mode(const Program& p, const Workspace& w, int e) {
+    const Friction& f = p.frictions[e];
+    const Vec3 u = slip_velocity(w.now, f);
+    return f.dim == 1 ? w.state.mode[e] * u[0] : u.dot(w.state.slip_direction[e]);
+}
+
+double slip_rate_along_mode(const Program& p, Workspace& w, int e) {
+    const Friction& f = p.frictions[e];
+    const Block& block = p.blocks[f.block];
+    multiply(block, w.now.A, w.now.a, w.scratch.r);
+    Vec3 rate = Vec3::Zero();
+    for (int k = 0; k < f.dim; ++k) rate[k] = w.scratch.r[block.row + k] - w.now.b[block.row + k];
+    return f.dim == 1 ? w.state.mode[e] * rate[0] : rate.dot(w.state.slip_direction[e]);
+}
+
 double slip_factor(const Program& p, const Workspace& w, int e) {
     const Friction& f = p.frictions[e];
     return f.speed_factor(w.state.mode[e] == sticking ? 0.0 : slip_velocity(w.now, f).norm());

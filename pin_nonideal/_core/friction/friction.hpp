@@ -36,6 +36,9 @@ struct Friction {
 
 // Slip velocity along an element's directions, of the rows evaluated last.
 Vec3 slip_velocity(const Evaluation& now, const Friction& f);
+// Slip speed the way that the element's mode says, and its rate in the motion at hand.
+double slip_along_mode(const Program& p, const Workspace& w, int element);
+double slip_rate_along_mode(const Program& p, Workspace& w, int element);
 // Limit over load at the present slip speed, at rest where an element sticks.
 double slip_factor(const Program& p, const Workspace& w, int element);
 // The load of an element, as the limit that it gives at rest without the static ratio, for the motion in the workspace.

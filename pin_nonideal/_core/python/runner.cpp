@@ -173,7 +173,7 @@ Numbers Runner::derivative(double t, const Array& y_in, bool energy) {
     VecX rate(system.ny);
     choose_modes(t, {});
     system.rate_of_evaluation(t, y, rate);
-    return to_numpy(rate.data(), system.ny - system.ne);
+    return to_numpy(rate.data(), system.ns);
 }
 
 std::pair<Numbers, double> Runner::project_outside(double t, const Array& y_in, bool with_energy) {
@@ -184,7 +184,7 @@ std::pair<Numbers, double> Runner::project_outside(double t, const Array& y_in, 
     normalize(p->mechanism, q.data());
     y.head(system.nq) = q;
     y.segment(system.nq, system.nv) = v;
-    return {to_numpy(y.data(), system.ny - system.ne), energy() - before};
+    return {to_numpy(y.data(), system.ns), energy() - before};
 }
 
 Outcome Runner::record(const Array& times, const Array2& states, const Array& moved, const RecordOptions& wanted,
@@ -204,7 +204,7 @@ Outcome Runner::record(const Array& times, const Array2& states, const Array& mo
 
 VecX Runner::read_state(const System& system, const VecX& outside) {
     VecX y = VecX::Zero(system.ny);
-    if (outside.size() != system.ny - system.ne) throw std::invalid_argument("y does not fit the scene");
+    if (outside.size() != system.ns) throw std::invalid_argument("y does not fit the scene");
     y.head(outside.size()) = outside;
     q = y.head(system.nq);
     v = system.velocity(y);

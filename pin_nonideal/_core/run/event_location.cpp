@@ -27,8 +27,9 @@ constexpr double arrived_speed = 1e-7;
 constexpr double rest_part = 0.05, passing_speed = 1e-6;
 // A fixed step covers this part of the time to rest, and this part of its own length at least.
 constexpr double part_toward_rest = 0.5, least_shortened = 1e-3;
-// Parts of a step at which a speed is looked at that dips through zero and back.
-constexpr double dip_places[] = {0.2, 0.4, 0.6, 0.8};
+// A least speed between two stages counts as a dip below zero where it is below this part of the speeds' range: the
+// cubics through the stages miss the motion by less.
+constexpr double dip_part = 0.02;
 
 // --- The interpolant
 constexpr int location_grid = 24;  // points of a step at which a margin is looked at first
@@ -72,6 +73,18 @@ double root_between(double low, double margin_low, double high, double margin_hi
     return high;
 }
 
+// Least value of the cubic with values u0, u1 and slopes a0, a1 at 0 and 1 inside, where it has one there.
+double least_inside(double u0, double a0, double u1, double a1) {
+    // u' = a0 + 2 b x + 3 c x^2
+    const double b = 3.0 * (u1 - u0) - 2.0 * a0 - a1, c = a0 + a1 - 2.0 * (u1 - u0);
+    const double root = std::sqrt(b * b - 3.0 * a0 * c);  // no number: no extremum
+    const double q = -(b + std::copysign(root, b));
+    double least = HUGE_VAL;
+    for (double x : {q / (3.0 * c), a0 / q})  // of a maximum and a minimum
+        if (x > 0.0 && x < 1.0) least = std::min(least, u0 + x * (a0 + x * (b + x * c)));
+    return least;
+}
+
 // A place between a and b where the margin is negative, by golden sections toward its least value; none: b.
 template <class Margin>
 double dip_between(double a, double b, const Margin& margin, double& value) {
@@ -96,16 +109,15 @@ double dip_between(double a, double b, const Margin& margin, double& value) {
 
 }  // namespace
 
-double slip_along_mode(const Program& p, const Workspace& w, int e) {
-    const Friction& f = p.frictions[e];
-    const Vec3 u = slip_velocity(w.now, f);
-    return f.dim == 1 ? w.state.mode[e] * u[0] : u.dot(w.state.slip_direction[e]);
-}
-
 EventLocator::EventLocator(System& system, Stepper& stepper, const std::vector<double>& slip_at_start,
                            const std::vector<char>& pulls)
     : system_(system), stepper_(stepper), p(system.p), w(system.w), slip_at_start_(slip_at_start), pulls_(pulls),
-      probe_(VecX::Zero(system.ny)), probe_rate_(probe_) {}
+      probe_(VecX::Zero(system.ny)), probe_rate_(probe_) {
+    for (int i = 0; i < stepper.stages; ++i)
+        if (i == 0 || (stepper.method.C && stepper.method.C[i] < 1.0)) by_time_.push_back(i);
+    std::stable_sort(by_time_.begin(), by_time_.end(), [&](int i, int j) { return time_of(i) < time_of(j); });
+    by_time_.push_back(stepper.stages);
+}
 
 double EventLocator::shorten_toward_rest(const VecX& rate, double size) {
     for (int e = 0; e < system_.ne; ++e) {
@@ -167,19 +179,30 @@ bool EventLocator::may_stop(int e) const {
     return slip_along_mode(p, w, e) < -noise || dips(e, noise);
 }
 
-// A dip through zero and back: the cubic through both ends and their slopes tells, of an element on one dof.
+// A dip through zero and back. Speeds and their rates are known at the stages and at both ends: cubics through them
+// tell where one may have been below zero in between.
 bool EventLocator::dips(int e, double noise) const {
-    const Block& block = p.blocks[p.frictions[e].block];
-    if (block.dof < 0 || block.total != 1 || stepper_.method.order < 2) return false;
-    const int i = system_.nq + block.dof;
-    const double sign = w.state.mode[e], u0 = sign * stepper_.y0[i], u1 = sign * stepper_.y1[i];
-    const double a0 = sign * stepper_.h * stepper_.rates.front()[i];
-    const double a1 = sign * stepper_.h * stepper_.rates[stepper_.stages][i];
-    return std::any_of(std::begin(dip_places), std::end(dip_places), [&](double x) {
-        const double z = 1.0 - x;
-        return z * z * (1.0 + 2.0 * x) * u0 + x * x * (1.0 + 2.0 * z) * u1 + x * z * (z * a0 - x * a1) < -noise;
-    });
+    if (stepper_.method.order < 2) return false;
+    const std::vector<VecX>& rates = stepper_.rates;
+    const auto speed = [&](int i) { return system_.slip(rates[i], e); };
+    double least = HUGE_VAL, most = -HUGE_VAL;
+    for (int i : by_time_) {
+        least = std::min(least, speed(i));
+        most = std::max(most, speed(i));
+        if (i > 0 && i < stepper_.stages && speed(i) < -noise) return true;
+    }
+    for (size_t k = 0; k + 1 < by_time_.size(); ++k) {
+        const int i = by_time_[k], j = by_time_[k + 1];
+        const double length = (time_of(j) - time_of(i)) * stepper_.h;
+        const double inside = least_inside(speed(i), length * system_.slip_rate(rates[i], e), speed(j),
+                                           length * system_.slip_rate(rates[j], e));
+        if (inside < dip_part * (most - least)) return true;
+    }
+    return false;
 }
+
+// Part of the step at which a stage stands, or its end.
+double EventLocator::time_of(int stage) const { return stage < stepper_.stages ? stepper_.method.C[stage] : 1.0; }
 
 // What lies past its event at the step's end (the workspace is evaluated there), or may have crossed inside.
 std::vector<EventLocator::Watch> EventLocator::crossed() {
@@ -201,10 +224,16 @@ std::vector<EventLocator::Watch> EventLocator::crossed() {
 // Part of the step at which a watched margin first falls below zero, on a grid and between its points; beyond the step
 // where it does not.
 double EventLocator::first_crossing(const Watch& watch) {
+    const bool by_kinematics = watch.kind == Watch::Kind::slip && !system_.on_constraints;
     const auto margin_at = [&](double part) {
         const double t = stepper_.t0 + part * stepper_.h;
         stepper_.interpolate(part, probe_);
-        system_.derivative(t, probe_, probe_rate_);
+        if (by_kinematics) {
+            system_.read(probe_);
+            update_kinematics(p, w, t, system_.q, system_.v);
+        } else {
+            system_.derivative(t, probe_, probe_rate_);
+        }
         return margin(watch, t, probe_);
     };
     constexpr double apart = 1.0 / location_grid;
@@ -230,11 +259,7 @@ void EventLocator::end_step_at(double size) {
 // Rate of a margin at the end of the step of this size: known for slip along one direction, else by a step a little
 // shorter.
 double EventLocator::margin_rate(const Watch& watch, double size, double here, double full) {
-    if (known_rate(watch)) {
-        const Block& block = p.blocks[p.frictions[watch.index].block];
-        multiply(block, w.now.A, w.now.a, w.scratch.r);
-        return w.state.mode[watch.index] * (w.scratch.r[block.row] - w.now.b[block.row]);
-    }
+    if (known_rate(watch)) return slip_rate_along_mode(p, w, watch.index);
     const double shorter = std::max(0.0, size - std::max(difference_part * full, least_difference));
     if (!(shorter < size)) return 0.0;
     end_step_at(shorter);

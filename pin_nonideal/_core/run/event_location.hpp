@@ -26,9 +26,6 @@ struct FoundEvent {
     bool changes_modes() const { return kind == Kind::rest_or_limit || kind == Kind::released_together; }
 };
 
-// Slip speed the way that the element's mode says, of the rows evaluated last.
-double slip_along_mode(const Program& p, const Workspace& w, int element);
-
 class EventLocator {
 public:
     // Slip speed of each element of several directions when its step began, and whether each contact pulls by then.
@@ -53,6 +50,7 @@ private:
     bool may_reach_limit(int element);
     bool may_stop(int element) const;
     bool dips(int element, double noise) const;
+    double time_of(int stage) const;
     bool passes_by_rest(int element) const;
     std::vector<Watch> crossed();
 
@@ -73,6 +71,7 @@ private:
     Workspace& w;
     const std::vector<double>& slip_at_start_;
     const std::vector<char>& pulls_;
+    std::vector<int> by_time_;  // stages before the step's end, and that end
     VecX probe_, probe_rate_;
 };
 

@@ -16,7 +16,8 @@ constexpr double least_limit = 1e-300;
 
 System::System(const Program& program, Workspace& workspace, bool with_energy)
     : p(program), w(workspace), energy(with_energy), nq(p.mechanism.nq), nv(p.mechanism.nv), nz(p.states),
-      nw(with_energy ? power_count(p) : 0), ne(static_cast<int>(p.frictions.size())), ny(nq + nv + nz + nw + ne),
+      nw(with_energy ? power_count(p) : 0), ne(static_cast<int>(p.frictions.size())),
+      ns(nq + nv + nz + nw), ny(ns + 2 * ne),
       q(VecX::Zero(nq)), v(VecX::Zero(nv)), projected_(VecX::Zero(ny)) {}
 
 void System::read(const VecX& y) {
@@ -55,13 +56,21 @@ void System::rate_of_evaluation(double t, const VecX& y, VecX& dy) {
     dy.segment(nq, nv) = w.now.a;
     if (nz > 0) dy.segment(nq + nv, nz) = w.now.dz;
     if (energy) powers(p, w, v, dy.data() + nq + nv + nz);
+    watch(t, dy);
+}
+
+void System::watch(double t, VecX& dy) {
     for (int e = 0; e < ne; ++e) {
-        double& share = dy[ny - ne + e];
-        share = 0.0;
-        if (w.state.mode[e] != sticking || w.state.indeterminate) continue;
-        const double limit = static_limit(p, w, e, t, q, v);
-        const Vec3 force = friction_force(p, w, e);  // of one direction with its sign: smooth where it passes zero
-        share = (p.frictions[e].dim == 1 ? force[0] : force.norm()) / std::max(limit, least_limit);
+        double *of_element = dy.data() + ns + 2 * e, &share = of_element[0], &rate = of_element[1];
+        share = rate = 0.0;
+        if (slips(w.state.mode[e])) {
+            share = slip_along_mode(p, w, e);
+            rate = slip_rate_along_mode(p, w, e);
+        } else if (w.state.mode[e] == sticking && !w.state.indeterminate) {
+            const double limit = static_limit(p, w, e, t, q, v);
+            const Vec3 force = friction_force(p, w, e);  // of one direction with its sign: smooth where it passes zero
+            share = (p.frictions[e].dim == 1 ? force[0] : force.norm()) / std::max(limit, least_limit);
+        }
     }
 }
 

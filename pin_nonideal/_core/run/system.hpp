@@ -1,6 +1,8 @@
-// The right-hand side of y' = f(t, y) on the flat state y = (q, v, z, work, shares): z are the states of laws, work the
-// integrals of the ledger's powers, shares the integrals of force / limit of each sticking element, so that the step
-// control resolves a load that comes and goes while nothing moves, and the stages tell whether a limit was passed.
+// The right-hand side of y' = f(t, y) on the flat state y = (q, v, z, work, watch): z are the states of laws, work the
+// integrals of the ledger's powers. watch has two numbers for each frictional element, whose rates the stages leave
+// behind: of one that sticks force / limit, so that the step control resolves a load that comes and goes while nothing
+// moves, and the stages tell whether a limit was passed; of one that slips its slip speed and the rate of that, which
+// tell whether it came to rest inside the step.
 //
 // q is integrated in ambient coordinates (a quaternion as four numbers): the right-hand side extends smoothly off the
 // unit sphere, so the order is kept, and lengths are restored at the step's end.
@@ -19,7 +21,7 @@ struct System {
     bool on_constraints = false;
     double smallest_pivot = 1.0;  // of the rows' factor, over the evaluations since it was set
     double moved_energy = 0.0;    // by the last projection of a step's end, where the ledger is kept
-    const int nq, nv, nz, nw, ne, ny;  // sizes of q, v, z, work, shares, y
+    const int nq, nv, nz, nw, ne, ns, ny;  // sizes of q, v, z, work, elements, y without watch, y
     VecX q, v;                         // of the state read last
 
     System(const Program& program, Workspace& workspace, bool with_energy);
@@ -31,7 +33,9 @@ struct System {
     void read_law_states(const VecX& y);
     auto velocity(const VecX& y) const { return y.segment(nq, nv); }
     auto work(VecX& y) const { return y.segment(nq + nv + nz, nw); }
-    double share(const VecX& y, int element) const { return y[ny - ne + element]; }
+    double share(const VecX& dy, int element) const { return dy[ns + 2 * element]; }
+    double slip(const VecX& dy, int element) const { return dy[ns + 2 * element]; }
+    double slip_rate(const VecX& dy, int element) const { return dy[ns + 2 * element + 1]; }
 
     void derivative(double t, const VecX& y, VecX& dy);
     // dy from the evaluation that the workspace holds.
@@ -41,6 +45,7 @@ struct System {
     void normalize(VecX& y) const;
 
 private:
+    void watch(double t, VecX& dy);
     double energy_at(const VecX& y);
 
     VecX projected_;
