@@ -33,6 +33,7 @@ __all__ = [
 
 Axis = str | Sequence[float]
 TIME_FUNCTION = "t -> (value, rate, acceleration)"
+MOST_ROWS = 10_000  # of a user's constraint: a gigabyte of A at 10,000 degrees of freedom
 
 
 def _frames(description: Any) -> None:
@@ -322,7 +323,7 @@ class UserConstraint:
         function: (t, q, v, data) -> (A, b), shapes (size, nv) and (size,).  `data` is a read-only
             pinocchio.Data for (q, v) as after forwardKinematics(q, v, 0), with frames and joint Jacobians
             (WORLD) current.
-        size: number of rows, at least 1.
+        size: number of rows, from 1 to 10,000.
         residual: (t, q) -> phi, shape (size,).
         rate: (t, q, v) -> shape (size,).
         name: used in messages and results.
@@ -338,7 +339,7 @@ class UserConstraint:
         _name(self)
         who = label(self)
         function(f"{who}: function", self.function, "(t, q, v, data) -> (A, b)")
-        object.__setattr__(self, "size", count(f"{who}: size", self.size, least=1))
+        object.__setattr__(self, "size", count(f"{who}: size", self.size, least=1, most=MOST_ROWS))
         if self.residual is not None:
             function(f"{who}: residual", self.residual, "(t, q) -> phi")
         if self.rate is not None:

@@ -97,6 +97,16 @@ def test_a_period_without_end():
         pn.simulate(pn.Scene(MODEL, actuation=control), 1.0)
 
 
+def test_more_periods_than_a_run_can_call():
+    control = pn.SampledControl(lambda t, q, v: np.zeros(MODEL.nv), 1e-12)
+    message = (
+        "SampledControl: period must leave at most 1e+08 calls in a run; 1e-12 s leaves 1e+12; "
+        "set a longer period"
+    )
+    with refuses(message, InputError):
+        pn.simulate(pn.Scene(MODEL, actuation=control), 1.0)
+
+
 def test_a_run_needs_a_scene():
     with refuses("simulate: scene must be a Scene; got Model", InputError):
         pn.simulate(MODEL, 1.0)

@@ -294,6 +294,10 @@ REFUSED = {
         lambda: UserConstraint(nothing, 0),
         "UserConstraint: size must be at least 1; got 0",
     ),
+    "rows without end": (
+        lambda: UserConstraint(nothing, 10**9),
+        "UserConstraint: size must be at most 10000; got 1000000000",
+    ),
     "spring without stiffness": (
         lambda: SpringDamper("a", "b"),
         "SpringDamper: stiffness or damping must be positive; both are zero, so leave the force out",

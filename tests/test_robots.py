@@ -293,6 +293,11 @@ def test_n_four_bar_refuses_bad_parameters(key, value, message):
         pn.load("n_four_bar", **{key: value})
 
 
+def test_n_four_bar_without_end():
+    with refuses("n_four_bar: N must be at most 10000; got 1000000", InputError):
+        pn.load("n_four_bar", N=1_000_000)
+
+
 def test_unknown_parameter_of_a_generated_robot():
     with refuses('robot "n_four_bar" takes no parameter "M"; known: "N", "m", "L", "g", "speed"', InputError):
         pn.load("n_four_bar", M=3)

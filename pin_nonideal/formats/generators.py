@@ -14,6 +14,7 @@ from pin_nonideal.types import GeometryModel, Model, Placement
 from .urdf import RobotFile
 
 THICKNESS = 0.03  # of a drawn rod over its length
+MOST_WINDOWS = 10_000  # Pinocchio's own time to add so many joints is minutes
 
 
 def n_four_bar(
@@ -30,7 +31,7 @@ def n_four_bar(
     "coupler<i>_tip".
 
     Args:
-        N: number of windows, at least 1.
+        N: number of windows, from 1 to 10,000.
         m: mass of each rod [kg].
         L: length of each rod [m].
         g: gravity [m/s^2].
@@ -42,7 +43,7 @@ def n_four_bar(
     Source:
         IFToMM benchmark A02; Bayo and Avello, Nonlinear Dynamics 5 (1994) 209-231.
     """
-    N = count("n_four_bar: N", N, least=1)
+    N = count("n_four_bar: N", N, least=1, most=MOST_WINDOWS)
     m, L = positive("n_four_bar: m", m), positive("n_four_bar: L", L)
     g, speed = nonnegative("n_four_bar: g", g), number("n_four_bar: speed", speed)
     model, visual = pin.Model(), pin.GeometryModel()

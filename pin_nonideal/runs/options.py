@@ -166,3 +166,8 @@ def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, fl
             f"simulate: {key} must leave at most {MOST_SAMPLES:g} samples; {lengths[key]:g} s leaves "
             f"{duration / lengths[key]:.2g}; set a longer {'output_dt' if key == 'dt' else key}"
         )
+    if isinstance(scene.actuation, SampledControl) and duration / scene.actuation.period > MOST_SAMPLES:
+        raise InputError(
+            f"{label(scene.actuation)}: period must leave at most {MOST_SAMPLES:g} calls in a run; "
+            f"{scene.actuation.period:g} s leaves {duration / scene.actuation.period:.2g}; set a longer period"
+        )

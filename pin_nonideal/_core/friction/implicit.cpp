@@ -205,7 +205,9 @@ struct Implicit {
             }
             last = error;
             differentiate(y, g, size);
-            y += (MatX::Identity(n, n) - w.scratch.jacobian).partialPivLu().solve(residual);
+            const VecX step = (MatX::Identity(n, n) - w.scratch.jacobian).partialPivLu().solve(residual);
+            if (!step.allFinite()) paradox(0.0);  // exactly between one solution and none
+            y += step;
         }
         w.now.determinant = least_determinant(w.scratch.jacobian);
         paradox(w.now.determinant);
