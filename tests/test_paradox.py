@@ -120,6 +120,16 @@ class TestRod:
             assert caught.value.element == element
             assert caught.value.determinant == pytest.approx(1.0 - share, abs=DETERMINANT)
 
+    @pytest.mark.parametrize("angle", ANGLES)
+    @pytest.mark.parametrize(("way", "element"), WAYS)
+    def test_the_threshold_itself_is_a_paradox(self, way, element, angle):
+        """Where the one solution goes to infinity, to the digits in which a determinant can be told from zero."""
+        rod = Rod(angle)
+        for beyond in (0.0, 1e-16, -1e-16, 1e-13, -1e-13, 1e-10, -1e-10, 1e-9, -1e-9):
+            with raises(element) as caught:
+                way(rod, (1.0 + beyond) / rod.k).solve(*rod.state(-1))
+            assert abs(caught.value.determinant) < DETERMINANT
+
     def test_on_the_ideal_reaction_there_is_no_paradox(self):
         """The paper's law does not look at what it causes."""
         rod = Rod(1.1)

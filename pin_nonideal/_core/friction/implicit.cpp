@@ -17,6 +17,7 @@ constexpr double stalled = 1e-12;             // Newton's error that no longer f
 constexpr double slow_change = 1e-13;         // a change that contracts slowly is followed where it is above this
 constexpr double good_contraction = 0.25;     // slower fixed points go to Newton's method
 constexpr double difference = 1e-7;           // part of the unknowns' size: square root of the rounding, with a margin
+constexpr double least_determinant_told = 1e-8;  // differences tell no smaller one from zero
 constexpr double least_size = 1e-300;         // of unknowns that are all zero
 constexpr int fixed_point_limit = 30, newton_limit = 30;
 constexpr int most_mixed = 6;                 // laws whose mixtures of branches are all looked at; else one by one
@@ -157,7 +158,7 @@ struct Implicit {
         const MatX I = MatX::Identity(n, n), J = w.scratch.jacobian;
         const double here = (I - J).determinant();
         w.now.determinant = here;
-        if (!(here > 0.0)) paradox(here);
+        if (!(here > least_determinant_told)) paradox(here);
         const VecX bound = (I - J.cwiseAbs()).partialPivLu().solve(VecX::Ones(n));
         if ((bound.array() > 0.0).all()) return;
         const VecX c = constants();
