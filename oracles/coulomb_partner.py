@@ -1,8 +1,8 @@
-"""A body of unit inertia rubbed by a partner that swings: its motion between reversals is a straight line in time.
+"""A body of unit inertia rubbed by a partner that swings: between reversals its velocity is linear in time.
 
-The partner has the velocity u(t) = cos(omega t + phase); dry friction of the limit c is all that moves the body.
-While it slips with velocity w, dw/dt = -c sgn(w - u); it sticks while |du/dt| <= c.  What remains are the roots of
-w(t) - u(t), which are searched on a fine grid and in the dips between its points.
+The partner has the velocity u(t) = cos(omega t + phase); dry friction of the limit c is all that moves the
+body.  While it slips with velocity w, dw/dt = -c sgn(w - u); it sticks while |du/dt| <= c.  What remains are
+the roots of w(t) - u(t), which are searched on a fine grid and in the dips between its points.
 """
 
 from __future__ import annotations
@@ -110,4 +110,3 @@ class Partner:
                 return low, True
             low = ahead[0]
         return brentq(gap, low, high, xtol=1e-16), True
-

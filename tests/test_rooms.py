@@ -93,3 +93,13 @@ def test_stub_is_the_core(tmp_path: Path) -> None:
     command = ["-m", "nanobind.stubgen", "-q", "-m", "pin_nonideal._core", "-p", patterns, "-o", generated]
     subprocess.run([sys.executable, *command], check=True, cwd=tmp_path)
     assert generated.read_text(encoding="utf-8") == (PACKAGE / "_core.pyi").read_text(encoding="utf-8")
+
+
+def test_lines_of_the_core_fit_a_screen() -> None:
+    long = [
+        f"{path.relative_to(PACKAGE)}:{number}"
+        for path in sorted((PACKAGE / "_core").rglob("*.[ch]pp"))
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if len(line) > 125
+    ]
+    assert long == []

@@ -169,5 +169,6 @@ def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, fl
     if isinstance(scene.actuation, SampledControl) and duration / scene.actuation.period > MOST_SAMPLES:
         raise InputError(
             f"{label(scene.actuation)}: period must leave at most {MOST_SAMPLES:g} calls in a run; "
-            f"{scene.actuation.period:g} s leaves {duration / scene.actuation.period:.2g}; set a longer period"
+            f"{scene.actuation.period:g} s leaves {duration / scene.actuation.period:.2g}; "
+            "set a longer period"
         )

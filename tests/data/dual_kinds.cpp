@@ -68,7 +68,9 @@ struct Mat {
         return m;
     }
 };
-template <class S> Vec<S> operator*(const Mat<S>& m, const Vec<S>& v) { return v[0] * m.c[0] + v[1] * m.c[1] + v[2] * m.c[2]; }
+template <class S> Vec<S> operator*(const Mat<S>& m, const Vec<S>& v) {
+    return v[0] * m.c[0] + v[1] * m.c[1] + v[2] * m.c[2];
+}
 template <class S> Vec<S> operator*(const Mat<S>& m, const pn::Vec3& v) { return m * Vec<S>(v); }
 
 template <class S> Mat<S> transpose_times(const Mat<S>& a, const Mat<S>& b) {

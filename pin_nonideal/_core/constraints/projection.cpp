@@ -24,9 +24,9 @@ constexpr double no_floor = 1e-16;
 
 // x := R^-T B^T (B B^T)^-1 r, the least move in the metric of M that changes A x by r.
 void least_move(const Program& p, Workspace& w, VecX& x) {
-    solve_rows(p.layout, w.now.rows, w.scratch.r, w.now.lam);
+    solve_rows(p.layout, w.now.rows, w.scratch.r, w.scratch.lam_step);
     x.setZero();
-    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.now.lam, x);
+    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.scratch.lam_step, x);
     solve_Rt(p.mechanism, w.now.terms, x);
 }
 

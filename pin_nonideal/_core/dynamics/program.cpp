@@ -1,7 +1,6 @@
-// What a scene consists of, laid out for the evaluation, and the room that it works in.
-#include <algorithm>
-
 #include "dynamics/program.hpp"
+
+#include <algorithm>
 
 namespace pn {
 

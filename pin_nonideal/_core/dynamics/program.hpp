@@ -51,7 +51,7 @@ struct Program {
         return constraints < static_cast<int>(blocks.size()) ? blocks[constraints].row : layout.rows;
     }
 
-    // Numbers the kept rows, finds supports and lays out the storage; called again when rows are left out.
+    // Numbers the kept rows, finds supports and lays out the storage; once, before the program is shared.
     void finish();
 };
 

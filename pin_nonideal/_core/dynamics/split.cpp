@@ -38,8 +38,8 @@ IdealMotion::IdealMotion(const Program& program, Workspace& workspace) : p(progr
     if (sticks) {
         w.now.terms.locked.swap(w.scratch.ideal_locked);
         factorize(p.mechanism, w.now.terms);
-        std::swap(w.now.rows, w.scratch.ideal_rows);
-        const RowSystem& own = w.scratch.ideal_rows;
+        std::swap(w.now.rows, w.now.ideal_rows);
+        const RowSystem& own = w.now.ideal_rows;
         w.now.rows.refine = own.refine;
         if (!w.state.ideal_decided) {
             for (int r = 0; r < p.layout.rows; ++r) w.now.rows.wanted[r] = own.wanted[r] && r < p.constraint_rows();
@@ -62,7 +62,7 @@ IdealMotion::~IdealMotion() {
     if (!sticks) return;
     w.now.terms.locked.swap(w.scratch.ideal_locked);
     factorize(p.mechanism, w.now.terms);
-    std::swap(w.now.rows, w.scratch.ideal_rows);
+    std::swap(w.now.rows, w.now.ideal_rows);
     scale_rows(p, w);
 }
 

@@ -13,6 +13,7 @@ static void size(const Program& p, RunState& state) {
     state.last_direction = state.slip_direction;
     state.z = VecX::Zero(p.states);
     state.held_torque = VecX::Zero(p.mechanism.nv);
+    state.limit.assign(elements, 0.0);
     state.unknown = VecX::Zero(p.unknowns());
     state.third_order_lam = VecX::Zero(p.layout.rows);
 }
@@ -31,11 +32,11 @@ static void size(const Program& p, Evaluation& now) {
     now.B.assign(p.entries, 0.0);
     for (VecX* x : {&now.b, &now.lam, &now.reactions.lam}) *x = VecX::Zero(p.layout.rows);
     now.rows.allocate(p.layout, static_cast<int>(p.blocks.size()), nv);
+    now.ideal_rows = now.rows;
     now.body_force.assign(bodies, no_force);
     now.reactions.body.assign(bodies, no_force);
     now.reactions.momentum.assign(bodies, no_force);
     now.reactions.motion.assign(bodies, Motion{Vec3::Zero(), Vec3::Zero()});
-    now.limit.assign(elements, 0.0);
     now.load.assign(elements, 0.0);
     now.slip_force.assign(elements, Vec3::Zero());
     now.user_C.assign(p.user_laws, VecX::Zero(nv));
@@ -49,7 +50,6 @@ static void size(const Program& p, const Evaluation& now, Scratch& scratch) {
         *x = VecX::Zero(p.layout.rows);
     scratch.position_start = VecX::Zero(p.mechanism.nq);
     scratch.position_lam_steps.assign(projection_limit, scratch.position_lam);
-    scratch.ideal_rows = now.rows;
     scratch.ideal_locked.assign(nv, 0);
     scratch.unknown = scratch.image = VecX::Zero(p.unknowns());
     scratch.subtree_force = now.body_force;

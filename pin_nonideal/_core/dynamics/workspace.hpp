@@ -11,19 +11,20 @@ struct Counters {
     long evaluations = 0, factorizations = 0, projections = 0, iterations = 0;
 };
 
-// What the next step needs of those before it, beside the state (q, v) itself.
+// What the next step needs of those before it, beside the state (q, v) itself and the choice of independent rows.
 struct RunState {
     Modes mode;
     // For elements of two or three directions: of the step's start, and where slip last had a clear direction.
     std::vector<Vec3> slip_direction, last_direction;
     bool indeterminate = false;   // what sticks shares its load in several ways: one multiplier says little
-    VecX z;                       // states of laws
+    VecX z;                       // states of laws, at the stage evaluated last
     VecX held_torque;             // of sampled control
     bool has_held = false;
     VecX unknown;                 // of the implicit reaction equation, by element and law: where its next solution starts
     bool warm = false;
     VecX third_order_lam;         // multipliers of third order in the step, over its cube
     bool ideal_decided = false;   // which rows are independent without what sticks, over this step
+    std::vector<double> limit;    // kinetic, of each element, as found last
 };
 
 // What joints, anchors and contacts carry in the motion at hand (friction/reactions.hpp).
@@ -40,14 +41,13 @@ struct Evaluation {
     Terms terms;
     std::vector<RowValues> values;  // of each block
     std::vector<double> A, B;
-    RowSystem rows;
+    RowSystem rows, ideal_rows;  // ideal: of the constraints without what sticks; IdealMotion swaps them in
     VecX b, lam;  // by kept row
     VecX tau, external, F, C, C_smooth, base_C, a;  // generalized forces and acceleration
     Reactions reactions;
     VecX holding;                     // M a - F - C - A^T lam: what holds the locked dofs
     bool has_holding = false;
     bool ideal = false;               // the motion is that of the ideal constraints alone
-    std::vector<double> limit;        // kinetic, at the present load and slip speed
     std::vector<double> load;         // limit at rest before the static ratio
     std::vector<Vec3> slip_force;     // of each slipping element, along its directions
     std::vector<VecX> user_C;
@@ -65,7 +65,6 @@ struct Evaluation {
 
 struct Scratch {
     VecX scaled, scaled_free, trial, work, r, residual, lam_step;
-    RowSystem ideal_rows;  // of the constraints without what sticks; IdealMotion swaps them in
     std::vector<char> ideal_locked;
     // Of the projection of a position: where its factors were taken, the multipliers from there and in all, and the
     // steps that they took.

@@ -207,26 +207,26 @@ struct ConeProgram {
         double last = HUGE_VAL;
         for (int it = 0; it < most_newton; ++it) {
             MatX J = MatX::Zero(n + elements, n + elements);
-            VecX miss = VecX::Zero(n + elements);
+            VecX residual = VecX::Zero(n + elements);
             J.topLeftCorner(n, n) = V;
-            miss.head(n) = V * there + r0;
+            residual.head(n) = V * there + r0;
             for (int e = 0; e < elements; ++e) {
                 const auto xe = there.segment(at[e], dims[e]);
                 if (!slides[e]) continue;
                 J.block(at[e], at[e], dims[e], dims[e]).diagonal().array() += m[e];
                 J.block(at[e], n + e, dims[e], 1) = xe;
                 J.block(n + e, at[e], 1, dims[e]) = xe.transpose();
-                miss.segment(at[e], dims[e]) += m[e] * xe;
-                miss[n + e] = 0.5 * (xe.squaredNorm() - 1.0);
+                residual.segment(at[e], dims[e]) += m[e] * xe;
+                residual[n + e] = 0.5 * (xe.squaredNorm() - 1.0);
             }
-            const double error = miss.cwiseAbs().maxCoeff();
-            const bool settled = error <= newton_tolerance || (error < condition && error >= last);
+            const double error = residual.cwiseAbs().maxCoeff();
+            const bool done = error <= newton_tolerance || (error < condition && error >= last);
             last = error;
-            if (settled) break;
+            if (done) break;
             Eigen::CompleteOrthogonalDecomposition<MatX> cod(n + elements, n + elements);
             cod.setThreshold(rank_threshold);
             cod.compute(J);
-            const VecX step = cod.solve(miss);
+            const VecX step = cod.solve(residual);
             there -= step.head(n);
             m -= step.tail(elements);
         }
@@ -235,7 +235,7 @@ struct ConeProgram {
 
     // The modes that the path leads to: what has more acceleration than room slides. Where both are small only the
     // solution tells: modes that it contradicts are changed until none is. False if they do not come to rest.
-    bool settle_modes() {
+    bool find_modes() {
         std::vector<char> slides(elements);
         for (int e = 0; e < elements; ++e) slides[e] = y[e].head > 1.0 - tail(x, e).norm();
         VecX there(n), m(elements);
@@ -264,10 +264,10 @@ struct ConeProgram {
 
     VecX solve() {
         follow_central_path();
-        const bool settled = settle_modes();
+        const bool found = find_modes();
         for (int e = 0; e < elements; ++e) {  // what slides is at its limit, to the last bit
             const double length = tail(x, e).norm();
-            if (settled ? length > 1.0 - condition : y[e].head > 1.0 - length) x.segment(at[e], dims[e]) /= length;
+            if (found ? length > 1.0 - condition : y[e].head > 1.0 - length) x.segment(at[e], dims[e]) /= length;
         }
         return scale.cwiseProduct(x);
     }

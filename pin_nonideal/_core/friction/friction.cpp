@@ -47,29 +47,43 @@ double slip_along_mode(const Program& p, const Workspace& w, int e) {
     return f.dim == 1 ? w.state.mode[e] * u[0] : u.dot(w.state.slip_direction[e]);
 }
 
-double slip_rate_along_mode(const Program& p, Workspace& w, int e) {
-    const Friction& f = p.frictions[e];
+// Rates of the slip velocities in the motion at hand.
+static Vec3 slip_acceleration(const Program& p, Workspace& w, const Friction& f) {
     const Block& block = p.blocks[f.block];
     multiply(block, w.now.A, w.now.a, w.scratch.r);
     Vec3 rate = Vec3::Zero();
     for (int k = 0; k < f.dim; ++k) rate[k] = w.scratch.r[block.row + k] - w.now.b[block.row + k];
+    return rate;
+}
+
+double slip_rate_along_mode(const Program& p, Workspace& w, int e) {
+    const Friction& f = p.frictions[e];
+    const Vec3 rate = slip_acceleration(p, w, f);
     return f.dim == 1 ? w.state.mode[e] * rate[0] : rate.dot(w.state.slip_direction[e]);
 }
 
-double slip_factor(const Program& p, const Workspace& w, int e) {
+std::pair<double, double> slip_toward_rest(const Program& p, Workspace& w, int e) {
     const Friction& f = p.frictions[e];
-    return f.speed_factor(w.state.mode[e] == sticking ? 0.0 : slip_velocity(w.now, f).norm());
+    const Vec3 u = slip_velocity(w.now, f);
+    const double along = slip_along_mode(p, w, e), size = u.norm();
+    if (f.dim == 1 || 2.0 * along * along > size * size) return {along, slip_rate_along_mode(p, w, e)};
+    return {size, size > 0.0 ? slip_acceleration(p, w, f).dot(u) / size : 0.0};
+}
+
+double limit_under(const Program& p, const Workspace& w, int e, double load) {
+    const Friction& f = p.frictions[e];
+    return f.kinetic_limit(load, w.state.mode[e] == sticking ? 0.0 : slip_velocity(w.now, f).norm());
 }
 
 void update_limit(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
     w.now.load[e] = load_limit(p, w, p.frictions[e], t, q, v);
-    w.now.limit[e] = w.now.load[e] * slip_factor(p, w, e);
+    w.state.limit[e] = limit_under(p, w, e, w.now.load[e]);
 }
 
 double static_limit(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
     const Friction& f = p.frictions[e];
     if (f.reaction == Reaction::total) w.now.load[e] = load_limit(p, w, f, t, q, v);
-    return w.now.load[e] * f.static_ratio;
+    return f.holding_limit(w.now.load[e]);
 }
 
 Vec3 friction_force(const Program& p, Workspace& w, int e) {
@@ -99,7 +113,7 @@ static Vec3 force_direction(const Program& p, Workspace& w, int e) {
 void add_slip_force(const Program& p, Workspace& w, int e, VecX& C) {
     if (!slips(w.state.mode[e])) return;
     const Block& block = p.blocks[p.frictions[e].block];
-    w.now.slip_force[e] = w.now.limit[e] * force_direction(p, w, e);
+    w.now.slip_force[e] = w.state.limit[e] * force_direction(p, w, e);
     w.now.reactions.current = false;
     if (block.dof >= 0)
         for (int k = 0; k < block.total; ++k) C[block.dof + k] += w.now.slip_force[e][k];

@@ -5,6 +5,8 @@
 // limit = load x speed factor.
 #pragma once
 
+#include <utility>
+
 #include "friction/laws.hpp"
 #include "friction/mode.hpp"
 
@@ -32,6 +34,9 @@ struct Friction {
         const Real x = speed / stribeck_velocity;
         return 1.0 + (static_ratio - 1.0) * exp(-x * x);
     }
+    // The limit under a load: of an element that slips at this speed, and of one that sticks.
+    double kinetic_limit(double load, double speed) const { return load * speed_factor(speed); }
+    double holding_limit(double load) const { return load * static_ratio; }
 };
 
 // Slip velocity along an element's directions, of the rows evaluated last.
@@ -39,8 +44,10 @@ Vec3 slip_velocity(const Evaluation& now, const Friction& f);
 // Slip speed the way that the element's mode says, and its rate in the motion at hand.
 double slip_along_mode(const Program& p, const Workspace& w, int element);
 double slip_rate_along_mode(const Program& p, Workspace& w, int element);
-// Limit over load at the present slip speed, at rest where an element sticks.
-double slip_factor(const Program& p, const Workspace& w, int element);
+// The same where slip of several directions goes through rest or on: where it turns sideways, its size and the rate of it.
+std::pair<double, double> slip_toward_rest(const Program& p, Workspace& w, int element);
+// The limit under a load at the present slip speed, at rest where an element sticks.
+double limit_under(const Program& p, const Workspace& w, int element, double load);
 // The load of an element, as the limit that it gives at rest without the static ratio, for the motion in the workspace.
 double load_limit(const Program& p, Workspace& w, const Friction& f, double t, const VecX& q, const VecX& v);
 // Load and kinetic limit of an element for that motion.

@@ -57,7 +57,7 @@ struct Implicit {
 
     void set(const VecX& y) {
         int k = 0;
-        each_unknown([&](size_t e) { w.now.limit[e] = y[k++]; },
+        each_unknown([&](size_t e) { w.state.limit[e] = y[k++]; },
                      [&](const UserLaw& law) { w.now.user_C[law.index] = y.segment(k, nv()); k += nv(); });
     }
 
@@ -76,7 +76,7 @@ struct Implicit {
         // A stage that has run away is no case for the laws, a user's above all.
         if (!std::isfinite(w.now.a.squaredNorm())) throw Failure(Failure::Kind::not_finite, t);
         int k = 0;
-        each_unknown([&](size_t e) { g[k++] = load(e) * slip_factor(p, w, e); },
+        each_unknown([&](size_t e) { g[k++] = limit_under(p, w, e, load(e)); },
                      [&](const UserLaw& law) { g.segment(k, nv()) = ask(p, law, w, t, q, v); k += nv(); });
         ++w.counters.iterations;
     }
@@ -117,7 +117,7 @@ struct Implicit {
     VecX constants() const {
         VecX c = VecX::Zero(n);
         int k = 0;
-        each_unknown([&](size_t e) { c[k++] = p.frictions[e].constant * slip_factor(p, w, e); }, [](const UserLaw&) {});
+        each_unknown([&](size_t e) { c[k++] = limit_under(p, w, e, p.frictions[e].constant); }, [](const UserLaw&) {});
         return c;
     }
 
@@ -284,6 +284,7 @@ static void ideal_loads(const Program& p, Workspace& w, double t, const VecX& q,
 }
 
 void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    w.now.determinant = 1.0;
     if (!p.needs_reactions) {
         w.now.C = w.now.C_smooth;
         w.scratch.trial = w.now.F + w.now.C;

@@ -132,7 +132,7 @@ struct Search {
         for (size_t i = 0; i < list.size(); ++i) {
             const Friction& friction = p.frictions[list[i]];
             double limit = static_limit(p, w, list[i], t, q, v);
-            if (modes[i] != sticking) limit *= friction.speed_factor(0.0) / friction.static_ratio;
+            if (modes[i] != sticking) limit = friction.kinetic_limit(w.now.load[list[i]], 0.0);
             change = std::max(change, std::abs(limit - limits[i]) / std::max(limit, least_limit));
             limits[i] = limit;
         }
@@ -186,6 +186,8 @@ struct Search {
 
 void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes) {
     w.state.mode.values_ = modes;
+    for (size_t e = 0; e < modes.size(); ++e)
+        if (modes[e] == unloaded) w.now.slip_force[e] = Vec3::Zero();
     w.now.renew();
     select_rows(p, w);
 }

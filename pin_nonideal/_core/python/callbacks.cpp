@@ -41,7 +41,8 @@ TimeFunction time_function(const nb::object& f) {
         const auto numbers = nb::cast<std::vector<double>>(parts[1]);
         if (kind == "polynomial") return Polynomial{numbers};
         if (kind == "sinusoid") return Sinusoid{numbers[0], numbers[1], numbers[2], numbers[3]};
-        return Spline{numbers, nb::cast<std::vector<double>>(parts[2])};
+        if (kind == "spline") return Spline{numbers, nb::cast<std::vector<double>>(parts[2])};
+        throw std::invalid_argument("unknown function of time " + kind);
     }
     return std::function<Jet(double)>([f](double t) {
         nb::gil_scoped_acquire gil;

@@ -27,7 +27,7 @@ using Rows = void(double t, const VecX& q, const VecX& v, MatX& A, VecX& b);
 template <class Signature> struct Seen;
 template <> struct Seen<OfState> { using Type = Numbers(double, Numbers, Numbers); };
 template <> struct Seen<OfPosition> { using Type = Numbers(double, Numbers); };
-template <> struct Seen<Rows> { using Type = std::pair<Numbers, Numbers>(double, Numbers, Numbers); };
+template <> struct Seen<Rows> { using Type = std::pair<Table, Numbers>(double, Numbers, Numbers); };
 template <class Signature>
 std::function<Signature> user_function(nb::callable f);
 template <>

@@ -234,7 +234,8 @@ static bool is_interrupt(const std::exception_ptr& error) {
 
 // Outcomes of runs from many states, on several threads, each with a workspace of its own. Where one is interrupted
 // all stop, and those not begun are None.
-static nb::typed<nb::list, std::optional<Outcome>> rollout(const Program& p, const Array2& q, const Array2& v, Options options, int threads) {
+static nb::typed<nb::list, std::optional<Outcome>> rollout(const Program& p, const Array2& q, const Array2& v,
+                                                           Options options, int threads) {
     const size_t count = q.shape(0);
     std::vector<std::optional<Outcome>> outcomes(count);
     std::atomic<bool> stopped{false};

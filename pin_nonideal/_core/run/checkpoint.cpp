@@ -21,9 +21,9 @@ void fields(Archive& a, Modes& x) {
 
 static void fields(Archive& a, RunState& x) {
     auto& [mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm,
-           third_order_lam, ideal_decided] = x;
+           third_order_lam, ideal_decided, limit] = x;
     a(mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm, third_order_lam,
-      ideal_decided);
+      ideal_decided, limit);
 }
 
 static void fields(Archive& a, Progress& x) {
@@ -50,10 +50,10 @@ static void fields(Archive& a, Recording& x) {
     a(steps, rejected);
 }
 
-// Two things of an evaluation outlive it: which rows are independent, decided at the start of a step and kept until that
-// shows to be wrong; and the limits by which time stepping books the work of the friction of its next step.
+// One thing of an evaluation outlives it: which rows are independent, decided at the start of a step and kept until that
+// shows to be wrong.
 static void archive(Archive& a, Workspace& w, Progress& progress, Recording& out) {
-    a(w.state, w.counters, w.now.rows.active, w.now.limit, progress, out);
+    a(w.state, w.counters, w.now.rows.active, progress, out);
 }
 
 std::string to_bytes(Workspace& w, Progress& progress, Recording& out) {

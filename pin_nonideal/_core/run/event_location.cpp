@@ -39,6 +39,7 @@ constexpr double beyond = 2.0;     // part of a step: none of it
 // that is looked into.
 constexpr double parabola_part = 0.25;
 constexpr int root_passes = 60;
+constexpr int start_halvings = 30;  // of the first part, in which a slip from rest may have come to rest again
 constexpr double root_width = 1e-13, root_margin = 1e-13;  // the guess of a step that is taken again
 
 // --- The step taken again
@@ -71,6 +72,19 @@ double root_between(double low, double margin_low, double high, double margin_hi
         }
     }
     return high;
+}
+
+// The same for a margin that is zero at the start: where it has risen before it falls, the root after that; else the
+// start, from where it goes the wrong way at once.
+template <class Margin>
+double root_after_start(double high, double margin_high, const Margin& margin) {
+    for (int it = 0; it < start_halvings; ++it) {
+        const double low = 0.5 * high, margin_low = margin(low);
+        if (margin_low > 0.0) return root_between(low, margin_low, high, margin_high, margin);
+        high = low;
+        margin_high = margin_low;
+    }
+    return 0.0;
 }
 
 // Least value of the cubic with values u0, u1 and slopes a0, a1 at 0 and 1 inside, where it has one there.
@@ -186,11 +200,17 @@ bool EventLocator::dips(int e, double noise) const {
     const std::vector<VecX>& rates = stepper_.rates;
     const auto speed = [&](int i) { return system_.slip(rates[i], e); };
     double least = HUGE_VAL, most = -HUGE_VAL;
+    bool below = false;
     for (int i : by_time_) {
         least = std::min(least, speed(i));
         most = std::max(most, speed(i));
-        if (i > 0 && i < stepper_.stages && speed(i) < -noise) return true;
+        below |= i > 0 && i < stepper_.stages && speed(i) < -noise;
     }
+    // Slip of several directions that begins in this step first turns into its direction: that it comes to rest again
+    // shows where it has risen before.
+    if (p.frictions[e].dim > 1 && speed(0) < rest_part * most)
+        return below && speed(by_time_[1]) > 0.0 && speed(by_time_[2]) > 0.0;
+    if (below) return true;
     for (size_t k = 0; k + 1 < by_time_.size(); ++k) {
         const int i = by_time_[k], j = by_time_[k + 1];
         const double length = (time_of(j) - time_of(i)) * stepper_.h;
@@ -239,8 +259,11 @@ double EventLocator::first_crossing(const Watch& watch) {
     constexpr double apart = 1.0 / location_grid;
     double g[location_grid + 1];
     g[0] = margin_at(0.0);
+    const double speed = system_.velocity(stepper_.y0).cwiseAbs().maxCoeff();
+    const double rest = watch.kind == Watch::Kind::slip ? rest_speed * (1.0 + speed) : 0.0;  // it has just begun
     for (int k = 1; k <= location_grid; ++k) {
         g[k] = margin_at(k * apart);
+        if (g[k] < 0.0 && k == 1 && g[0] <= rest) return root_after_start(apart, g[1], margin_at);
         if (g[k] < 0.0) return root_between((k - 1) * apart, g[k - 1], k * apart, g[k], margin_at);
         if (k == 1 || g[k - 1] > g[k - 2] || g[k - 1] > g[k]) continue;
         if (g[k - 1] > parabola_part * (g[k - 2] - 2.0 * g[k - 1] + g[k])) continue;
@@ -325,9 +348,9 @@ std::optional<FoundEvent> EventLocator::locate() {
     }
     step_onto(*earliest, first);
     if (earliest->kind == Watch::Kind::contact) return found(EventKind::pull, earliest->index);
-    const bool turns = earliest->kind == Watch::Kind::slip && passes_by_rest(earliest->index);
+    const bool reverses = earliest->kind == Watch::Kind::slip && passes_by_rest(earliest->index);
     if (const auto released = release_together()) return released;  // which may come earlier
-    return found(turns ? EventKind::turn : EventKind::rest_or_limit, earliest->index);
+    return found(reverses ? EventKind::reversal : EventKind::rest_or_limit, earliest->index);
 }
 
 // Whether all elements at rest at the step's end that stuck before it can stick on.

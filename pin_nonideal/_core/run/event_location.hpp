@@ -17,7 +17,7 @@ struct FoundEvent {
     enum class Kind {
         rest_or_limit,      // an element has come to rest, or what sticks has reached its limit
         released_together,  // redundant elements at rest cannot hold any longer, this one among them
-        turn,               // the slip of an element has turned without coming to rest
+        reversal,           // the slip of an element has turned without coming to rest
         pull,               // a contact begins to pull
     } kind;
     int index;  // of the friction element, or of the contact that pulls

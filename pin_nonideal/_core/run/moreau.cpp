@@ -48,15 +48,15 @@ void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
 void Moreau::solve_without_friction(double t) {
     set_modes(p, w, std::vector<Mode>(system_.ne, unloaded));
     begin_step(p, w, t, q_mid_, v0_);
+    VecX b = w.now.b;
     for (int i = 0; i < p.constraints; ++i) {
         const Block& block = p.blocks[i];
-        for (size_t k = 0; k < block.kept.size(); ++k)
-            w.now.b[block.row + k] = -w.now.values[i].rate[block.kept[k]] / h_;
+        for (size_t k = 0; k < block.kept.size(); ++k) b[block.row + k] = -w.now.values[i].rate[block.kept[k]] / h_;
     }
     const VecX force = w.now.F + (p.has_laws() ? w.now.C : VecX(VecX::Zero(system_.nv)));
-    solve_acceleration(p, w, force);
     a_free_ = w.now.a;
     lam_free_ = w.now.lam;
+    solve_acceleration(p, w, force, b, a_free_, lam_free_);
 }
 
 // Slip velocities at the step's end over h take the place of slip accelerations.
@@ -86,8 +86,8 @@ double Moreau::update_limits(double t) {
     for (int e = 0; e < system_.ne; ++e) {
         const Friction& friction = p.frictions[e];
         const double speed = slip_velocity(w.now, friction).norm();
-        const double limit = load_limit(p, w, friction, t, w.now.terms.q, v0_) *
-                             (speed == 0.0 ? friction.static_ratio : friction.speed_factor(speed));
+        const double load = load_limit(p, w, friction, t, w.now.terms.q, v0_);
+        const double limit = speed == 0.0 ? friction.holding_limit(load) : friction.kinetic_limit(load, speed);
         change = std::max(change, std::abs(limit - limit_[e]));
         limit_[e] = limit;
     }
@@ -104,7 +104,7 @@ void Moreau::solve_friction(const FrictionProblem& problem, double t) {
         if (pass > 0 && (change <= load_tolerance * largest || !p.needs_reactions)) return;
         force_ = friction_program(problem.W, problem.alpha0, problem.dims, limit_);
         force_limit_ = limit_;
-        if (pass + 1 == load_passes) throw Failure(Failure::Kind::paradox, t, {0}, change);
+        if (pass + 1 == load_passes) throw Failure(Failure::Kind::paradox, t, elements_, change);
     }
 }
 

@@ -50,7 +50,8 @@ double whole_lengths(double time, double length) { return std::floor(time / leng
 Simulation::Simulation(const Program& program, Workspace& workspace, const Options& run_options, Recording& recording)
     : p(program), w(workspace), options(run_options), out(recording), t_end(options.t0 + options.duration),
       system(program, workspace, options.record.energy), stepper(options.method, system),
-      norm(system, options.rtol, options.atol), control(options.method, options.rtol), locator(system, stepper, slip_at_start, pulls), moreau(system),
+      norm(system, options.rtol, options.atol), control(options.method, options.rtol),
+      locator(system, stepper, slip_at_start, pulls), moreau(system),
       recorder(system, options.record, recording), sample_(VecX::Zero(system.ny)) {
     y = rate = configured_y = sample_;
     slip_at_start.assign(p.frictions.size(), 0.0);
@@ -119,7 +120,7 @@ void Simulation::save() {
 
 void Simulation::restore(const std::string& state) { from_bytes(state, system, *this, out); }
 
-// --- Propose ----------------------------------------------------------------------------------------------------------
+// --- Propose --------------------------------------------------------------------------------------------------------
 
 void Simulation::sample_control() {
     const auto* sampled = std::get_if<SampledTorque>(&p.actuation);
@@ -174,7 +175,7 @@ Simulation::Proposal Simulation::propose() {
     return {size, stop, last};
 }
 
-// --- Integrate ----------------------------------------------------------------------------------------------------------
+// --- Integrate ------------------------------------------------------------------------------------------------------
 
 std::optional<double> Simulation::integrate(const Proposal& proposal) {
     stepper.y0 = y;
@@ -215,7 +216,7 @@ std::optional<double> Simulation::try_step(double size) {
     return error;
 }
 
-// --- Control the error ----------------------------------------------------------------------------------------------------
+// --- Control the error ----------------------------------------------------------------------------------------------
 
 bool Simulation::control_error(const Proposal& proposal, std::optional<double> error) {
     const bool accepted = control.accepts(error, proposal.size, proposal.last, h);
@@ -226,7 +227,7 @@ bool Simulation::control_error(const Proposal& proposal, std::optional<double> e
     throw Failure(Failure::Kind::step_size, t);
 }
 
-// --- Accept -----------------------------------------------------------------------------------------------------------------
+// --- Accept ---------------------------------------------------------------------------------------------------------
 
 void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent>& event) {
     ++out.steps;
@@ -236,10 +237,11 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     y = stepper.y1;
     rate = stepper.end_rate();
     configured_now();
+    if (!event || !event->changes_modes()) report_pulls(event);
     emit_inside_step();
     if (!event) return;
     if (event->changes_modes()) change_modes(*event);
-    if (event->kind != FoundEvent::Kind::turn) return;
+    if (event->kind != FoundEvent::Kind::reversal) return;
     recent_events.push_back(t);
     bridge_cluster(event->index);
 }
@@ -267,14 +269,13 @@ void Simulation::bridge_cluster(int element) {
     configured_now();
 }
 
-// --- Record -----------------------------------------------------------------------------------------------------------------
+// --- Record ---------------------------------------------------------------------------------------------------------
 
 void Simulation::record(const std::optional<FoundEvent>& event) {
     if (event && event->changes_modes()) {
         emit(t, y, true);
         return;
     }
-    report_pulls(event);
     const bool on_grid = options.output_dt > 0.0 && std::abs(next_sample() - t) <= same_time(t);
     if (options.output_dt != 0.0 && !on_grid && t < t_end) return;
     samples += on_grid;
@@ -327,7 +328,7 @@ void Simulation::report_pulls(const std::optional<FoundEvent>& event) {
     }
 }
 
-// --- Time stepping ----------------------------------------------------------------------------------------------------------
+// --- Time stepping --------------------------------------------------------------------------------------------------
 
 void Simulation::step_in_time(double stop, double dt) {
     sample_control();
@@ -354,7 +355,7 @@ void Simulation::step_in_time(double stop, double dt) {
     if (options.output_dt == 0.0 || on_grid || t >= t_end) emit(t, y, true);
 }
 
-// --- Runs -------------------------------------------------------------------------------------------------------------------
+// --- Runs -----------------------------------------------------------------------------------------------------------
 
 template <class Steps>
 static void keep_what_stops(Recording& out, Steps steps) {

@@ -64,8 +64,9 @@ void System::watch(double t, VecX& dy) {
         double *of_element = dy.data() + ns + 2 * e, &share = of_element[0], &rate = of_element[1];
         share = rate = 0.0;
         if (slips(w.state.mode[e])) {
-            share = slip_along_mode(p, w, e);
-            rate = slip_rate_along_mode(p, w, e);
+            const auto [speed, change] = slip_toward_rest(p, w, e);
+            share = speed;
+            rate = change;
         } else if (w.state.mode[e] == sticking && !w.state.indeterminate) {
             const double limit = static_limit(p, w, e, t, q, v);
             const Vec3 force = friction_force(p, w, e);  // of one direction with its sign: smooth where it passes zero
