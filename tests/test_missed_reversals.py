@@ -11,8 +11,8 @@ from oracles.coulomb_partner import Partner
 
 from .mechanisms import body, empty, frame
 
-# The body's motion is exact between events but for the tolerance of the step control, which friction magnifies by the
-# number of events; a missed reversal is an error of 1e-3 and more.
+# The body's motion is exact between events but for the tolerance of the step control, which friction magnifies
+# by the number of events; a missed reversal is an error of 1e-3 and more.
 ALLOWED = 1e3
 DURATION = 2.0
 
@@ -87,7 +87,7 @@ def wrong(kind, seed, rtol):
     return abs(run.v[-1] @ row - exact) / (ALLOWED * rtol)
 
 
-# At a loose tolerance a step may hold both the beginning of a contact's slip and its end, which docs/limits.md tells.
+# At a loose tolerance a step may hold both the beginning and the end of a slip of a contact (docs/limits.md).
 CASES = [(kind, rtol) for kind in KINDS for rtol in (1e-8, 1e-6) if (kind, rtol) != ("contact", 1e-6)]
 
 
