@@ -11,7 +11,7 @@ from oracles.coulomb_partner import Partner
 
 from .mechanisms import body, empty, frame
 
-# The body's motion is exact between events but for the tolerance of the step control, which friction magnifies
+# The motion is exact between events but for the tolerance of the step control, which friction magnifies
 # by the number of events; a missed reversal is an error of 1e-3 and more.
 ALLOWED = 1e3
 DURATION = 2.0
