@@ -48,6 +48,13 @@ class ReactionView:
 
     def of_block(self, block: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
 
+class Provider(enum.Enum):
+    """Who computes kinematics, M and the bias forces."""
+
+    core = 0
+
+    pinocchio = 1
+
 class Load(enum.Enum):
     """What loads the bearing that rubs."""
 
@@ -133,12 +140,15 @@ class Program:
     def law_names(self) -> list[str]: ...
 
     @property
+    def power_names(self) -> list[str]: ...
+
+    @property
     def element_names(self) -> list[str]: ...
 
     def runner(self) -> Runner: ...
 
 class Builder:
-    def __init__(self, model: object, pinocchio_terms: bool = False) -> None: ...
+    def __init__(self, model: object, terms: Provider = Provider.core) -> None: ...
 
     def keep_rows(self, block: int, rows: Sequence[int]) -> None: ...
 

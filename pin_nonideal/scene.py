@@ -27,7 +27,7 @@ from .types import Array, GeometryModel, Model, Table
 Rest = ParamSpec("Rest")
 Result = TypeVar("Result")
 
-TERMS = ("core", "pinocchio")
+TERMS = tuple(provider.name for provider in core.Provider)
 
 
 class Scene:

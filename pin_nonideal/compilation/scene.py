@@ -43,7 +43,7 @@ class CompiledScene:
     def __init__(self, model: Model, q0: Array, v0: Array, said: Descriptions) -> None:
         self.model, self.q0, self.said = model, q0, said
         try:
-            builder = core.Builder(model, pinocchio_terms=said.terms == "pinocchio")
+            builder = core.Builder(model, core.Provider[said.terms])
         except ValueError as error:
             raise InputError(str(error)) from None
         where = Resolution(model, q0)

@@ -11,7 +11,7 @@ from pin_nonideal.core import core
 from pin_nonideal.errors import LoopClosureError, OutputError, RunError, RunInterrupted, UserFunctionError
 from pin_nonideal.scene import Scene
 from pin_nonideal.states.rows import rows_at
-from pin_nonideal.trajectory import Event, Stats, Trajectory
+from pin_nonideal.trajectory import LEDGER, Event, Stats, Trajectory
 from pin_nonideal.types import Array, Table
 
 from .options import RunOptions
@@ -94,12 +94,12 @@ def shaped(scene: Scene, outcome: core.Outcome, options: RunOptions, wall: float
         fields["lam"] = outcome.lam.reshape(nt, program.rows)
         fields["lam_ideal"] = outcome.lam_ideal.reshape(nt, program.rows)
     if options.power or options.energy:
-        columns = ["actuation", "forces", "constraints", *_columns(scene.law_names)]
+        columns = _columns(program)
     if options.power:
         power = outcome.power.reshape(nt, len(columns))
         fields["power"] = dict(zip(columns, power.T, strict=True))
     if options.energy:
-        fields["energy"] = _ledger(columns, outcome.energy.reshape(nt, len(columns) + 3))
+        fields["energy"] = _ledger(columns, outcome.energy)
     if program.states:
         fields["z"] = outcome.z.reshape(nt, program.states)
     elements = scene.element_names
@@ -134,19 +134,21 @@ def _event(scene: Scene, event: core.Event) -> Event:
     return Event(event.time, event.kind.name, names[event.element])
 
 
-def _ledger(columns: Sequence[str], numbers: Array) -> dict[str, Array]:
-    ledger = {
-        "kinetic": numbers[:, 0],
-        "potential": numbers[:, 1],
-        "total": numbers[:, 0] + numbers[:, 1],
-    }
-    ledger |= dict(zip([*columns, "projection"], numbers[:, 2:].T, strict=True))
-    done = numbers[:, 2:].sum(axis=1)
-    ledger["balance"] = ledger["total"] - ledger["total"][:1] - done
+def _ledger(columns: Sequence[str], energy: Array) -> dict[str, Array]:
+    """The core's columns of energy, stored and done since the start, and their sums."""
+    stored, done = ("kinetic", "potential"), (*columns, "projection")
+    split = len(stored)
+    numbers = energy.reshape(-1, split + len(done))
+    ledger = dict(zip(stored, numbers.T[:split], strict=True))
+    ledger["total"] = ledger["kinetic"] + ledger["potential"]
+    ledger |= dict(zip(done, numbers.T[split:], strict=True))
+    ledger["balance"] = ledger["total"] - ledger["total"][:1] - numbers[:, split:].sum(axis=1)
     return ledger
 
 
-def _columns(laws: Sequence[str]) -> list[str]:
-    """Law names as ledger columns that no other column bears."""
-    taken = {"kinetic", "potential", "total", "actuation", "forces", "constraints", "projection", "balance"}
-    return [f"law {name}" if name in taken else name for name in laws]
+def _columns(program: core.Program) -> list[str]:
+    """Columns of power, with laws under names that no other column of a ledger bears."""
+    names = program.power_names
+    first_law = len(names) - len(program.law_names)
+    taken = {*LEDGER, *names[:first_law], "projection"}
+    return names[:first_law] + [f"law {name}" if name in taken else name for name in names[first_law:]]

@@ -38,9 +38,10 @@ class _Run:
 
     def __init__(self, scene: Scene, options: RunOptions, tick: Tick | None) -> None:
         self.scene, self.options, self.tick = scene, options, tick
-        self.runner, self.states = scene._compiled.program.runner(), scene._compiled.program.states
+        program = scene._compiled.program
+        self.runner, self.states = program.runner(), program.states
         self.energy = options.energy
-        self.work = 3 + len(scene.law_names) if self.energy else 0
+        self.work = len(program.power_names) if self.energy else 0
         self.moved = 0.0  # energy, by projections that the run went on from
         self.steps = 0
         self.samples: list[tuple[float, Array, float]] = []

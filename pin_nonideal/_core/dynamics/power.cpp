@@ -4,6 +4,12 @@ namespace pn {
 
 int power_count(const Program& p) { return first_law_power + static_cast<int>(p.law_names.size()); }
 
+std::vector<std::string> power_names(const Program& p) {
+    std::vector<std::string> names(std::begin(scene_powers), std::end(scene_powers));
+    names.insert(names.end(), p.law_names.begin(), p.law_names.end());
+    return names;
+}
+
 void powers(const Program& p, Workspace& w, const VecX& v, double* out) {
     out[0] = p.driven ? v.dot(w.now.tau) : 0.0;
     out[1] = p.driven ? v.dot(w.now.external) : 0.0;

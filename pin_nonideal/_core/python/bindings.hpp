@@ -62,8 +62,7 @@ using Function = std::optional<nb::typed<nb::callable, Signature>>;
 struct Builder {
     std::shared_ptr<Program> p = std::make_shared<Program>();
 
-    // M and the bias forces by Pinocchio's algorithms, or by the core's own pass.
-    Builder(nb::object model, bool pinocchio_terms);
+    Builder(nb::object model, Provider terms);
     // Return the index of the new block or law. Directions of friction follow all constraints.
     int add(const std::string& name, Kind kind, Role role);
     int add_law(const std::string& name);

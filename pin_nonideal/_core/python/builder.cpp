@@ -1,5 +1,7 @@
 // Builds a Program from plain numbers and functions: friction, other laws, forces, torques.
 #include "python/callbacks.hpp"
+
+#include "dynamics/power.hpp"
 #include "tree/model_extraction.hpp"
 
 #include <nanobind/stl/optional.h>
@@ -12,8 +14,8 @@ using namespace nanobind::literals;
 
 namespace pn {
 
-Builder::Builder(nb::object model, bool pinocchio_terms) {
-    p->mechanism = read_mechanism(model_pointer(model.ptr()), pinocchio_terms ? Provider::pinocchio : Provider::core);
+Builder::Builder(nb::object model, Provider terms) {
+    p->mechanism = read_mechanism(model_pointer(model.ptr()), terms);
 }
 
 int Builder::add_law(const std::string& name) {
@@ -137,6 +139,9 @@ void bind_actuation(nb::class_<Builder>& builder) {
 }
 
 void bind_enums(nb::module_& m) {
+    nb::enum_<Provider>(m, "Provider", "Who computes kinematics, M and the bias forces.")
+        .value("core", Provider::core)
+        .value("pinocchio", Provider::pinocchio);
     using Load = Friction::Load;
     nb::enum_<Load>(m, "Load", "What loads the bearing that rubs.")
         .value("none", Load::none)
@@ -177,6 +182,7 @@ void bind_program(nb::module_& m) {
         .def_prop_ro("rows", [](const Program& p) { return p.user_rows; })
         .def_prop_ro("states", [](const Program& p) { return p.states; })
         .def_prop_ro("law_names", [](const Program& p) { return p.law_names; })
+        .def_prop_ro("power_names", &power_names)
         .def_prop_ro("element_names", [](const Program& p) {
             std::vector<std::string> names;
             for (const Friction& f : p.frictions) names.push_back(p.law_names[f.law]);
@@ -191,7 +197,7 @@ void bind_builder(nb::module_& m) {
     bind_enums(m);
     bind_program(m);
     nb::class_<Builder> builder(m, "Builder");
-    builder.def(nb::init<nb::object, bool>(), "model"_a, "pinocchio_terms"_a = false)
+    builder.def(nb::init<nb::object, Provider>(), "model"_a, "terms"_a = Provider::core)
         .def("keep_rows", [](Builder& b, int block, std::vector<int> rows) {
             b.p->blocks[block].kept = std::move(rows);
         }, "block"_a, "rows"_a)
