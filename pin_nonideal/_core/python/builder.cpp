@@ -1,8 +1,4 @@
-// Builds a Program from plain numbers and functions: friction, other laws, forces, torques.
-#include "python/callbacks.hpp"
-
-#include "dynamics/power.hpp"
-#include "tree/model_extraction.hpp"
+#include "python/builder.hpp"
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
@@ -10,12 +6,29 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include "dynamics/power.hpp"
+#include "python/callbacks.hpp"
+#include "python/constraints.hpp"
+#include "python/runner.hpp"
+#include "tree/model_extraction.hpp"
+
 using namespace nanobind::literals;
 
 namespace pn {
 
 Builder::Builder(nb::object model, Provider terms) {
     p->mechanism = read_mechanism(model_pointer(model.ptr()), terms);
+}
+
+int Builder::add(const std::string& name, Kind kind, Role role) {
+    const int index = static_cast<int>(p->blocks.size());
+    p->blocks.emplace_back(name, std::move(kind));
+    if (role == Role::direction) return index;
+    p->blocks[index].user_row = p->user_rows;
+    p->user_rows += p->blocks[index].total;
+    p->constraints = index + 1;
+    if (role == Role::contact) p->contacts.push_back(index);
+    return index;
 }
 
 int Builder::add_law(const std::string& name) {

@@ -1,9 +1,11 @@
 // The user's Python functions as the core calls them: with the lock held, arrays copied both ways.
 #pragma once
 
-#include <vector>
+#include <functional>
+#include <utility>
 
-#include "python/bindings.hpp"
+#include "dynamics/workspace.hpp"
+#include "python/arrays.hpp"
 
 namespace pn {
 
@@ -42,5 +44,7 @@ std::function<void(double, double*)> wrench_function(nb::object f);
 // Limit of friction, and force of a law; both may ask about the reactions.
 decltype(Friction::user_limit) limit_function(nb::object f);
 decltype(UserLaw::function) law_function(nb::object f, int states, bool reads_reactions);
+
+void bind_reactions(nb::module_& m);
 
 }  // namespace pn

@@ -1,6 +1,4 @@
-// Constraints and directions of friction from plain numbers and functions: what a kind says that it is made of, Python
-// may give.
-#include "python/callbacks.hpp"
+#include "python/constraints.hpp"
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
@@ -8,20 +6,11 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include "python/callbacks.hpp"
+
 using namespace nanobind::literals;
 
 namespace pn {
-
-int Builder::add(const std::string& name, Kind kind, Role role) {
-    const int index = static_cast<int>(p->blocks.size());
-    p->blocks.emplace_back(name, std::move(kind));
-    if (role == Role::direction) return index;
-    p->blocks[index].user_row = p->user_rows;
-    p->user_rows += p->blocks[index].total;
-    p->constraints = index + 1;
-    if (role == Role::contact) p->contacts.push_back(index);
-    return index;
-}
 
 std::vector<ConstraintRows> constraint_rows(const Program& p) {
     std::vector<ConstraintRows> out;
@@ -65,7 +54,7 @@ struct From<std::function<Signature>> {  // a function of the user, or None wher
     }
 };
 
-// Builder.add_<name>(name, data...) of one kind.
+// Builder.add_<name>(name, data...) of one kind: what it says that it is made of, Python may give.
 template <class K, class... Value>
 void bind_kind(nb::class_<Builder>& builder, const Datum<K, Value>&... data) {
     builder.def((std::string("add_") + K::name).c_str(),

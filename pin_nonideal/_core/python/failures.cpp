@@ -1,7 +1,6 @@
-// A failure of the core as the exception that Python sees: `CoreFailure` with kind, time, elements and value.
-#include <nanobind/stl/vector.h>
+#include "python/failures.hpp"
 
-#include "python/bindings.hpp"
+#include <nanobind/stl/vector.h>
 
 namespace pn {
 

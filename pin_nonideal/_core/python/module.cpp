@@ -5,8 +5,11 @@
 #include <nanobind/stl/vector.h>
 
 #include "friction/cone_program.hpp"
-#include "python/bindings.hpp"
-#include "friction/modes.hpp"
+#include "python/builder.hpp"
+#include "python/callbacks.hpp"
+#include "python/failures.hpp"
+#include "python/runner.hpp"
+#include "run/checkpoint.hpp"
 
 using namespace pn;
 using namespace nanobind::literals;

@@ -1,5 +1,4 @@
-// Evaluations of single states, and what an integrator outside the core asks for.
-#include "python/bindings.hpp"
+#include "python/runner.hpp"
 
 #include <chrono>
 
@@ -200,6 +199,29 @@ Outcome Runner::record(const Array& times, const Array2& states, const Array& mo
     }
     out.steps = steps;
     return {w->counters, std::move(out)};
+}
+
+Outcome Runner::simulate(const Array& q_in, const Array& v_in, const Options& options) {
+    const VecX q0 = map(q_in), v0 = map(v_in);
+    w->state.z = VecX::Zero(p->states);
+    w->now.has_override = false;
+    Recording recording;
+    {
+        nb::gil_scoped_release release;
+        pn::simulate(*p, *w, q0, v0, options, recording);
+    }
+    return {w->counters, std::move(recording)};
+}
+
+Outcome Runner::resume(const nb::bytes& state, const Options& options) {
+    const std::string bytes(static_cast<const char*>(state.data()), state.size());
+    Recording recording;
+    w = std::make_unique<Workspace>(*p);
+    {
+        nb::gil_scoped_release release;
+        pn::resume(*p, *w, bytes, options, recording);
+    }
+    return {w->counters, std::move(recording)};
 }
 
 VecX Runner::read_state(const System& system, const VecX& outside) {

@@ -1,5 +1,4 @@
-// Runs: options and states in, recordings out.
-#include "python/bindings.hpp"
+#include "python/runs.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -13,6 +12,10 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
+
+#include "constraints/projection.hpp"
+#include "python/failures.hpp"
+#include "python/runner.hpp"
 
 using namespace nanobind::literals;
 
@@ -59,8 +62,6 @@ struct type_caster<pn::Options> {
 };
 
 }  // namespace nanobind::detail
-
-#include "constraints/projection.hpp"
 
 namespace pn {
 
@@ -114,29 +115,6 @@ auto recorded(nb::handle_t<Outcome> run) {
 }
 
 }  // namespace
-
-Outcome Runner::simulate(const Array& q_in, const Array& v_in, const Options& options) {
-    const VecX q0 = map(q_in), v0 = map(v_in);
-    w->state.z = VecX::Zero(p->states);
-    w->now.has_override = false;
-    Recording recording;
-    {
-        nb::gil_scoped_release release;
-        pn::simulate(*p, *w, q0, v0, options, recording);
-    }
-    return {w->counters, std::move(recording)};
-}
-
-Outcome Runner::resume(const nb::bytes& state, const Options& options) {
-    const std::string bytes(static_cast<const char*>(state.data()), state.size());
-    Recording recording;
-    w = std::make_unique<Workspace>(*p);
-    {
-        nb::gil_scoped_release release;
-        pn::resume(*p, *w, bytes, options, recording);
-    }
-    return {w->counters, std::move(recording)};
-}
 
 static int useful_threads(size_t count, int threads) { return static_cast<int>(std::min<size_t>(threads, count)); }
 

@@ -1,0 +1,59 @@
+// Arrays in and out, and the other plain data of Python's calls. Everything a user can pass wrong has been checked in
+// Python before it comes here.
+#pragma once
+
+#include <optional>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include "constraints/geometry.hpp"
+
+namespace pn {
+
+namespace nb = nanobind;
+
+using Array = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Array2 = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+inline Eigen::Map<const VecX> map(const Array& a) { return {a.data(), static_cast<Eigen::Index>(a.shape(0))}; }
+inline Eigen::Map<const RowMajor> map(const Array2& a) {
+    return {a.data(), static_cast<Eigen::Index>(a.shape(0)), static_cast<Eigen::Index>(a.shape(1))};
+}
+
+// Arrays that Python gets.
+using Numbers = nb::ndarray<nb::numpy, double, nb::ndim<1>>;
+using Table = nb::ndarray<nb::numpy, double, nb::ndim<2>>;
+
+inline Numbers to_numpy(std::vector<double>&& x) {  // its numbers stay where they are
+    auto* kept = new std::vector<double>(std::move(x));
+    kept->reserve(1);  // an array has an address, one without numbers too
+    nb::capsule owner(kept, [](void* v) noexcept { delete static_cast<std::vector<double>*>(v); });
+    return Numbers(kept->data(), {kept->size()}, owner);
+}
+inline Numbers to_numpy(const double* data, size_t n) { return to_numpy(std::vector<double>(data, data + n)); }
+inline Numbers to_numpy(const VecX& x) { return to_numpy(x.data(), x.size()); }
+
+inline void read_into(const nb::object& from, VecX& to) {
+    const Array a = nb::cast<Array>(from);
+    to = map(a);
+}
+
+using FrameTuple = std::tuple<int, std::vector<double>, std::vector<double>>;  // joint, R by rows, p
+
+inline Vec3 vec3(const std::vector<double>& x) { return Vec3(x[0], x[1], x[2]); }
+
+inline Frame frame_of(const FrameTuple& f) {
+    return {std::get<0>(f), Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(std::get<1>(f).data()),
+            vec3(std::get<2>(f))};
+}
+
+// A function of Python, or None.
+template <class Signature>
+using Function = std::optional<nb::typed<nb::callable, Signature>>;
+
+}  // namespace pn

@@ -1,0 +1,69 @@
+// Evaluations of single states, what an integrator outside the core asks for, and one run after another.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "python/runs.hpp"
+
+namespace pn {
+
+// Eq. (40) at one state, with what its friction does.
+struct Instant {
+    Numbers a, F_ideal, F_nonideal, C, F, lam, lam_ideal;
+    int rank;
+    std::vector<Mode> modes;
+    std::vector<Numbers> friction;  // force of each element along its directions
+    std::vector<double> limits;
+};
+
+// One workspace and the program it belongs to: evaluates states, and carries runs.
+struct Runner {
+    std::shared_ptr<const Program> p;
+    std::unique_ptr<Workspace> w;
+    VecX q, v;
+
+    explicit Runner(std::shared_ptr<const Program> program);
+
+    // Writes the acceleration into `out`, an array of nv numbers; plain buffers, since this is called in tight loops.
+    void acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle tau, nb::handle out);
+    Instant solve(const Array& q_in, const Array& v_in, double t, const std::optional<Array>& tau,
+                  const std::optional<std::vector<Mode>>& modes);
+    int constraint_rank() const;
+    // All rows of all constraints, dropped ones too: A (by rows), b, residual, rate.
+    std::tuple<Numbers, Numbers, Numbers, Numbers> rows(const Array& q_in, const Array& v_in, double t);
+    // M (dense, by rows) and the bias forces.
+    std::pair<Numbers, Numbers> terms(const Array& q_in, const Array& v_in);
+    // q and v on the constraints, and the largest residual before (beyond `far` nothing moves), residual and rate
+    // after.
+    std::tuple<Numbers, Numbers, double, double, double> project(const Array& q_in, const Array& v_in, double t,
+                                                                 double far);
+    double time_evaluations(const Array& q_in, const Array& v_in, double t, int count);
+
+    // For integrators outside the core: the rate of y = (q, v, states of laws, work of the ledger's columns).
+    Numbers derivative(double t, const Array& y_in, bool energy);
+    // Such a y put on the constraints, and the energy that this moved.
+    std::pair<Numbers, double> project_outside(double t, const Array& y_in, bool with_energy);
+    // Samples of such a run as the core records its own; `moved` is the energy moved by projection up to each.
+    Outcome record(const Array& times, const Array2& states, const Array& moved, const RecordOptions& options,
+                   long steps);
+
+    Outcome simulate(const Array& q_in, const Array& v_in, const Options& options);
+    Outcome resume(const nb::bytes& state, const Options& options);
+
+private:
+    // What does not fit is refused here and explained in Python.
+    void set(const Array& q_in, const Array& v_in, const std::optional<Array>& tau);
+    // Modes by velocity, and at rest by the complementarity problem; or the ones given.
+    void choose_modes(double t, const std::optional<std::vector<Mode>>& modes);
+    // Such a y with the core's watch of sticking elements behind it.
+    VecX read_state(const System& system, const VecX& outside);
+    double energy();
+};
+
+void bind_runner(nb::module_& m);
+
+}  // namespace pn
