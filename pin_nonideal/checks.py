@@ -137,6 +137,21 @@ def sequence(what: str, value: object) -> tuple[Any, ...]:
     return tuple(value)
 
 
+def floats(value: object, kinds: str = "fiu") -> tuple[NDArray[np.float64] | None, tuple[int, ...] | None]:
+    """A copy as floats, and the place of its first entry that is not finite, None where all are.
+
+    There is no copy (None) unless the type of `value` is one of `kinds`, NumPy's letters of real numbers.
+    """
+    try:
+        given = np.asarray(value)
+        result = np.array(given, dtype=float) if given.dtype.kind in kinds else None
+    except (TypeError, ValueError):  # rows of unequal length, or objects that are no numbers
+        result = None
+    if result is None or np.count_nonzero(np.isfinite(result)) == result.size:  # faster than all()
+        return result, None
+    return result, tuple(np.argwhere(~np.isfinite(result))[0].tolist())
+
+
 def array(what: str, value: object, shape: Sequence[int | None]) -> NDArray[np.float64]:
     """A finite array of the given shape, copied and read-only.
 
@@ -148,23 +163,14 @@ def array(what: str, value: object, shape: Sequence[int | None]) -> NDArray[np.f
     Raises:
         InputError: wrong shape, not numbers, or not finite.
     """
-    wanted = (
-        "(" + ", ".join("n" if s is None else str(s) for s in shape) + ("," if len(shape) == 1 else "") + ")"
-    )
-    try:
-        given = np.asarray(value)
-    except (TypeError, ValueError):
-        given = np.asarray(None)
-    if given.dtype.kind not in "fiu":
+    wanted = str(tuple("n" if s is None else s for s in shape)).replace("'", "")
+    result, where = floats(value)
+    if result is None:
         raise InputError(f"{what} must be an array of numbers of shape {wanted}; got {value!r}")
-    result = np.array(given, dtype=float)
-    if result.ndim != len(shape) or any(
-        s is not None and s != n for s, n in zip(shape, result.shape, strict=True)
-    ):
+    if result.ndim != len(shape) or any(s not in (None, n) for s, n in zip(shape, result.shape, strict=True)):
         raise InputError(f"{what} must have shape {wanted}; got shape {result.shape}")
-    if not np.isfinite(result).all():
-        where = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
-        place = f"entry [{', '.join(map(str, where))}] is" if where else "got"
+    if where is not None:
+        place = f"entry {list(where)} is" if where else "got"
         raise InputError(f"{what} must be finite; {place} {result[where]}")
     result.setflags(write=False)
     return result

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .checks import floats
 from .errors import InconsistentConstraintsError, InputError, NonFiniteError, SingularMassError
 
 Array = NDArray[np.floating[Any]]
@@ -246,17 +247,12 @@ def _checked(
 
 def _numbers(name: str, value: ArrayLike) -> Array:
     """`value` as an array of finite floats."""
-    try:
-        raw = np.asarray(value)
-        array = np.array(raw, dtype=np.float64) if raw.dtype.kind in "iuf" else None
-    except ValueError:  # rows of unequal length
-        array = None
+    array, where = floats(value)
     if array is None:
         raise InputError(f"{name} must hold real numbers, got {type(value).__name__}; pass floats")
-    if not np.isfinite(array).all():
-        where = ", ".join(str(i) for i in np.argwhere(~np.isfinite(array))[0])
-        bad = array[~np.isfinite(array)][0]
-        raise InputError(f"{name} must be finite, got {bad} at {name}[{where}]; check how it is computed")
+    if where is not None:
+        place = f"{name}{list(where)}"
+        raise InputError(f"{name} must be finite, got {array[where]} at {place}; check how it is computed")
     return array
 
 

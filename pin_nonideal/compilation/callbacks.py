@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from pin_nonideal.checks import floats
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, RunError, UnknownNameError, UserFunctionError, nearest
 from pin_nonideal.timefunctions import Constant, Polynomial, Sinusoid, Spline
@@ -49,19 +50,14 @@ def checked(function: Callable[..., Any], who: str, *shapes: tuple[int, ...]) ->
 
 
 def _numbers(part: Any, shape: tuple[int, ...], who: str) -> Array:
-    try:
-        if np.iscomplexobj(part):
-            raise TypeError
-        result = np.array(part, dtype=float, order="C")
-    except (TypeError, ValueError):
-        raise UserFunctionError(f"{who} must return numbers of shape {shape}; got {part!r}") from None
-    if result.shape != shape and result.size == math.prod(shape):
-        result = result.reshape(shape)
-    if result.shape != shape:
+    result, where = floats(part, "fiubOUS")  # whatever float() takes
+    if result is None:
+        raise UserFunctionError(f"{who} must return numbers of shape {shape}; got {part!r}")
+    if result.shape != shape and result.size != math.prod(shape):
         raise UserFunctionError(f"{who} must return shape {shape}; got shape {result.shape}")
-    if not np.isfinite(result).all():
-        raise UserFunctionError(f"{who} must return finite numbers; got {result}")
-    return result
+    if where is not None:
+        raise UserFunctionError(f"{who} must return finite numbers; got {result.reshape(shape)}")
+    return np.asarray(result.reshape(shape), order="C")
 
 
 def time_function(function: Any, who: str) -> Any:
