@@ -13,10 +13,11 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal import constraints
+from pin_nonideal import constraints, laws
 from pin_nonideal.compilation.constraints import lower_constraint
+from pin_nonideal.compilation.laws import lower_law
 from pin_nonideal.core import core
-from pin_nonideal.formats.robot_yaml import CONSTRAINTS
+from pin_nonideal.formats.robot_yaml import CONSTRAINTS, LAWS
 
 ROOT = Path(__file__).parents[1]
 CORE = ROOT / "pin_nonideal" / "_core"
@@ -109,3 +110,24 @@ def test_formulas_in_dual_numbers_are_derivatives_of_each_other(tmp_path: Path) 
     assert built.returncode == 0, built.stderr
     ran = subprocess.run([program], capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stdout) == (0, "")
+
+
+@pytest.mark.parametrize("law", get_args(laws.Law), ids=names)
+class TestLaw:
+    def test_is_public(self, law: type) -> None:
+        assert law.__name__ in pn.__all__
+
+    def test_compiles(self, law: type) -> None:
+        assert law in lower_law.registry
+
+    def test_stands_in_robot_yaml_unless_it_holds_functions(self, law: type) -> None:
+        assert (law.__name__ in LAWS) is not law.__name__.startswith("User")
+
+
+def test_every_law_of_the_core_is_bound() -> None:
+    """Those of the variant; a law that reads reactions, or forgets its states, does not compile."""
+    header = (CORE / "friction" / "laws.hpp").read_text()
+    (variant,) = re.findall(r"using Law = std::variant<([^>]*)>", header)
+    for name in re.findall(r"\w+", variant):
+        bound = {"LuGre": "lugre", "UserLaw": "user_law"}.get(name, name.lower())
+        assert callable(getattr(core.Builder, f"add_{bound}"))

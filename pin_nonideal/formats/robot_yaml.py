@@ -46,7 +46,7 @@ MODEL_KEYS = (
 )
 
 CONSTRAINTS = {c.__name__: c for c in get_args(constraints.Constraint) if not c.__name__.startswith("User")}
-LAWS = {c.__name__: c for c in (laws.JointFriction, laws.SigmoidFriction, laws.LuGre, laws.Drag)}
+LAWS = {c.__name__: c for c in get_args(laws.Law) if not c.__name__.startswith("User")}
 CONTACTS = {"PointContact": contacts.PointContact}
 FORCES = {c.__name__: c for c in (forces.SpringDamper, forces.JointSpring, forces.Wrench)}
 ACTUATION = {c.__name__: c for c in (actuation.HoldPosition, actuation.Table)}

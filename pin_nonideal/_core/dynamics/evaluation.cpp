@@ -113,7 +113,7 @@ void solve_dynamics(const Program& p, Workspace& w, double t, const VecX& v) {
         w.now.v = v;
         w.now.speed = v.cwiseAbs().maxCoeff();
         smooth_laws(p, w, t, w.now.terms.q, v);
-        solve_with_laws(p, w, t, w.now.terms.q, v);
+        solve_with_laws(p, w, t, w.now.terms.q, v, w.now.C_smooth);
     }
     if (!w.now.a.allFinite()) throw Failure(Failure::Kind::not_finite, t);
     if (is_immobile(p, w) && (v.array() == 0.0).all()) w.now.a.setZero();

@@ -4,6 +4,19 @@
 
 namespace pn {
 
+// Numbers the law's states after those of the laws before.
+template <class L>
+static void number_states(Program& p, L& law) {
+    if constexpr (std::is_same_v<L, UserLaw>) law.index = p.user_laws++;
+    if constexpr (has_states<L>) law.state = p.states;
+    p.states += law.states;
+}
+
+void Program::add(Law law) {
+    std::visit([this](auto& kind) { number_states(*this, kind); }, law);
+    laws.push_back(std::move(law));
+}
+
 void Program::finish() {
     int row = 0;
     entries = 0;
@@ -36,7 +49,6 @@ void Program::finish() {
         needs_reactions |= law.reaction != Reaction::none;
         needs_joint_reactions |= law.reaction != Reaction::none;
     });
-    each_law<Drag>(laws, [&](Drag& drag) { drag.dofs = mechanism.dofs_of(drag.frame.joint); });
     for (const Friction& f : frictions) needs_joint_reactions |= f.load == Friction::Load::user;
     for (int i = 0; i < constraints; ++i) {
         moves_in_time |= pn::moves_in_time(blocks[i].kind);

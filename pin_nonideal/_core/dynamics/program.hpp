@@ -51,6 +51,8 @@ struct Program {
         return constraints < static_cast<int>(blocks.size()) ? blocks[constraints].row : layout.rows;
     }
 
+    // A law, with places for its states.
+    void add(Law law);
     // Numbers the kept rows, finds supports and lays out the storage; once, before the program is shared.
     void finish();
 };

@@ -283,15 +283,15 @@ static void ideal_loads(const Program& p, Workspace& w, double t, const VecX& q,
     });
 }
 
-void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const VecX& known) {
     w.now.determinant = 1.0;
     if (!p.needs_reactions) {
-        w.now.C = w.now.C_smooth;
+        w.now.C = known;
         w.scratch.trial = w.now.F + w.now.C;
         solve_acceleration(p, w, w.scratch.trial);
         return;
     }
-    w.now.base_C = w.now.C_smooth;  // C that does not change while the reactions are sought
+    w.now.base_C = known;  // C that does not change while the reactions are sought
     ideal_loads(p, w, t, q, v);
     Implicit implicit{p, w, t, q, v};
     if (implicit.n == 0) implicit.motion();

@@ -9,7 +9,7 @@
 
 namespace pn {
 
-// C, a and lam for the forces F and the laws C_smooth that read no reactions.
-void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
+// C, a and lam for the forces F, what is known of C (the laws that read no reactions), and the laws that do.
+void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const VecX& known);
 
 }  // namespace pn

@@ -15,8 +15,11 @@ struct GeneralizedForce {
     VecX* dz = nullptr;
 
     void on_dof(int dof, double force) { C[dof] += force; }
-    void on_body(int, const std::vector<int>& dofs, const Force& f) {
-        for (int dof : dofs) C[dof] += dot(now.terms.J[dof], f);
+    void on_body(int joint, const Force& f) {
+        for (int i = joint; i != 0; i = p.mechanism.joints[i].parent) {
+            const Joint& j = p.mechanism.joints[i];
+            for (int dof = j.iv; dof < j.iv + j.nv; ++dof) C[dof] += dot(now.terms.J[dof], f);
+        }
     }
     void along(int block, const Vec3& f) { add_along(p.blocks[block], now, f, C); }
     void on_all(const VecX& force) { C += force; }
@@ -30,7 +33,7 @@ struct BodyForces {
     std::vector<Force>& body;
 
     void on_dof(int, double) {}
-    void on_body(int joint, const std::vector<int>&, const Force& f) { body[joint] += f; }
+    void on_body(int joint, const Force& f) { body[joint] += f; }
     void along(int block, const Vec3& f) {
         if (now.values[block].geometric) add_wrench(p.blocks[block], now.terms, now.values[block].wrench[0], f[0], body);
     }

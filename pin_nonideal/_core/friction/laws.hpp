@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <functional>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
@@ -34,6 +35,7 @@ struct Viscous {  // C = -coefficient v on dofs, or on the slip velocity along a
     int law = 0;  // index into Program::law_names
     int dof = -1, count = 0, block = -1;
     double coefficient = 0.0;
+    static constexpr int states = 0;
     static constexpr Reaction reaction = Reaction::none;
 
     template <class Sink>
@@ -46,6 +48,7 @@ struct Viscous {  // C = -coefficient v on dofs, or on the slip velocity along a
 struct Sigmoid {  // identified robot friction, phi1/(1+exp(-phi2 (v+phi3))) - phi1/(1+exp(-phi2 phi3))
     int law = 0, dof = 0;
     double phi1 = 0.0, phi2 = 0.0, phi3 = 0.0;
+    static constexpr int states = 0;
     static constexpr Reaction reaction = Reaction::none;
 
     template <class Real>
@@ -58,8 +61,10 @@ struct Sigmoid {  // identified robot friction, phi1/(1+exp(-phi2 (v+phi3))) - p
 };
 
 struct LuGre {  // F = sigma0 z + sigma1 dz + sigma2 v, dz = v - sigma0 |v| z / g(v)
-    int law = 0, dof = 0, state = 0;
+    int law = 0, dof = 0;
     double sigma0 = 0.0, sigma1 = 0.0, sigma2 = 0.0, coulomb = 0.0, stiction = 0.0, stribeck_velocity = 1.0;
+    int state = 0;  // place of its first among the states of all laws, as Program::add gives it
+    static constexpr int states = 1;
     static constexpr Reaction reaction = Reaction::none;
 
     template <class Real>
@@ -81,7 +86,7 @@ struct Drag {  // force -coefficient |u|^(exponent - 1) u at the origin of a fra
     int law = 0;
     Frame frame;
     double coefficient = 0.0, exponent = 1.0;
-    std::vector<int> dofs;  // that move the frame
+    static constexpr int states = 0;
     static constexpr Reaction reaction = Reaction::none;
 
     template <class Vector>
@@ -95,7 +100,7 @@ struct Drag {  // force -coefficient |u|^(exponent - 1) u at the origin of a fra
         const Vec3 x = body.ref + body.p + body.R * frame.p, u = velocity_at(body, x);
         if (u.norm() == 0.0 || frame.joint == 0) return;
         const Vec3 f = force(u);
-        sink.on_body(frame.joint, dofs, Force{f, (x - body.ref).cross(f)});
+        sink.on_body(frame.joint, Force{f, (x - body.ref).cross(f)});
     }
 };
 
@@ -112,6 +117,26 @@ struct UserLaw {
 
 // Sums run kind by kind, in this order.
 using Law = std::variant<Viscous, Sigmoid, LuGre, Drag, UserLaw>;
+
+// Whether it has states of its own, and so a place for them.
+template <class L, class = void>
+constexpr bool has_states = false;
+template <class L>
+constexpr bool has_states<L, std::void_t<decltype(L::state)>> = true;
+
+// What each law must say of itself, so that none is added and never acts.
+template <class L>
+constexpr bool is_complete_law() {
+    static_assert(std::is_same_v<decltype(L::law), int>, "a law has `int law`, its column of the ledger");
+    if constexpr (!std::is_same_v<L, UserLaw>) {  // which says these of each of its kind
+        static_assert(L::reaction == Reaction::none, "reactions are solved for dry friction and for laws of the user");
+        static_assert(has_states<L> == (L::states > 0), "a law with states has `int state`, the place of the first");
+    }
+    return true;
+}
+template <class... L>
+constexpr bool all_laws_complete(const std::variant<L...>*) { return (is_complete_law<L>() && ...); }
+static_assert(all_laws_complete(static_cast<const Law*>(nullptr)));
 
 // Calls f(law) for each law of one kind.
 template <class Kind, class Laws, class Function>

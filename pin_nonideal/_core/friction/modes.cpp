@@ -117,13 +117,11 @@ struct Search {
 
     // The motion under the forces f of the elements, and the limits that its loads give: the kinetic one for what
     // slips. Returns their largest relative change.
-    double follow(FrictionProblem& problem, const VecX& C_smooth, const VecX& f, const std::vector<Mode>& modes,
-                  VecX& limits) {
-        w.now.C_smooth = C_smooth;
-        VecX push = VecX::Zero(p.mechanism.nv);
-        problem.add_forces(p, w, f, push);
-        w.now.C_smooth += push;
-        solve_with_laws(p, w, t, w.now.terms.q, v);
+    double follow(FrictionProblem& problem, const VecX& f, const std::vector<Mode>& modes, VecX& limits) {
+        VecX C = VecX::Zero(p.mechanism.nv);
+        problem.add_forces(p, w, f, C);
+        C = w.now.C_smooth + C;
+        solve_with_laws(p, w, t, w.now.terms.q, v, C);
         const VecX driven = problem.alpha0;
         problem.alpha0 = problem.slip_accelerations(p, w) - problem.W * f;
         for (int i = 0; i < problem.rows; ++i)
@@ -157,7 +155,6 @@ struct Search {
         const std::vector<Mode> unloaded_modes(list.size(), unloaded);
         VecX limits(list.size());
         FrictionProblem problem = pose(unloaded_modes, limits);
-        const VecX C_smooth = w.now.C_smooth;
         std::vector<Mode> modes = unloaded_modes;
         double change = 0.0;
         for (int it = 0; it < outer_limit; ++it) {
@@ -175,7 +172,7 @@ struct Search {
                 if (enumerate(problem, released)) return;
                 throw Failure(Failure::Kind::paradox, t, list, std::min(determinant, w.now.determinant));
             }
-            change = follow(problem, C_smooth, f, modes, limits);
+            change = follow(problem, f, modes, limits);
         }
         clear_forces();
         apply(modes);

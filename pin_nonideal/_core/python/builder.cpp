@@ -80,32 +80,27 @@ void bind_laws(nb::class_<Builder>& builder) {
     builder
         .def("add_law", &Builder::add_law, "name"_a)
         .def("add_viscous", [](Builder& b, int law, double coefficient, int dof, int count, int block) {
-            b.p->laws.push_back(Viscous{law, dof, count, block, coefficient});
+            b.p->add(Viscous{law, dof, count, block, coefficient});
         }, "law"_a, "coefficient"_a, nb::kw_only(), "dof"_a = -1, "count"_a = 1, "block"_a = -1)
         .def("add_drag", [](Builder& b, int law, const FrameTuple& frame, double coefficient, double exponent) {
-            b.p->laws.push_back(Drag{law, frame_of(frame), coefficient, exponent, {}});
+            b.p->add(Drag{law, frame_of(frame), coefficient, exponent});
         }, "law"_a, "frame"_a, "coefficient"_a, "exponent"_a)
         .def("add_sigmoid", [](Builder& b, int law, int dof, double phi1, double phi2, double phi3) {
-            b.p->laws.push_back(Sigmoid{law, dof, phi1, phi2, phi3});
+            b.p->add(Sigmoid{law, dof, phi1, phi2, phi3});
         }, "law"_a, "dof"_a, "phi1"_a, "phi2"_a, "phi3"_a)
         .def("add_lugre", [](Builder& b, int law, int dof, double stiffness, double damping, double viscous,
                              double coulomb, double stiction, double stribeck_velocity) {
-            b.p->laws.push_back(LuGre{law, dof, b.p->states, stiffness, damping, viscous, coulomb, stiction,
-                                     stribeck_velocity});
-            ++b.p->states;
+            b.p->add(LuGre{law, dof, stiffness, damping, viscous, coulomb, stiction, stribeck_velocity});
         }, "law"_a, "dof"_a, "stiffness"_a, "damping"_a, "viscous"_a, "coulomb"_a, "stiction"_a,
            "stribeck_velocity"_a)
         .def("add_user_law", [](Builder& b, int law, int states, Reaction reaction,
                                 const nb::typed<nb::callable, nb::object(...)>& function) {
             UserLaw u;
             u.law = law;
-            u.index = b.p->user_laws++;
-            u.state = b.p->states;
             u.states = states;
-            b.p->states += states;
             u.reaction = reaction;
             u.function = law_function(function, states, u.reaction != Reaction::none);
-            b.p->laws.push_back(std::move(u));
+            b.p->add(std::move(u));
         }, "law"_a, "states"_a, "reaction"_a, "function"_a);
 }
 
