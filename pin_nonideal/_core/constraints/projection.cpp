@@ -66,7 +66,7 @@ double gather_rates(const Program& p, Workspace& w, double t, const VecX& v) {
 }
 
 // Whether factors of the new place are worth their cost when each iteration goes on to take as much as the last did.
-bool wants_new_factors(double before, double now, double floor) {
+bool needs_new_factors(double before, double now, double floor) {
     if (!(now < before)) return true;
     return std::log(now / std::max(floor, no_floor)) / std::log(before / now) > iterations_for_factors;
 }
@@ -192,7 +192,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
             move_position(p, w, q, p.constrained_dofs);  // the others move no row
             evaluate_residuals(p, w, t, q, v);
             now = gather_residuals(p, w);
-            configured = now > floor && wants_new_factors(largest, now, floor);
+            configured = now > floor && needs_new_factors(largest, now, floor);
         }
         if (configured) {
             move_position(p, w, q);

@@ -73,8 +73,8 @@ int householder(RowSystem& s, int n, bool pivot, double tolerance) {
 void decide_rows(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
                  RowSystem& s, double tolerance) {
     delassus(layout, blocks, B, s);
-    scale_to_unit_length(layout, s.wanted, s);
-    dense_columns(blocks, B, s.wanted, s);
+    scale_to_unit_length(layout, s.required, s);
+    dense_columns(blocks, B, s.required, s);
     s.rank = householder(s, static_cast<int>(s.columns.size()), true, tolerance);
     std::fill(s.active.begin(), s.active.end(), char(0));
     for (int k = 0; k < s.rank; ++k) s.active[s.columns[k]] = 1;

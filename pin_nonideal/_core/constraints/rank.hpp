@@ -12,7 +12,7 @@ constexpr double rank_tolerance = 1e-10;
 // square root of the threshold on responses in the program that finds the modes (rank_threshold).
 constexpr double rank_tolerance_sticking = 3e-7;
 
-// Rank and independent subset of the wanted rows, by column-pivoted QR of B^T.
+// Rank and independent subset of the required rows, by column-pivoted QR of B^T.
 void decide_rows(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
                  RowSystem& s, double tolerance = rank_tolerance);
 // B^T = Q T of the active rows, as they stand.

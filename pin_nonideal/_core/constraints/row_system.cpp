@@ -16,21 +16,21 @@ void RowSystem::allocate(const RowLayout& layout, int block_count, int nv) {
     factor.assign(layout.entries, 0.0);
     scale = VecX::Zero(layout.rows);
     active.assign(layout.rows, 0);
-    wanted.assign(layout.rows, 0);
+    required.assign(layout.rows, 0);
     Q.resize(nv, 0);
     tau = VecX::Zero(layout.rows);
     work = VecX::Zero(std::max(nv, layout.rows));
     columns.reserve(layout.rows);
 }
 
-void RowSystem::use_wanted(const std::vector<Block>& all) {
+void RowSystem::use_required(const std::vector<Block>& all) {
     blocks.clear();
     for (size_t i = 0; i < all.size(); ++i) {
         block_used[i] = 0;
-        for (size_t k = 0; k < all[i].kept.size(); ++k) block_used[i] |= wanted[all[i].row + k];
+        for (size_t k = 0; k < all[i].kept.size(); ++k) block_used[i] |= required[all[i].row + k];
         if (block_used[i]) blocks.push_back(static_cast<int>(i));
     }
-    active = wanted;
+    active = required;
     redundant = false;
     orthogonal = false;
 }

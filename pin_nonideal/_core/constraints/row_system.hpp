@@ -19,26 +19,26 @@ struct RowSystem {
     std::vector<double> G, factor;  // B B^T and its Cholesky factor, in the envelope
     VecX scale;                     // 1 / length of each row of B
     std::vector<char> active;       // rows in use
-    std::vector<char> wanted;       // rows that must hold (constraints, sticking elements)
-    std::vector<int> blocks;        // blocks with a wanted row
+    std::vector<char> required;     // rows that must hold (constraints, sticking elements)
+    std::vector<int> blocks;        // blocks with a required row
     std::vector<char> block_used;
     bool orthogonal = false;        // B^T = Q T in use instead of the Cholesky factor
-    bool redundant = false;         // some wanted row is not active
+    bool redundant = false;         // some required row is not active
     bool refine = false;            // very unequal pivots of M: solutions are refined
     double min_pivot = 1.0;
     // Square of the sine at which some row stands to the others, or of its length beside the other rows of its block
     // (a singular position turns a row into zero): small near a singular position.
     double distance = 1.0;
     int rank = 0;
-    // Orthogonal factorization of the scaled active rows, one column a row: no columns before it is first wanted, for
+    // Orthogonal factorization of the scaled active rows, one column a row: no columns before it is first needed, for
     // in a mechanism of many loops it takes far more room than all else.
     MatX Q;
     VecX tau, work;
     std::vector<int> columns;
 
     void allocate(const RowLayout& layout, int blocks, int nv);
-    // Blocks with a wanted row, and all wanted rows in use.
-    void use_wanted(const std::vector<Block>& all);
+    // Blocks with a required row, and all required rows in use.
+    void use_required(const std::vector<Block>& all);
 };
 
 // B B^T and its factor for the active rows; falls back to the orthogonal factorization.

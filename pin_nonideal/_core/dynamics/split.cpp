@@ -13,7 +13,7 @@ void share_multipliers(const Program& p, Workspace& w, const VecX& lam, VecX& sh
     // A_dependent = W A_active; x + W^T y = lam with least |x|^2 + |y|^2 is y = (I + W W^T)^-1 W lam, x = lam - W^T y.
     std::vector<int> dependent;
     for (int r = 0; r < p.layout.rows; ++r)
-        if (w.now.rows.wanted[r] && !w.now.rows.active[r]) dependent.push_back(r);
+        if (w.now.rows.required[r] && !w.now.rows.active[r]) dependent.push_back(r);
     const int d = static_cast<int>(dependent.size());
     MatX W(d, p.layout.rows);
     VecX column(p.mechanism.nv), unit = VecX::Zero(p.layout.rows), products(p.layout.rows), weights(p.layout.rows);
@@ -42,8 +42,8 @@ IdealMotion::IdealMotion(const Program& program, Workspace& workspace) : p(progr
         const RowSystem& own = w.now.ideal_rows;
         w.now.rows.refine = own.refine;
         if (!w.state.ideal_decided) {
-            for (int r = 0; r < p.layout.rows; ++r) w.now.rows.wanted[r] = own.wanted[r] && r < p.constraint_rows();
-            w.now.rows.use_wanted(p.blocks);
+            for (int r = 0; r < p.layout.rows; ++r) w.now.rows.required[r] = own.required[r] && r < p.constraint_rows();
+            w.now.rows.use_required(p.blocks);
         }
         if (!w.now.rows.blocks.empty()) {
             scale_rows(p, w);

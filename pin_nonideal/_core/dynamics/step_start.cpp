@@ -13,7 +13,7 @@ namespace pn {
 constexpr double consistency_tolerance = 1e-6, background = 1e-3;
 
 void select_rows(const Program& p, Workspace& w) {
-    for (int r = 0; r < p.layout.rows; ++r) w.now.rows.wanted[r] = r < p.constraint_rows();
+    for (int r = 0; r < p.layout.rows; ++r) w.now.rows.required[r] = r < p.constraint_rows();
     std::fill(w.now.terms.locked.begin(), w.now.terms.locked.end(), char(0));
     for (size_t e = 0; e < p.frictions.size(); ++e) {
         const Block& block = p.blocks[p.frictions[e].block];
@@ -21,9 +21,9 @@ void select_rows(const Program& p, Workspace& w) {
         if (block.dof >= 0)
             for (int k = 0; k < block.total; ++k) w.now.terms.locked[block.dof + k] = 1;
         else
-            for (size_t k = 0; k < block.kept.size(); ++k) w.now.rows.wanted[block.row + k] = 1;
+            for (size_t k = 0; k < block.kept.size(); ++k) w.now.rows.required[block.row + k] = 1;
     }
-    w.now.rows.use_wanted(p.blocks);
+    w.now.rows.use_required(p.blocks);
     w.state.ideal_decided = false;
 }
 
@@ -37,7 +37,7 @@ static int contradicting_block(const Program& p, Workspace& w, double& worst) {
         const int n = static_cast<int>(block.kept.size());
         for (int k = 0; k < n; ++k) {
             const int row = block.row + k;
-            if (!w.now.rows.wanted[row] || w.now.rows.active[row]) continue;
+            if (!w.now.rows.required[row] || w.now.rows.active[row]) continue;
             double sum = -w.now.b[row], size = std::abs(w.now.b[row]);
             const double* A = w.now.A.data() + block.offset + k;
             for (size_t l = 0; l < block.support.size(); ++l) {

@@ -7,7 +7,7 @@ namespace pn {
 
 namespace {
 
-// Forces as generalized ones, and the rates of the laws' states where they are wanted.
+// Forces as generalized ones, and the rates of the laws' states where they are required.
 struct GeneralizedForce {
     const Program& p;
     const Evaluation& now;

@@ -71,7 +71,7 @@ static void evaluate_anew(System& system, const Progress& progress, const std::v
     const Counters counters = w.counters;
     select_rows(p, w);
     w.now.rows.active = active;
-    w.now.rows.redundant = active != w.now.rows.wanted;
+    w.now.rows.redundant = active != w.now.rows.required;
     system.read(progress.y);
     configure(p, w, progress.t, system.q, system.v);
     if (state.ideal_decided) {

@@ -206,7 +206,7 @@ std::optional<double> Simulation::try_step(double size) {
         stepper.take(t, size);
     }
     if (!stepper.y1.allFinite()) throw Failure(Failure::Kind::not_finite, t + size);
-    if (control.wants_detour(system.smallest_pivot, start_pivot, w.now.rows.distance)) return std::nullopt;
+    if (control.needs_detour(system.smallest_pivot, start_pivot, w.now.rows.distance)) return std::nullopt;
     const bool needs_end = options.method.first_same_as_last;
     double error = needs_end ? 0.0 : stepper.error(norm);
     if (!(error <= 1.0)) return error;

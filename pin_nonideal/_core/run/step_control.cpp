@@ -21,7 +21,7 @@ constexpr int detour_limit = 3;
 
 }  // namespace
 
-bool StepControl::wants_detour(double least_pivot, double start_pivot, double end_pivot) const {
+bool StepControl::needs_detour(double least_pivot, double start_pivot, double end_pivot) const {
     const double way = std::sqrt(start_pivot) + std::sqrt(end_pivot);
     return method_.adaptive() && detours_ < detour_limit && std::sqrt(least_pivot) < clearance * way &&
            rounding_at(least_pivot) > rtol_;

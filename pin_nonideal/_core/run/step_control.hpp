@@ -17,7 +17,7 @@ public:
 
     // Whether rounding near a singular position would spoil the stages of a step, which one of another length keeps clear
     // of: least pivot of the rows' factor at the stages, and its pivots at both ends.
-    bool wants_detour(double least_pivot, double start_pivot, double end_pivot) const;
+    bool needs_detour(double least_pivot, double start_pivot, double end_pivot) const;
     // Whether a step of this size is accepted, with this norm of its error (1 at the tolerance; none: a detour), and the
     // size of the next one, or of its next trial, in h. `last`: it was cut at a stop.
     bool accepts(std::optional<double> error, double size, bool last, double& h);

@@ -11,7 +11,7 @@ namespace pn {
 namespace {
 
 // R0 turned about the joint's axis by the angle with this cosine and sine, touching only the columns that change.
-PN_INLINE void turn(const Joint& j, const Mat3& R0, double c, double s, Mat3& R) {
+PN_INLINE void rotate(const Joint& j, const Mat3& R0, double c, double s, Mat3& R) {
     if (j.axis_index < 0) {
         const Vec3& e = j.axis;
         const Mat3 turned({c, s * e[2], -s * e[1]}, {-s * e[2], c, s * e[0]}, {s * e[1], -s * e[0], c});
@@ -58,7 +58,7 @@ PN_INLINE void place(const Joint& j, const Body& parent, const VecX& q, const Co
     switch (j.kind) {
         case JointKind::revolute:
         case JointKind::helical: {
-            turn(j, R0, j.unbounded ? x[0] : angle.c, j.unbounded ? x[1] : angle.s, b.R);
+            rotate(j, R0, j.unbounded ? x[0] : angle.c, j.unbounded ? x[1] : angle.s, b.R);
             b.p = p0;
             if (j.kind == JointKind::helical) {
                 const double turns = j.unbounded ? std::atan2(x[1], x[0]) : x[0];

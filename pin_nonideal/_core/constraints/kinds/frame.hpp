@@ -44,10 +44,10 @@ struct FrameRows {
 
     template <class Sides, class Out>
     PN_INLINE void residual(const Sides& s, Out& out) const {
-        const auto turn = logarithm<typename Sides::Vec>(transpose_times(s.b.R, s.a.R));
+        const auto rotation = logarithm<typename Sides::Vec>(transpose_times(s.b.R, s.a.R));
         for (int k = 0; k < 3; ++k) {
             out.residual[k] = s.b.R.col(k).dot(s.a.x - s.b.x);  // Eq. (2)
-            out.residual[k + 3] = turn[k];
+            out.residual[k + 3] = rotation[k];
         }
     }
     template <class Sides, class Out>
