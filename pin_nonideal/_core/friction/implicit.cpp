@@ -158,7 +158,7 @@ struct Implicit {
         const MatX I = MatX::Identity(n, n), J = w.scratch.jacobian;
         const double here = (I - J).determinant();
         w.now.determinant = here;
-        if (!(here > least_determinant_told)) paradox(here);
+        if (!(here > least_determinant_told)) paradox(std::min(here, 0.0));  // what cannot be told from zero is zero
         const VecX bound = (I - J.cwiseAbs()).partialPivLu().solve(VecX::Ones(n));
         if ((bound.array() > 0.0).all()) return;
         const VecX c = constants();
