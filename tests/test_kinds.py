@@ -126,7 +126,7 @@ class TestLaw:
 
 def test_every_law_of_the_core_is_bound() -> None:
     """Those of the variant; a law that reads reactions, or forgets its states, does not compile."""
-    header = (CORE / "friction" / "laws.hpp").read_text()
+    header = (CORE / "forces" / "laws.hpp").read_text()
     (variant,) = re.findall(r"using Law = std::variant<([^>]*)>", header)
     for name in re.findall(r"\w+", variant):
         bound = {"LuGre": "lugre", "UserLaw": "user_law"}.get(name, name.lower())

@@ -29,6 +29,20 @@ page: geometry motion forces signals payload
 replay plotting pin_nonideal cli
 """
 
+# Headers and sources of the core in the same way, a header together with its source.
+CORE_ORDER = """
+math: lanes unrolled spatial angles timefunction
+tree: mechanism model_extraction liegroup body_terms pinocchio_pass own_pass terms factor
+constraints: geometry coordinates kinds kind block row_layout row_system orthogonal row_factor rank redundancy
+forces: given_forces laws mode friction
+dynamics: failure program workspace given_forces law_forces solution reactions split slip implicit power \
+evaluation projection step_start
+friction: box_program cone_program problem modes
+run: archive method step step_control runge_kutta system semi_implicit_euler error_norm stepper moreau \
+recorder checkpoint event_location events simulation
+python: failures arrays callbacks builder constraints runner runs program module
+"""
+
 
 def modules_in_order() -> list[str]:
     """Dotted names below the package, whose own name is empty."""
@@ -82,8 +96,40 @@ def test_imports_go_upward(name: str) -> None:
 
 def test_contributing_shows_the_order() -> None:
     text = " ".join((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").split())
-    shown = [re.sub(r"^(\w+): (.*)$", r"\1/ (\2)", line) for line in ORDER.strip().splitlines()]
-    assert "; ".join(line.replace(" ", ", ").replace("/, (", "/ (") for line in shown) in text
+    for order in (ORDER, CORE_ORDER):
+        shown = [re.sub(r"^(\w+): (.*)$", r"\1/ (\2)", line) for line in order.strip().splitlines()]
+        assert "; ".join(line.replace(" ", ", ").replace("/, (", "/ (") for line in shown) in text
+
+
+def units_in_order() -> list[str]:
+    rooms = [line.partition(":") for line in CORE_ORDER.strip().splitlines()]
+    return [f"{room}/{name}" for room, _, names in rooms for name in names.split()]
+
+
+def included_units() -> dict[str, set[str]]:
+    """What the header and the source of each unit of the core include from others; kinds are one unit."""
+    found: dict[str, set[str]] = {}
+    for path in (PACKAGE / "_core").rglob("*.[ch]pp"):
+        included = re.findall(r'#include "(.+)\.hpp"', path.read_text(encoding="utf-8"))
+        unit, *names = ("/".join(name.split("/")[:2]) for name in (unit_name(path), *included))
+        found.setdefault(unit, set()).update(set(names) - {unit})
+    return found
+
+
+def unit_name(path: Path) -> str:
+    return path.relative_to(PACKAGE / "_core").with_suffix("").as_posix()
+
+
+def test_the_core_includes_upward() -> None:
+    order, included = units_in_order(), included_units()
+    assert sorted(order) == sorted(included)
+    climbs = [
+        (unit, name)
+        for unit, names in included.items()
+        for name in names
+        if name not in order[: order.index(unit)]
+    ]
+    assert climbs == []
 
 
 def test_stub_is_the_core(tmp_path: Path) -> None:

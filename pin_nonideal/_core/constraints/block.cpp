@@ -105,4 +105,24 @@ void multiply(const Block& block, const std::vector<double>& B, const VecX& x, V
     });
 }
 
+void add_along(const Block& block, const std::vector<double>& rows, const Vec3& f, VecX& force) {
+    const int n = static_cast<int>(block.kept.size());
+    const double* A = rows.data() + block.offset;
+    for (size_t l = 0; l < block.support.size(); ++l) {
+        double sum = 0.0;
+        for (int k = 0; k < n; ++k) sum += A[l * n + k] * f[k];
+        if (sum != 0.0) force[block.support[l]] += sum;
+    }
+}
+
+void add_wrench(const Block& block, const Terms& terms, const Wrench& unit, double size, std::vector<Force>& body) {
+    for (int side = 0; side < 2; ++side) {
+        const int joint = side == 0 ? block.joint1 : block.joint2;
+        if (joint == 0) continue;
+        const double s = side == 0 ? size : -size;
+        const Vec3 force = s * unit.force;
+        body[joint] += Force{force, s * unit.couple + (unit.point - terms.body[joint].ref).cross(force)};
+    }
+}
+
 }  // namespace pn

@@ -42,4 +42,9 @@ void scale_rows(const Mechanism& m, const Terms& terms, const Block& block, cons
 void add_transpose(const Block& block, const std::vector<double>& B, const VecX& lam, VecX& y);
 void multiply(const Block& block, const std::vector<double>& B, const VecX& x, VecX& r);
 
+// force += A^T f for a force along the rows of a block.
+void add_along(const Block& block, const std::vector<double>& rows, const Vec3& f, VecX& force);
+// Adds a unit wrench times its size to the forces on the two bodies of a block, about their reference points.
+void add_wrench(const Block& block, const Terms& terms, const Wrench& unit, double size, std::vector<Force>& body);
+
 }  // namespace pn

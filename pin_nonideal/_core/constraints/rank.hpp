@@ -1,7 +1,7 @@
 // Rank of the rows and an independent subset, by the orthogonal factorization of B^T.
 #pragma once
 
-#include "constraints/row_system.hpp"
+#include "constraints/row_factor.hpp"
 
 namespace pn {
 
@@ -15,9 +15,5 @@ constexpr double rank_tolerance_sticking = 3e-7;
 // Rank and independent subset of the required rows, by column-pivoted QR of B^T.
 void decide_rows(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
                  RowSystem& s, double tolerance = rank_tolerance);
-// B^T = Q T of the active rows, as they stand.
-void factor_orthogonally(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s);
-// lam with T^T T lam = r.
-void solve_orthogonally(RowSystem& s, const VecX& r, VecX& lam);
 
 }  // namespace pn

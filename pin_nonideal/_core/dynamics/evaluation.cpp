@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "constraints/projection.hpp"
+#include "dynamics/given_forces.hpp"
+#include "dynamics/implicit.hpp"
 #include "dynamics/solution.hpp"
-#include "friction/implicit.hpp"
 #include "tree/factor.hpp"
 
 namespace pn {
@@ -65,14 +65,6 @@ void update_kinematics(const Program& p, Workspace& w, double t, const VecX& q, 
     evaluate_rows(p, w, t, v);
 }
 
-void scale_rows(const Program& p, Workspace& w) {
-    for (int i : w.now.rows.blocks) {
-        const Block& block = p.blocks[i];
-        scale_rows(p.mechanism, w.now.terms, block, w.now.A.data() + block.offset,
-                   w.now.B.data() + block.offset);  // Eq. (7)
-    }
-}
-
 static void factor_placed_rows(const Program& p, Workspace& w, double t, const VecX& v) {
     place_rows(p, w, t, v);
     if (w.now.rows.blocks.empty()) return;
@@ -112,7 +104,7 @@ void solve_dynamics(const Program& p, Workspace& w, double t, const VecX& v) {
     } else {
         w.now.v = v;
         w.now.speed = v.cwiseAbs().maxCoeff();
-        smooth_laws(p, w, t, w.now.terms.q, v);
+        find_known_forces(p, w, t, w.now.terms.q, v);
         solve_with_laws(p, w, t, w.now.terms.q, v, w.now.C_smooth);
     }
     if (!w.now.a.allFinite()) throw Failure(Failure::Kind::not_finite, t);
@@ -121,12 +113,6 @@ void solve_dynamics(const Program& p, Workspace& w, double t, const VecX& v) {
 
 void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     configure(p, w, t, q, v);
-    assemble_forces(p, w, t, v);
-    solve_dynamics(p, w, t, v);
-}
-
-void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
-    project(p, w, t, q, v);
     assemble_forces(p, w, t, v);
     solve_dynamics(p, w, t, v);
 }

@@ -7,8 +7,6 @@ namespace pn {
 
 // Acceleration a and multipliers lam at (t, q, v) for the modes and active rows in the workspace.
 void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// The same after the state was put on the constraints.
-void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 
 // The part of it that the configuration decides: placements, M and the rows, with their factors. A user's own A may
 // depend on v; where it does, a change of v has it taken anew.
@@ -22,8 +20,6 @@ void solve_dynamics(const Program& p, Workspace& w, double t, const VecX& v);
 void update_kinematics(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 void evaluate_rows(const Program& p, Workspace& w, double t, const VecX& v);
 void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// B = A R^-T of the rows in use.
-void scale_rows(const Program& p, Workspace& w);
 
 // Largest residual and rate over all rows of all descriptions at the state last evaluated.
 void violations(const Program& p, const Workspace& w, double& position, double& velocity);

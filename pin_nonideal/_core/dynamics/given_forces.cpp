@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dynamics/workspace.hpp"
-
 namespace pn {
 
 namespace {

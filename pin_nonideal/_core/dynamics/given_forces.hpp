@@ -1,55 +1,9 @@
-// Given forces F beside the bias: springs, wrenches, the user's own, and the torques of the actuation.
+// Given forces F beside the bias, and the torques of the actuation, at one state.
 #pragma once
 
-#include <functional>
-#include <variant>
-#include <vector>
-
-#include "constraints/geometry.hpp"
+#include "dynamics/workspace.hpp"
 
 namespace pn {
-
-struct Program;
-struct Workspace;
-
-// Each tells whether it acts on bodies, not on joints, and whether it asks a function of the user, so that it may
-// change while nothing moves.
-struct SpringDamper {
-    Frame frame1, frame2;
-    double stiffness = 0.0, damping = 0.0, rest_length = 0.0;
-    static constexpr bool acts_on_bodies = true;
-    bool asks_function() const { return false; }
-};
-struct JointSpring {
-    int joint = 0;
-    double stiffness = 0.0, rest = 0.0, damping = 0.0;
-    static constexpr bool acts_on_bodies = false;
-    bool asks_function() const { return false; }
-};
-struct FrameWrench {
-    Frame frame;
-    std::function<void(double t, double* six)> function;  // empty: constant
-    double value[6] = {};
-    static constexpr bool acts_on_bodies = true;
-    bool asks_function() const { return static_cast<bool>(function); }
-};
-struct UserForce {
-    std::function<void(double t, const VecX& q, const VecX& v, VecX& force)> function;
-    static constexpr bool acts_on_bodies = false;
-    bool asks_function() const { return true; }
-};
-using GivenForce = std::variant<SpringDamper, JointSpring, FrameWrench, UserForce>;
-
-struct NoActuation {};
-struct ConstantTorque { VecX tau; };
-struct TorqueFunction { std::function<void(double t, const VecX& q, const VecX& v, VecX& tau)> function; };
-struct SampledTorque {
-    std::function<void(double t, const VecX& q, const VecX& v, VecX& tau)> function;
-    double period;
-};
-struct HoldPosition { VecX kp, kd, q; };
-struct TorqueTable { std::vector<double> times; MatX values; };  // one column a time
-using Actuation = std::variant<NoActuation, ConstantTorque, TorqueFunction, SampledTorque, HoldPosition, TorqueTable>;
 
 // Given forces and actuation into w.now.tau and w.now.external.
 void given_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);

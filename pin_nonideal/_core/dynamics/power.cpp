@@ -1,5 +1,8 @@
 #include "dynamics/power.hpp"
 
+#include "dynamics/law_forces.hpp"
+#include "dynamics/slip.hpp"
+
 namespace pn {
 
 int power_count(const Program& p) { return first_law_power + static_cast<int>(p.law_names.size()); }
@@ -20,8 +23,11 @@ void powers(const Program& p, Workspace& w, const VecX& v, double* out) {
         out[2] = v.dot(w.scratch.work);
     }
     if (!p.has_laws()) return;
-    law_forces(p, w, v, w.scratch.law_force);
-    for (size_t l = 0; l < p.law_names.size(); ++l) out[first_law_power + l] = v.dot(w.scratch.law_force[l]);
+    std::vector<VecX>& force = w.scratch.law_force;
+    for (VecX& each : force) each.setZero();
+    add_forces_by_law(p, w, v, force);
+    for (size_t e = 0; e < p.frictions.size(); ++e) add_slip_force(p, w, e, force[p.frictions[e].law]);
+    for (size_t l = 0; l < p.law_names.size(); ++l) out[first_law_power + l] = v.dot(force[l]);
 }
 
 }  // namespace pn

@@ -8,8 +8,8 @@
 
 #include "constraints/row_layout.hpp"
 #include "dynamics/failure.hpp"
-#include "dynamics/given_forces.hpp"
-#include "friction/friction.hpp"
+#include "forces/friction.hpp"
+#include "forces/given_forces.hpp"
 
 namespace pn {
 

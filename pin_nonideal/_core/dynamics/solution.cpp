@@ -8,6 +8,14 @@ namespace pn {
 // them back.
 constexpr int refinement_passes = 2;
 
+void scale_rows(const Program& p, Workspace& w) {
+    for (int i : w.now.rows.blocks) {
+        const Block& block = p.blocks[i];
+        scale_rows(p.mechanism, w.now.terms, block, w.now.A.data() + block.offset,
+                   w.now.B.data() + block.offset);  // Eq. (7)
+    }
+}
+
 // r := b - A x, or b - B x with the scaled rows, for the rows in use.
 static void row_residuals(const Program& p, const Evaluation& now, const std::vector<double>& rows, const VecX& x,
                           const VecX& b, VecX& r) {

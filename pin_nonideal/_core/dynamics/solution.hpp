@@ -6,6 +6,9 @@
 
 namespace pn {
 
+// B = A R^-T of the rows in use.
+void scale_rows(const Program& p, Workspace& w);
+
 // Acceleration and multipliers for a given force F + C and right-hand side b, by the factors in the workspace; refined
 // where light bodies spoil them.
 void solve_acceleration(const Program& p, Workspace& w, const VecX& force, const VecX& b, VecX& a, VecX& lam);

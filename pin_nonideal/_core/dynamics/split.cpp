@@ -1,37 +1,10 @@
 #include "dynamics/split.hpp"
 
-#include "dynamics/evaluation.hpp"
+#include "constraints/redundancy.hpp"
 #include "dynamics/solution.hpp"
-#include "friction/friction.hpp"
 #include "tree/factor.hpp"
 
 namespace pn {
-
-void share_multipliers(const Program& p, Workspace& w, const VecX& lam, VecX& shared) {
-    shared = lam;
-    if (!w.now.rows.redundant) return;
-    // A_dependent = W A_active; x + W^T y = lam with least |x|^2 + |y|^2 is y = (I + W W^T)^-1 W lam, x = lam - W^T y.
-    std::vector<int> dependent;
-    for (int r = 0; r < p.layout.rows; ++r)
-        if (w.now.rows.required[r] && !w.now.rows.active[r]) dependent.push_back(r);
-    const int d = static_cast<int>(dependent.size());
-    MatX W(d, p.layout.rows);
-    VecX column(p.mechanism.nv), unit = VecX::Zero(p.layout.rows), products(p.layout.rows), weights(p.layout.rows);
-    for (int k = 0; k < d; ++k) {
-        column.setZero();
-        products.setZero();
-        unit[dependent[k]] = 1.0;
-        for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, unit, column);
-        unit[dependent[k]] = 0.0;
-        for (int i : w.now.rows.blocks) multiply(p.blocks[i], w.now.B, column, products);
-        solve_rows(p.layout, w.now.rows, products, weights);
-        W.row(k) = weights.transpose();
-    }
-    const MatX S = MatX::Identity(d, d) + W * W.transpose();
-    const VecX y = S.ldlt().solve(W * lam);
-    shared -= W.transpose() * y;
-    for (int k = 0; k < d; ++k) shared[dependent[k]] = y[k];
-}
 
 IdealMotion::IdealMotion(const Program& program, Workspace& workspace) : p(program), w(workspace) {
     for (Mode mode : w.state.mode) sticks |= mode == sticking;
@@ -78,7 +51,7 @@ void split_forces(const Program& p, Workspace& w, Split& out) {
     const int nv = p.mechanism.nv;
     const VecX a = w.now.a, lam = w.now.lam;
     VecX shared;
-    share_multipliers(p, w, lam, shared);
+    share_multipliers(p.layout, p.blocks, w.now.B, w.now.rows, lam, shared);
     to_user_rows(p, shared, out.lam);
     out.C = p.has_laws() ? w.now.C : VecX(VecX::Zero(nv));
     VecX total = VecX::Zero(nv);
@@ -91,7 +64,7 @@ void split_forces(const Program& p, Workspace& w, Split& out) {
         if (w.now.terms.locked[dof]) out.C[dof] += holding_forces(p, w)[dof];
     {
         const IdealMotion ideal(p, w);
-        share_multipliers(p, w, w.now.lam, shared);
+        share_multipliers(p.layout, p.blocks, w.now.B, w.now.rows, w.now.lam, shared);
         out.F_ideal = VecX::Zero(nv);
         for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.A, shared, out.F_ideal);
         if (w.now.rows.blocks.empty()) shared.setZero();

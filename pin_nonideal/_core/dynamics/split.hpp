@@ -5,9 +5,6 @@
 
 namespace pn {
 
-// Multipliers of least norm among redundant rows (in the user's row scale) for those of the rows in use.
-void share_multipliers(const Program& p, Workspace& w, const VecX& lam, VecX& shared);
-
 // The motion of the ideal constraints: without C, and without what sticks. The workspace holds it, with its factors,
 // while this object lives; then the factors are again those of the modes, and a and lam are left to the caller.
 class IdealMotion {

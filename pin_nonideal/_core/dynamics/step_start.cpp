@@ -3,29 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "constraints/projection.hpp"
 #include "dynamics/evaluation.hpp"
+#include "dynamics/projection.hpp"
 
 namespace pn {
 
 // Rows that were found dependent must be met by the solution all the same, to this part of their terms; of
 // accelerations in play a thousandth counts, and as many m/s^2 where nothing is accelerated.
 constexpr double consistency_tolerance = 1e-6, background = 1e-3;
-
-void select_rows(const Program& p, Workspace& w) {
-    for (int r = 0; r < p.layout.rows; ++r) w.now.rows.required[r] = r < p.constraint_rows();
-    std::fill(w.now.terms.locked.begin(), w.now.terms.locked.end(), char(0));
-    for (size_t e = 0; e < p.frictions.size(); ++e) {
-        const Block& block = p.blocks[p.frictions[e].block];
-        if (w.state.mode[e] != sticking) continue;
-        if (block.dof >= 0)
-            for (int k = 0; k < block.total; ++k) w.now.terms.locked[block.dof + k] = 1;
-        else
-            for (size_t k = 0; k < block.kept.size(); ++k) w.now.rows.required[block.row + k] = 1;
-    }
-    w.now.rows.use_required(p.blocks);
-    w.state.ideal_decided = false;
-}
 
 // Residual of the dependent rows; the worst block, or -1 when all are met.
 static int contradicting_block(const Program& p, Workspace& w, double& worst) {

@@ -1,8 +1,7 @@
 // The room that one thread works in.
 #include "dynamics/workspace.hpp"
 
-#include "constraints/projection.hpp"
-#include "friction/modes.hpp"
+#include <algorithm>
 
 namespace pn {
 
@@ -61,6 +60,29 @@ Workspace::Workspace(const Program& p) {
     size(p, now);
     size(p, now, scratch);
     set_modes(p, *this, state.mode);
+}
+
+void select_rows(const Program& p, Workspace& w) {
+    for (int r = 0; r < p.layout.rows; ++r) w.now.rows.required[r] = r < p.constraint_rows();
+    std::fill(w.now.terms.locked.begin(), w.now.terms.locked.end(), char(0));
+    for (size_t e = 0; e < p.frictions.size(); ++e) {
+        const Block& block = p.blocks[p.frictions[e].block];
+        if (w.state.mode[e] != sticking) continue;
+        if (block.dof >= 0)
+            for (int k = 0; k < block.total; ++k) w.now.terms.locked[block.dof + k] = 1;
+        else
+            for (size_t k = 0; k < block.kept.size(); ++k) w.now.rows.required[block.row + k] = 1;
+    }
+    w.now.rows.use_required(p.blocks);
+    w.state.ideal_decided = false;
+}
+
+void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes) {
+    w.state.mode.values_ = modes;
+    for (size_t e = 0; e < modes.size(); ++e)
+        if (modes[e] == unloaded) w.now.slip_force[e] = Vec3::Zero();
+    w.now.renew();
+    select_rows(p, w);
 }
 
 }  // namespace pn

@@ -7,6 +7,9 @@
 
 namespace pn {
 
+// Iterations of a projection, each of which keeps its multipliers; where Newton's method serves it takes three.
+constexpr int projection_limit = 12;
+
 struct Counters {
     long evaluations = 0, factorizations = 0, projections = 0, iterations = 0;
 };
@@ -27,7 +30,7 @@ struct RunState {
     std::vector<double> limit;    // kinetic, of each element, as found last
 };
 
-// What joints, anchors and contacts carry in the motion at hand (friction/reactions.hpp).
+// What joints, anchors and contacts carry in the motion at hand (dynamics/reactions.hpp).
 struct Reactions {
     bool current = false;  // made of that motion
     VecX lam;              // by kept row; least norm among redundant rows
@@ -84,5 +87,11 @@ struct Workspace {
 
     explicit Workspace(const Program& p);
 };
+
+// Rows that must hold in these modes: constraints, and elements that stick elsewhere than in a joint (a joint that
+// sticks is locked instead, which costs less than letting it move). All count as independent until a step begins.
+void select_rows(const Program& p, Workspace& w);
+// The one way to change modes: what hangs on them (rows that must hold, locked dofs, forces, reactions) follows.
+void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes);
 
 }  // namespace pn

@@ -4,10 +4,11 @@
 #include <cmath>
 
 #include "dynamics/evaluation.hpp"
+#include "dynamics/implicit.hpp"
+#include "dynamics/slip.hpp"
 #include "dynamics/solution.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/cone_program.hpp"
-#include "friction/implicit.hpp"
 #include "friction/problem.hpp"
 
 namespace pn {
@@ -180,14 +181,6 @@ struct Search {
 };
 
 }  // namespace
-
-void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes) {
-    w.state.mode.values_ = modes;
-    for (size_t e = 0; e < modes.size(); ++e)
-        if (modes[e] == unloaded) w.now.slip_force[e] = Vec3::Zero();
-    w.now.renew();
-    select_rows(p, w);
-}
 
 static bool hardly_slips(const Program& p, const Workspace& w, int e, const VecX& v) {
     return slip_velocity(w.now, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());

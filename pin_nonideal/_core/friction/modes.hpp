@@ -11,9 +11,6 @@ namespace pn {
 // Slip slower than this part of the scene's speed is rest: rounding of the located event.
 constexpr double rest_speed = 1e-11;
 
-// The one way to change modes: what hangs on them (rows that must hold, locked dofs, forces, reactions) follows.
-void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes);
-
 // Modes to be found: those of elements that move are known, the others are at rest along their directions.
 struct ModeQuestion {
     std::vector<Mode> modes;  // of all elements; what those at rest hold is no matter

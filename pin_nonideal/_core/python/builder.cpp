@@ -6,10 +6,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include "dynamics/power.hpp"
 #include "python/callbacks.hpp"
-#include "python/constraints.hpp"
-#include "python/runner.hpp"
 #include "tree/model_extraction.hpp"
 
 using namespace nanobind::literals;
@@ -177,45 +174,21 @@ void bind_enums(nb::module_& m) {
         .value("total", Reaction::total);
 }
 
-void bind_program(nb::module_& m) {
-    nb::class_<ConstraintRows>(m, "ConstraintRows")
-        .def_ro("name", &ConstraintRows::name)
-        .def_ro("first", &ConstraintRows::first)
-        .def_ro("count", &ConstraintRows::count)
-        .def_ro("holonomic", &ConstraintRows::holonomic)
-        .def_ro("moves_in_time", &ConstraintRows::moves_in_time)
-        .def_ro("shown", &ConstraintRows::shown);
-    nb::class_<Program>(m, "Program")
-        .def_prop_ro("constraints", &constraint_rows)
-        .def_prop_ro("rows", [](const Program& p) { return p.user_rows; })
-        .def_prop_ro("states", [](const Program& p) { return p.states; })
-        .def_prop_ro("law_names", [](const Program& p) { return p.law_names; })
-        .def_prop_ro("power_names", &power_names)
-        .def_prop_ro("element_names", [](const Program& p) {
-            std::vector<std::string> names;
-            for (const Friction& f : p.frictions) names.push_back(p.law_names[f.law]);
-            return names;
-        })
-        .def("runner", [](std::shared_ptr<const Program> p) { return Runner(std::move(p)); });
-}
-
 }  // namespace
 
-void bind_builder(nb::module_& m) {
+nb::class_<Builder> bind_builder(nb::module_& m) {
     bind_enums(m);
-    bind_program(m);
     nb::class_<Builder> builder(m, "Builder");
     builder.def(nb::init<nb::object, Provider>(), "model"_a, "terms"_a = Provider::core)
         .def("keep_rows", [](Builder& b, int block, std::vector<int> rows) {
             b.p->blocks[block].kept = std::move(rows);
         }, "block"_a, "rows"_a)
-        .def_prop_ro("constraints", [](const Builder& b) { return constraint_rows(*b.p); })
         .def("finish", &Builder::finish);
-    bind_constraints(builder);
     bind_friction(builder);
     bind_laws(builder);
     bind_forces(builder);
     bind_actuation(builder);
+    return builder;
 }
 
 }  // namespace pn

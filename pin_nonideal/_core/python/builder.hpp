@@ -21,6 +21,6 @@ struct Builder {
     std::shared_ptr<const Program> finish() const;
 };
 
-void bind_builder(nb::module_& m);
+nb::class_<Builder> bind_builder(nb::module_& m);
 
 }  // namespace pn

@@ -1,6 +1,6 @@
 #include "python/callbacks.hpp"
 
-#include "friction/reactions.hpp"
+#include "dynamics/reactions.hpp"
 
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>

@@ -72,6 +72,16 @@ void bind_kinds(nb::class_<Builder>& builder, const std::variant<K...>*) {
 
 }  // namespace
 
-void bind_constraints(nb::class_<Builder>& builder) { bind_kinds(builder, static_cast<const Kind*>(nullptr)); }
+void bind_constraints(nb::module_& m, nb::class_<Builder>& builder) {
+    nb::class_<ConstraintRows>(m, "ConstraintRows")
+        .def_ro("name", &ConstraintRows::name)
+        .def_ro("first", &ConstraintRows::first)
+        .def_ro("count", &ConstraintRows::count)
+        .def_ro("holonomic", &ConstraintRows::holonomic)
+        .def_ro("moves_in_time", &ConstraintRows::moves_in_time)
+        .def_ro("shown", &ConstraintRows::shown);
+    builder.def_prop_ro("constraints", [](const Builder& b) { return constraint_rows(*b.p); });
+    bind_kinds(builder, static_cast<const Kind*>(nullptr));
+}
 
 }  // namespace pn

@@ -18,6 +18,6 @@ struct ConstraintRows {
 };
 std::vector<ConstraintRows> constraint_rows(const Program& p);
 
-void bind_constraints(nb::class_<Builder>& builder);
+void bind_constraints(nb::module_& m, nb::class_<Builder>& builder);
 
 }  // namespace pn

@@ -7,8 +7,10 @@
 #include "friction/cone_program.hpp"
 #include "python/builder.hpp"
 #include "python/callbacks.hpp"
+#include "python/constraints.hpp"
 #include "python/failures.hpp"
-#include "python/runner.hpp"
+#include "python/program.hpp"
+#include "python/runs.hpp"
 #include "run/checkpoint.hpp"
 
 using namespace pn;
@@ -20,8 +22,11 @@ NB_MODULE(_core, m) {
     m.attr("state_layout") = state_layout() + " for Pinocchio " PIN_NONIDEAL_PINOCCHIO_VERSION;
     bind_failures(m);
     bind_reactions(m);
-    bind_builder(m);
-    bind_runner(m);
+    nb::class_<Builder> builder = bind_builder(m);
+    bind_constraints(m, builder);
+    nb::class_<Runner> runner = bind_runner(m);
+    bind_runs(m, runner);
+    bind_program(m);
 
     // The friction program on arrays, for tests against enumeration.
     m.def("friction_program", [](const Array2& W, const Array& alpha0, const std::vector<int>& dims,

@@ -7,8 +7,9 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include "constraints/projection.hpp"
 #include "dynamics/evaluation.hpp"
+#include "dynamics/projection.hpp"
+#include "dynamics/slip.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/modes.hpp"
 #include "tree/liegroup.hpp"
@@ -249,7 +250,7 @@ double Runner::time_evaluations(const Array& q_in, const Array& v_in, double t, 
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / count;
 }
 
-void bind_runner(nb::module_& m) {
+nb::class_<Runner> bind_runner(nb::module_& m) {
     constexpr auto own = nb::rv_policy::automatic;  // arrays that own their numbers
     nb::class_<Instant>(m, "Instant")
         .def_ro("a", &Instant::a, own)
@@ -279,7 +280,7 @@ void bind_runner(nb::module_& m) {
             const RowSystem& s = r.w->now.rows;
             return std::make_tuple(s.min_pivot, s.orthogonal, s.redundant, s.refine);
         });
-    bind_runs(m, runner);
+    return runner;
 }
 
 }  // namespace pn

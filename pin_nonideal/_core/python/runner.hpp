@@ -7,7 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "python/runs.hpp"
+#include "python/arrays.hpp"
+#include "run/simulation.hpp"
 
 namespace pn {
 
@@ -18,6 +19,12 @@ struct Instant {
     std::vector<Mode> modes;
     std::vector<Numbers> friction;  // force of each element along its directions
     std::vector<double> limits;
+};
+
+// A run that has ended.
+struct Outcome {
+    Counters counters;
+    Recording recording;
 };
 
 // One workspace and the program it belongs to: evaluates states, and carries runs.
@@ -64,6 +71,6 @@ private:
     double energy();
 };
 
-void bind_runner(nb::module_& m);
+nb::class_<Runner> bind_runner(nb::module_& m);
 
 }  // namespace pn

@@ -13,9 +13,8 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include "constraints/projection.hpp"
+#include "dynamics/projection.hpp"
 #include "python/failures.hpp"
-#include "python/runner.hpp"
 
 using namespace nanobind::literals;
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "constraints/projection.hpp"
+#include "dynamics/projection.hpp"
 #include "tree/liegroup.hpp"
 
 namespace pn {

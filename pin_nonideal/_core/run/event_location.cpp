@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "constraints/projection.hpp"
 #include "dynamics/evaluation.hpp"
+#include "dynamics/projection.hpp"
+#include "dynamics/slip.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/modes.hpp"
 

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 
-#include "constraints/projection.hpp"
+#include "dynamics/projection.hpp"
+#include "dynamics/slip.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/modes.hpp"
 

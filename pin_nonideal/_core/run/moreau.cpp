@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "dynamics/power.hpp"
+#include "dynamics/slip.hpp"
 #include "dynamics/solution.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/cone_program.hpp"

@@ -1,6 +1,6 @@
 #include "run/semi_implicit_euler.hpp"
 
-#include "constraints/projection.hpp"
+#include "dynamics/projection.hpp"
 #include "tree/liegroup.hpp"
 
 namespace pn {

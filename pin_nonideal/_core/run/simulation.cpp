@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "constraints/projection.hpp"
 #include "dynamics/evaluation.hpp"
+#include "dynamics/projection.hpp"
 #include "dynamics/step_start.hpp"
 #include "run/events.hpp"
 

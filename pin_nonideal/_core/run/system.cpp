@@ -2,11 +2,11 @@
 
 #include <algorithm>
 
-#include "constraints/projection.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/power.hpp"
+#include "dynamics/projection.hpp"
+#include "dynamics/slip.hpp"
 #include "dynamics/step_start.hpp"
-#include "friction/friction.hpp"
 #include "tree/liegroup.hpp"
 
 namespace pn {

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "math/angles.hpp"
-#include "tree/terms.hpp"
 
 namespace pn {
 
@@ -101,7 +100,7 @@ PN_INLINE void place(const Joint& j, const Body& parent, const VecX& q, const Co
 
 // Moves the reference point of joint i's tree to its place. The bodies before it only slide, so that their motions do
 // not depend on the reference point.
-void recenter(const Mechanism& m, int i, Terms& terms) {
+void recenter(const Mechanism& m, int i, BodyTerms& terms) {
     const Vec3 moved = terms.body[i].p;
     for (int k = m.joints[i].root; k <= i; ++k)
         if (m.joints[k].root == m.joints[i].root) {
@@ -154,7 +153,7 @@ OwnPass::OwnPass(const Mechanism& m) : cos_sin(m.joints.size()), others(m), rest
 }
 
 // Places body i behind its parent.
-static PN_INLINE void place_body(const Mechanism& m, OwnPass& pass, Terms& terms, int i) {
+static PN_INLINE void place_body(const Mechanism& m, OwnPass& pass, BodyTerms& terms, int i) {
     const Joint& j = m.joints[i];
     if (j.kind == JointKind::other) pass.others.evaluate(i, terms.q, pass.rest, pass.motion);
     place(j, terms.body[j.parent], terms.q, pass.cos_sin[i], terms.body[i], pass.motion);
@@ -165,7 +164,7 @@ static PN_INLINE void place_body(const Mechanism& m, OwnPass& pass, Terms& terms
 static PN_INLINE void weigh_body(const Joint& j, Body& b) { b.Y = b.own = in_world(b, j.mass, j.com, j.inertia); }
 
 // Cosines and sines of angles, by fours; the last group is filled up with the last angle.
-static PN_INLINE void find_cos_sin(OwnPass& pass, const Terms& terms, const std::vector<Angle>& angles) {
+static PN_INLINE void find_cos_sin(OwnPass& pass, const BodyTerms& terms, const std::vector<Angle>& angles) {
     const int n = static_cast<int>(angles.size());
     for (int k = 0; k < n; k += 4) {
         Lanes x, c, s;
@@ -175,13 +174,13 @@ static PN_INLINE void find_cos_sin(OwnPass& pass, const Terms& terms, const std:
     }
 }
 
-PN_WIDE void place_bodies(const Mechanism& m, OwnPass& pass, Terms& terms, const std::vector<int>& joints,
+PN_WIDE void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms, const std::vector<int>& joints,
                           const std::vector<Angle>& angles) {
     find_cos_sin(pass, terms, angles);
     for (int i : joints) place_body(m, pass, terms, i);
 }
 
-PN_WIDE void place_bodies(const Mechanism& m, OwnPass& pass, Terms& terms) {
+PN_WIDE void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms) {
     find_cos_sin(pass, terms, m.angles);
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
@@ -195,7 +194,7 @@ PN_WIDE void place_bodies(const Mechanism& m, OwnPass& pass, Terms& terms) {
     }
 }
 
-PN_WIDE void move_bodies(const Mechanism& m, OwnPass& pass, Terms& terms, const VecX& v) {
+PN_WIDE void move_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms, const VecX& v) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
         const Joint& j = m.joints[i];
@@ -213,7 +212,7 @@ PN_WIDE void move_bodies(const Mechanism& m, OwnPass& pass, Terms& terms, const 
     }
 }
 
-PN_WIDE void mass_matrix(const Mechanism& m, OwnPass&, Terms& terms) {
+PN_WIDE void mass_matrix(const Mechanism& m, OwnPass&, BodyTerms& terms) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = n - 1; i > 0; --i) {
         const Joint& j = m.joints[i];
@@ -229,7 +228,7 @@ PN_WIDE void mass_matrix(const Mechanism& m, OwnPass&, Terms& terms) {
     }
 }
 
-PN_WIDE void bias_forces(const Mechanism& m, OwnPass&, Terms& terms) {
+PN_WIDE void bias_forces(const Mechanism& m, OwnPass&, BodyTerms& terms) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
         Body& b = terms.body[i];

@@ -7,8 +7,6 @@
 
 namespace pn {
 
-struct Terms;
-
 struct CosSin {  // of an angle
     double c = 1.0, s = 0.0;
 };
@@ -24,11 +22,11 @@ struct OwnPass {
 };
 
 // Each as the function of this name in terms.hpp, for the configuration in `terms`.
-void place_bodies(const Mechanism& m, OwnPass& pass, Terms& terms);
-void place_bodies(const Mechanism& m, OwnPass& pass, Terms& terms, const std::vector<int>& joints,
+void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms);
+void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms, const std::vector<int>& joints,
                   const std::vector<Angle>& angles);
-void move_bodies(const Mechanism& m, OwnPass& pass, Terms& terms, const VecX& v);
-void mass_matrix(const Mechanism& m, OwnPass& pass, Terms& terms);
-void bias_forces(const Mechanism& m, OwnPass& pass, Terms& terms);
+void move_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms, const VecX& v);
+void mass_matrix(const Mechanism& m, OwnPass& pass, BodyTerms& terms);
+void bias_forces(const Mechanism& m, OwnPass& pass, BodyTerms& terms);
 
 }  // namespace pn

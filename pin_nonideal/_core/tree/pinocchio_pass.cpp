@@ -6,7 +6,6 @@
 #include <pinocchio/algorithm/kinematics.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
 
-#include "tree/terms.hpp"
 
 namespace pn {
 
@@ -75,14 +74,14 @@ PinocchioPass::PinocchioPass(const Mechanism& m)
         tensor->resize(0, 0, 0);
 }
 
-void place_bodies(const Mechanism& m, PinocchioPass& pass, Terms& terms, const std::vector<int>& joints,
+void place_bodies(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms, const std::vector<int>& joints,
                   const std::vector<Angle>&) {
     auto& [owner, model, data] = pass.data();
     pinocchio::forwardKinematics(model, data, Vector(terms.q));  // oMi
     for (int i : joints) place(m, data, i, terms.body[i]);
 }
 
-void place_bodies(const Mechanism& m, PinocchioPass& pass, Terms& terms) {
+void place_bodies(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms) {
     auto& [owner, model, data] = pass.data();
     pinocchio::computeJointJacobians(model, data, Vector(terms.q));  // oMi, J
     for (size_t i = 1; i < m.joints.size(); ++i) {
@@ -96,7 +95,7 @@ void place_bodies(const Mechanism& m, PinocchioPass& pass, Terms& terms) {
     }
 }
 
-void move_bodies(const Mechanism& m, PinocchioPass& pass, Terms& terms, const VecX& v) {
+void move_bodies(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms, const VecX& v) {
     auto& [owner, model, data] = pass.data();
     pinocchio::nonLinearEffects(model, data, Vector(terms.q), Vector(v));  // v, a_gf, f, nle
     for (size_t i = 1; i < m.joints.size(); ++i) {
@@ -106,7 +105,7 @@ void move_bodies(const Mechanism& m, PinocchioPass& pass, Terms& terms, const Ve
     }
 }
 
-void mass_matrix(const Mechanism& m, PinocchioPass& pass, Terms& terms) {
+void mass_matrix(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms) {
     auto& [owner, model, data] = pass.data();
     // In local axes: about the world's origin a robot that has walked far would lose digits.
     pinocchio::crba(model, data, Vector(terms.q), pinocchio::Convention::LOCAL);  // M, Ycrb
@@ -124,7 +123,7 @@ void mass_matrix(const Mechanism& m, PinocchioPass& pass, Terms& terms) {
     }
 }
 
-void bias_forces(const Mechanism& m, PinocchioPass& pass, Terms& terms) {
+void bias_forces(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms) {
     const pinocchio::Data& data = pass.data().data;
     terms.nle = data.nle;  // in F of Eq. (1)
     for (size_t i = 1; i < m.joints.size(); ++i) {

@@ -5,11 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include "tree/mechanism.hpp"
+#include "tree/body_terms.hpp"
 
 namespace pn {
-
-struct Terms;
 
 struct JointMotion {  // of a joint's moving frame: placement behind the joint, motion per dof and bias in its own axes
     Mat3 R;
@@ -48,11 +46,11 @@ private:
 };
 
 // Each as the function of this name in terms.hpp, for the configuration in `terms`.
-void place_bodies(const Mechanism& m, PinocchioPass& pass, Terms& terms);
-void place_bodies(const Mechanism& m, PinocchioPass& pass, Terms& terms, const std::vector<int>& joints,
+void place_bodies(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms);
+void place_bodies(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms, const std::vector<int>& joints,
                   const std::vector<Angle>& angles);
-void move_bodies(const Mechanism& m, PinocchioPass& pass, Terms& terms, const VecX& v);
-void mass_matrix(const Mechanism& m, PinocchioPass& pass, Terms& terms);
-void bias_forces(const Mechanism& m, PinocchioPass& pass, Terms& terms);
+void move_bodies(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms, const VecX& v);
+void mass_matrix(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms);
+void bias_forces(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms);
 
 }  // namespace pn

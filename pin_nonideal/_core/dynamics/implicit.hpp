@@ -9,6 +9,8 @@
 
 namespace pn {
 
+// C of all that reads no reactions, slipping friction of constant limits among it, into w.now.C_smooth.
+void find_known_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 // C, a and lam for the forces F, what is known of C (the laws that read no reactions), and the laws that do.
 void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const VecX& known);
 

@@ -1,11 +1,10 @@
-#include "constraints/projection.hpp"
+#include "dynamics/projection.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "dynamics/evaluation.hpp"
 #include "dynamics/solution.hpp"
-#include "friction/modes.hpp"
 #include "tree/factor.hpp"
 #include "tree/liegroup.hpp"
 
@@ -249,6 +248,12 @@ bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
     const bool moved = project_position(p, w, t, q, v);
     return project_velocity(p, w, t, v) || moved;
+}
+
+void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
+    project(p, w, t, q, v);
+    assemble_forces(p, w, t, v);
+    solve_dynamics(p, w, t, v);
 }
 
 void remove_normal_part(const Program& p, Workspace& w, Eigen::Ref<VecX> motion) {

@@ -145,13 +145,4 @@ void each_law(Laws& laws, const Function& f) {
         if (auto* kind = std::get_if<Kind>(&law)) f(*kind);
 }
 
-// The force of a user's law, for the reactions that the workspace holds: into w.now.user_C, and to its caller.
-const VecX& ask(const Program& p, const UserLaw& law, Workspace& w, double t, const VecX& q, const VecX& v);
-// C of every law that does not read reactions, and the constant part of slipping friction.
-void smooth_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// C of each law at the evaluation in the workspace.
-void law_forces(const Program& p, Workspace& w, const VecX& v, std::vector<VecX>& force);
-// Adds the forces of smooth laws on bodies to those that the joints carry.
-void add_body_forces(const Program& p, const Workspace& w, std::vector<Force>& body);
-
 }  // namespace pn

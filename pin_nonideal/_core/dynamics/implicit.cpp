@@ -1,9 +1,11 @@
-#include "friction/implicit.hpp"
+#include "dynamics/implicit.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "dynamics/law_forces.hpp"
+#include "dynamics/slip.hpp"
 #include "dynamics/solution.hpp"
 #include "dynamics/split.hpp"
 
@@ -281,6 +283,14 @@ static void ideal_loads(const Program& p, Workspace& w, double t, const VecX& q,
     each_law<UserLaw>(p.laws, [&](const UserLaw& law) {
         if (law.reaction == Reaction::ideal) w.now.base_C += ask(p, law, w, t, q, v);
     });
+}
+
+void find_known_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    w.now.C_smooth.setZero();
+    add_smooth_forces(p, w, t, q, v, w.now.C_smooth);
+    for (size_t e = 0; e < p.frictions.size(); ++e)
+        if (p.frictions[e].reaction == Reaction::none) update_limit(p, w, e, t, q, v);
+    add_slip_forces(p, w, false, w.now.C_smooth);
 }
 
 void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const VecX& known) {

@@ -8,7 +8,6 @@ namespace pn {
 
 // Residuals below this part of the scene's size are rounding: a few hundred operations of unit roundoff.
 constexpr double projection_floor = 2e-14;
-constexpr int projection_limit = 12;
 // A pivot of the rows' unit-diagonal factor below this is near a singular position: the square of the sine at which
 // the nearest row stands to the others.
 constexpr double near_singular = 2.5e-3;
@@ -41,6 +40,8 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
 bool project_velocity(const Program& p, Workspace& w, double t, VecX& v);
 // Moves both, and leaves the workspace configured there.
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
+// And evaluates them there.
+void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 
 // Takes from a small motion what the rows forbid, by the factors in the workspace.
 void remove_normal_part(const Program& p, Workspace& w, Eigen::Ref<VecX> motion);

@@ -1,9 +1,9 @@
-#include "friction/reactions.hpp"
+#include "dynamics/reactions.hpp"
 
 #include <algorithm>
 
-#include "dynamics/split.hpp"
-#include "friction/friction.hpp"
+#include "constraints/redundancy.hpp"
+#include "dynamics/law_forces.hpp"
 
 namespace pn {
 
@@ -52,7 +52,7 @@ const Reactions& reactions(const Program& p, Workspace& w) {
     Reactions& r = w.now.reactions;
     if (r.current) return r;
     r.current = true;
-    share_multipliers(p, w, w.now.lam, r.lam);
+    share_multipliers(p.layout, p.blocks, w.now.B, w.now.rows, w.now.lam, r.lam);
     if (!p.needs_joint_reactions) return r;
     gather_body_forces(p, w, r.body);
     sweep_tree(p.mechanism, w.now, r);

@@ -1,7 +1,4 @@
-#include "friction/laws.hpp"
-
-#include "dynamics/workspace.hpp"
-#include "friction/friction.hpp"
+#include "dynamics/law_forces.hpp"
 
 namespace pn {
 
@@ -21,7 +18,7 @@ struct GeneralizedForce {
             for (int dof = j.iv; dof < j.iv + j.nv; ++dof) C[dof] += dot(now.terms.J[dof], f);
         }
     }
-    void along(int block, const Vec3& f) { add_along(p.blocks[block], now, f, C); }
+    void along(int block, const Vec3& f) { add_along(p.blocks[block], now.A, f, C); }
     void on_all(const VecX& force) { C += force; }
     void on_state(int state, double rate) { if (dz) (*dz)[state] = rate; }
 };
@@ -53,9 +50,7 @@ const VecX& ask(const Program& p, const UserLaw& law, Workspace& w, double t, co
     return C;
 }
 
-void smooth_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    VecX& C = w.now.C_smooth;
-    C.setZero();
+void add_smooth_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& C) {
     each_law<UserLaw>(p.laws, [&](const UserLaw& law) { if (law.reaction == Reaction::none) ask(p, law, w, t, q, v); });
     GeneralizedForce sink{p, w.now, C, &w.now.dz};
     const LawState state = law_state(w, v);
@@ -63,20 +58,15 @@ void smooth_laws(const Program& p, Workspace& w, double t, const VecX& q, const 
         std::visit([&](const auto& law) {
             if (law.reaction == Reaction::none) law.act(state, sink);  // Eq. (9)
         }, each);
-    for (size_t e = 0; e < p.frictions.size(); ++e)
-        if (p.frictions[e].reaction == Reaction::none) update_limit(p, w, e, t, q, v);
-    add_slip_forces(p, w, false, C);
 }
 
-void law_forces(const Program& p, Workspace& w, const VecX& v, std::vector<VecX>& force) {
-    for (VecX& f : force) f.setZero();
+void add_forces_by_law(const Program& p, const Workspace& w, const VecX& v, std::vector<VecX>& force) {
     const LawState state = law_state(w, v);
     for (const Law& each : p.laws)
         std::visit([&](const auto& law) {
             GeneralizedForce sink{p, w.now, force[law.law]};
             law.act(state, sink);
         }, each);
-    for (size_t e = 0; e < p.frictions.size(); ++e) add_slip_force(p, w, e, force[p.frictions[e].law]);
 }
 
 void add_body_forces(const Program& p, const Workspace& w, std::vector<Force>& body) {

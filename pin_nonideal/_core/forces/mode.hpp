@@ -15,7 +15,7 @@ struct Program;
 struct Workspace;
 class Archive;
 
-// Those of all elements, to be read by all and changed by set_modes (modes.hpp) alone.
+// Those of all elements, to be read by all and changed by set_alone.
 class Modes {
 public:
     explicit Modes(size_t elements = 0) : values_(elements, slip_plus) {}

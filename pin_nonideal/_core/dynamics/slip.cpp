@@ -1,7 +1,7 @@
-#include "friction/friction.hpp"
+#include "dynamics/slip.hpp"
 
+#include "dynamics/reactions.hpp"
 #include "dynamics/solution.hpp"
-#include "friction/reactions.hpp"
 
 namespace pn {
 
@@ -118,32 +118,12 @@ void add_slip_force(const Program& p, Workspace& w, int e, VecX& C) {
     if (block.dof >= 0)
         for (int k = 0; k < block.total; ++k) C[block.dof + k] += w.now.slip_force[e][k];
     else
-        add_along(block, w.now, w.now.slip_force[e], C);
+        add_along(block, w.now.A, w.now.slip_force[e], C);
 }
 
 void add_slip_forces(const Program& p, Workspace& w, bool loaded, VecX& C) {
     for (size_t e = 0; e < p.frictions.size(); ++e)
         if ((p.frictions[e].reaction != Reaction::none) == loaded) add_slip_force(p, w, e, C);
-}
-
-void add_along(const Block& block, const Evaluation& now, const Vec3& f, VecX& C) {
-    const int n = static_cast<int>(block.kept.size());
-    const double* A = now.A.data() + block.offset;
-    for (size_t l = 0; l < block.support.size(); ++l) {
-        double sum = 0.0;
-        for (int k = 0; k < n; ++k) sum += A[l * n + k] * f[k];
-        if (sum != 0.0) C[block.support[l]] += sum;
-    }
-}
-
-void add_wrench(const Block& block, const Terms& terms, const Wrench& unit, double size, std::vector<Force>& body) {
-    for (int side = 0; side < 2; ++side) {
-        const int joint = side == 0 ? block.joint1 : block.joint2;
-        if (joint == 0) continue;
-        const double s = side == 0 ? size : -size;
-        const Vec3 force = s * unit.force;
-        body[joint] += Force{force, s * unit.couple + (unit.point - terms.body[joint].ref).cross(force)};
-    }
 }
 
 }  // namespace pn

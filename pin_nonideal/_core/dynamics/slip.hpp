@@ -1,0 +1,33 @@
+// Elements of dry friction in the motion at hand: how they slip, what loads them, the force that they exert.
+#pragma once
+
+#include <utility>
+
+#include "dynamics/workspace.hpp"
+
+namespace pn {
+
+// Slip velocity along an element's directions, of the rows evaluated last.
+Vec3 slip_velocity(const Evaluation& now, const Friction& f);
+// Slip speed the way that the element's mode says, and its rate in the motion at hand.
+double slip_along_mode(const Program& p, const Workspace& w, int element);
+double slip_rate_along_mode(const Program& p, Workspace& w, int element);
+// The same where slip of several directions goes through rest or on: where it turns sideways, its size and the rate of it.
+std::pair<double, double> slip_toward_rest(const Program& p, Workspace& w, int element);
+// The limit under a load at the present slip speed, at rest where an element sticks.
+double limit_under(const Program& p, const Workspace& w, int element, double load);
+// The load of an element, as the limit that it gives at rest without the static ratio, for the motion in the workspace.
+double load_limit(const Program& p, Workspace& w, const Friction& f, double t, const VecX& q, const VecX& v);
+// Load and kinetic limit of an element for that motion.
+void update_limit(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
+// Largest force with which an element can stick now.
+double static_limit(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
+
+// Friction force of an element in the evaluation at hand: the multiplier of what sticks, the law's force of what slips.
+Vec3 friction_force(const Program& p, Workspace& w, int element);
+// Adds the force of a slipping element, for the limit in the workspace, to a generalized force; or those of all whose
+// load comes from these reactions (`loaded`: from any).
+void add_slip_force(const Program& p, Workspace& w, int element, VecX& C);
+void add_slip_forces(const Program& p, Workspace& w, bool loaded, VecX& C);
+
+}  // namespace pn

@@ -1,0 +1,42 @@
+// Dry friction: elements that slip or stick along the directions of a block (rows whose rate is the slip velocity).
+//
+// In a mode of slip the force of an element is -limit along the slip; in the mode of sticking its rows join the
+// constraints and the static limit only bounds the multiplier. The limit comes from the load at hand and the slip speed:
+// limit = load x speed factor.
+#pragma once
+
+#include <utility>
+
+#include "forces/laws.hpp"
+#include "forces/mode.hpp"
+
+namespace pn {
+
+struct Friction {
+    enum class Load { none, revolute, prismatic, spherical, contact, user } load = Load::none;
+    int law = 0;    // index into Program::law_names
+    int block = 0;  // its directions
+    int dim = 1;
+    double constant = 0.0;  // coulomb + preload
+    double mu = 0.0, radius = 0.0, axial_radius = 0.0, inverse_span = 0.0;
+    double static_ratio = 1.0, stribeck_velocity = 0.0;  // 0: kinetic friction at any slip velocity
+    Reaction reaction = Reaction::none;
+    int joint = -1;   // tree joint that carries the load
+    int anchor = -1;  // or the block (hinge anchor, contact) that does
+    Vec3 axis = Vec3::UnitZ();  // in the joint's frame, or in frame 1 of the anchor
+    std::function<double(const Program& p, double t, const VecX& q, const VecX& v, Workspace& w)> user_limit;
+
+    // Limit over load at a slip speed.
+    template <class Real>
+    Real speed_factor(const Real& speed) const {
+        using std::exp;
+        if (static_ratio == 1.0 || stribeck_velocity == 0.0) return 1.0;
+        const Real x = speed / stribeck_velocity;
+        return 1.0 + (static_ratio - 1.0) * exp(-x * x);
+    }
+    // The limit under a load: of an element that slips at this speed, and of one that sticks.
+    double kinetic_limit(double load, double speed) const { return load * speed_factor(speed); }
+    double holding_limit(double load) const { return load * static_ratio; }
+};
+
+}  // namespace pn

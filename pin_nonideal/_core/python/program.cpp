@@ -1,0 +1,28 @@
+#include "python/program.hpp"
+
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "dynamics/power.hpp"
+#include "python/constraints.hpp"
+#include "python/runner.hpp"
+
+namespace pn {
+
+void bind_program(nb::module_& m) {
+    nb::class_<Program>(m, "Program")
+        .def_prop_ro("constraints", &constraint_rows)
+        .def_prop_ro("rows", [](const Program& p) { return p.user_rows; })
+        .def_prop_ro("states", [](const Program& p) { return p.states; })
+        .def_prop_ro("law_names", [](const Program& p) { return p.law_names; })
+        .def_prop_ro("power_names", &power_names)
+        .def_prop_ro("element_names", [](const Program& p) {
+            std::vector<std::string> names;
+            for (const Friction& f : p.frictions) names.push_back(p.law_names[f.law]);
+            return names;
+        })
+        .def("runner", [](std::shared_ptr<const Program> p) { return Runner(std::move(p)); });
+}
+
+}  // namespace pn

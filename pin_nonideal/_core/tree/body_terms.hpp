@@ -1,0 +1,64 @@
+// What a pass over the tree finds: placements and motions of the bodies, M(q) and the bias forces.
+//
+// Everything is expressed in world axes about one reference point per kinematic tree: the place of its first joint
+// that turns, frozen for the instant of the evaluation. This keeps numbers small for a robot that has walked far, on a
+// floating base or on sliding joints.
+#pragma once
+
+#include <vector>
+
+#include "tree/mechanism.hpp"
+
+namespace pn {
+
+struct Body {
+    Mat3 R = Mat3::Identity();
+    Vec3 p = Vec3::Zero();    // joint frame's origin, from the reference point
+    Vec3 ref = Vec3::Zero();  // the reference point in the world
+    Motion v{Vec3::Zero(), Vec3::Zero()};
+    Motion a{Vec3::Zero(), Vec3::Zero()};  // acceleration at zero qdd, minus gravity
+    Force f{Vec3::Zero(), Vec3::Zero()};   // bias force of the subtree
+    Inertia own, Y;                        // of the body (the own pass's), and of the subtree
+};
+
+struct BodyTerms {
+    std::vector<Body> body;
+    std::vector<Motion> J;  // motion per unit velocity of each dof
+    std::vector<Force> Ag;  // subtree momentum per unit velocity of each dof
+    VecX nle;               // bias generalized force: Coriolis, centrifugal, gravity
+    std::vector<double> M;  // rows of M (Mechanism::row_offset)
+    std::vector<double> L;  // and of its factor, M = L^T D L
+    VecX D, inv_sqrt_D;
+    std::vector<char> locked;  // dofs that cannot move: they drop out of the factor, and R^-1 x is zero there
+    VecX q;  // configuration with unit quaternions
+};
+
+// A motion of a body, and an inertia that it carries, from its own axes and origin to the world's axes and the reference
+// point.
+PN_INLINE Motion in_world(const Body& b, const Motion& local) {
+    const Vec3 ang = b.R * local.ang;
+    Motion out{b.p.cross(ang), ang};
+    out.lin += b.R * local.lin;
+    return out;
+}
+PN_INLINE Inertia in_world(const Body& b, double mass, const Vec3& com, const Mat3& about_com) {
+    const Vec3 c = b.p + b.R * com;
+    Inertia Y;
+    Y.mass = mass;
+    Y.first = mass * c;
+    Y.second = times_transpose(b.R * about_com, b.R);
+    const double square = c.dot(Y.first);
+    Y.second.c[0] += square * Vec3::UnitX() - c[0] * Y.first;
+    Y.second.c[1] += square * Vec3::UnitY() - c[1] * Y.first;
+    Y.second.c[2] += square * Vec3::UnitZ() - c[2] * Y.first;
+    return Y;
+}
+
+// World position, velocity and classical acceleration (at zero qdd, without gravity) of the point of a body at x.
+PN_INLINE Vec3 velocity_at(const Body& b, const Vec3& x) { return b.v.lin + b.v.ang.cross(x - b.ref); }
+PN_INLINE Vec3 acceleration_at(const Mechanism& m, const Body& b, const Vec3& x) {
+    const Vec3 r = x - b.ref;  // Body::a carries minus gravity, also that of the world
+    return b.a.lin + m.gravity + b.a.ang.cross(r) + b.v.ang.cross(b.v.lin + b.v.ang.cross(r));
+}
+
+}  // namespace pn
