@@ -15,14 +15,11 @@ Vec3 slip_velocity(const Evaluation& now, const Friction& f) {
     return u;
 }
 
-double load_limit(const Program& p, Workspace& w, const Friction& f, double t, const VecX& q, const VecX& v) {
+LoadVectors load_vectors(const Program& p, Workspace& w, const Friction& f) {
     using Load = Friction::Load;
-    switch (f.load) {
-        case Load::none: return f.constant;
-        case Load::user: return f.user_limit(p, t, q, v, w);
-        case Load::contact: return f.constant + f.mu * std::abs(reactions(p, w).lam[p.blocks[f.anchor].row]);
-        default: break;
-    }
+    const Vec3 none = Vec3::Zero();
+    if (f.load == Load::none || f.load == Load::user) return {none, none, none};
+    if (f.load == Load::contact) return {f.mu * reactions(p, w).lam[p.blocks[f.anchor].row] * Vec3::UnitX(), none, none};
     Force r;
     Vec3 axis;
     if (f.joint > 0) {
@@ -33,12 +30,19 @@ double load_limit(const Program& p, Workspace& w, const Friction& f, double t, c
         const Frame& frame = *frames(p.blocks[f.anchor].kind).first;
         axis = w.now.terms.body[frame.joint].R * (frame.R * f.axis);
     }
-    if (f.load == Load::spherical) return f.constant + f.mu * f.radius * r.lin.norm();
-    const double axial = r.lin.dot(axis);
-    const double radial = (r.lin - axial * axis).norm();
-    if (f.load == Load::prismatic) return f.constant + f.mu * (radial + f.inverse_span * r.ang.norm());
-    const double bending = f.inverse_span == 0.0 ? 0.0 : (r.ang - r.ang.dot(axis) * axis).norm() * f.inverse_span;
-    return f.constant + f.mu * (f.radius * (radial + bending) + f.axial_radius * std::abs(axial));
+    const double rub = f.mu * f.radius;
+    if (f.load == Load::spherical) return {rub * r.lin, none, none};
+    const Vec3 axial = r.lin.dot(axis) * axis, radial = r.lin - axial;
+    if (f.load == Load::prismatic) return {f.mu * radial, f.mu * f.inverse_span * r.ang, none};
+    return {rub * radial, rub * f.inverse_span * (r.ang - r.ang.dot(axis) * axis), f.mu * f.axial_radius * axial};
+}
+
+double load_limit(const Program& p, Workspace& w, const Friction& f, double t, const VecX& q, const VecX& v) {
+    if (f.load == Friction::Load::user) return f.user_limit(p, t, q, v, w);
+    double limit = f.constant;
+    if (f.load == Friction::Load::none) return limit;
+    for (const Vec3& vector : load_vectors(p, w, f)) limit += vector.norm();
+    return limit;
 }
 
 double slip_along_mode(const Program& p, const Workspace& w, int e) {

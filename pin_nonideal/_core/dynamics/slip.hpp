@@ -1,6 +1,7 @@
 // Elements of dry friction in the motion at hand: how they slip, what loads them, the force that they exert.
 #pragma once
 
+#include <array>
 #include <utility>
 
 #include "dynamics/workspace.hpp"
@@ -16,6 +17,10 @@ double slip_rate_along_mode(const Program& p, Workspace& w, int element);
 std::pair<double, double> slip_toward_rest(const Program& p, Workspace& w, int element);
 // The limit under a load at the present slip speed, at rest where an element sticks.
 double limit_under(const Program& p, const Workspace& w, int element, double load);
+// What loads an element in the motion at hand, as vectors linear in the reactions whose lengths add up to what the limit
+// has beyond its constant part. Those that a bearing has not are zero; a user's limit has none.
+using LoadVectors = std::array<Vec3, 3>;
+LoadVectors load_vectors(const Program& p, Workspace& w, const Friction& f);
 // The load of an element, as the limit that it gives at rest without the static ratio, for the motion in the workspace.
 double load_limit(const Program& p, Workspace& w, const Friction& f, double t, const VecX& q, const VecX& v);
 // Load and kinetic limit of an element for that motion.
