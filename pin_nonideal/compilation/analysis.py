@@ -21,8 +21,14 @@ Rows = NDArray[np.bool_]
 # Rows below this part of the largest entry of A at random states vanish structurally, and rows whose
 # directions differ by less are copies: rounding of the kinematics.
 STRUCTURAL = 1e-11
+# What such a row asks for beside the largest, and how far projections of copies may differ: long sums.
+SUM_ROUNDING = 1e-9
+# Stands for the length of rows that are all zero.
+LEAST_LENGTH = 1e-300
 # The derivatives of a user's constraint are compared with differences, which carry about this relative error.
 DERIVATIVE_TOLERANCE = 1e-4
+# Step of these [s], the cube root of unit roundoff, and an instant that no function singles out.
+DIFFERENCE, AN_INSTANT = 1e-5, 0.21
 
 
 def check_model(model: Model) -> None:
@@ -86,7 +92,7 @@ def idle_rows(model: Model, q0: Array, program: core.Program) -> list[tuple[str,
     right = np.column_stack([b for _, b, _ in samples])
     gaps = np.abs(np.column_stack([phi for _, _, phi in samples])).max(axis=1)
     length = np.linalg.norm(wide, axis=1)
-    vanishing = (length <= STRUCTURAL * max(float(length.max()), 1e-300)) & ~fixed
+    vanishing = (length <= STRUCTURAL * max(float(length.max()), LEAST_LENGTH)) & ~fixed
     dropped = []
     for row in map(int, np.flatnonzero(vanishing)):
         _check_vanishing(*owners[row], np.abs(right[row]).max(), np.abs(right).max(), gaps[row])
@@ -101,7 +107,7 @@ def idle_rows(model: Model, q0: Array, program: core.Program) -> list[tuple[str,
 
 def _check_vanishing(name: str, local: int, asked: float, largest: float, gap: float) -> None:
     """A row that moves nothing must ask for nothing: no acceleration, and no gap to be closed."""
-    if asked > 1e-9 * max(1.0, largest):
+    if asked > SUM_ROUNDING * max(1.0, largest):
         raise InconsistentConstraintsError(
             f'row {local} of constraint "{name}" moves nothing and asks for the acceleration {asked:.1e}; '
             "the joints leave that direction no freedom: drop the row or free a joint"
@@ -134,7 +140,7 @@ def _copies(wide: Array, right: Array, length: Array, candidates: Rows) -> list[
         if copy[i]:
             continue
         for j in order[place + 1 :]:
-            if abs(abs(probe[j]) - abs(probe[i])) > 1e-9 * (1.0 + abs(probe[i])):
+            if abs(abs(probe[j]) - abs(probe[i])) > SUM_ROUNDING * (1.0 + abs(probe[i])):
                 break
             close = STRUCTURAL * (1.0 + np.abs(unit[i]).max())
             if not copy[j] and np.abs(unit[i] - unit[j]).max() <= close:
@@ -166,7 +172,7 @@ def check_user_constraints(
     ]
     if not mine:
         return
-    runner, h, t = program.runner(), 1e-5, 0.21
+    runner, h, t = program.runner(), DIFFERENCE, AN_INSTANT
     generator = np.random.default_rng(3)
     n = model.nv
     for rows, name, c in mine:

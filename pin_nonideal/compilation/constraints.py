@@ -36,6 +36,10 @@ from .names import Resolution, placed_on, words
 
 # A rational gear ratio with a larger denominator than this leaves the angle of endless joints undetermined.
 LARGEST_GEAR = 64
+# A ratio that misses a fraction by less is that fraction as a float.
+GEAR_ROUNDING = 1e-12
+# Central differences in time take this part of it [s]: between rounding and curvature.
+TIME_DIFFERENCE = 1e-6
 
 
 @singledispatch
@@ -112,7 +116,7 @@ def _(c: JointCoupling, name: str, out: core.Builder, where: Resolution) -> None
     turn = 2.0 * math.pi
     if endless[0] and endless[1]:
         gear = Fraction(c.ratio).limit_denominator(LARGEST_GEAR)
-        position = abs(float(gear) - c.ratio) < 1e-12
+        position = abs(float(gear) - c.ratio) < GEAR_ROUNDING
         period = turn / gear.denominator
     elif endless[0]:
         period = turn
@@ -178,7 +182,7 @@ def _(c: UserConstraint, name: str, out: core.Builder, where: Resolution) -> Non
         held = residual
 
         def rate(t: float, q: Array, v: Array) -> Array:
-            step = 1e-6 * max(1.0, abs(t))
+            step = TIME_DIFFERENCE * max(1.0, abs(t))
             moving = (held(t + step, q) - held(t - step, q)) / (2.0 * step)
             result: Array = rows(t, q, v)[0] @ v + moving
             return result

@@ -59,7 +59,7 @@ struct Implicit {
 
     void set(const VecX& y) {
         int k = 0;
-        each_unknown([&](size_t e) { w.state.limit[e] = y[k++]; },
+        each_unknown([&](size_t e) { w.now.limit[e] = y[k++]; },
                      [&](const UserLaw& law) { w.now.user_C[law.index] = y.segment(k, nv()); k += nv(); });
     }
 

@@ -162,10 +162,10 @@ void follow_constraints(const Program& p, Workspace& w, double h, VecX& move) {
     move += w.scratch.scaled;
 }
 
-void learn_third_order(Workspace& w, double h) { w.state.third_order_lam += w.scratch.position_lam_sum / (h * h * h); }
+void learn_third_order(Workspace& w, double h) { w.state.third_order_lam += w.now.closing_lam / (h * h * h); }
 
 bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
-    w.scratch.position_lam_sum.setZero();
+    w.now.closing_lam.setZero();
     double largest = 0.0, floor = 0.0;
     if (!w.now.rows.blocks.empty()) {
         evaluate_residuals(p, w, t, q, v);
@@ -183,7 +183,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
         }
         broyden_step(p, w, count);
         w.scratch.position_lam += w.scratch.position_lam_steps[count];
-        w.scratch.position_lam_sum += w.scratch.position_lam_steps[count++];
+        w.now.closing_lam += w.scratch.position_lam_steps[count++];
         // One that goes on falling so, and ends below rounding, is evaluated where the step's end is configured.
         configured = count > 1 && largest * rate < trusted_part * floor;
         double now = largest;

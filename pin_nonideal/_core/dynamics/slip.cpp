@@ -81,7 +81,7 @@ double limit_under(const Program& p, const Workspace& w, int e, double load) {
 
 void update_limit(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
     w.now.load[e] = load_limit(p, w, p.frictions[e], t, q, v);
-    w.state.limit[e] = limit_under(p, w, e, w.now.load[e]);
+    w.now.limit[e] = limit_under(p, w, e, w.now.load[e]);
 }
 
 double static_limit(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
@@ -117,7 +117,7 @@ static Vec3 force_direction(const Program& p, Workspace& w, int e) {
 void add_slip_force(const Program& p, Workspace& w, int e, VecX& C) {
     if (!slips(w.state.mode[e])) return;
     const Block& block = p.blocks[p.frictions[e].block];
-    w.now.slip_force[e] = w.state.limit[e] * force_direction(p, w, e);
+    w.now.slip_force[e] = w.now.limit[e] * force_direction(p, w, e);
     w.now.reactions.current = false;
     if (block.dof >= 0)
         for (int k = 0; k < block.total; ++k) C[block.dof + k] += w.now.slip_force[e][k];

@@ -12,7 +12,6 @@ static void size(const Program& p, RunState& state) {
     state.last_direction = state.slip_direction;
     state.z = VecX::Zero(p.states);
     state.held_torque = VecX::Zero(p.mechanism.nv);
-    state.limit.assign(elements, 0.0);
     state.unknown = VecX::Zero(p.unknowns());
     state.third_order_lam = VecX::Zero(p.layout.rows);
 }
@@ -29,7 +28,7 @@ static void size(const Program& p, Evaluation& now) {
     for (size_t i = 0; i < p.blocks.size(); ++i) now.values[i].resize(p.blocks[i].kind, nv);
     now.A.assign(p.entries, 0.0);
     now.B.assign(p.entries, 0.0);
-    for (VecX* x : {&now.b, &now.lam, &now.reactions.lam}) *x = VecX::Zero(p.layout.rows);
+    for (VecX* x : {&now.b, &now.lam, &now.closing_lam, &now.reactions.lam}) *x = VecX::Zero(p.layout.rows);
     now.rows.allocate(p.layout, static_cast<int>(p.blocks.size()), nv);
     now.ideal_rows = now.rows;
     now.body_force.assign(bodies, no_force);
@@ -37,6 +36,7 @@ static void size(const Program& p, Evaluation& now) {
     now.reactions.momentum.assign(bodies, no_force);
     now.reactions.motion.assign(bodies, Motion{Vec3::Zero(), Vec3::Zero()});
     now.load.assign(elements, 0.0);
+    now.limit.assign(elements, 0.0);
     now.slip_force.assign(elements, Vec3::Zero());
     now.user_C.assign(p.user_laws, VecX::Zero(nv));
     now.dz = VecX::Zero(p.states);
@@ -45,7 +45,7 @@ static void size(const Program& p, Evaluation& now) {
 static void size(const Program& p, const Evaluation& now, Scratch& scratch) {
     const int nv = p.mechanism.nv;
     for (VecX* x : {&scratch.scaled, &scratch.scaled_free, &scratch.trial, &scratch.work}) *x = VecX::Zero(nv);
-    for (VecX* x : {&scratch.r, &scratch.residual, &scratch.lam_step, &scratch.position_lam, &scratch.position_lam_sum})
+    for (VecX* x : {&scratch.r, &scratch.residual, &scratch.lam_step, &scratch.position_lam})
         *x = VecX::Zero(p.layout.rows);
     scratch.position_start = VecX::Zero(p.mechanism.nq);
     scratch.position_lam_steps.assign(projection_limit, scratch.position_lam);

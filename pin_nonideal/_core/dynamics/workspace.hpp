@@ -27,7 +27,6 @@ struct RunState {
     bool warm = false;
     VecX third_order_lam;         // multipliers of third order in the step, over its cube
     bool ideal_decided = false;   // which rows are independent without what sticks, over this step
-    std::vector<double> limit;    // kinetic, of each element, as found last
 };
 
 // What joints, anchors and contacts carry in the motion at hand (dynamics/reactions.hpp).
@@ -46,12 +45,14 @@ struct Evaluation {
     std::vector<double> A, B;
     RowSystem rows, ideal_rows;  // ideal: of the constraints without what sticks; IdealMotion swaps them in
     VecX b, lam;  // by kept row
+    VecX closing_lam;  // multipliers of the move that closed the position last
     VecX tau, external, F, C, C_smooth, base_C, a;  // generalized forces and acceleration
     Reactions reactions;
     VecX holding;                     // M a - F - C - A^T lam: what holds the locked dofs
     bool has_holding = false;
     bool ideal = false;               // the motion is that of the ideal constraints alone
     std::vector<double> load;         // limit at rest before the static ratio
+    std::vector<double> limit;        // kinetic, of each element
     std::vector<Vec3> slip_force;     // of each slipping element, along its directions
     std::vector<VecX> user_C;
     VecX dz;
@@ -69,9 +70,9 @@ struct Evaluation {
 struct Scratch {
     VecX scaled, scaled_free, trial, work, r, residual, lam_step;
     std::vector<char> ideal_locked;
-    // Of the projection of a position: where its factors were taken, the multipliers from there and in all, and the
-    // steps that they took.
-    VecX position_start, position_lam, position_lam_sum;
+    // Of the projection of a position: where its factors were taken, the multipliers from there, and the steps that they
+    // took.
+    VecX position_start, position_lam;
     std::vector<VecX> position_lam_steps;
     VecX unknown, image;  // of the implicit reaction equation
     MatX jacobian;

@@ -101,7 +101,7 @@ Instant Runner::solve(const Array& q_in, const Array& v_in, double t, const std:
         const Mode mode = w->state.mode[e];
         Vec3 f = friction_force(*p, *w, element);
         out.friction.push_back(to_numpy(&f[0], p->frictions[e].dim));
-        out.limits.push_back(mode == sticking ? static_limit(*p, *w, element, t, q, v) : w->state.limit[e]);
+        out.limits.push_back(mode == sticking ? static_limit(*p, *w, element, t, q, v) : w->now.limit[e]);
         out.modes.push_back(mode);
     }
     Split split;

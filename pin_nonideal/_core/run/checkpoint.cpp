@@ -21,9 +21,9 @@ void fields(Archive& a, Modes& x) {
 
 static void fields(Archive& a, RunState& x) {
     auto& [mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm,
-           third_order_lam, ideal_decided, limit] = x;
+           third_order_lam, ideal_decided] = x;
     a(mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm, third_order_lam,
-      ideal_decided, limit);
+      ideal_decided);
 }
 
 static void fields(Archive& a, Progress& x) {

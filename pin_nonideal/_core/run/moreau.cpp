@@ -37,8 +37,9 @@ void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
     solve_without_friction(t + 0.5 * h);
     const FrictionProblem problem = pose_problem();
     solve_friction(problem, t);
-    end_velocity(problem);
+    const std::vector<Mode> modes = end_velocity(problem);
     if (system_.energy) book_work(problem, y, moved_energy);
+    set_modes(p, w, modes);
     if (system_.nz > 0) y.segment(system_.nq + system_.nv, system_.nz) += h * w.now.dz;
     move = 0.5 * h * v1_;
     retract(m, q_mid_.data(), move.data(), y.data());
@@ -63,6 +64,7 @@ void Moreau::solve_without_friction(double t) {
 // Slip velocities at the step's end over h take the place of slip accelerations.
 FrictionProblem Moreau::pose_problem() {
     FrictionProblem problem(p, w, elements_);
+    problem.clean(p, w);
     problem.alpha0 = problem.along(p, w, a_free_);
     int at = 0;
     for (const Friction& friction : p.frictions)
@@ -110,7 +112,7 @@ void Moreau::solve_friction(const FrictionProblem& problem, double t) {
 }
 
 // Velocity at the step's end, and the modes there: what stays below its limit sticks.
-void Moreau::end_velocity(const FrictionProblem& problem) {
+std::vector<Mode> Moreau::end_velocity(const FrictionProblem& problem) {
     const VecX alpha = problem.alpha0 + problem.W * force_;
     std::vector<Mode> modes(system_.ne);
     v1_ = v0_ + h_ * (a_free_ + problem.response * force_);
@@ -121,16 +123,19 @@ void Moreau::end_velocity(const FrictionProblem& problem) {
         const Block& block = p.blocks[p.frictions[e].block];
         if (held && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
     }
-    set_modes(p, w, modes);
+    return modes;
 }
 
 // Work over the step, by the mean velocity. Where a slip turns inside the step its mean velocity may go with the
 // friction that meets its end: that is work of the scheme, not of friction.
 void Moreau::book_work(const FrictionProblem& problem, VecX& y, double& moved_energy) {
     w.now.lam = lam_free_ + problem.multipliers * force_;
-    powers(p, w, 0.5 * (v0_ + v1_), power_.data());
-    for (const Friction& friction : p.frictions) {
-        double& power = power_[first_law_power + friction.law];
+    const VecX mean = 0.5 * (v0_ + v1_);
+    powers(p, w, mean, power_.data());  // of all but dry friction, whose modes are still open
+    const VecX slip = problem.along(p, w, mean);
+    for (int e = 0, at = 0; e < system_.ne; at += problem.dims[e], ++e) {
+        double& power = power_[first_law_power + p.frictions[e].law];
+        power += slip.segment(at, problem.dims[e]).dot(force_.segment(at, problem.dims[e]));
         if (!(power > 0.0)) continue;
         moved_energy += h_ * power;
         power = 0.0;

@@ -24,7 +24,7 @@ private:
     void solve_friction(const FrictionProblem& problem, double t);
     void apply_forces(const FrictionProblem& problem);
     double update_limits(double t);
-    void end_velocity(const FrictionProblem& problem);
+    std::vector<Mode> end_velocity(const FrictionProblem& problem);
     void book_work(const FrictionProblem& problem, VecX& y, double& moved_energy);
 
     System& system_;

@@ -41,9 +41,14 @@ constexpr int chatter_steps = 50;
 // Part of a step of time stepping that is not worth one of its own.
 constexpr double least_part = 1e-9;
 // Times closer than this part of them, or this many seconds, are the same.
-double same_time(double t) { return 1e-12 * std::max(1.0, std::abs(t)); }
-// Number of whole lengths in a time that should be a multiple of them, rounding aside.
-double whole_lengths(double time, double length) { return std::floor(time / length * (1.0 + 1e-14) + 1e-9); }
+constexpr double time_rounding = 1e-12;
+double same_time(double t) { return time_rounding * std::max(1.0, std::abs(t)); }
+// Number of whole lengths in a time that should be a multiple of them; their quotient may miss it by so much of itself
+// and of one.
+constexpr double quotient_rounding = 1e-14, count_rounding = 1e-9;
+double whole_lengths(double time, double length) {
+    return std::floor(time / length * (1.0 + quotient_rounding) + count_rounding);
+}
 
 }  // namespace
 

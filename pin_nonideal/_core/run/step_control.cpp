@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace pn {
 
@@ -14,7 +15,7 @@ constexpr double safety = 0.65, retry_safety = 0.9, shrink_limit = 0.2, growth_l
 
 // Unit roundoff in an acceleration at a sine s to a singular position: 1/s of it in the place, 1/s^2 in the velocity
 // after projection, 1/s^3 where the rows are solved.
-double rounding_at(double pivot) { return 2.2e-16 / (pivot * std::sqrt(pivot)); }
+double rounding_at(double pivot) { return std::numeric_limits<double>::epsilon() / (pivot * std::sqrt(pivot)); }
 // A step whose evaluations come nearer than this part of its way through is shortened so, which moves them elsewhere.
 constexpr double clearance = 0.04, detour = 0.85;
 constexpr int detour_limit = 3;

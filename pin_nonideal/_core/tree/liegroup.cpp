@@ -25,17 +25,21 @@ void quaternion_tangent(const double* q, const double* dq, double* w) {
     Eigen::Map<Vector>{w} = 2.0 * (q[3] * d - dq[3] * a - a.cross(d));
 }
 
+// Below these angles a series of the terms written is exact to rounding, and a quotient of small numbers is not.
+constexpr double small_half_angle = 1e-8, small_angle = 1e-4, small_cubic_angle = 1e-2;
+
 Quat exponential(const Vector& w) {
     const double angle = w.norm();
-    const double s = angle < 1e-8 ? 0.5 - angle * angle / 48.0 : std::sin(0.5 * angle) / angle;
+    const double s = angle < small_half_angle ? 0.5 - angle * angle / 48.0 : std::sin(0.5 * angle) / angle;
     return Quat(std::cos(0.5 * angle), s * w[0], s * w[1], s * w[2]);
 }
 
 // sin(x)/x, (1 - cos x)/x^2 and (x - sin x)/x^3 with their series near zero.
-double sinc(double x) { return std::abs(x) < 1e-4 ? 1.0 - x * x / 6.0 : std::sin(x) / x; }
-double versine(double x) { return std::abs(x) < 1e-4 ? 0.5 - x * x / 24.0 : (1.0 - std::cos(x)) / (x * x); }
+double sinc(double x) { return std::abs(x) < small_angle ? 1.0 - x * x / 6.0 : std::sin(x) / x; }
+double versine(double x) { return std::abs(x) < small_angle ? 0.5 - x * x / 24.0 : (1.0 - std::cos(x)) / (x * x); }
 double cubic(double x) {
-    return std::abs(x) < 1e-2 ? 1.0 / 6.0 - x * x / 120.0 + x * x * x * x / 5040.0 : (x - std::sin(x)) / (x * x * x);
+    if (std::abs(x) < small_cubic_angle) return 1.0 / 6.0 - x * x / 120.0 + x * x * x * x / 5040.0;
+    return (x - std::sin(x)) / (x * x * x);
 }
 
 // Numbers of a chart that have unit length: a quaternion or (cos, sin), or none.
