@@ -1,15 +1,14 @@
 // Where an event lies inside a step.
 //
-// A slipping element watches its slip velocity, a sticking one its multiplier against the static limit, a contact its
-// normal force. The interpolant gives the first guess of the instant; the step is then taken again up to there and the
-// guess corrected by Newton's or the secant method, so that an event is as accurate as a step.
+// The search on the interpolant gives the first guess of the instant; the step is then taken again up to there, so that an
+// event is as accurate as a step, and its end moved by what the margin is there.
 #pragma once
 
 #include <optional>
 #include <vector>
 
 #include "friction/modes.hpp"
-#include "run/stepper.hpp"
+#include "run/event_search.hpp"
 
 namespace pn {
 
@@ -40,27 +39,13 @@ public:
     double shorten_toward_rest(const VecX& rate, double size);
 
 private:
-    // What may cross zero inside the step: the margin of an element that slips or sticks, or of a contact.
-    struct Watch {
-        enum class Kind { slip, stick, contact } kind;
-        int index;
-    };
-
     bool has_arrived(int element) const;
-    bool may_reach_limit(int element);
-    bool may_stop(int element) const;
-    bool dips(int element, double noise) const;
-    double time_of(int stage) const;
     bool passes_by_rest(int element) const;
-    std::vector<Watch> crossed();
 
-    double margin(const Watch& watch, double t, const VecX& y);
     double margin_at_end(const Watch& watch);
-    bool known_rate(const Watch& watch) const;
-    double margin_rate(const Watch& watch, double size, double here, double full);
-    double first_crossing(const Watch& watch);
     void end_step_at(double size);
-    void step_onto(const Watch& watch, double part);
+    void correct_end_to(double size, double full);
+    void step_onto(const Crossing& crossing);
 
     bool can_hold(const std::vector<Mode>& modes, ModeQuestion& asked);
     std::optional<FoundEvent> release_together();
@@ -70,9 +55,7 @@ private:
     const Program& p;
     Workspace& w;
     const std::vector<double>& slip_at_start_;
-    const std::vector<char>& pulls_;
-    std::vector<int> by_time_;  // stages before the step's end, and that end
-    VecX probe_, probe_rate_;
+    EventSearch search_;
 };
 
 }  // namespace pn

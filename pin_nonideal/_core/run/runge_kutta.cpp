@@ -84,4 +84,15 @@ void RungeKutta::interpolate(double part, VecX& y) const {
     y += step_.y0;
 }
 
+std::pair<double, double> RungeKutta::interpolated(double part, int index) const {
+    double value = 0.0, change = 0.0;
+    for (int i = static_cast<int>(coefficients_.size()) - 1; i >= 0; --i) {
+        value += coefficients_[i][index];
+        const bool forward = method_.P || i % 2 == 0;
+        change = change * (forward ? part : 1.0 - part) + (forward ? value : -value);
+        value *= forward ? part : 1.0 - part;
+    }
+    return {value + step_.y0[index], change};
+}
+
 }  // namespace pn

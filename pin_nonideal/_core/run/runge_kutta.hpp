@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <utility>
 
 #include "run/method.hpp"
 #include "run/step.hpp"
@@ -68,6 +69,8 @@ public:
         else sum_terms();
     }
     void interpolate(double part, VecX& y) const;
+    // One number of it, and its change over the step at that rate.
+    std::pair<double, double> interpolated(double part, int index) const;
 
 private:
     // Of the square of the coarse estimate in the size of both. [Hairer, Norsett, Wanner, eq. II.10.17]

@@ -2,6 +2,8 @@
 // by Euler's rule. Order 1.
 #pragma once
 
+#include <utility>
+
 #include "run/step.hpp"
 #include "run/system.hpp"
 
@@ -19,6 +21,9 @@ public:
     // The interpolant is a line.
     void make_interpolant(System&) { delta_ = step_.y1 - step_.y0; }
     void interpolate(double part, VecX& y) const;
+    std::pair<double, double> interpolated(double part, int index) const {
+        return {step_.y0[index] + part * delta_[index], delta_[index]};
+    }
 
 private:
     Step& step_;

@@ -184,6 +184,7 @@ Simulation::Proposal Simulation::propose() {
 
 std::optional<double> Simulation::integrate(const Proposal& proposal) {
     stepper.y0 = y;
+    stepper.y0.tail(2 * system.ne).setZero();  // what elements watch is theirs over one step
     stepper.start_rate() = rate;
     try {
         return try_step(proposal.size);

@@ -22,6 +22,13 @@ void Stepper::take(double t, double size) {
     with_scheme(scheme_, [&](auto& scheme) { scheme.advance(system_); });
 }
 
+void Stepper::move_end(double dt) {
+    h += dt;
+    y1 += dt * end_rate();
+    system_.normalize(y1);
+    has_interpolant_ = false;
+}
+
 double Stepper::error(ErrorNorm& norm) {
     if (!method.adaptive()) return 0.0;
     norm.set_tolerances(y0, y1, h);
@@ -41,6 +48,18 @@ void Stepper::make_interpolant() {
 void Stepper::interpolate(double part, VecX& y) const {
     with_scheme(scheme_, [&](const auto& scheme) { scheme.interpolate(part, y); });
     system_.normalize(y);
+}
+
+double Stepper::interpolated(double part, int index) const {
+    double value = 0.0;
+    with_scheme(scheme_, [&](const auto& scheme) { value = scheme.interpolated(part, index).first; });
+    return value;
+}
+
+double Stepper::interpolated_rate(double part, int index) const {
+    double rate = 0.0;
+    with_scheme(scheme_, [&](const auto& scheme) { rate = scheme.interpolated(part, index).second / h; });
+    return rate;
 }
 
 }  // namespace pn

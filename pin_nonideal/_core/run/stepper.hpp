@@ -17,6 +17,8 @@ public:
 
     // y1 = one step of size h from (t0, y0); the rate there must be known.
     void take(double t, double size);
+    // Moves the end by a time so short that the rate there, which must be known, does not change. The interpolant is lost.
+    void move_end(double dt);
     // Norm of the error estimate, 1 at the tolerance; 0 of methods without one.
     double error(ErrorNorm& norm);
     // What the projection of the end of an accepted step has shown, for methods that use it.
@@ -25,6 +27,9 @@ public:
     // Interpolant over the step; needs the rate at its end. Leaves the workspace at other states.
     void make_interpolant();
     void interpolate(double part, VecX& y) const;
+    // One number of it (lengths that must be one are not restored), and its rate.
+    double interpolated(double part, int index) const;
+    double interpolated_rate(double part, int index) const;
     bool has_interpolant() const { return has_interpolant_; }
 
 private:

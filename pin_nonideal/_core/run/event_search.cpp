@@ -1,0 +1,243 @@
+#include "run/event_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "dynamics/evaluation.hpp"
+#include "run/root_search.hpp"
+
+namespace pn {
+
+namespace {
+
+// --- What may have happened in a step. Speeds [rad/s or m/s] grow with the largest of the scene, as 1 + speed.
+// Part of a limit by which rounding may pass it: of a force that stands still, and of the share that stages see.
+constexpr double limit_rounding = 1e-12, share_rounding = 1e-9;
+// What a parabola through the shares at three stages rises above them counts so often, and their range by this part: the
+// share itself may go further between the stages.
+constexpr double times_parabola = 3.0, range_between = 0.02;
+// Part of the speed of rest by which an element that has just begun to slip may lie on the other side.
+constexpr double fresh_slip = 1e-3;
+// Slip that begins with less than this part of the most that it has in a step is slip that begins there.
+constexpr double rest_part = 0.05;
+// A least speed between two stages counts as a dip below zero where it is below this part of the speeds' range: the
+// cubics through the stages miss the motion by less.
+constexpr double dip_part = 0.02;
+
+// --- The interpolant
+constexpr int location_grid = 24;  // points of a step at which a margin is looked at first
+constexpr double apart = 1.0 / location_grid;
+constexpr double beyond = 2.0;     // part of a step: none of it
+// A parabola through three points lies lower than the middle one by an eighth of its second difference at most; twice
+// that is looked into.
+constexpr double parabola_part = 0.25;
+constexpr double slope_part = 1e-4;  // of the step, over which the rate of a margin is a difference
+// What the shares' rates tell is confirmed in so many evaluations, to this part of the step.
+constexpr int confirmations = 3;
+constexpr double confirmed_width = 1e-6;
+
+}  // namespace
+
+EventSearch::EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls)
+    : system_(system), stepper_(stepper), p(system.p), w(system.w), pulls_(pulls), probe_(VecX::Zero(system.ny)),
+      probe_rate_(probe_) {
+    for (int i = 0; i < stepper.stages; ++i)
+        if (i == 0 || (stepper.method.C && stepper.method.C[i] < 1.0)) by_time_.push_back(i);
+    std::stable_sort(by_time_.begin(), by_time_.end(), [&](int i, int j) { return time_of(i) < time_of(j); });
+    by_time_.push_back(stepper.stages);
+}
+
+double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
+    if (watch.kind == Watch::Kind::contact) return w.now.lam[p.blocks[p.contacts[watch.index]].row];
+    if (watch.kind == Watch::Kind::slip) return slip_along_mode(p, w, watch.index);
+    system_.read(y);
+    return static_limit(p, w, watch.index, t, system_.q, system_.v) * (1.0 + limit_rounding) -
+           friction_force(p, w, watch.index).norm();
+}
+
+// --- What may have crossed ------------------------------------------------------------------------------------------
+
+// Part of the step at which a stage stands, or its end.
+double EventSearch::time_of(int stage) const { return stage < stepper_.stages ? stepper_.method.C[stage] : 1.0; }
+
+double EventSearch::noise() const {
+    return fresh_slip * rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff());
+}
+
+// Whether what sticks is past its limit at the step's end, or may have been inside, between two stages.
+bool EventSearch::may_reach_limit(int e) {
+    const auto share = [&](size_t k) { return system_.share(stepper_.rates[by_time_[k]], e); };
+    double least = share(0), most = least, rise = 0.0;
+    for (size_t k = 1; k < by_time_.size(); ++k) {
+        least = std::min(least, share(k));
+        most = std::max(most, share(k));
+    }
+    const double range = most - least;
+    if (range <= share_rounding) return most > 1.0 + share_rounding || least < -1.0 - share_rounding;
+    for (size_t k = 2; k < by_time_.size(); ++k) {
+        const double t0 = time_of(by_time_[k - 2]), t1 = time_of(by_time_[k - 1]), t2 = time_of(by_time_[k]);
+        rise = std::max({rise, rise_between(t0, share(k - 2), t1, share(k - 1), t2, share(k)),
+                         rise_between(t0, -share(k - 2), t1, -share(k - 1), t2, -share(k))});
+    }
+    return std::max(most, -least) + times_parabola * rise + range_between * range > 1.0 + limit_rounding;
+}
+
+// Whether what slips goes the other way at the step's end, or may have done so inside.
+bool EventSearch::may_stop(int e) const { return slip_along_mode(p, w, e) < -noise() || dips(e); }
+
+// A dip through zero and back. Speeds and their rates are known at the stages and at both ends: cubics through them
+// tell where one may have been below zero in between.
+bool EventSearch::dips(int e) const {
+    if (stepper_.method.order < 2) return false;
+    const std::vector<VecX>& rates = stepper_.rates;
+    const auto speed = [&](int i) { return system_.slip(rates[i], e); };
+    const double below_rest = -noise();
+    double least = HUGE_VAL, most = -HUGE_VAL;
+    bool below = false;
+    for (int i : by_time_) {
+        least = std::min(least, speed(i));
+        most = std::max(most, speed(i));
+        below |= i > 0 && i < stepper_.stages && speed(i) < below_rest;
+    }
+    // Slip of several directions that begins in this step first turns into its direction: that it comes to rest again
+    // shows where it has risen before.
+    if (p.frictions[e].dim > 1 && speed(0) < rest_part * most)
+        return below && speed(by_time_[1]) > 0.0 && speed(by_time_[2]) > 0.0;
+    if (below) return true;
+    for (size_t k = 0; k + 1 < by_time_.size(); ++k) {
+        const int i = by_time_[k], j = by_time_[k + 1];
+        const double length = (time_of(j) - time_of(i)) * stepper_.h;
+        const double inside = least_inside(speed(i), length * system_.slip_rate(rates[i], e), speed(j),
+                                           length * system_.slip_rate(rates[j], e));
+        if (inside < dip_part * (most - least)) return true;
+    }
+    return false;
+}
+
+// What lies past its event at the step's end (the workspace is evaluated there), or may have crossed inside.
+std::vector<Watch> EventSearch::crossed() {
+    std::vector<Watch> list;
+    if (stepper_.method.order > 1)
+        for (int i = 0; i < static_cast<int>(p.contacts.size()); ++i)
+            if (!pulls_[i] && w.now.lam[p.blocks[p.contacts[i]].row] < 0.0)
+                list.push_back({Watch::Kind::contact, i});
+    for (int e = 0; e < system_.ne; ++e) {
+        if (w.state.mode[e] != sticking) {
+            if (may_stop(e)) list.push_back({Watch::Kind::slip, e});
+        } else if (!w.state.indeterminate && may_reach_limit(e)) {
+            list.push_back({Watch::Kind::stick, e});
+        }
+    }
+    return list;
+}
+
+// --- Where it crosses -----------------------------------------------------------------------------------------------
+
+EventSearch::Source EventSearch::source(const Watch& watch) const {
+    if (watch.kind == Watch::Kind::contact) return Source::evaluation;
+    if (watch.kind == Watch::Kind::stick) return stepper_.method.order > 1 ? Source::shares : Source::evaluation;
+    if (system_.on_constraints) return Source::evaluation;
+    return p.blocks[p.frictions[watch.index].block].dof >= 0 ? Source::velocities : Source::kinematics;
+}
+
+double EventSearch::margin_inside(const Watch& watch, Source source, double part) {
+    const Friction* f = watch.kind == Watch::Kind::contact ? nullptr : &p.frictions[watch.index];
+    if (source == Source::shares) {
+        const double share = stepper_.interpolated_rate(part, system_.ns + 2 * watch.index);
+        return 1.0 + limit_rounding - std::abs(share);
+    }
+    if (source == Source::velocities) {
+        const int first = system_.nq + p.blocks[f->block].dof;
+        if (f->dim == 1) return w.state.mode[watch.index] * stepper_.interpolated(part, first);
+        double along = 0.0;
+        for (int k = 0; k < f->dim; ++k)
+            along += w.state.slip_direction[watch.index][k] * stepper_.interpolated(part, first + k);
+        return along;
+    }
+    const double t = stepper_.t0 + part * stepper_.h;
+    stepper_.interpolate(part, probe_);
+    if (source == Source::evaluation) {
+        system_.derivative(t, probe_, probe_rate_);
+    } else {
+        system_.read(probe_);
+        update_kinematics(p, w, t, system_.q, system_.v);
+    }
+    return margin(watch, t, probe_);
+}
+
+// Part of the step at which a watched margin first falls below zero, on a grid and between its points; beyond the step
+// where it does not.
+double EventSearch::first_crossing(const Watch& watch, Source source) {
+    const auto margin_at = [&](double part) { return margin_inside(watch, source, part); };
+    double g[location_grid + 1];
+    g[0] = margin_at(0.0);
+    const double speed = system_.velocity(stepper_.y0).cwiseAbs().maxCoeff();
+    const double rest = watch.kind == Watch::Kind::slip ? rest_speed * (1.0 + speed) : 0.0;  // it has just begun
+    for (int k = 1; k <= location_grid; ++k) {
+        g[k] = margin_at(k * apart);
+        if (g[k] < 0.0 && k == 1 && g[0] <= rest) return root_after_start(apart, g[1], margin_at);
+        if (g[k] < 0.0) return root_between((k - 1) * apart, g[k - 1], k * apart, g[k], margin_at);
+        if (k == 1 || g[k - 1] > g[k - 2] || g[k - 1] > g[k]) continue;
+        if (g[k - 1] > parabola_part * (g[k - 2] - 2.0 * g[k - 1] + g[k])) continue;
+        double value = 0.0;
+        const double dip = dip_between((k - 2) * apart, k * apart, margin_at, value);
+        if (value < 0.0) return root_between((k - 2) * apart, g[k - 2], dip, value, margin_at);
+    }
+    return beyond;
+}
+
+// Newton's method on the motion that the interpolant gives, from where the shares' rates say that a limit was reached;
+// nothing where it does not converge.
+std::optional<double> EventSearch::confirm(const Watch& watch, double part, double slope) {
+    for (int it = 0; it < confirmations && slope < 0.0; ++it) {
+        const double here = margin_inside(watch, Source::evaluation, part);
+        const double next = part - here / slope;
+        if (!(next >= 0.0 && next <= 1.0)) break;
+        const double change = std::abs(next - part);
+        part = next;
+        if (change < confirmed_width) return part;
+    }
+    return std::nullopt;
+}
+
+Crossing EventSearch::cross(const Watch& watch, Source from) {
+    const double part = first_crossing(watch, from);
+    if (part == beyond) return {watch, part, 0.0};
+    const double before = std::max(0.0, part - slope_part), after = before + slope_part;
+    return {watch, part, (margin_inside(watch, from, after) - margin_inside(watch, from, before)) / slope_part};
+}
+
+// The crossing that the shares' rates tell, as the motion on the interpolant has it.
+Crossing EventSearch::confirmed(const Crossing& told) {
+    system_.read(stepper_.y1);
+    const double limit = static_limit(p, w, told.watch.index, stepper_.t0 + stepper_.h, system_.q, system_.v);
+    const auto part = confirm(told.watch, told.part, told.slope * limit);
+    return part ? Crossing{told.watch, *part, told.slope * limit} : cross(told.watch, Source::evaluation);
+}
+
+std::optional<Crossing> EventSearch::first() {
+    const std::vector<Watch> watches = crossed();
+    if (watches.empty()) return std::nullopt;
+    stepper_.make_interpolant();
+    std::vector<std::pair<Crossing, bool>> list;  // and whether it is sure
+    for (const Watch& watch : watches) {
+        const Source from = source(watch);
+        list.emplace_back(cross(watch, from), from != Source::shares);
+    }
+    for (;;) {
+        auto& [earliest, sure] = *std::min_element(list.begin(), list.end(), [](const auto& one, const auto& other) {
+            return one.first.part < other.first.part;
+        });
+        if (earliest.part == beyond) break;
+        if (sure) return earliest;
+        earliest = confirmed(earliest);
+        sure = true;
+    }
+    system_.read(stepper_.y1);
+    system_.read_law_states(stepper_.y1);
+    evaluate(p, w, stepper_.t0 + stepper_.h, system_.q, system_.v);
+    return std::nullopt;
+}
+
+}  // namespace pn

@@ -1,0 +1,67 @@
+// Where in a step just taken a margin first crosses zero: of the slip speed of what slips, of what is left to the limit of
+// what sticks, of the normal force of a contact.
+//
+// Speeds, forces and limits at the stages tell what may have crossed. The method's own interpolant tells where: of slip
+// by its velocities, which take no evaluation, of what sticks by the rate of the shares that it integrates, which one or
+// two evaluations confirm.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "friction/modes.hpp"
+#include "run/stepper.hpp"
+
+namespace pn {
+
+// What may cross zero inside the step.
+struct Watch {
+    enum class Kind { slip, stick, contact } kind;
+    int index;  // of the friction element, or of the contact
+};
+
+struct Crossing {
+    Watch watch;
+    double part, slope;  // of the step, and the rate of the margin there over the step
+};
+
+class EventSearch {
+public:
+    // Whether each contact pulls by the step's start.
+    EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls);
+
+    // The first crossing; the workspace must be evaluated at the step's end, and is so again where there is none.
+    std::optional<Crossing> first();
+
+    // Positive before the event, zero at it. The workspace must be evaluated at the state.
+    double margin(const Watch& watch, double t, const VecX& y);
+
+private:
+    // How a margin is found inside the step: from the interpolated velocities or shares alone, by kinematics, or by a
+    // whole evaluation.
+    enum class Source { velocities, shares, kinematics, evaluation };
+
+    double time_of(int stage) const;
+    double noise() const;
+    bool may_reach_limit(int element);
+    bool may_stop(int element) const;
+    bool dips(int element) const;
+    std::vector<Watch> crossed();
+
+    Source source(const Watch& watch) const;
+    double margin_inside(const Watch& watch, Source source, double part);
+    double first_crossing(const Watch& watch, Source source);
+    Crossing cross(const Watch& watch, Source source);
+    Crossing confirmed(const Crossing& told);
+    std::optional<double> confirm(const Watch& watch, double part, double slope);
+
+    System& system_;
+    Stepper& stepper_;
+    const Program& p;
+    Workspace& w;
+    const std::vector<char>& pulls_;
+    std::vector<int> by_time_;  // stages before the step's end, and that end
+    VecX probe_, probe_rate_;
+};
+
+}  // namespace pn

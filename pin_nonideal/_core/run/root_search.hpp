@@ -1,0 +1,97 @@
+// Where a margin first falls below zero, on functions of the part of a step.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+namespace pn {
+
+constexpr int dip_passes = 40;     // golden sections: a dip of 1e-16 of the margin's own change
+constexpr int root_passes = 60;
+constexpr int start_halvings = 30;  // of the first part, in which a slip from rest may have come to rest again
+constexpr double root_width = 1e-13, root_margin = 1e-13;  // the guess of a step that is taken again
+
+// Root of a margin between a part of the step where it is positive and one where it is negative: secants, kept inside
+// (Illinois).
+template <class Margin>
+double root_between(double low, double margin_low, double high, double margin_high, const Margin& margin) {
+    if (margin_low <= 0.0) return low;  // it starts at zero and goes the wrong way at once
+    int side = 0;
+    for (int it = 0; it < root_passes && high - low > root_width; ++it) {
+        double mid = (low * margin_high - high * margin_low) / (margin_high - margin_low);
+        if (!(mid > low && mid < high)) mid = 0.5 * (low + high);
+        const double here = margin(mid);
+        if (std::abs(here) < root_margin) return mid;
+        if (here > 0.0) {
+            low = mid;
+            margin_low = here;
+            if (side == 1) margin_high *= 0.5;
+            side = 1;
+        } else {
+            high = mid;
+            margin_high = here;
+            if (side == -1) margin_low *= 0.5;
+            side = -1;
+        }
+    }
+    return high;
+}
+
+// The same for a margin that is zero at the start: where it has risen before it falls, the root after that; else the
+// start, from where it goes the wrong way at once.
+template <class Margin>
+double root_after_start(double high, double margin_high, const Margin& margin) {
+    for (int it = 0; it < start_halvings; ++it) {
+        const double low = 0.5 * high, margin_low = margin(low);
+        if (margin_low > 0.0) return root_between(low, margin_low, high, margin_high, margin);
+        high = low;
+        margin_high = margin_low;
+    }
+    return 0.0;
+}
+
+// Least value of the cubic with values u0, u1 and slopes a0, a1 at 0 and 1 inside, where it has one there.
+inline double least_inside(double u0, double a0, double u1, double a1) {
+    // u' = a0 + 2 b x + 3 c x^2
+    const double b = 3.0 * (u1 - u0) - 2.0 * a0 - a1, c = a0 + a1 - 2.0 * (u1 - u0);
+    const double root = std::sqrt(b * b - 3.0 * a0 * c);  // no number: no extremum
+    const double q = -(b + std::copysign(root, b));
+    double least = HUGE_VAL;
+    for (double x : {q / (3.0 * c), a0 / q})  // of a maximum and a minimum
+        if (x > 0.0 && x < 1.0) least = std::min(least, u0 + x * (a0 + x * (b + x * c)));
+    return least;
+}
+
+// How far the parabola through three points rises above the highest of them in between; 0 where it does not.
+inline double rise_between(double t0, double u0, double t1, double u1, double t2, double u2) {
+    const double first = (u1 - u0) / (t1 - t0), second = ((u2 - u1) / (t2 - t1) - first) / (t2 - t0);
+    if (!(second < 0.0)) return 0.0;
+    const double top = 0.5 * (t0 + t1 - first / second);
+    if (!(top > t0 && top < t2)) return 0.0;
+    const double peak = u0 + (top - t0) * (first + second * (top - t1));
+    return std::max(0.0, peak - std::max({u0, u1, u2}));
+}
+
+// A place between a and b where the margin is negative, by golden sections toward its least value; none: b.
+template <class Margin>
+double dip_between(double a, double b, const Margin& margin, double& value) {
+    constexpr double golden = 0.3819660112501051;
+    const double end = b;
+    double x1 = a + golden * (b - a), x2 = b - golden * (b - a), g1 = margin(x1), g2 = margin(x2);
+    for (int it = 0; it < dip_passes; ++it) {
+        if (std::min(g1, g2) < 0.0) {
+            value = std::min(g1, g2);
+            return g1 < g2 ? x1 : x2;
+        }
+        if (g1 < g2) {
+            b = x2; x2 = x1; g2 = g1;
+            g1 = margin(x1 = a + golden * (b - a));
+        } else {
+            a = x1; x1 = x2; g1 = g2;
+            g2 = margin(x2 = b - golden * (b - a));
+        }
+    }
+    return end;
+}
+
+}  // namespace pn
