@@ -31,15 +31,15 @@ replay plotting pin_nonideal cli
 
 # Headers and sources of the core in the same way, a header together with its source.
 CORE_ORDER = """
-math: lanes unrolled spatial angles timefunction
+math: lanes unrolled spatial angles timefunction roots
 tree: mechanism model_extraction liegroup body_terms pinocchio_pass own_pass terms factor
 constraints: geometry coordinates kinds kind block row_layout row_system orthogonal row_factor rank redundancy
 forces: given_forces laws mode friction
 dynamics: failure program workspace given_forces law_forces solution reactions split slip implicit power \
 evaluation projection step_start
-friction: box_program cone_program problem modes
+friction: box_program cone_program problem modes continuation
 run: archive method step step_control runge_kutta system semi_implicit_euler error_norm stepper moreau \
-recorder checkpoint event_location events simulation
+recorder checkpoint event_search event_location events simulation
 python: failures arrays callbacks builder constraints runner runs program module
 """
 

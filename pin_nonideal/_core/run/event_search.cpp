@@ -5,7 +5,8 @@
 #include <utility>
 
 #include "dynamics/evaluation.hpp"
-#include "run/root_search.hpp"
+#include "dynamics/slip.hpp"
+#include "math/roots.hpp"
 
 namespace pn {
 
@@ -33,6 +34,7 @@ constexpr double beyond = 2.0;     // part of a step: none of it
 // that is looked into.
 constexpr double parabola_part = 0.25;
 constexpr double slope_part = 1e-4;  // of the step, over which the rate of a margin is a difference
+constexpr double doubted_part = 1e-2;  // of the change of a share, to which an interpolant of low order tells it
 // What the shares' rates tell is confirmed in so many evaluations, to this part of the step.
 constexpr int confirmations = 3;
 constexpr double confirmed_width = 1e-6;
@@ -46,6 +48,9 @@ EventSearch::EventSearch(System& system, Stepper& stepper, const std::vector<cha
         if (i == 0 || (stepper.method.C && stepper.method.C[i] < 1.0)) by_time_.push_back(i);
     std::stable_sort(by_time_.begin(), by_time_.end(), [&](int i, int j) { return time_of(i) < time_of(j); });
     by_time_.push_back(stepper.stages);
+    // Of stages at one instant the last is the best.
+    const auto same = [&](int i, int j) { return time_of(i) == time_of(j); };
+    by_time_.erase(by_time_.begin(), std::unique(by_time_.rbegin(), by_time_.rend(), same).base());
 }
 
 double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
@@ -59,7 +64,9 @@ double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
 // --- What may have crossed ------------------------------------------------------------------------------------------
 
 // Part of the step at which a stage stands, or its end.
-double EventSearch::time_of(int stage) const { return stage < stepper_.stages ? stepper_.method.C[stage] : 1.0; }
+double EventSearch::time_of(int stage) const {
+    return stage == 0 ? 0.0 : stage < stepper_.stages ? stepper_.method.C[stage] : 1.0;
+}
 
 double EventSearch::noise() const {
     return fresh_slip * rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff());
@@ -141,11 +148,32 @@ EventSearch::Source EventSearch::source(const Watch& watch) const {
     return p.blocks[p.frictions[watch.index].block].dof >= 0 ? Source::velocities : Source::kinematics;
 }
 
+double EventSearch::interpolated_share(int e, double part) const {
+    return stepper_.interpolated_rate(part, system_.ns + 2 * e);
+}
+
+// How far the interpolated share of what sticks may be off: by what the further stages of the interpolant show, which
+// are as good as itself; without them by what the others show, and by a part of the share's change.
+double EventSearch::share_error(int e) const {
+    const Method& method = stepper_.method;
+    const bool further = method.further_stages > 0;
+    double error = 0.0;
+    if (!further)
+        for (int i : by_time_)
+            error = std::max(error, doubted_part * std::abs(system_.share(stepper_.rates[i], e) -
+                                                            system_.share(stepper_.rates[0], e)));
+    for (int k = further ? 0 : 1; k < (further ? method.further_stages : method.stages); ++k) {
+        const double part = further ? method.C_further[k] : method.C[k];
+        const VecX& rate = stepper_.rates[further ? method.stages + 1 + k : k];
+        error = std::max(error, std::abs(interpolated_share(e, part) - system_.share(rate, e)));
+    }
+    return error;
+}
+
 double EventSearch::margin_inside(const Watch& watch, Source source, double part) {
     const Friction* f = watch.kind == Watch::Kind::contact ? nullptr : &p.frictions[watch.index];
     if (source == Source::shares) {
-        const double share = stepper_.interpolated_rate(part, system_.ns + 2 * watch.index);
-        return 1.0 + limit_rounding - std::abs(share);
+        return 1.0 + limit_rounding - doubt_ - std::abs(interpolated_share(watch.index, part));
     }
     if (source == Source::velocities) {
         const int first = system_.nq + p.blocks[f->block].dof;
@@ -202,6 +230,7 @@ std::optional<double> EventSearch::confirm(const Watch& watch, double part, doub
 }
 
 Crossing EventSearch::cross(const Watch& watch, Source from) {
+    if (from == Source::shares) doubt_ = share_error(watch.index);
     const double part = first_crossing(watch, from);
     if (part == beyond) return {watch, part, 0.0};
     const double before = std::max(0.0, part - slope_part), after = before + slope_part;

@@ -49,6 +49,8 @@ private:
     std::vector<Watch> crossed();
 
     Source source(const Watch& watch) const;
+    double interpolated_share(int element, double part) const;
+    double share_error(int element) const;
     double margin_inside(const Watch& watch, Source source, double part);
     double first_crossing(const Watch& watch, Source source);
     Crossing cross(const Watch& watch, Source source);
@@ -61,6 +63,7 @@ private:
     Workspace& w;
     const std::vector<char>& pulls_;
     std::vector<int> by_time_;  // stages before the step's end, and that end
+    double doubt_ = 0.0;        // of the share that is looked at
     VecX probe_, probe_rate_;
 };
 

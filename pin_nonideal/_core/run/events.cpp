@@ -5,7 +5,7 @@
 #include "dynamics/projection.hpp"
 #include "dynamics/slip.hpp"
 #include "dynamics/step_start.hpp"
-#include "friction/modes.hpp"
+#include "friction/continuation.hpp"
 
 namespace pn {
 
@@ -73,7 +73,7 @@ std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, con
     const int held = event && before[event->index] == sticking ? event->index : -1;
     if (event && event->kind == FoundEvent::Kind::released_together) asked.breaking = asked.at_rest;
     else if (held >= 0) asked.breaking = {held};
-    resolve_together(system, t, asked);
+    if (!event || !go_on(p, w, t, system.q, system.v, asked, event->index)) resolve_together(system, t, asked);
     system.write(y);
     w.state.indeterminate = shares_load(system, t, asked.at_rest, held);
     system.rate_of_evaluation(t, y, dy);
