@@ -27,6 +27,7 @@ from .errors import (
     RunInterrupted,
     SingularMassError,
     StepSizeError,
+    StiffnessError,
     UnknownNameError,
     UserFunctionError,
 )
@@ -60,6 +61,7 @@ __all__ = [
     "Solution",
     "Stats",
     "StepSizeError",
+    "StiffnessError",
     "Trajectory",
     "UnknownNameError",
     "UserFunctionError",

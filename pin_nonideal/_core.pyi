@@ -32,7 +32,13 @@ class FailureKind(enum.Enum):
     step_size = 5
     """value: number of steps so far, when it would never end"""
 
-    interrupted = 6
+    stiff = 6
+    """elements: the degree of freedom; value: rate"""
+
+    steps = 7
+    """value: number of steps, which is all that the run may take"""
+
+    interrupted = 8
 
 class CoreFailure(Exception):
     kind: FailureKind
@@ -245,10 +251,6 @@ class Runner:
 
     def project(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], t: float, far: float) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], float, float, float]: ...
 
-    def derivative(self, t: float, y: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], energy: bool) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
-
-    def project_outside(self, t: float, y: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], energy: bool) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], float]: ...
-
     def time_evaluations(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], t: float, count: int) -> float: ...
 
     @property
@@ -261,14 +263,18 @@ class Runner:
 
     def resume(self, state: bytes, options: pin_nonideal.runs.options.RunOptions, tick: Callable[[float], None] | None = None, save: Callable[[bytes], None] | None = None, save_interval: float = 0.0) -> Outcome: ...
 
-    def record(self, times: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], states: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], moved: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], options: pin_nonideal.runs.options.RunOptions, steps: int) -> Outcome: ...
-
 class Method:
     @property
     def name(self) -> str: ...
 
     @property
     def adaptive(self) -> bool: ...
+
+    @property
+    def outside(self) -> bool: ...
+
+    @property
+    def one_step(self) -> bool: ...
 
 def methods() -> list[Method]: ...
 
@@ -368,6 +374,28 @@ class Outcome:
 def nearest_states(program: Program, q: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], t: float, far: float, threads: int) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]: ...
 
 def rollout(program: Program, q: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], options: pin_nonideal.runs.options.RunOptions, threads: int) -> list[Outcome | None]: ...
+
+class FollowedRun:
+    def __init__(self, program: Program, options: pin_nonideal.runs.options.RunOptions, tick: Callable[[float], None] | None = None) -> None: ...
+
+    def start(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None: ...
+
+    def derivative(self, t: float, y: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    def jacobian(self, t: float, y: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]: ...
+
+    def follow(self, t: float, interpolant: Callable[[float], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]) -> bool: ...
+
+    @property
+    def t(self) -> float: ...
+
+    @property
+    def y(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def rate(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    def outcome(self) -> Outcome: ...
 
 class Program:
     @property

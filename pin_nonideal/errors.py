@@ -92,7 +92,21 @@ class FrictionParadoxError(RunError):
 
 
 class StepSizeError(RunError):
-    """The step size needed for the asked tolerance fell below the spacing of floating-point numbers."""
+    """Steps as short as the asked tolerance needs lead nowhere, or the run may take no more of them."""
+
+
+class StiffnessError(StepSizeError):
+    """An explicit method crawls: its stability, not the accuracy, keeps the steps short.
+
+    Attributes:
+        joint: name of the joint whose force relaxes so fast.
+        rate: at which it does [1/s].
+    """
+
+    def __init__(self, message: str, *, joint: str, rate: float, time: float | None = None) -> None:
+        super().__init__(message, time=time)
+        self.joint = joint
+        self.rate = rate
 
 
 class UserFunctionError(RunError):

@@ -31,6 +31,7 @@ def simulate(
     atol: ArrayLike | None = None,
     dt: float | None = None,
     output_dt: float | None = None,
+    max_steps: float | None = None,
     record: str | Sequence[str] = (),
     progress: bool | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
@@ -55,6 +56,8 @@ def simulate(
             states of laws take the number, or the smallest of the array.
         dt: step of the fixed-step methods [s].
         output_dt: time between samples [s]; every accepted step when None.  Events are samples as well.
+        max_steps: most steps that the run may take; when None as many as it takes, but a stiff scene stops as
+            soon as an explicit method would take 100,000 more.
         record: any of "a", "forces", "energy", "power", or names of fields that they fill.
         progress: progress bar on standard error; None shows it on a terminal only.
         checkpoint: file that the run is kept in, so that `resume` goes on with it should it be killed; None
@@ -69,12 +72,13 @@ def simulate(
         InputError: an argument does not fit.
         OutputError: the checkpoint cannot be written.
         LoopClosureError: the initial state cannot be put on the constraints, or the run was pulled off them.
+        StiffnessError: the scene is stiff, and the method explicit; `joint` and `rate` say where and how.
         RunError: the run stopped early; its `trajectory` holds the samples up to there.
         RunInterrupted: Ctrl-C; the same.
     """
     if not isinstance(scene, Scene):
         raise InputError(f"simulate: scene must be a Scene; got {type(scene).__name__}")
-    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, record)
+    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, max_steps, record)
     q0, v0 = (
         scene.project(q, v, options.t0) if (q is not None or v is not None or t0) else scene.initial_state()
     )
@@ -113,6 +117,7 @@ def rollout(
     atol: ArrayLike | None = None,
     dt: float | None = None,
     output_dt: float | None = None,
+    max_steps: float | None = None,
     record: str | Sequence[str] = (),
     threads: int = 1,
 ) -> list[Trajectory]:
@@ -131,6 +136,7 @@ def rollout(
         atol: absolute tolerance, a number or an array (2 nv,).
         dt: step of the fixed-step methods [s].
         output_dt: time between samples [s]; every accepted step when None.
+        max_steps: as in `simulate`.
         record: as in `simulate`.
         threads: number of native threads.
 
@@ -153,7 +159,7 @@ def rollout(
     starts_v = array("rollout: v", v, (None, scene.model.nv))
     if len(starts_q) != len(starts_v):
         raise InputError(f"rollout: q and v must have as many rows; got {len(starts_q)} and {len(starts_v)}")
-    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, record)
+    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, max_steps, record)
     if method in SCIPY:
         raise InputError(f'rollout: method must be one of the core\'s; "{method}" runs in SciPy')
     begin = time.perf_counter()

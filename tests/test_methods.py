@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from pin_nonideal.core import core
-from pin_nonideal.runs.options import METHODS
+from pin_nonideal.runs.options import METHODS, SCIPY
 
 CORE = Path(__file__).parents[1] / "pin_nonideal" / "_core"
 EIGEN = Path(pin.__file__).parents[4] / "include" / "eigen3"
@@ -84,5 +84,7 @@ def test_a_new_table_needs_no_other_line(tmp_path):
 
 def test_methods_are_listed_once():
     fixed = {"rk4": False, "semi_implicit_euler": False, "moreau": False}
-    assert {"dop853": True, "dopri5": True} | fixed == METHODS
+    outside = {"Radau": True, "BDF": True, "LSODA": True}
+    assert {"dop853": True, "dopri5": True} | fixed | outside == METHODS
+    assert tuple(outside) == SCIPY
     assert len(core.methods()) == len(METHODS)

@@ -38,9 +38,9 @@ forces: given_forces laws mode friction
 dynamics: failure program workspace given_forces law_forces solution reactions split slip implicit power \
 evaluation projection step_start
 friction: box_program cone_program problem modes continuation
-run: archive method step step_control runge_kutta system semi_implicit_euler error_norm stepper moreau \
-recorder checkpoint event_search event_location events simulation
-python: failures arrays callbacks builder constraints runner runs program module
+run: archive method step outside_step step_control runge_kutta system semi_implicit_euler error_norm stepper \
+moreau recorder checkpoint stiffness event_search event_location events simulation followed_run
+python: failures arrays callbacks builder constraints runner options runs followed program module
 """
 
 

@@ -16,6 +16,7 @@ from pin_nonideal.errors import (
     RunInterrupted,
     SingularMassError,
     StepSizeError,
+    StiffnessError,
 )
 from pin_nonideal.types import Model
 
@@ -61,7 +62,31 @@ def named_failure(failure: core.CoreFailure, model: Model, program: core.Program
         return opened(name, {name: value}, t)
     if kind is kinds.interrupted:
         return RunInterrupted(f"the run was interrupted at t = {t:.4g} s", time=t)
+    if kind is kinds.stiff:
+        return _stiff(model, failure.elements[0], value, t)
+    if kind is kinds.steps:
+        return StepSizeError(
+            f"the run has taken all of its max_steps = {value:.0f} steps by t = {t:.4g} s; allow more, "
+            "loosen rtol and atol, or simulate a shorter duration",
+            time=t,
+        )
     return _stuck(value, t)
+
+
+def _stiff(model: Model, dof: int, rate: float, t: float) -> RunError:
+    joint = str(model.names[_joint_of(model, dof)])
+    return StiffnessError(
+        f'joint "{joint}" is stiff at t = {t:.4g} s: its motion relaxes at {rate:.2g} 1/s, and an explicit '
+        "method takes steps that short, too many to reach the end; look at its damping, stiffness and "
+        'inertia, use method="Radau", or allow the steps with max_steps',
+        joint=joint,
+        rate=rate,
+        time=t,
+    )
+
+
+def _joint_of(model: Model, dof: int) -> int:
+    return next(i for i, j in enumerate(model.joints) if i and j.idx_v <= dof < j.idx_v + j.nv)
 
 
 def _paradox(element: str, determinant: float, t: float) -> RunError:
@@ -101,7 +126,7 @@ def _inconsistent(names: Sequence[str], items: list[int], residual: float, t: fl
 
 
 def _singular(model: Model, dof: int, t: float) -> RunError:
-    joint = next(i for i, j in enumerate(model.joints) if i and j.idx_v <= dof < j.idx_v + j.nv)
+    joint = _joint_of(model, dof)
     bodies = [f.name for f in model.frames if f.parentJoint == joint and f.type == pin.FrameType.BODY]
     links = ", ".join(f'"{b}"' for b in bodies) or "its body"
     return SingularMassError(

@@ -9,21 +9,24 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pin_nonideal.actuation import SampledControl
-from pin_nonideal.checks import array, choice, label, nonnegative, number, positive, sequence
+from pin_nonideal.checks import array, choice, count, label, nonnegative, number, positive, sequence
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene import Scene
 from pin_nonideal.types import Array
 
-# Those of the core: whether each chooses its own steps.
+# Whether each chooses its own steps.
 METHODS = {method.name: method.adaptive for method in core.methods()}
-SCIPY = ("Radau", "BDF", "LSODA")
+# Those of SciPy, and of them those that go on from a state that was put in place.
+SCIPY = tuple(method.name for method in core.methods() if method.outside)
+ONE_STEP = tuple(method.name for method in core.methods() if method.outside and method.one_step)
 RECORDS = ("a", "forces", "energy", "power")
 FIELDS = {"F_ideal": "forces", "F_nonideal": "forces", "lam": "forces", "lam_ideal": "forces"}
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-8, 1e-10
 # Times are floating-point numbers: a step of fewer of their spacings is off by more than a percent, and one
 # shorter than a spacing leads nowhere.
 LEAST_SPACINGS = 100.0
+NO_LIMIT = 2**62  # of steps
 MOST_SAMPLES = 1e8  # some gigabytes for a small robot
 # No step meets a tolerance below rounding; the square of what misses it must not overflow.
 LEAST_RTOL, LEAST_ATOL = 1e-14, 1e-100
@@ -41,6 +44,7 @@ class RunOptions:
         atol: absolute tolerances of positions, velocities and states of laws, (2 nv + nz,).
         dt: step of the fixed-step methods [s], or 0.
         output_dt: time between samples [s], or 0 for every accepted step.
+        max_steps: most accepted steps, or 0 for as many as it takes, and fewer of a stiff scene.
         a: whether accelerations are recorded.
         forces: whether forces and multipliers are.
         energy: whether the ledger is.
@@ -54,6 +58,7 @@ class RunOptions:
     atol: Array
     dt: float
     output_dt: float
+    max_steps: int
     a: bool
     forces: bool
     energy: bool
@@ -69,6 +74,7 @@ def run_options(
     atol: ArrayLike | None,
     dt: float | None,
     output_dt: float | None,
+    max_steps: float | None,
     record: str | Sequence[str],
 ) -> RunOptions:
     """Options of a run, checked.
@@ -82,13 +88,14 @@ def run_options(
         atol: absolute tolerance, a number or an array (2 nv,), or None.
         dt: step of the fixed-step methods [s], or None.
         output_dt: time between samples [s], or None.
+        max_steps: most accepted steps, infinite too, or None.
         record: names of what to record.
 
     Raises:
         InputError: one is wrong, or they do not go together.
     """
-    choice("simulate: method", method, (*METHODS, *SCIPY))
-    if not METHODS.get(method, True):
+    choice("simulate: method", method, tuple(METHODS))
+    if not METHODS[method]:
         if dt is None:
             raise InputError(f'simulate: method "{method}" needs a step dt')
         unused = [name for name, value in (("rtol", rtol), ("atol", atol)) if value is not None]
@@ -130,11 +137,29 @@ def run_options(
         atol=np.ascontiguousarray(np.maximum(tolerance, LEAST_ATOL)),
         dt=lengths.get("dt", 0.0),
         output_dt=lengths.get("output_dt", 0.0),
+        max_steps=_most_steps(max_steps),
         a="a" in groups,
         forces="forces" in groups,
         energy="energy" in groups,
         power="power" in groups,
     )
+
+
+def _most_steps(max_steps: float | None) -> int:
+    """A number of steps as the core reads it; infinity is one that no run reaches.
+
+    Args:
+        max_steps: a whole number of at least 1, infinity, or None.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if max_steps is None:
+        return 0
+    if isinstance(max_steps, float) and max_steps == np.inf:
+        return NO_LIMIT
+    whole = isinstance(max_steps, float) and max_steps.is_integer()
+    return count("simulate: max_steps", int(max_steps) if whole else max_steps, least=1, most=NO_LIMIT)
 
 
 def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, float]) -> None:

@@ -8,11 +8,11 @@
 namespace pn {
 
 struct Failure : std::exception {
-    enum class Kind { singular_mass, inconsistent, not_finite, paradox, closure, step_size, interrupted };
+    enum class Kind { singular_mass, inconsistent, not_finite, paradox, closure, step_size, stiff, steps, interrupted };
     Kind kind;
     double time = 0.0;
     std::vector<int> elements;  // dofs, blocks or frictions, as the kind says
-    double value = 0.0;         // residual, gap or determinant
+    double value = 0.0;         // residual, gap, determinant, rate or number of steps
     Failure(Kind k, double t, std::vector<int> e = {}, double x = 0.0)
         : kind(k), time(t), elements(std::move(e)), value(x) {}
 };

@@ -24,6 +24,8 @@ void bind_failures(nb::module_& m) {
         .value("paradox", Kind::paradox, "elements: frictional elements; value: determinant")
         .value("closure", Kind::closure, "elements: the block of rows; value: gap")
         .value("step_size", Kind::step_size, "value: number of steps so far, when it would never end")
+        .value("stiff", Kind::stiff, "elements: the degree of freedom; value: rate")
+        .value("steps", Kind::steps, "value: number of steps, which is all that the run may take")
         .value("interrupted", Kind::interrupted);
     core_failure = PyErr_NewException("pin_nonideal._core.CoreFailure", nullptr, nullptr);
     m.attr("CoreFailure") = nb::steal(core_failure).inc_ref();

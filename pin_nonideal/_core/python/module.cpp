@@ -9,6 +9,7 @@
 #include "python/callbacks.hpp"
 #include "python/constraints.hpp"
 #include "python/failures.hpp"
+#include "python/followed.hpp"
 #include "python/program.hpp"
 #include "python/runs.hpp"
 #include "run/checkpoint.hpp"
@@ -26,6 +27,7 @@ NB_MODULE(_core, m) {
     bind_constraints(m, builder);
     nb::class_<Runner> runner = bind_runner(m);
     bind_runs(m, runner);
+    bind_followed(m);
     bind_program(m);
 
     // The friction program on arrays, for tests against enumeration.

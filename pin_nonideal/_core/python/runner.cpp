@@ -167,41 +167,6 @@ std::tuple<Numbers, Numbers, double, double, double> Runner::project(const Array
     return {to_numpy(q), to_numpy(v), found.before, found.after, found.rate};
 }
 
-Numbers Runner::derivative(double t, const Array& y_in, bool energy) {
-    System system(*p, *w, energy);
-    const VecX y = read_state(system, map(y_in));
-    VecX rate(system.ny);
-    choose_modes(t, {});
-    system.rate_of_evaluation(t, y, rate);
-    return to_numpy(rate.data(), system.ns);
-}
-
-std::pair<Numbers, double> Runner::project_outside(double t, const Array& y_in, bool with_energy) {
-    System system(*p, *w, with_energy);
-    VecX y = read_state(system, map(y_in));
-    const double before = energy();
-    project_anew(*p, *w, t, q, v);
-    normalize(p->mechanism, q.data());
-    y.head(system.nq) = q;
-    y.segment(system.nq, system.nv) = v;
-    return {to_numpy(y.data(), system.ns), energy() - before};
-}
-
-Outcome Runner::record(const Array& times, const Array2& states, const Array& moved, const RecordOptions& wanted,
-                       long steps) {
-    System system(*p, *w, wanted.energy);
-    Recording out;
-    Recorder recorder(system, wanted, out);
-    for (size_t k = 0; k < times.shape(0); ++k) {
-        const double* row = states.data() + k * states.shape(1);
-        const VecX y = read_state(system, Eigen::Map<const VecX>(row, states.shape(1)));
-        choose_modes(times.data()[k], {});
-        recorder.sample(times.data()[k], y, moved.data()[k], true);
-    }
-    out.steps = steps;
-    return {w->counters, std::move(out)};
-}
-
 Outcome Runner::simulate(const Array& q_in, const Array& v_in, const Options& options) {
     const VecX q0 = map(q_in), v0 = map(v_in);
     w->state.z = VecX::Zero(p->states);
@@ -223,23 +188,6 @@ Outcome Runner::resume(const nb::bytes& state, const Options& options) {
         pn::resume(*p, *w, bytes, options, recording);
     }
     return {w->counters, std::move(recording)};
-}
-
-VecX Runner::read_state(const System& system, const VecX& outside) {
-    VecX y = VecX::Zero(system.ny);
-    if (outside.size() != system.ns) throw std::invalid_argument("y does not fit the scene");
-    y.head(outside.size()) = outside;
-    q = y.head(system.nq);
-    v = system.velocity(y);
-    if (system.nz > 0) w->state.z = y.segment(system.nq + system.nv, system.nz);
-    w->now.has_override = false;
-    return y;
-}
-
-double Runner::energy() {
-    kinematics(p->mechanism, w->now.terms, q, v);
-    inertia(p->mechanism, w->now.terms);
-    return kinetic_energy(p->mechanism, w->now.terms, v) + potential_energy(p->mechanism, w->now.terms);
 }
 
 double Runner::time_evaluations(const Array& q_in, const Array& v_in, double t, int count) {
@@ -271,8 +219,6 @@ nb::class_<Runner> bind_runner(nb::module_& m) {
         .def("rows", &Runner::rows, "q"_a, "v"_a, "t"_a)
         .def("terms", &Runner::terms, "q"_a, "v"_a)
         .def("project", &Runner::project, "q"_a, "v"_a, "t"_a, "far"_a)
-        .def("derivative", &Runner::derivative, "t"_a, "y"_a, "energy"_a)
-        .def("project_outside", &Runner::project_outside, "t"_a, "y"_a, "energy"_a)
         .def("time_evaluations", &Runner::time_evaluations, "q"_a, "v"_a, "t"_a, "count"_a)
         .def_prop_ro("rank", &Runner::constraint_rank)
         // How the rows were factored last: smallest pivot, orthogonal road taken, redundant, refined.

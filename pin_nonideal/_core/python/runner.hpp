@@ -1,4 +1,4 @@
-// Evaluations of single states, what an integrator outside the core asks for, and one run after another.
+// Evaluations of single states, and one run after another.
 #pragma once
 
 #include <memory>
@@ -50,14 +50,6 @@ struct Runner {
                                                                  double far);
     double time_evaluations(const Array& q_in, const Array& v_in, double t, int count);
 
-    // For integrators outside the core: the rate of y = (q, v, states of laws, work of the ledger's columns).
-    Numbers derivative(double t, const Array& y_in, bool energy);
-    // Such a y put on the constraints, and the energy that this moved.
-    std::pair<Numbers, double> project_outside(double t, const Array& y_in, bool with_energy);
-    // Samples of such a run as the core records its own; `moved` is the energy moved by projection up to each.
-    Outcome record(const Array& times, const Array2& states, const Array& moved, const RecordOptions& options,
-                   long steps);
-
     Outcome simulate(const Array& q_in, const Array& v_in, const Options& options);
     Outcome resume(const nb::bytes& state, const Options& options);
 
@@ -66,9 +58,6 @@ private:
     void set(const Array& q_in, const Array& v_in, const std::optional<Array>& tau);
     // Modes by velocity, and at rest by the complementarity problem; or the ones given.
     void choose_modes(double t, const std::optional<std::vector<Mode>>& modes);
-    // Such a y with the core's watch of sticking elements behind it.
-    VecX read_state(const System& system, const VecX& outside);
-    double energy();
 };
 
 nb::class_<Runner> bind_runner(nb::module_& m);

@@ -15,52 +15,9 @@
 
 #include "dynamics/projection.hpp"
 #include "python/failures.hpp"
+#include "python/options.hpp"
 
 using namespace nanobind::literals;
-
-namespace nanobind::detail {
-
-// The one place that reads Python's RunOptions: all of them, or what a run records.
-constexpr auto run_options = const_name("pin_nonideal.runs.options.RunOptions");
-
-template <>
-struct type_caster<pn::RecordOptions> {
-    NB_TYPE_CASTER(pn::RecordOptions, run_options)
-
-    bool from_python(handle from, uint32_t, cleanup_list*) noexcept {
-        try {
-            const auto wanted = [&](const char* key) { return nanobind::cast<bool>(from.attr(key)); };
-            value = {wanted("a"), wanted("forces"), wanted("energy"), wanted("power")};
-            return true;
-        } catch (const std::exception&) {
-            return false;
-        }
-    }
-};
-
-template <>
-struct type_caster<pn::Options> {
-    NB_TYPE_CASTER(pn::Options, run_options)
-
-    bool from_python(handle from, uint32_t, cleanup_list*) noexcept {
-        try {
-            const auto number = [&](const char* key) { return nanobind::cast<double>(from.attr(key)); };
-            value.method = pn::method_named(nanobind::cast<std::string>(from.attr("method")));
-            value.t0 = number("t0");
-            value.duration = number("duration");
-            value.rtol = number("rtol");
-            value.dt = number("dt");
-            value.output_dt = number("output_dt");
-            pn::read_into(from.attr("atol"), value.atol);
-            value.record = nanobind::cast<pn::RecordOptions>(from);
-            return true;
-        } catch (const std::exception&) {
-            return false;
-        }
-    }
-};
-
-}  // namespace nanobind::detail
 
 namespace pn {
 
@@ -292,7 +249,9 @@ static void bind_outcome(nb::module_& m) {
 void bind_runs(nb::module_& m, nb::class_<Runner>& runner) {
     nb::class_<Method>(m, "Method")
         .def_prop_ro("name", [](const Method& method) { return std::string(method.name); })
-        .def_prop_ro("adaptive", &Method::adaptive);
+        .def_prop_ro("adaptive", &Method::adaptive)
+        .def_prop_ro("outside", &Method::outside)
+        .def_prop_ro("one_step", [](const Method& method) { return method.one_step; });
     m.def("methods", [] { return methods(); });
     bind_outcome(m);
     runner
@@ -307,8 +266,7 @@ void bind_runs(nb::module_& m, nb::class_<Runner>& runner) {
             watch(options, tick);
             keep(options, save, save_interval);
             return r.resume(state, options);
-        }, "state"_a, "options"_a, "tick"_a = nb::none(), "save"_a = nb::none(), "save_interval"_a = 0.0)
-        .def("record", &Runner::record, "times"_a, "states"_a, "moved"_a, "options"_a, "steps"_a);
+        }, "state"_a, "options"_a, "tick"_a = nb::none(), "save"_a = nb::none(), "save_interval"_a = 0.0);
     m.def("nearest_states", &nearest_states, "program"_a, "q"_a, "v"_a, "t"_a, "far"_a, "threads"_a);
     m.def("rollout", &rollout, "program"_a, "q"_a, "v"_a, "options"_a, "threads"_a);
 }

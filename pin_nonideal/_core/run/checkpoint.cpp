@@ -28,8 +28,9 @@ static void fields(Archive& a, RunState& x) {
 
 static void fields(Archive& a, Progress& x) {
     auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, recent_events, slip_at_start,
-           pulls] = x;
-    a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, slip_at_start, pulls);
+           pulls, stiff_steps, quiet_steps] = x;
+    a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, slip_at_start, pulls, stiff_steps,
+      quiet_steps);
     a.list(recent_events);
 }
 

@@ -143,7 +143,8 @@ std::vector<Watch> EventSearch::crossed() {
 
 EventSearch::Source EventSearch::source(const Watch& watch) const {
     if (watch.kind == Watch::Kind::contact) return Source::evaluation;
-    if (watch.kind == Watch::Kind::stick) return stepper_.method.order > 1 ? Source::shares : Source::evaluation;
+    const bool integrates_shares = stepper_.method.order > 1 && !stepper_.method.outside();
+    if (watch.kind == Watch::Kind::stick) return integrates_shares ? Source::shares : Source::evaluation;
     if (system_.on_constraints) return Source::evaluation;
     return p.blocks[p.frictions[watch.index].block].dof >= 0 ? Source::velocities : Source::kinematics;
 }

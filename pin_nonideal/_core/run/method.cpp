@@ -181,13 +181,33 @@ constexpr Method scheme(const char* name, Method::Scheme scheme) {
     return m;
 }
 
+// SciPy's, looked at in the middle of a step.
+constexpr double outside_C[] = {0.0, 0.5};
+constexpr Method outside(const char* name, bool one_step) {
+    Method m = scheme(name, Method::Scheme::outside);
+    m.order = 5;
+    m.stages = 2;
+    m.C = outside_C;
+    m.one_step = one_step;
+    return m;
+}
+
+constexpr Method stable_to(double length, Method m) {
+    m.stability = length;
+    return m;
+}
+
 constexpr Method list[] = {
-    with_terms(with_error(runge_kutta("dop853", 8, dop853_A, dop853_B, dop853_C), dop853_E5, dop853_E3),
-               dop853_A_dense, dop853_C_dense, dop853_D),
-    with_powers(with_error(runge_kutta("dopri5", 5, dopri5_A, dopri5_B, dopri5_C), dopri5_E), dopri5_P),
+    stable_to(6.1, with_terms(with_error(runge_kutta("dop853", 8, dop853_A, dop853_B, dop853_C), dop853_E5, dop853_E3),
+                              dop853_A_dense, dop853_C_dense, dop853_D)),
+    stable_to(3.25, with_powers(with_error(runge_kutta("dopri5", 5, dopri5_A, dopri5_B, dopri5_C), dopri5_E),
+                                dopri5_P)),
     runge_kutta("rk4", 4, rk4_A, rk4_B, rk4_C),
     scheme("semi_implicit_euler", Method::Scheme::semi_implicit_euler),
     scheme("moreau", Method::Scheme::moreau),
+    outside("Radau", true),
+    outside("BDF", false),
+    outside("LSODA", false),
 };
 
 }  // namespace

@@ -71,6 +71,8 @@ public:
     void interpolate(double part, VecX& y) const;
     // One number of it, and its change over the step at that rate.
     std::pair<double, double> interpolated(double part, int index) const;
+    // Where the last stage was evaluated, until the interpolant is made.
+    const VecX& last_stage() const { return stage_; }
 
 private:
     // Of the square of the coarse estimate in the size of both. [Hairer, Norsett, Wanner, eq. II.10.17]

@@ -56,6 +56,7 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
     : p(program), w(workspace), options(run_options), out(recording), t_end(options.t0 + options.duration),
       system(program, workspace, options.record.energy), stepper(options.method, system),
       norm(system, options.rtol, options.atol), control(options.method, options.rtol),
+      stiffness(system, stepper, *this, t_end, run_options.max_steps),
       locator(system, stepper, slip_at_start, pulls), moreau(system),
       recorder(system, options.record, recording), sample_(VecX::Zero(system.ny)) {
     y = rate = configured_y = sample_;
@@ -98,6 +99,7 @@ void Simulation::run() {
         }
         Proposal proposal = propose();
         while (!control_error(proposal, integrate(proposal))) proposal = propose();
+        stiffness.look();
         const std::optional<FoundEvent> event = locate_event();
         accept(proposal, event);
         record(event);
@@ -116,6 +118,8 @@ void Simulation::between_steps() {
     if (options.save && Clock::now() >= next_save) save();
     if (out.steps == early_steps && t - options.t0 < least_progress * options.duration)
         throw Failure(Failure::Kind::step_size, t, {}, static_cast<double>(out.steps));
+    if (options.max_steps > 0 && out.steps >= options.max_steps)
+        throw Failure(Failure::Kind::steps, t, {}, static_cast<double>(out.steps));
 }
 
 void Simulation::save() {
@@ -268,6 +272,7 @@ void Simulation::bridge_cluster(int element) {
     if (recent_events.size() > chatter_events) recent_events.erase(recent_events.begin());
     if (recent_events.size() < chatter_events || t - recent_events.front() > chatter_time) return;
     recent_events.clear();
+    stiffness.require_time_steps(chatter_time / chatter_steps);
     out.events.push_back({t, Event::Kind::chatter, element});
     const double stop = std::min(t_end, t + chatter_time);
     while (t < stop) step_in_time(stop, chatter_time / chatter_steps);

@@ -9,6 +9,7 @@
 #include "run/event_location.hpp"
 #include "run/moreau.hpp"
 #include "run/step_control.hpp"
+#include "run/stiffness.hpp"
 
 namespace pn {
 
@@ -19,6 +20,7 @@ struct Options {
     double t0 = 0.0, duration = 0.0;
     double rtol = 1e-8, dt = 0.0, output_dt = 0.0;  // output_dt 0: every accepted step
     VecX atol;                                      // 2 nv + states
+    long max_steps = 0;                             // 0: as many as it takes, and fewer of a stiff scene
     RecordOptions record;
     std::function<void(double t)> tick;  // progress and interruption, called now and then between steps
     std::function<void(const std::string& state)> save;  // writes a checkpoint; empty: none
@@ -31,7 +33,7 @@ void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, co
 // when the state does not fit.
 void resume(const Program& p, Workspace& w, const std::string& state, const Options& options, Recording& out);
 
-class Simulation : Progress {
+class Simulation : protected Progress {
 public:
     Simulation(const Program& p, Workspace& w, const Options& options, Recording& out);
     void start(const VecX& q0, const VecX& v0);
@@ -39,7 +41,7 @@ public:
     // To the end, from the start or from a restored state.
     void run();
 
-private:
+protected:
     struct Proposal {
         double size;
         double stop;  // the step must not go beyond
@@ -82,6 +84,7 @@ private:
     Stepper stepper;
     ErrorNorm norm;
     StepControl control;
+    StiffnessGuard stiffness;
     EventLocator locator;
     Moreau moreau;
     Recorder recorder;

@@ -6,6 +6,7 @@ Stepper::Stepper(const Method& chosen, System& system)
     : Step(chosen.stages, chosen.rates(), system.ny), method(chosen), system_(system) {
     if (method.scheme == Method::Scheme::runge_kutta) scheme_.emplace<RungeKutta>(method, *this);
     if (method.scheme == Method::Scheme::semi_implicit_euler) scheme_.emplace<SemiImplicitEuler>(*this);
+    if (method.outside()) scheme_.emplace<OutsideStep>(method, *this);
 }
 
 // Calls `use` with the stepper that the method has; time stepping is no business of these.
@@ -13,6 +14,7 @@ template <class Scheme, class Use>
 static void with_scheme(Scheme& scheme, const Use& use) {
     if (auto* runge_kutta = std::get_if<RungeKutta>(&scheme)) use(*runge_kutta);
     else if (auto* euler = std::get_if<SemiImplicitEuler>(&scheme)) use(*euler);
+    else if (auto* outside = std::get_if<OutsideStep>(&scheme)) use(*outside);
 }
 
 void Stepper::take(double t, double size) {
@@ -27,6 +29,13 @@ void Stepper::move_end(double dt) {
     y1 += dt * end_rate();
     system_.normalize(y1);
     has_interpolant_ = false;
+}
+
+void Stepper::follow(double t, double size, OutsideStep::Interpolant interpolant) {
+    auto& outside = std::get<OutsideStep>(scheme_);
+    outside.set_interpolant(std::move(interpolant));
+    take(t, size);
+    if (system_.ne > 0) outside.look_inside(system_);
 }
 
 double Stepper::error(ErrorNorm& norm) {

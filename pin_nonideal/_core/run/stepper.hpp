@@ -4,6 +4,7 @@
 #include <variant>
 
 #include "run/error_norm.hpp"
+#include "run/outside_step.hpp"
 #include "run/runge_kutta.hpp"
 #include "run/semi_implicit_euler.hpp"
 
@@ -19,8 +20,12 @@ public:
     void take(double t, double size);
     // Moves the end by a time so short that the rate there, which must be known, does not change. The interpolant is lost.
     void move_end(double dt);
+    // The step from t that an integrator outside has taken, and the rates inside it.
+    void follow(double t, double size, OutsideStep::Interpolant interpolant);
     // Norm of the error estimate, 1 at the tolerance; 0 of methods without one.
     double error(ErrorNorm& norm);
+    // What the method's last stage was evaluated at, until there is an interpolant; of explicit Runge-Kutta methods.
+    const VecX& last_stage() const { return std::get<RungeKutta>(scheme_).last_stage(); }
     // What the projection of the end of an accepted step has shown, for methods that use it.
     void learn();
 
@@ -34,7 +39,7 @@ public:
 
 private:
     System& system_;
-    std::variant<std::monostate, RungeKutta, SemiImplicitEuler> scheme_;
+    std::variant<std::monostate, RungeKutta, SemiImplicitEuler, OutsideStep> scheme_;
     bool has_interpolant_ = false;
 };
 

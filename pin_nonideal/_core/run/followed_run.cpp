@@ -1,0 +1,51 @@
+#include "run/followed_run.hpp"
+
+#include <algorithm>
+
+#include "dynamics/projection.hpp"
+
+namespace pn {
+
+// Relative step of central differences: the cube root of the rounding, where rounding and curvature cost the same.
+constexpr double difference = 6e-6;
+
+void FollowedRun::derivative(double at, const VecX& y_outside, VecX& rate_outside) {
+    inside_ = inside_rate_ = VecX::Zero(system.ny);
+    inside_.head(system.ns) = y_outside;
+    system.derivative(at, inside_, inside_rate_);
+    rate_outside = inside_rate_.head(system.ns);
+}
+
+// The steps of positions stay bounded when a joint has turned many times.
+MatX FollowedRun::jacobian(double at, const VecX& y_outside) {
+    const int n = system.ns;
+    MatX out = MatX::Zero(n, n);
+    VecX ahead = y_outside, back = y_outside, rate_ahead(n), rate_back(n);
+    for (int k = 0; k < n - system.nw; ++k) {
+        const double step = difference * (k < system.nq ? 1.0 : std::max(1.0, std::abs(y_outside[k])));
+        ahead[k] += step;
+        back[k] -= step;
+        derivative(at, ahead, rate_ahead);
+        derivative(at, back, rate_back);
+        out.col(k) = (rate_ahead - rate_back) / (ahead[k] - back[k]);
+        ahead[k] = back[k] = y_outside[k];
+    }
+    return out;
+}
+
+bool FollowedRun::follow(double end, const OutsideStep::Interpolant& interpolant) {
+    between_steps();
+    moved_energy = moved_before_;
+    stepper.y0 = y;
+    stepper.start_rate() = rate;
+    stepper.follow(t, end - t, interpolant);
+    system.project_and_evaluate(end, stepper.y1, stepper.end_rate());
+    const std::optional<FoundEvent> event = locate_event();
+    accept({stepper.h, end, true}, event);
+    record(event);
+    system.on_constraints = w.now.rows.distance < near_singular && !w.now.rows.blocks.empty();
+    if (event || options.method.one_step) moved_before_ = moved_energy;
+    return event.has_value();
+}
+
+}  // namespace pn
