@@ -4,26 +4,28 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from .checks import sequence
+from .checks import choice, sequence
 from .errors import InputError, LoadingError, UnknownNameError, nearest
-from .formats.assembly import scene_arguments
+from .formats.assembly import Start, scene_arguments
 from .formats.generators import GENERATORS
-from .formats.mjcf import read_mjcf
 from .formats.robot_yaml import MODEL_KEYS, check_keys, optional_string, read_yaml
 from .formats.urdf import RobotFile, read_mimics, read_urdf
+from .mjcf.reader import read_mjcf
+from .mjcf.told import ALLOWED
 from .scene import Scene, loaded
 from .types import Model, Table
 
 FILE_PARAMETERS = ("free_flyer", "package_dirs", "merge_ball_joints")
+MJCF_PARAMETERS = ("allow", "ctrl")
 
 
-def load(name: str | os.PathLike[str], *, terms: str = "core", **parameters: Any) -> Scene:
+def load(name: str | os.PathLike[str], *, terms: str = "core", q0: Start = None, **parameters: Any) -> Scene:
     """Loads a robot as a scene.
 
     `name` is one of
@@ -40,9 +42,14 @@ def load(name: str | os.PathLike[str], *, terms: str = "core", **parameters: Any
     Args:
         name: see above.
         terms: who computes M(q) and the bias forces, see `Scene`.
+        q0: initial configuration in place of the file's: numbers (nq,), a table by joint name that changes
+            some of them, or the name of a reference configuration (of a keyframe of an MJCF file, whose
+            velocities and controls come along).
         **parameters: of a generated robot, such as N for "n_four_bar"; of URDF files and folders:
             `free_flyer` (bool, a floating base), `package_dirs` (folders for package:// paths),
-            `merge_ball_joints` (bool, True).
+            `merge_ball_joints` (bool, True); of MJCF files: `allow` (what may be left out although it moves
+            the robot, such as ("fluid", "muscle")), `ctrl` (controls of the actuators: numbers (nu,), a table
+            by actuator's name, or a function (t, q, v) -> (nu,); zero when left out).
 
     Returns:
         The scene; `simulate` takes it.
@@ -56,8 +63,31 @@ def load(name: str | os.PathLike[str], *, terms: str = "core", **parameters: Any
     text = os.fspath(name) if isinstance(name, (str, os.PathLike)) else None
     if not isinstance(text, str) or not text or "\0" in text:
         raise InputError(f"name must be the name of a robot or a path; got {name!r}")
-    scene = Scene(**_load(name, text, parameters), terms=terms)
-    return loaded(scene, _origin(text, parameters if terms == "core" else {**parameters, "terms": terms}))
+    found = _find(name, text, parameters)
+    arguments = scene_arguments(found.robot, found.table, found.name, merge=found.merge, start=q0)
+    given = dict(parameters)
+    if terms != "core":
+        given["terms"] = terms
+    if q0 is not None:
+        given["q0"] = q0 if isinstance(q0, (str, Mapping)) else np.asarray(q0).tolist()
+    scene = Scene(**arguments, terms=terms)
+    return loaded(scene, _origin(text, given), found.robot.contact_friction)
+
+
+class Found(NamedTuple):
+    """A robot's file as read, with what stands beside it.
+
+    Attributes:
+        robot: what the file holds.
+        table: content of robot.yaml, {} when there is none.
+        name: name of the scene.
+        merge: merge three revolutes with massless links between into ball joints.
+    """
+
+    robot: RobotFile
+    table: Table
+    name: str
+    merge: bool = False
 
 
 def _origin(text: str, parameters: Table) -> Table | None:
@@ -76,7 +106,7 @@ def _origin(text: str, parameters: Table) -> Table | None:
         return None
 
 
-def _load(name: str | os.PathLike[str], text: str, parameters: Table) -> Table:
+def _find(name: str | os.PathLike[str], text: str, parameters: Table) -> Found:
     path = Path(text).expanduser()
     folders = robot_folders()
     if text in folders:
@@ -91,7 +121,7 @@ def _load(name: str | os.PathLike[str], text: str, parameters: Table) -> Table:
     ):
         return _load_file(path, parameters)
     check_parameters(parameters, (), text)
-    return scene_arguments(_example_robot(text, list(folders)), {}, text, merge=False)
+    return Found(_example_robot(text, list(folders)), {}, text)
 
 
 def robots() -> list[tuple[str, str]]:
@@ -136,21 +166,28 @@ def _file_options(parameters: Table, name: str) -> tuple[Table, bool]:
     return options, parameters.get("merge_ball_joints", True)
 
 
-def _load_file(path: Path, parameters: Table) -> Table:
+def _mjcf_options(parameters: Table, name: str) -> Table:
+    check_parameters(parameters, MJCF_PARAMETERS, name)
+    allow = parameters.get("allow", ())
+    for key in sequence("allow", [allow] if isinstance(allow, str) else allow):
+        choice("allow", key, ALLOWED)
+    return {**parameters, "allow": (allow,) if isinstance(allow, str) else tuple(allow)}
+
+
+def _load_file(path: Path, parameters: Table) -> Found:
     if not path.is_file():
         raise LoadingError(f'no file or folder "{path}"; give a path that exists, or the name of a robot')
     if path.suffix == ".urdf":
         options, merge = _file_options(parameters, path.name)
-        return scene_arguments(read_urdf(path, **options), {}, path.stem, merge=merge)
+        return Found(read_urdf(path, **options), {}, path.stem, merge)
     if path.suffix in (".xml", ".mjcf"):
-        check_parameters(parameters, (), path.name)
-        return scene_arguments(read_mjcf(path), {}, path.stem, merge=False)
+        return Found(read_mjcf(path, **_mjcf_options(parameters, path.name)), {}, path.stem)
     raise LoadingError(
         f'"{path}" must be a folder, a .urdf file or a .xml file (MJCF); got "{path.suffix or path.name}"'
     )
 
 
-def _load_folder(folder: Path, parameters: Table) -> Table:
+def _load_folder(folder: Path, parameters: Table) -> Found:
     """A folder with robot.yaml, robot.urdf, or both."""
     name = folder.resolve().name
     yaml_path = folder / "robot.yaml"
@@ -174,11 +211,11 @@ def _load_folder(folder: Path, parameters: Table) -> Table:
     if "example_robot_data" in entry:
         check_parameters(parameters, (), name)
         robot = _example_robot(entry["example_robot_data"], [])
-        return scene_arguments(robot, table, name, merge=False)
+        return Found(robot, table, name)
     return _from_urdf(folder, entry, table, parameters, name)
 
 
-def _from_urdf(folder: Path, entry: Table, table: Table, parameters: Table, name: str) -> Table:
+def _from_urdf(folder: Path, entry: Table, table: Table, parameters: Table, name: str) -> Found:
     urdf = folder / entry.get("urdf", "robot.urdf")
     if not urdf.resolve().is_relative_to(folder.resolve()):
         raise LoadingError(f'model: urdf must lie in the folder "{folder}"; got "{entry["urdf"]}"')
@@ -188,7 +225,7 @@ def _from_urdf(folder: Path, entry: Table, table: Table, parameters: Table, name
         raise LoadingError(f'"{folder}" must hold a {urdf.name}; there is none{hint}')
     options, merge = _file_options(parameters, name)
     options.setdefault("free_flyer", _flag(entry, "free_flyer", name))
-    return scene_arguments(read_urdf(urdf, **options), table, name, merge=merge)
+    return Found(read_urdf(urdf, **options), table, name, merge)
 
 
 def _flag(entry: Table, key: str, name: str) -> bool:
@@ -198,7 +235,7 @@ def _flag(entry: Table, key: str, name: str) -> bool:
     return value
 
 
-def _generated(entry: Table, table: Table, parameters: Table, name: str, path: Path) -> Table:
+def _generated(entry: Table, table: Table, parameters: Table, name: str, path: Path) -> Found:
     """A robot that a function of this package builds from parameters."""
     key = entry["generator"]
     if key not in GENERATORS:
@@ -210,7 +247,7 @@ def _generated(entry: Table, table: Table, parameters: Table, name: str, path: P
     known = tuple(generator.__kwdefaults__ or ())
     check_keys(defaults, known, f'"{path}": model: parameters')
     check_parameters(parameters, known, name)
-    return scene_arguments(generator(**{**defaults, **parameters}), table, name)
+    return Found(generator(**{**defaults, **parameters}), table, name, True)
 
 
 def _example_robot(name: str, others: list[str]) -> RobotFile:

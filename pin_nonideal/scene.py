@@ -47,8 +47,8 @@ class Scene:
         q0: initial configuration, (nq,); the neutral one when None.  Frames held to the world are held where
             they are here.
         v0: initial velocity, (nv,); zero when None.
-        visual_model: pinocchio.GeometryModel for the replay.
-        collision_model: pinocchio.GeometryModel.
+        visual_model: pinocchio.GeometryModel for the replay, or a function that makes it when asked for.
+        collision_model: pinocchio.GeometryModel, or such a function.
         name: shown in messages and pages; the model's own when None.
         notes: remarks of the loader, shown by `report`.
         source: where the robot comes from.
@@ -66,6 +66,8 @@ class Scene:
         element_names: names of the frictional elements, in the order of `modes`.
         law_names: names of the laws, in the order of the ledger's columns.
         dropped: (name, row, reason) of rows that can never act.
+        contact_friction: coefficients of sliding, spinning and rolling that the robot's file gives its
+            collision geometry, by name.
     """
 
     def __init__(
@@ -79,8 +81,8 @@ class Scene:
         actuation: Actuation | None = None,
         q0: ArrayLike | None = None,
         v0: ArrayLike | None = None,
-        visual_model: GeometryModel | None = None,
-        collision_model: GeometryModel | None = None,
+        visual_model: GeometryModel | Callable[[], GeometryModel] | None = None,
+        collision_model: GeometryModel | Callable[[], GeometryModel] | None = None,
         name: str | None = None,
         notes: Sequence[str] = (),
         source: str | None = None,
@@ -90,7 +92,7 @@ class Scene:
         if not isinstance(model, pin.Model):
             raise InputError(f"Scene: model must be a pinocchio.Model; got {type(model).__name__}")
         for what, geometry in (("visual_model", visual_model), ("collision_model", collision_model)):
-            if geometry is not None and not isinstance(geometry, pin.GeometryModel):
+            if not (geometry is None or callable(geometry) or isinstance(geometry, pin.GeometryModel)):
                 raise InputError(
                     f"Scene: {what} must be a pinocchio.GeometryModel; got {type(geometry).__name__}"
                 )
@@ -99,7 +101,8 @@ class Scene:
         self.constraints, self.laws = sequence("constraints", constraints), sequence("laws", laws)
         self.contacts, self.forces = sequence("contacts", contacts), sequence("forces", forces)
         self.actuation, self.terms = actuation, choice("Scene: terms", terms, TERMS)
-        self.visual_model, self.collision_model = visual_model, collision_model
+        self._visual, self._collision = visual_model, collision_model
+        self.contact_friction: dict[str, tuple[float, float, float]] = {}
         self.notes = list(sequence("notes", notes))
         self.source, self.licence = (
             optional_text(f"Scene: {what}", value)
@@ -130,6 +133,31 @@ class Scene:
             f'<Scene "{self.name}": nv {self.model.nv}, {len(self.constraints)} constraints, '
             f"{len(self.laws)} laws, {len(self.contacts)} contacts>"
         )
+
+    @property
+    def visual_model(self) -> GeometryModel | None:
+        """pinocchio.GeometryModel for the replay, or None; meshes of a file are read when first asked for."""
+        self._visual = self._read(self._visual)
+        return self._visual
+
+    @property
+    def collision_model(self) -> GeometryModel | None:
+        """pinocchio.GeometryModel for collisions, or None; meshes are read when first asked for."""
+        self._collision = self._read(self._collision)
+        return self._collision
+
+    def _read(self, shapes: GeometryModel | Callable[[], GeometryModel] | None) -> GeometryModel | None:
+        """The geometry itself, made now where only the means to make it were given."""
+        if not callable(shapes):
+            return shapes
+        geometry = shapes()
+        if not isinstance(geometry, pin.GeometryModel):
+            raise InputError(
+                "Scene: what makes a geometry must return a pinocchio.GeometryModel; "
+                f"got {type(geometry).__name__}"
+            )
+        self.notes += [note for note in getattr(shapes, "notes", ()) if note not in self.notes]
+        return geometry
 
     # --- states ---------------------------------------------------------------------------------------------
 
@@ -282,12 +310,15 @@ class Scene:
         return report(self._compiled, self.name, self._runner.rank, notes)
 
 
-def loaded(scene: Scene, origin: Table | None) -> Scene:
+def loaded(
+    scene: Scene, origin: Table | None, friction: dict[str, tuple[float, float, float]] | None = None
+) -> Scene:
     """The scene, which remembers what `load` made it from, so that `resume` can load it again.
 
     Args:
         scene: as loaded.
         origin: name and parameters, or None when a file cannot hold them.
+        friction: coefficients of the file's collision geometry.
     """
-    scene._origin = origin
+    scene._origin, scene.contact_friction = origin, friction or {}
     return scene

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.constraints import Distance, FrameAnchor, JointCoupling, PointAnchor, PrescribedMotion
+from pin_nonideal.constraints import FrameAnchor, JointCoupling, PointAnchor, PrescribedMotion, UserConstraint
 
 from .refusals import refuses
 
@@ -48,8 +50,12 @@ def test_every_root_body_arrives(tmp_path):
 
 
 def test_bodies_and_joints_without_names_arrive(tmp_path):
-    bodies = '<body><joint/><geom size="0.1"/><body><freejoint/><geom size="0.1"/></body></body>'
-    assert pn.load(write(tmp_path, bodies=bodies)).model.nv == 7
+    bodies = (
+        '<body><joint/><geom size="0.1"/></body><body name="joint_0"><freejoint/><geom size="0.1"/></body>'
+    )
+    model = pn.load(write(tmp_path, bodies=bodies)).model
+    assert model.nv == 7
+    assert list(model.names)[1:] == ["joint_0", "joint_1"]
 
 
 def test_several_joints_of_one_body_stay_single(tmp_path):
@@ -102,8 +108,11 @@ def test_connect_to_the_world(tmp_path):
 
 def test_connect_and_weld_of_sites(tmp_path):
     equality = '<connect site1="rod_tip" site2="rocker_tip"/><weld site1="rod_tip" site2="rocker_tip"/>'
-    connect, weld = pn.load(write(tmp_path, equality)).constraints
-    assert (connect.frame1, connect.frame2) == (weld.frame1, weld.frame2) == ("rod_tip", "rocker_tip")
+    scene = pn.load(write(tmp_path, equality))
+    sites = frame_places(scene, "rod_tip", "rocker_tip")
+    for anchor in scene.constraints:
+        for place, site in zip(frame_places(scene, anchor.frame1, anchor.frame2), sites, strict=True):
+            np.testing.assert_allclose(place.homogeneous, site.homogeneous, atol=ROUNDING)
 
 
 def test_weld_holds_the_pose_at_the_reference(tmp_path):
@@ -135,80 +144,56 @@ def test_joint_equalities_are_taken_from_the_reference_positions(tmp_path):
     assert held.function(3.0) == (0.75, 0.0, 0.0)
 
 
-def test_distance_of_spheres(tmp_path):
-    scene = pn.load(write(tmp_path, '<distance geom1="knob" geom2="ball" distance="0.5"/>'))
-    (rod,) = scene.constraints
-    assert isinstance(rod, Distance)
-    assert rod.length == pytest.approx(0.5 + 0.1 + 0.2, rel=1e-15)
-    one, two = frame_places(scene, rod.frame1, rod.frame2)
-    np.testing.assert_allclose(one.translation, [0.5, 0, 1], atol=ROUNDING)
-    np.testing.assert_allclose(two.translation, [2, 0, 0.75], atol=ROUNDING)
-
-
 def test_what_is_left_out_is_noted(tmp_path):
     equality = """<connect name="off" body1="rod" anchor="1 0 0" active="false"/>
         <connect name="soft" body1="rod" anchor="1 0 0" solref="0.1 1"/>"""
-    scene = pn.load(write(tmp_path, equality, tail='<actuator><motor joint="rod_joint"/></actuator>'))
+    scene = pn.load(write(tmp_path, equality))
     assert [c.name for c in scene.constraints] == ["soft"]
     assert 'equality "off" is inactive in the MJCF file and left out' in scene.notes
     assert "solref and solimp of soft are not used: constraints here are exact, not soft" in scene.notes
-    assert "<actuator> of the MJCF file is not read" in scene.notes
+
+
+def test_joint_equalities_of_higher_order_are_rows(tmp_path):
+    equality = '<joint joint1="rod_joint" joint2="crank_joint" polycoef="0.1 1 2 0 0"/>'
+    (row,) = pn.load(write(tmp_path, equality)).constraints
+    assert isinstance(row, UserConstraint)
+    q = np.array([0.25 + 0.3, 0.1 + 0.3 + 2 * 0.3**2, 0.0])  # the crank's reference is 0.25
+    np.testing.assert_allclose(row.residual(0.0, q), [0.0], atol=ROUNDING)
 
 
 EQUALITY_REFUSED = {
-    "tendon": (
-        '<tendon tendon1="t"/>',
-        "<tendon> cannot be honored; only connect, weld, joint, distance can",
-    ),
-    "flex": ('<flex flex="f"/>', "<flex> cannot be honored"),
-    "unknown body": ('<connect body1="rodd" anchor="0 0 0"/>', 'no body "rodd"; nearest: "rod"'),
-    "unknown site": ('<weld site1="rod_tip" site2="tip"/>', 'no site "tip"; nearest: "rod_tip"'),
-    "unknown joint": ('<joint joint1="rod_join"/>', 'no joint "rod_join"; nearest: "rod_joint"'),
-    "no anchor": ('<connect body1="rod"/>', "connect needs an anchor"),
-    "anchor nan": ('<connect body1="rod" anchor="0 nan 0"/>', 'anchor must be finite; got "0 nan 0"'),
-    "nonlinear": (
-        '<joint joint1="rod_joint" joint2="crank_joint" polycoef="0 1 2 0 0"/>',
-        "polycoef must be linear (c2 = c3 = c4 = 0) to become a coupling; got 0 1 2 0 0",
-    ),
-    "unknown geom": ('<distance geom1="knb" geom2="ball"/>', 'no geom "knb"; nearest: "knob"'),
-    "touching centers": (
-        '<distance geom1="knob" geom2="ball" distance="-1"/>',
-        "must be positive; got -0.7 m",
-    ),
+    "unknown body": ('<connect body1="rodd" anchor="0 0 0"/>', "cannot be compiled by MuJoCo: unknown"),
+    "no anchor": ('<connect body1="rod"/>', "cannot be read by MuJoCo: XML Error"),
 }
 
 
 @pytest.mark.parametrize(("equality", "message"), EQUALITY_REFUSED.values(), ids=EQUALITY_REFUSED)
-def test_equalities_that_cannot_be_honored_are_errors(tmp_path, equality, message):
+def test_equalities_that_mujoco_refuses_are_errors(tmp_path, equality, message):
     with refuses(message):
         pn.load(write(tmp_path, equality))
 
 
-def test_distance_of_other_shapes_is_an_error(tmp_path):
-    bodies = CRANK + ROCKER.replace('type="sphere" size="0.2"', 'type="box" size="0.2 0.2 0.2"')
-    with refuses('distance can be honored between spheres only; geom "ball" is a box'):
-        pn.load(write(tmp_path, '<distance geom1="knob" geom2="ball"/>', bodies))
-
-
 FILE_REFUSED = {
-    "include": (
-        '<include file="other.xml"/>' + CRANK,
-        "<include> is not read; write its content out in this file",
-    ),
-    "frame": (f'<frame pos="0 0 1">{CRANK}</frame>', "<frame> is not read"),
-    "no body": ('<geom size="1"/>', "must have a <worldbody> with at least one <body>"),
+    "include": ('<include file="other.xml"/>' + CRANK, "other.xml"),
     "twice the same joint": (
         CRANK + ROCKER.replace("rocker_joint", "rod_joint"),
-        '"rod_joint" appears twice',
+        "repeated name 'rod_joint'",
     ),
-    "unknown element": (CRANK.replace("<geom", "<sprout/><geom", 1), '<sprout> in body "crank" is not read'),
+    "unknown element": (CRANK.replace("<geom", "<sprout/><geom", 1), "sprout"),
+    "no mass": ('<body name="a"><joint/></body>', "mass and inertia of moving bodies must be larger"),
 }
 
 
 @pytest.mark.parametrize(("bodies", "message"), FILE_REFUSED.values(), ids=FILE_REFUSED)
-def test_bodies_that_cannot_be_read_are_errors(tmp_path, bodies, message):
+def test_bodies_that_mujoco_refuses_are_errors(tmp_path, bodies, message):
     with refuses(message):
         pn.load(write(tmp_path, bodies=bodies))
+
+
+def test_without_mujoco_the_error_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with refuses("pip install 'pin-nonideal[mjcf]'"):
+        pn.load(write(tmp_path))
 
 
 def test_another_xml_file_is_refused(tmp_path):
@@ -225,6 +210,86 @@ def test_truncated_mjcf_never_loads(tmp_path):
             pn.load(tmp_path / "cut.xml")
 
 
+SHARED = """<default><geom density="500"/></default><worldbody><frame pos="0 0 1" euler="0 0 90">
+    <body name="base"><joint name="first" axis="0 1 0"/><geom size="0.1" contype="0"
+    conaffinity="0"/></body></frame>
+    <replicate count="2" offset="1 0 0"><body name="arm" pos="0 1 0"><joint name="j" type="ball"/>
+    <geom type="box" size="0.1 0.2 0.3" pos="0.2 0 0"/></body></replicate></worldbody>"""
+
+
+def test_include_frame_replicate_and_several_sections_are_read_as_mujoco_reads_them(tmp_path):
+    (tmp_path / "shared.xml").write_text(f"<mujocoinclude>{SHARED}</mujocoinclude>")
+    tail = (
+        '<worldbody><body name="late"><joint name="k"/><geom size="0.1" density="1000"/></body></worldbody>'
+    )
+    (tmp_path / "robot.xml").write_text(f'<mujoco><include file="shared.xml"/>{tail}</mujoco>')
+    scene = pn.load(tmp_path / "robot.xml")
+    assert list(scene.model.names)[1:] == ["first", "j0", "j1", "k"]
+    masses = [scene.model.inertias[j].mass for j in range(1, 5)]
+    ball, box = 4.0 / 3.0 * np.pi * 0.1**3, 0.2 * 0.4 * 0.6
+    np.testing.assert_allclose(masses, [500 * ball, 500 * box, 500 * box, 1000 * ball], rtol=ROUNDING)
+
+
+def test_keyframes_are_named_starts(tmp_path):
+    tail = """<actuator><motor name="drive" joint="rod_joint"/></actuator><keyframe>
+        <key name="home" qpos="0.5 0.1 0.2" qvel="1 2 3" ctrl="0.7"/></keyframe>"""
+    file = write(tmp_path, tail=tail)
+    scene = pn.load(file, q0="home")
+    np.testing.assert_array_equal(scene.q0, [0.5, 0.1, 0.2])
+    np.testing.assert_array_equal(scene.v0, [1, 2, 3])
+    np.testing.assert_array_equal(scene.actuation.ctrl, [0.7])
+    np.testing.assert_array_equal(pn.load(file).q0, [0.25, 0, 0])
+    np.testing.assert_array_equal(pn.load(file, q0="home", ctrl={"drive": 0.2}).actuation.ctrl, [0.2])
+    np.testing.assert_array_equal(pn.load(file, q0={"rod_joint": 0.4}).q0, [0.25, 0.4, 0])
+    with refuses('load: q0: no reference configuration "hoem"; nearest: "home"', pn.InputError):
+        pn.load(file, q0="hoem")
+    with refuses('ctrl: no actuator "driv"; nearest: "drive"', pn.UnknownNameError):
+        pn.load(file, ctrl={"driv": 1.0})
+    with refuses("ctrl must have shape (1,); got shape (2,)", pn.InputError):
+        pn.load(file, ctrl=[1.0, 2.0])
+
+
+def test_controls_drive_a_run(tmp_path):
+    """A motor's constant control is a constant torque; a function of time is heeded too."""
+    body = '<body><joint name="j"/><inertial pos="0 0 0" mass="1" diaginertia="2 2 2"/></body>'
+    tail = '<actuator><motor joint="j" gear="3" ctrlrange="-1 1"/></actuator>'
+    file = write(tmp_path, bodies=body, tail=tail, head='<option gravity="0 0 0"/>')
+    run = pn.simulate(pn.load(file, ctrl=[5.0]), 2.0)
+    assert run.q[-1, 0] == pytest.approx(
+        0.5 * (3.0 * 1.0 / 2.0) * 4.0, rel=1e-9
+    )  # the control is cut off at 1
+    run = pn.simulate(pn.load(file, ctrl=lambda t, q, v: [0.5 * t]), 2.0, rtol=1e-9, atol=1e-9)
+    assert run.v[-1, 0] == pytest.approx(3.0 * 0.5 * 2.0**2 / 2.0 / 2.0, rel=1e-8)
+
+
+ACTIVATIONS = {
+    "filter": ('dyntype="filter" dynprm="0.5"', lambda t: 0.8 * (1.0 - np.exp(-t / 0.5))),
+    "exact filter": ('dyntype="filterexact" dynprm="0.5"', lambda t: 0.8 * (1.0 - np.exp(-t / 0.5))),
+    "integrator": ('dyntype="integrator" actlimited="true" actrange="-1 1"', lambda t: min(0.8 * t, 1.0)),
+}
+
+
+@pytest.mark.parametrize(("kind", "act"), ACTIVATIONS.values(), ids=ACTIVATIONS)
+def test_activations_follow_a_constant_control(tmp_path, kind, act):
+    tail = f'<actuator><general joint="rod_joint" gainprm="2" {kind}/></actuator>'
+    file = write(tmp_path, tail=tail)
+    scene = pn.load(file, ctrl=[0.8])
+    for t in (0.0, 0.3, 2.0):
+        tau = scene.actuation(t, scene.q0, scene.v0)
+        np.testing.assert_allclose(tau, [0.0, 2.0 * act(t), 0.0], atol=ROUNDING)
+    with refuses("ctrl must be constant for actuators with an activation", pn.InputError):
+        pn.load(file, ctrl=lambda t, q, v: [1.0])
+
+
+def test_a_name_that_body_joint_and_site_share_means_the_body(tmp_path):
+    inside = '<joint name="arm" pos="0 0 1"/><geom size="0.1"/><site name="arm" pos="1 0 0"/>'
+    model = pn.load(write(tmp_path, bodies=f'<body name="arm" pos="0 0 0">{inside}</body>')).model
+    scene = pn.Scene(model, constraints=[pn.PointAnchor("arm", "universe", axes="z")])
+    frame = model.frames[scene.anchor_frames[0][1]]
+    assert (frame.type, frame.parentJoint) == (pin.FrameType.BODY, 1)
+    np.testing.assert_array_equal(frame.placement.translation, [0, 0, -1])
+
+
 def test_missing_mesh_is_a_note_where_the_mass_is_known(tmp_path):
     head = '<asset><mesh name="hull" file="hull.stl"/></asset>'
     inertial = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
@@ -233,3 +298,49 @@ def test_missing_mesh_is_a_note_where_the_mass_is_known(tmp_path):
     assert 'mesh "hull.stl" was not found; its shape is left out' in scene.notes
     with refuses('body "a" has its mass from mesh "hull.stl", which was not found'):
         pn.load(write(tmp_path, bodies=bodies.replace(inertial, ""), head=head))
+
+
+TETRAHEDRON = """v 0 0 0
+v 1 0 0
+v 0 1 0
+v 0 0 1
+f 1 3 2
+f 1 2 4
+f 1 4 3
+f 2 3 4
+"""
+
+
+def test_meshes_are_read_when_a_replay_asks_for_them(tmp_path):
+    (tmp_path / "hull.obj").write_text(TETRAHEDRON)
+    head = '<asset><mesh name="hull" file="hull.obj"/></asset>'
+    inertial = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+    bodies = f"""<geom name="floor" type="plane" size="0 0 1"/><body name="a" pos="0 0 2"><joint name="j"/>
+        {inertial}<geom name="skin" type="mesh" mesh="hull" rgba="1 0 0 1"/>
+        <geom name="hidden" size="0.1" group="3"/></body>"""
+    scene = pn.load(write(tmp_path, bodies=bodies, head=head))
+    shapes = {item.name: item for item in scene.visual_model.geometryObjects}
+    assert sorted(shapes) == ["floor", "skin"]
+    np.testing.assert_array_equal(shapes["skin"].meshColor, [1, 0, 0, 1])
+    data = scene.model.createData()
+    pin.forwardKinematics(scene.model, data, scene.q0)
+    place = data.oMi[1] * shapes["skin"].placement
+    corners = [place.act(corner) for corner in shapes["skin"].geometry.vertices()]
+    expected = np.array([[0, 0, 2], [1, 0, 2], [0, 1, 2], [0, 0, 3]])
+    assert all(
+        min(np.linalg.norm(c - e) for c in corners) < 1e-6 for e in expected
+    )  # meshes are floats of 24 bits
+    assert [(p.first, p.second) for p in scene.collision_model.collisionPairs] == [(0, 1), (0, 2)]
+    assert scene.contact_friction["floor"] == (1.0, 0.005, 0.0001)
+
+
+def test_mass_of_meshes_is_mujocos(tmp_path):
+    (tmp_path / "hull.obj").write_text(TETRAHEDRON)
+    head = '<asset><mesh name="hull" file="hull.obj"/></asset>'
+    bodies = (
+        '<body name="a"><joint name="j"/><geom type="mesh" mesh="hull" contype="0" conaffinity="0"/></body>'
+    )
+    scene = pn.load(write(tmp_path, bodies=bodies, head=head))
+    inertia = scene.model.inertias[1]
+    assert inertia.mass == pytest.approx(1000.0 / 6.0, rel=1e-6)
+    np.testing.assert_allclose(inertia.lever, [0.25, 0.25, 0.25], rtol=1e-6)

@@ -13,7 +13,7 @@ from pin_nonideal.constraints import HingeAnchor
 from pin_nonideal.contacts import PointContact
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
-from pin_nonideal.states.placements import frame_on_joint, joint_placements
+from pin_nonideal.states.placements import frame_index, frame_on_joint, joint_placements
 from pin_nonideal.types import Array, Model, Placement
 
 # A frame as the core takes it: joint, orientation by rows, place.
@@ -47,7 +47,7 @@ class Resolution:
     def frame_id(self, name: str, who: str) -> int:
         """Index of a frame, or of the frame of a joint."""
         if self.model.existFrame(name):
-            return int(self.model.getFrameId(name))
+            return frame_index(self.model, name)
         names = [f.name for f in self.model.frames]
         raise UnknownNameError(f'{who}: no frame "{name}" in model "{self.model.name}"{nearest(name, names)}')
 

@@ -46,8 +46,12 @@ from .urdf import RobotFile
 # A quaternion this close to unit length is normalized; one farther away is a mistake.
 UNIT_TOLERANCE = 1e-3
 
+Start = Sequence[float] | NDArray[np.float64] | Mapping[str, Any] | str | None
 
-def scene_arguments(robot: RobotFile, table: Table, name: str, *, merge: bool = True) -> Table:
+
+def scene_arguments(
+    robot: RobotFile, table: Table, name: str, *, merge: bool = True, start: Start = None
+) -> Table:
     """Keyword arguments of Scene.
 
     Args:
@@ -55,9 +59,12 @@ def scene_arguments(robot: RobotFile, table: Table, name: str, *, merge: bool = 
         table: content of robot.yaml, {} when there is none.
         name: name of the scene, also used in messages.
         merge: merge three revolutes with massless links between into ball joints.
+        start: initial configuration in place of the file's: (nq,), by joint name, or the name of a reference
+            configuration.
 
     Raises:
         LoadingError: a name in the table does not exist, or a value is refused.
+        InputError: the start is refused.
         SingularMassError: M is not positive definite at the initial configuration.
     """
     where = f'robot.yaml of "{name}"'
@@ -70,6 +77,8 @@ def scene_arguments(robot: RobotFile, table: Table, name: str, *, merge: bool = 
         )
     q0, v0 = _initial(robot, table.get("initial"), where)
     q0, v0 = _lock(robot, table, q0, v0, where)
+    if start is not None:
+        q0, v0 = _started(robot, q0, v0, start)
     robot.constraints = [c for c in robot.constraints if _still_moves(robot.model, c, where)]
     motors = strings(table, "name_mot", where) or [m for m in robot.motors if robot.model.existJointName(m)]
     for motor in motors:
@@ -85,10 +94,12 @@ def scene_arguments(robot: RobotFile, table: Table, name: str, *, merge: bool = 
             *loops(table, where),
             *descriptions(table.get("constraints"), CONSTRAINTS, f"{where}: constraints"),
         ],
-        "laws": [*laws, *dissipation(robot.model, laws, robot.constraints, notes)],
+        "laws": [*laws, *robot.laws, *dissipation(robot.model, laws, robot.constraints, notes)],
         "contacts": descriptions(table.get("contacts"), CONTACTS, f"{where}: contacts"),
         "forces": [*robot.forces, *descriptions(table.get("forces"), FORCES, f"{where}: forces")],
-        "actuation": _actuation(robot.model, table.get("actuation"), motors, f"{where}: actuation"),
+        "actuation": robot.actuation
+        if table.get("actuation") is None
+        else _actuation(robot.model, table["actuation"], motors, f"{where}: actuation"),
         "q0": q0,
         "v0": v0,
         "visual_model": robot.visual,
@@ -153,7 +164,7 @@ def dissipation(
 def _change_joints(robot: RobotFile, table: Table, where: str, notes: list[str], merge: bool) -> None:
     """Exchanges joint types as the table asks, and merges revolutes that make a ball joint."""
     types, screws = joint_types(table, where), pitches(table, where)
-    coupled = {n for c in robot.constraints for n in dataclasses.astuple(c) if isinstance(n, str)}
+    coupled = {n for c in robot.constraints for n in vars(c).values() if isinstance(n, str)}
     keep = names_in(table) | set(robot.motors) | coupled
     chains = ball_chains(robot.model, keep) if merge else []
     if not chains and not types and not screws:
@@ -241,6 +252,28 @@ def _initial(robot: RobotFile, initial: Any, where: str) -> tuple[NDArray[np.flo
                 model, j, key, value, f'{where}: {key} of "{name}"'
             )
     return _with_unit_quaternions(model, q0, where), v0
+
+
+def _started(
+    robot: RobotFile, q0: NDArray[np.float64], v0: NDArray[np.float64], start: Start
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The configuration that the caller of `load` asks for, with the velocity of a keyframe.
+
+    Raises:
+        InputError: it does not fit the model.
+    """
+    if isinstance(start, str) and start in robot.keyframes:
+        keyframe = robot.keyframes[start]
+        keyframe.apply()
+        return np.array(keyframe.q), np.array(keyframe.v)
+    key, value = ("reference", start) if isinstance(start, str) else ("q", start)
+    if not isinstance(value, (str, Mapping)):
+        value = np.asarray(value).tolist()
+    kept = dataclasses.replace(robot, q0=q0, v0=v0)
+    try:
+        return _initial(kept, {key: dict(value) if isinstance(value, Mapping) else value}, "load: q0")[0], v0
+    except LoadingError as error:
+        raise InputError(str(error).replace("load: q0: initial", "load: q0")) from None
 
 
 def _joint_value(model: Model, j: int, key: str, value: Any, where: str) -> list[float]:

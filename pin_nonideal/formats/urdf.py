@@ -6,10 +6,10 @@ What Pinocchio's reader passes over in silence is an error, a note, a law or a c
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -24,20 +24,38 @@ from .urdf_checks import check_urdf
 from .xml import numbers, parse_xml, read_text
 
 
+class Keyframe(NamedTuple):
+    """A state that a file names.
+
+    Attributes:
+        q: configuration, (nq,).
+        v: velocity, (nv,).
+        apply: sets the controls that belong to it.
+    """
+
+    q: Array
+    v: Array
+    apply: Callable[[], None]
+
+
 @dataclass
 class RobotFile:
     """What a robot's file holds, before a scene is made of it.
 
     Attributes:
         model: pinocchio.Model.
-        visual: pinocchio.GeometryModel for display, or None.
-        collision: pinocchio.GeometryModel for collision, or None.
+        visual: pinocchio.GeometryModel for display, `Shapes` that make one, or None.
+        collision: the same for collision.
         constraints: constraints that the file itself states (mimic joints, equalities).
         forces: given forces that the file itself states (joint springs).
         motors: joints with a transmission.
         notes: what the user should know about the reading.
         q0: initial configuration that the file states, shape (nq,), or None.
         v0: initial velocity that the file states, shape (nv,), or None.
+        laws: nonideal laws that the file itself states, beside those that the model holds.
+        actuation: what drives the joints, or None.
+        keyframes: states that the file names.
+        contact_friction: coefficients of sliding, spinning and rolling by the geometry's name.
     """
 
     model: Model
@@ -49,6 +67,10 @@ class RobotFile:
     notes: list[str] = field(default_factory=list)
     q0: Array | None = None
     v0: Array | None = None
+    laws: list[Any] = field(default_factory=list)
+    actuation: Any = None
+    keyframes: dict[str, Keyframe] = field(default_factory=dict)
+    contact_friction: dict[str, tuple[float, float, float]] = field(default_factory=dict)
 
 
 def read_urdf(path: Path, *, free_flyer: bool = False, package_dirs: Sequence[str | Path] = ()) -> RobotFile:

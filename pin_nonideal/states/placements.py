@@ -43,5 +43,17 @@ def frame_on_joint(model: Model, name: str) -> tuple[int, Placement]:
     """
     if not model.existFrame(name) and model.existJointName(name):
         return int(model.getJointId(name)), pin.SE3.Identity()
-    frame = model.frames[model.getFrameId(name)]
+    frame = model.frames[frame_index(model, name)]
     return int(frame.parentJoint), frame.placement
+
+
+def frame_index(model: Model, name: str) -> int:
+    """Index of the frame of that name; of several, a body's before a joint's, and those before all others.
+
+    Args:
+        model: pinocchio.Model.
+        name: of a frame of the model.
+    """
+    kinds = (pin.FrameType.BODY, pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT, pin.FrameType.OP_FRAME)
+    found = (int(model.getFrameId(name, kind)) for kind in kinds if model.existFrame(name, kind))
+    return next(found, None) or int(model.getFrameId(name))

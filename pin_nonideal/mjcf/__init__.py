@@ -1,0 +1,1 @@
+"""MJCF files: MuJoCo compiles them, and what it compiles becomes the arguments of a scene."""

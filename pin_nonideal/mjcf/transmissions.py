@@ -1,0 +1,188 @@
+"""Transmissions of MJCF actuators: the length that an actuator sees, and the row its force acts along."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.types import Array, Placement
+
+from .forces import rotation
+from .motion import FixedTendon, Motion, Tendon
+from .tree import BALL, FREE, Tree
+
+JOINT, JOINT_IN_PARENT, SLIDER_CRANK, TENDON, SITE, BODY = range(6)  # of MuJoCo's mjtTrn
+
+
+@dataclass(frozen=True, eq=False)
+class Geared:
+    """A tendon, or a joint of one degree of freedom, behind a gear."""
+
+    tendon: Tendon
+    gear: float
+
+    def rows(self, q: Array) -> tuple[float, Array]:
+        """Length and moment arms, (nv,)."""
+        return self.gear * self.tendon.length(q), self.gear * self.tendon.jacobian(q)
+
+
+@dataclass(frozen=True, eq=False)
+class OnBall:
+    """A ball joint: the rotation vector along the gear's axis, in the axes of the joint's body or its parent.
+
+    Attributes:
+        at: place of the quaternion in q.
+        dof: first degree of freedom.
+        gear: (3,).
+        in_parent: whether the gear is given in the parent's axes.
+        size: number of degrees of freedom.
+    """
+
+    at: int
+    dof: int
+    gear: Array
+    in_parent: bool
+    size: int
+
+    def rows(self, q: Array) -> tuple[float, Array]:
+        """Length and moment arms, (nv,)."""
+        turn, row = rotation(q, self.at), np.zeros(self.size)
+        row[self.dof : self.dof + 3] = axis = turn.T @ self.gear if self.in_parent else self.gear
+        return float(pin.log3(turn) @ axis), row
+
+
+@dataclass(frozen=True, eq=False)
+class OnFree:
+    """A free joint: a force in world axes and a moment in the axes of the body or the world; no length.
+
+    Attributes:
+        at: place of the quaternion in q.
+        dof: first degree of freedom.
+        gear: (6,).
+        in_parent: whether the moment is given in the world's axes.
+        size: number of degrees of freedom.
+    """
+
+    at: int
+    dof: int
+    gear: Array
+    in_parent: bool
+    size: int
+
+    def rows(self, q: Array) -> tuple[float, Array]:
+        """Length and moment arms, (nv,)."""
+        back, row = rotation(q, self.at).T, np.zeros(self.size)
+        row[self.dof : self.dof + 3] = back @ self.gear[:3]
+        row[self.dof + 3 : self.dof + 6] = back @ self.gear[3:] if self.in_parent else self.gear[3:]
+        return 0.0, row
+
+
+@dataclass(frozen=True, eq=False)
+class OnSite:
+    """A wrench on a site in its own axes, or between a site and a reference site in the latter's axes.
+
+    Attributes:
+        motion: places of the bodies.
+        site: joint and placement.
+        reference: joint and placement, or None.
+        gear: force and moment, (6,).
+        shared: degrees of freedom that move both sites, which the wrench does not load.
+    """
+
+    motion: Motion
+    site: tuple[int, Placement]
+    reference: tuple[int, Placement] | None
+    gear: Array
+    shared: Array
+
+    def rows(self, q: Array) -> tuple[float, Array]:
+        """Length and moment arms, (nv,)."""
+        self.motion.update(q)
+        here = self.motion.place(*self.site)
+        frame = here if self.reference is None else self.motion.place(*self.reference)
+        force, moment = frame.rotation @ self.gear[:3], frame.rotation @ self.gear[3:]
+        forces = [(*self.site, force, moment)]
+        if self.reference is None:
+            return 0.0, self.motion.generalized(q, forces)
+        row = self.motion.generalized(q, [*forces, (*self.reference, -force, -moment)])
+        row[self.shared] = 0.0
+        between = frame.actInv(here)
+        length = between.translation @ self.gear[:3] + pin.log3(between.rotation) @ self.gear[3:]
+        return float(length), row
+
+
+@dataclass(frozen=True, eq=False)
+class SliderCrank:
+    """A crank pin that a rod of given length joins to a slider along a site's z axis.
+
+    Attributes:
+        motion: places of the bodies.
+        crank: joint and placement of the pin.
+        slider: joint and placement of the slider's axis.
+        rod: length of the rod [m].
+        gear: of the transmission.
+    """
+
+    motion: Motion
+    crank: tuple[int, Placement]
+    slider: tuple[int, Placement]
+    rod: float
+    gear: float
+
+    def rows(self, q: Array) -> tuple[float, Array]:
+        """Length and moment arms, (nv,)."""
+        self.motion.update(q)
+        pin_place, guide = self.motion.place(*self.crank), self.motion.place(*self.slider)
+        vector, axis = pin_place.translation - guide.translation, guide.rotation[:, 2]
+        along = float(vector @ axis)
+        inside = along**2 + self.rod**2 - float(vector @ vector)
+        length, by_axis, by_vector = along, vector, axis
+        if inside > 0.0:
+            root = float(np.sqrt(inside))
+            length -= root
+            by_axis = (1.0 - along / root) * vector
+            by_vector = (1.0 - along / root) * axis + vector / root
+        force, moment = self.gear * by_vector, self.gear * np.cross(axis, by_axis)
+        forces = [(*self.crank, force, np.zeros(3)), (*self.slider, -force, moment)]
+        return self.gear * length, self.motion.generalized(q, forces)
+
+
+Transmission = Geared | OnBall | OnFree | OnSite | SliderCrank
+
+
+def read_transmission(tree: Tree, actuator: int, tendons: list[Tendon | None]) -> Transmission | None:
+    """The transmission of an actuator, None where it cannot be carried (wrapping tendons, bodies, SO(3))."""
+    m, nv = tree.compiled, tree.model.nv
+    kind, (one, two) = int(m.actuator_trntype[actuator]), m.actuator_trnid[actuator]
+    gear = np.array(m.actuator_gear[m.actuator_outadr[actuator]])
+    if kind in (JOINT, JOINT_IN_PARENT):
+        at, dof = int(m.jnt_qposadr[one]), int(m.jnt_dofadr[one])
+        if m.jnt_type[one] == FREE:
+            return OnFree(at + 3, dof, gear, kind == JOINT_IN_PARENT, nv)
+        if m.jnt_type[one] == BALL:
+            return OnBall(at, dof, gear[:3], kind == JOINT_IN_PARENT, nv)
+        return Geared(FixedTendon(np.eye(tree.model.nq)[at], np.eye(nv)[dof]), float(gear[0]))
+    if kind == TENDON:
+        tendon = tendons[one]
+        return None if tendon is None else Geared(tendon, float(gear[0]))
+    if kind == SITE:
+        reference = None if two < 0 else tree.on_site(two)
+        shared = np.zeros(0, dtype=int) if reference is None else _shared(tree, one, two)
+        return OnSite(tree.motion, tree.on_site(one), reference, gear, shared)
+    if kind == SLIDER_CRANK:
+        rod = float(m.actuator_cranklength[actuator])
+        return SliderCrank(tree.motion, tree.on_site(one), tree.on_site(two), rod, float(gear[0]))
+    return None
+
+
+def _shared(tree: Tree, one: int, two: int) -> Any:
+    """Degrees of freedom of the joints that carry both sites."""
+    model = tree.model
+    chains = [set(model.supports[tree.on_site(site)[0]]) - {0} for site in (one, two)]
+    joints = chains[0] & chains[1]
+    return np.array(
+        [i for j in joints for i in range(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])], dtype=int
+    )
