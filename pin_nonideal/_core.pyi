@@ -72,9 +72,11 @@ class Load(enum.Enum):
 
     spherical = 3
 
-    contact = 4
+    planar = 4
 
-    user = 5
+    multiplier = 5
+
+    user = 6
 
 class Mode(enum.IntEnum):
     """How a frictional element moves: slip one way or the other, or rest."""
@@ -120,7 +122,7 @@ class Builder:
 
     def finish(self) -> Program: ...
 
-    def add_friction(self, law: int, block: int, *, load: Load = Load.none, reaction: Reaction = Reaction.none, joint: int = -1, anchor: int = -1, axis: Sequence[float] = [0.0, 0.0, 1.0], constant: float = 0.0, mu: float = 0.0, radius: float = 0.0, axial_radius: float = 0.0, inverse_span: float = 0.0, static_ratio: float = 1.0, stribeck_velocity: float = 0.0, user_limit: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], ReactionView], float] | None = None) -> None: ...
+    def add_friction(self, law: int, block: int, *, name: str, load: Load = Load.none, reaction: Reaction = Reaction.none, joint: int = -1, anchor: int = -1, row: int = 0, axis: Sequence[float] = [0.0, 0.0, 1.0], axis_dof: int = -1, constant: float = 0.0, mu: float = 0.0, radius: float = 0.0, axial_radius: float = 0.0, inverse_span: float = 0.0, static_ratio: float = 1.0, stribeck_velocity: float = 0.0, user_limit: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], ReactionView], float] | None = None) -> None: ...
 
     def add_law(self, name: str) -> int: ...
 
@@ -183,7 +185,11 @@ class Builder:
 
     def add_hinge_slip(self, name: str, frame1: tuple[int, Sequence[float], Sequence[float]], frame2: tuple[int, Sequence[float], Sequence[float]], axis: Sequence[float]) -> int: ...
 
+    def add_turn_slip(self, name: str, frame1: tuple[int, Sequence[float], Sequence[float]], frame2: tuple[int, Sequence[float], Sequence[float]], axes: Sequence[int]) -> int: ...
+
     def add_contact_slip(self, name: str, frame: tuple[int, Sequence[float], Sequence[float]], plane: tuple[int, Sequence[float], Sequence[float]], radius: float, tangent1: Sequence[float], tangent2: Sequence[float], normal: Sequence[float]) -> int: ...
+
+    def add_coupling_slip(self, name: str, joint1: int, joint2: int, weight1: float, weight2: float) -> int: ...
 
     def add_user_slip(self, name: str, direction: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))]], Annotated[NDArray[numpy.float64], dict(shape=(None,))]] | None) -> int: ...
 

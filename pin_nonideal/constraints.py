@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .checks import count, function, label, number, optional_text, positive, text, unit_axis
+from .checks import count, function, label, nonnegative, number, optional_text, positive, text, unit_axis
 from .errors import InputError
 from .timefunctions import TimeFunction
 
@@ -277,6 +277,9 @@ class Rolling:
     Rows: 3, along t1, t2 and n of `checks.axis_triad(normal)`, axes fixed in the plane.
     lam: force on the rolling body at c [N] along t1, t2 and n; the third is the normal force, positive when
     pressed.
+    Resistance: with w the angular velocity of the body against that of the plane, the torque
+    torsional |lam_n| opposes its part along the normal (spinning), and the torque rolling |lam_n| its part
+    along the plane (rolling); each sticks and slips on its own.
 
     Args:
         frame: name of the frame at the center of the sphere or disk.
@@ -285,6 +288,8 @@ class Rolling:
         plane: name of the frame whose origin the plane goes through (its body may move); None for the world's
             origin.
         normal: normal of the plane, in the axes of the plane's frame.
+        torsional: torque against spinning over normal force [m].
+        rolling: torque against rolling over normal force [m], the lever of rolling resistance.
         name: used in messages and results.
     """
 
@@ -293,6 +298,8 @@ class Rolling:
     axis: Axis | None = "y"
     plane: str | None = None
     normal: Axis = "z"
+    torsional: float = 0.0
+    rolling: float = 0.0
     name: str | None = None
 
     def __post_init__(self) -> None:
@@ -306,6 +313,8 @@ class Rolling:
         if self.plane == self.frame:
             raise InputError(f'{who}: frame and plane must differ; both are "{self.frame}"')
         _axis(self, "normal")
+        for key in ("torsional", "rolling"):
+            object.__setattr__(self, key, nonnegative(f"{who}: {key}", getattr(self, key)))
 
 
 @dataclass(frozen=True)

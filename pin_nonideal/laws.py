@@ -5,6 +5,7 @@ C never feeds energy when the law is a friction: its power v^T C is zero or nega
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -23,27 +24,51 @@ __all__ = [
 
 @dataclass(frozen=True)
 class JointFriction:
-    """Friction in a joint or an anchor, that may depend on the load it really carries.
+    """Friction in a joint, an anchor or a coupling, that may depend on the load it really carries.
 
-    With v_j the joint's velocity, f its reaction force split along (axial) and across (radial) the joint's
-    axis and m_b its bending moment, the dry limit is
+    With v_j the joint's velocity, f its reaction force split along (axial, normal) and across (radial) the
+    joint's axis and m_b its bending moment, the dry limit is
 
-        revolute, helical:  limit = coulomb + preload + mu (radius (|f_radial| + |m_b| / span)
-                                                          + axial_radius |f_axial|)          [N m]
-        spherical:          limit = coulomb + preload + mu radius |f|                        [N m]
-        prismatic:          limit = coulomb + preload + mu (|f_radial| + |m| / span)         [N]
+        revolute, helical, universal:  limit = constant + mu (radius (|f_radial| + |m_b| / span)
+                                                             + axial_radius |f_axial|)       [N m]
+        spherical:          limit = constant + mu radius |f|                                 [N m]
+        prismatic:          limit = constant + mu (|f_radial| + |m| / span)                  [N]
+        planar:             limit = constant + mu (|f_normal| + |m_b| / span)                [N]
+        translation, free flyer:       limit = constant                                      [N]
+        coupling:           limit = constant + k |ratio lam|                                 [N m or N]
 
-    where m is the reaction moment about the joint's origin and m_b its part across the axis; without `span`
-    moments are left out.
+    where constant = coulomb + preload and m is the reaction moment about the joint's origin, m_b its part
+    across the axis (of a planar joint the normal of its plane); without `span` moments are left out.
     Sliding gives C_j = -limit s(v_j) sgn(v_j) - viscous v_j, with Stribeck's factor
     s = 1 + (static_ratio - 1) exp(-(v_j / stribeck_velocity)^2), and s = 1 without stribeck_velocity.
     Sticking holds while the force it needs is below static_ratio times the limit.
 
+    Directions.  A universal joint has two axes that rub each on its own.  In a ball joint (spherical, or a
+    `PointAnchor` of all three axes) C points against the angular velocity, |C| = limit.  Planar joints and
+    free flyers slide in two or three directions like that, and turn besides: against their turning rubs
+    radius times the limit [N m] and radius^2 times `viscous`, as of an area of that mean radius; without
+    `radius` turning is free.  Sliding and turning do not weaken each other.
+
+    Couplings.  lam is the multiplier of a `JointCoupling`, the force between its teeth as it acts on joint1
+    [N m or N]; limit and v_j are those of joint2.  Either the thread of a screw or worm on joint2 is given,
+    of lead angle l (the thread rises ratio = tan(l) times the thread's mean radius) and with
+    tan(p) = mu / cos(pressure_angle), or the efficiencies are:
+
+        joint2 drives:  efficiency      = tan(l) / tan(l + p)
+        joint1 drives:  efficiency_back = tan(l - p) / tan(l)
+
+    Both follow from one rubbing pair of surfaces, which carries lam and takes part a of it from joint1 and
+    part b from joint2: a = tan(p) tan(l) and b = tan(p) / tan(l), or with the efficiencies e and e'
+    a = (1 - 2 e + e e') / (1 - e e') and b = (1 - 2 e' + e e') / (1 - e e'); k = a + b.  Where b >= 1, that
+    is efficiency_back <= 0, joint1 cannot drive joint2: the coupling locks itself.
+
     Args:
-        joint: name of a revolute, prismatic, helical or spherical joint, or of a hinge anchor.
+        joint: name of a revolute, prismatic, helical, spherical, universal, planar, translation or
+            free-flyer joint, of a `HingeAnchor`, of a `PointAnchor` of three axes, or of a `JointCoupling`.
         coulomb: constant dry friction [N m or N].
-        mu: coefficient of friction of the bearing surfaces.
-        radius: radius at which the radial load rubs [m].
+        mu: coefficient of friction of the surfaces that bear.
+        radius: radius at which the radial load rubs [m]; of planar joints and free flyers the mean radius of
+            the area that turns.
         axial_radius: mean radius at which the axial load rubs [m].
         span: lever at which the moment loads the bearing [m]: half the distance of two bearings.
         preload: dry friction of a preloaded bearing, present without load [N m or N].
@@ -52,6 +77,11 @@ class JointFriction:
         viscous: coefficient of the velocity [N m s/rad or N s/m].
         reaction: "total" solves the implicit equation on the real reaction, friction included; "ideal"
             evaluates the law on the ideal reaction, as the paper's Example (c) does.
+        lead_angle: of the thread of a coupling [rad], between 0 and pi/2; with `mu`.
+        pressure_angle: of its flanks, in the normal section [rad]: 0 for a square thread.
+        efficiency: power at joint1 over power at joint2 while joint2 drives, between 0 and 1.
+        efficiency_back: power at joint2 over power at joint1 while joint1 drives, below 1; zero or negative
+            where joint1 cannot drive.  None: equal to `efficiency`, as of a gear mesh.
         name: used in messages and results.
     """
 
@@ -66,6 +96,10 @@ class JointFriction:
     stribeck_velocity: float | None = None
     viscous: float = 0.0
     reaction: str = "total"
+    lead_angle: float | None = None
+    pressure_angle: float = 0.0
+    efficiency: float | None = None
+    efficiency_back: float | None = None
     name: str | None = None
 
     def __post_init__(self) -> None:
@@ -79,11 +113,69 @@ class JointFriction:
                 object.__setattr__(self, key, positive(f"{who}: {key}", getattr(self, key)))
         object.__setattr__(self, "static_ratio", static_ratio(who, self.static_ratio))
         choice(f"{who}: reaction", self.reaction, ("total", "ideal"))
-        if not (self.coulomb or self.mu or self.preload or self.viscous):
+        _thread(self, who)
+        _efficiencies(self, who)
+        if not (self.coulomb or self.mu or self.preload or self.viscous or self.efficiency):
             raise InputError(
                 f"{who}: one of coulomb, mu, preload, viscous must be positive; all are zero, "
                 "so leave the law out"
             )
+
+    @property
+    def tooth_losses(self) -> tuple[float, float]:
+        """Parts a and b of a coupling's tooth force that friction takes from joint1 and from joint2."""
+        if self.efficiency is not None:
+            e, back = self.efficiency, self.efficiency_back
+            back = e if back is None else back
+            return (1.0 - 2.0 * e + e * back) / (1.0 - e * back), (1.0 - 2.0 * back + e * back) / (
+                1.0 - e * back
+            )
+        if self.lead_angle is None:
+            return 0.0, 0.0
+        rough, rise = self.mu / math.cos(self.pressure_angle), math.tan(self.lead_angle)
+        return rough * rise, rough / rise
+
+
+def _acute(what: str, angle: float) -> float:
+    """An angle of a thread [rad], checked to be below a right one."""
+    if not angle < 0.5 * math.pi:
+        raise InputError(f"{what} must be below pi/2 rad; got {angle:g}")
+    return angle
+
+
+def _thread(law: JointFriction, who: str) -> None:
+    """The thread of a coupling: two angles, and the coefficient that they need."""
+    what = f"{who}: pressure_angle"
+    object.__setattr__(law, "pressure_angle", _acute(what, nonnegative(what, law.pressure_angle)))
+    if law.lead_angle is None:
+        if law.pressure_angle:
+            raise InputError(f"{who}: pressure_angle is that of a thread, which needs a lead_angle too")
+        return
+    what = f"{who}: lead_angle"
+    object.__setattr__(law, "lead_angle", _acute(what, positive(what, law.lead_angle)))
+    if not law.mu:
+        raise InputError(f"{who}: lead_angle needs a positive mu, with which the thread rubs")
+
+
+def _efficiencies(law: JointFriction, who: str) -> None:
+    """What a coupling leaves of power, there and back."""
+    if law.efficiency is None:
+        if law.efficiency_back is not None:
+            raise InputError(f"{who}: efficiency_back needs an efficiency too, of the way there")
+        return
+    if law.mu or law.lead_angle is not None:
+        raise InputError(
+            f"{who}: give either efficiency, or mu and lead_angle, from which it follows; got both"
+        )
+    forth = number(f"{who}: efficiency", law.efficiency)
+    if not 0.0 < forth < 1.0:
+        raise InputError(f"{who}: efficiency must lie between 0 and 1; got {forth:g}")
+    object.__setattr__(law, "efficiency", forth)
+    if law.efficiency_back is not None:
+        back = number(f"{who}: efficiency_back", law.efficiency_back)
+        if not back < 1.0:
+            raise InputError(f"{who}: efficiency_back must be below 1; got {back:g}")
+        object.__setattr__(law, "efficiency_back", back)
 
 
 @dataclass(frozen=True)

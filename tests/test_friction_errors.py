@@ -40,6 +40,14 @@ def with_law(robot, law, constraints=()):
     return pn.Scene(robot.model, constraints=[*robot.constraints, *constraints], laws=[law])
 
 
+def single(kind, law):
+    """A body on one joint, "joint"."""
+    model = pin.Model()
+    model.addJoint(0, kind, pin.SE3.Identity(), "joint")
+    model.appendBodyToJoint(1, pin.Inertia(1.0, np.zeros(3), np.eye(3)), pin.SE3.Identity())
+    return pn.Scene(model, laws=[law])
+
+
 class TestNumbers:
     """Of the descriptions themselves, before any scene."""
 
@@ -156,44 +164,45 @@ class TestPlaces:
             with_law(gripper, self.LAWS["JointFriction"]("hand"))
 
     @pytest.mark.parametrize(
-        "anchor",
+        ("anchor", "what"),
         [
-            pn.PointAnchor("hand", name="loop"),
-            pn.FrameAnchor("hand", name="loop"),
-            pn.Distance("hand", "base", length=1.0, name="loop"),
-            pn.JointCoupling("rail", "pin", 2.0, name="loop"),
-            pn.PrescribedMotion("rail", pn.polynomial([0.0]), name="loop"),
+            (pn.PointAnchor("hand", axes="xz", name="loop"), "PointAnchor that holds 2 of three directions"),
+            (pn.FrameAnchor("hand", name="loop"), "FrameAnchor"),
+            (pn.Distance("hand", "base", length=1.0, name="loop"), "Distance"),
+            (pn.PrescribedMotion("rail", pn.polynomial([0.0]), name="loop"), "PrescribedMotion"),
         ],
         ids=lambda anchor: type(anchor).__name__,
     )
-    def test_anchor_with_no_axis(self, gripper, anchor):
-        kind = type(anchor).__name__
-        words = f'JointFriction(loop): "loop" is a {kind}, which has no axis to rub about; use a HingeAnchor'
+    def test_anchor_in_which_nothing_rubs(self, gripper, anchor, what):
+        words = (
+            f'JointFriction(loop): "loop" is a {what}, in which nothing is known to rub; friction acts in a '
+            'HingeAnchor, in a PointAnchor with axes="xyz" and on a JointCoupling'
+        )
         with refuses(words, InputError):
             with_law(gripper, self.LAWS["JointFriction"]("loop"), [anchor])
 
     @pytest.mark.parametrize(
-        ("kind", "words"),
-        [
-            (pin.JointModelFreeFlyer, "must have 1 or 3 degrees of freedom; it has 6"),
-            (
-                pin.JointModelPlanar,
-                "must be revolute, prismatic, helical or spherical; it is JointModelPlanar",
-            ),
-            (
-                pin.JointModelSphericalZYX,
-                "must be revolute, prismatic, helical or spherical; it is JointModelSphericalZYX",
-            ),
-        ],
+        "kind", [pin.JointModelSphericalZYX, lambda: pin.JointModelEllipsoid(0.3, 0.2, 0.1)]
     )
-    def test_joint_with_no_bearing(self, kind, words):
-        model = pin.Model()
-        model.addJoint(0, kind(), pin.SE3.Identity(), "joint")
-        model.appendBodyToJoint(1, pin.Inertia(1.0, np.zeros(3), np.eye(3)), pin.SE3.Identity())
+    def test_joint_with_no_bearing(self, kind):
+        words = (
+            "must be revolute, prismatic, helical, spherical, universal, planar, translation or free flyer; "
+            f"it is {kind().shortname()}"
+        )
         with refuses(f'JointFriction(joint): joint "joint" {words}', InputError):
-            pn.Scene(model, laws=[pn.JointFriction("joint", mu=0.1, radius=0.1)])
-        with refuses(f'joint "joint" must have 1 degree of freedom; it has {model.nv}', InputError):
-            pn.Scene(model, laws=[pn.LuGre("joint", 1e4, 10.0, 1.0)])
+            single(kind(), pn.JointFriction("joint", mu=0.1, radius=0.1))
+
+    @pytest.mark.parametrize("kind", [pin.JointModelFreeFlyer, pin.JointModelTranslation])
+    def test_joint_without_load(self, kind):
+        words = 'JointFriction(joint): joint "joint" carries no load that mu could follow; give coulomb'
+        with refuses(words, InputError):
+            single(kind(), pn.JointFriction("joint", mu=0.1, radius=0.1))
+
+    @pytest.mark.parametrize("kind", [pin.JointModelFreeFlyer, pin.JointModelPlanar])
+    def test_bristles_need_a_joint_of_one_velocity(self, kind):
+        joint = kind()
+        with refuses(f'joint "joint" must have 1 degree of freedom; it has {joint.nv}', InputError):
+            single(joint, pn.LuGre("joint", 1e4, 10.0, 1.0))
 
     def test_coefficient_without_radius(self, gripper):
         words = (

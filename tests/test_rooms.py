@@ -19,7 +19,7 @@ version errors types checks files equation
 timefunctions constraints laws contacts forces actuation
 _core core
 states: placements configurations closure rows projection
-compilation: failures callbacks names constraints laws forces lowering analysis scene report
+compilation: failures callbacks names constraints friction laws forces lowering analysis scene report
 scene trajectory
 formats: xml shapes model_edit inertia urdf_checks urdf generators robot_yaml assembly
 mjcf: compile motion tree tendons forces transmissions actuators equality fields told shapes reader

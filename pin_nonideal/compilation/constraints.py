@@ -32,7 +32,7 @@ from pin_nonideal.timefunctions import Constant
 from pin_nonideal.types import Array
 
 from .callbacks import checked, time_function
-from .names import Resolution, placed_on, words
+from .names import Frame, Resolution, placed_on, words
 
 # A rational gear ratio with a larger denominator than this leaves the angle of endless joints undetermined.
 LARGEST_GEAR = 64
@@ -61,13 +61,26 @@ def lower_constraint(c: Any, name: str, out: core.Builder, where: Resolution) ->
         raise InputError(
             f"a constraint must be one of this package's or of Pinocchio's {', '.join(known)}; got {c!r}"
         )
-    f1, f2 = placed_on(c.joint1_id, c.joint1_placement), placed_on(c.joint2_id, c.joint2_placement)
+    f1, f2 = frames_of(c, where, kind)
     if kind == "PointAnchorConstraintModel" or (
         kind == "RigidConstraintModel" and c.type == pin.ContactType.CONTACT_3D
     ):
         out.add_point(name, f1, f2, axes=[0, 1, 2])
     else:
         out.add_frame(name, f1, f2)
+
+
+def frames_of(c: Any, where: Resolution, who: str) -> tuple[Frame, Frame]:
+    """Both frames of an anchor, or of a constraint model of Pinocchio.
+
+    Args:
+        c: the description.
+        where: frames and joints by name.
+        who: words for messages.
+    """
+    if hasattr(c, "joint1_placement"):
+        return placed_on(c.joint1_id, c.joint1_placement), placed_on(c.joint2_id, c.joint2_placement)
+    return where.pair(c, who)
 
 
 @lower_constraint.register

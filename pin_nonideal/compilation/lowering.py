@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from pin_nonideal.constraints import Rolling
 from pin_nonideal.core import core
 from pin_nonideal.states.rows import row_slices
 
 from .callbacks import ReactionNames
 from .constraints import lower_constraint, lower_contact
 from .forces import lower_actuation, lower_force
-from .laws import Surroundings, lower_contact_friction, lower_law
+from .friction import Surroundings, lower_contact_friction
+from .laws import lower_law
 from .names import Resolution, unique_names
 
 
@@ -59,7 +61,12 @@ def lower(said: Descriptions, builder: core.Builder, where: Resolution) -> None:
     around = Surroundings(where, dict(zip(constraint_names, said.constraints, strict=True)), names)
     for law, name in zip(said.laws, law_names, strict=True):
         lower_law(law, name, builder, around)
-    for c, name in zip(said.contacts, contact_names, strict=True):
+    rolling = [
+        (c, name)
+        for c, name in zip(said.constraints, constraint_names, strict=True)
+        if isinstance(c, Rolling)
+    ]
+    for c, name in [*rolling, *zip(said.contacts, contact_names, strict=True)]:
         lower_contact_friction(c, name, builder, around)
     for f in said.forces:
         lower_force(f, builder, where)

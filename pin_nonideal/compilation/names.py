@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.checks import Vector3, axis_triad, unit_axis
-from pin_nonideal.constraints import HingeAnchor
+from pin_nonideal.constraints import HingeAnchor, Rolling
 from pin_nonideal.contacts import PointContact
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
@@ -103,7 +103,9 @@ class Resolution:
         x, y, z = (float(x) for x in self.in_world(self.frame(hinge.frame1, who)).rotation @ np.array(axis))
         return (x, y, z)
 
-    def contact(self, c: PointContact, who: str) -> tuple[Frame, Frame, tuple[Vector3, Vector3, Vector3]]:
+    def contact(
+        self, c: PointContact | Rolling, who: str
+    ) -> tuple[Frame, Frame, tuple[Vector3, Vector3, Vector3]]:
         """Frame, plane, and right-handed directions (along, along, normal) in the axes of the plane."""
         plane = self.plane(c.plane, who)
         return self.frame(c.frame, who), plane, axis_triad(unit_axis(who, c.normal))

@@ -167,6 +167,7 @@ int main() {
     check("rolling disk", pn::RollingRows{f, f, 0.2, false, y, x, y, z}, 2, 3);
     check("rolling sphere", pn::RollingRows{f, f, 0.2, true, y, x, y, z}, 2, 3);
     check("hinge slip", pn::HingeSlipRows{f, f, z}, 0, 0);
+    check("turn slip", pn::TurnSlipRows{f, f, {0, 1, 2}}, 0, 0);
     check("contact slip", pn::ContactSlipRows{f, f, 0.2, x, y, z}, 0, 0);
     return wrong != 0;
 }

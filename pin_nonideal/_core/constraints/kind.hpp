@@ -13,6 +13,7 @@
 #include "constraints/kinds/contact.hpp"
 #include "constraints/kinds/contact_slip.hpp"
 #include "constraints/kinds/coupling.hpp"
+#include "constraints/kinds/coupling_slip.hpp"
 #include "constraints/kinds/distance.hpp"
 #include "constraints/kinds/dof_slip.hpp"
 #include "constraints/kinds/frame.hpp"
@@ -22,13 +23,15 @@
 #include "constraints/kinds/motion.hpp"
 #include "constraints/kinds/point.hpp"
 #include "constraints/kinds/rolling.hpp"
+#include "constraints/kinds/turn_slip.hpp"
 #include "constraints/kinds/user.hpp"
 #include "constraints/kinds/user_slip.hpp"
 
 namespace pn {
 
 using Kind = std::variant<PointRows, ContactRow, FrameRows, HingeRows, DistanceRows, KnifeRows, RollingRows,
-                          CouplingRows, MotionRows, UserRows, DofRows, HingeSlipRows, ContactSlipRows, UserSlipRow>;
+                          CouplingRows, MotionRows, UserRows, DofRows, HingeSlipRows, TurnSlipRows, ContactSlipRows,
+                          CouplingSlipRow, UserSlipRow>;
 
 // Rows of one constraint before any is left out.
 struct RowValues {

@@ -32,7 +32,9 @@ struct BodyForces {
     void on_dof(int, double) {}
     void on_body(int joint, const Force& f) { body[joint] += f; }
     void along(int block, const Vec3& f) {
-        if (now.values[block].geometric) add_wrench(p.blocks[block], now.terms, now.values[block].wrench[0], f[0], body);
+        const RowValues& values = now.values[block];
+        if (!values.geometric) return;
+        for (int k = 0; k < values.rows; ++k) add_wrench(p.blocks[block], now.terms, values.wrench[k], f[k], body);
     }
     void on_all(const VecX&) {}
     void on_state(int, double) {}

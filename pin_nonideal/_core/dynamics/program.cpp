@@ -37,8 +37,13 @@ void Program::finish() {
     // A contact whose normal nothing moves along has no row: it carries nothing and never pulls.
     const auto bare = [&](int block) { return blocks[block].kept.empty(); };
     contacts.erase(std::remove_if(contacts.begin(), contacts.end(), bare), contacts.end());
-    for (Friction& f : frictions)
-        if (f.load == Friction::Load::contact && bare(f.anchor)) f.load = Friction::Load::none;
+    for (Friction& f : frictions) {
+        if (f.load != Friction::Load::multiplier) continue;
+        const Block& anchor = blocks[f.anchor];
+        const auto kept = std::find(anchor.kept.begin(), anchor.kept.end(), f.anchor_row);
+        f.row = anchor.row + static_cast<int>(kept - anchor.kept.begin());
+        if (kept == anchor.kept.end()) f.load = Friction::Load::none;
+    }
     for (const Friction& f : frictions) {
         needs_reactions |= f.reaction != Reaction::none;
         needs_joint_reactions |= f.reaction != Reaction::none && f.joint > 0;

@@ -19,12 +19,12 @@ LoadVectors load_vectors(const Program& p, Workspace& w, const Friction& f) {
     using Load = Friction::Load;
     const Vec3 none = Vec3::Zero();
     if (f.load == Load::none || f.load == Load::user) return {none, none, none};
-    if (f.load == Load::contact) return {f.mu * reactions(p, w).lam[p.blocks[f.anchor].row] * Vec3::UnitX(), none, none};
+    if (f.load == Load::multiplier) return {f.mu * reactions(p, w).lam[f.row] * Vec3::UnitX(), none, none};
     Force r;
     Vec3 axis;
     if (f.joint > 0) {
         r = joint_wrench(p, w, f.joint);
-        axis = w.now.terms.body[f.joint].R * f.axis;
+        axis = f.axis_dof >= 0 ? w.now.terms.J[f.axis_dof].ang : w.now.terms.body[f.joint].R * f.axis;
     } else {
         r = anchor_wrench(p, w, f.anchor);
         const Frame& frame = *frames(p.blocks[f.anchor].kind).first;
@@ -34,7 +34,9 @@ LoadVectors load_vectors(const Program& p, Workspace& w, const Friction& f) {
     if (f.load == Load::spherical) return {rub * r.lin, none, none};
     const Vec3 axial = r.lin.dot(axis) * axis, radial = r.lin - axial;
     if (f.load == Load::prismatic) return {f.mu * radial, f.mu * f.inverse_span * r.ang, none};
-    return {rub * radial, rub * f.inverse_span * (r.ang - r.ang.dot(axis) * axis), f.mu * f.axial_radius * axial};
+    const Vec3 bending = r.ang - r.ang.dot(axis) * axis;
+    if (f.load == Load::planar) return {f.mu * axial, f.mu * f.inverse_span * bending, none};
+    return {rub * radial, rub * f.inverse_span * bending, f.mu * f.axial_radius * axial};
 }
 
 double load_limit(const Program& p, Workspace& w, const Friction& f, double t, const VecX& q, const VecX& v) {

@@ -5,6 +5,7 @@
 // limit = load x speed factor.
 #pragma once
 
+#include <string>
 #include <utility>
 
 #include "forces/laws.hpp"
@@ -13,7 +14,8 @@
 namespace pn {
 
 struct Friction {
-    enum class Load { none, revolute, prismatic, spherical, contact, user } load = Load::none;
+    enum class Load { none, revolute, prismatic, spherical, planar, multiplier, user } load = Load::none;
+    std::string name;
     int law = 0;    // index into Program::law_names
     int block = 0;  // its directions
     int dim = 1;
@@ -22,8 +24,11 @@ struct Friction {
     double static_ratio = 1.0, stribeck_velocity = 0.0;  // 0: kinetic friction at any slip velocity
     Reaction reaction = Reaction::none;
     int joint = -1;   // tree joint that carries the load
-    int anchor = -1;  // or the block (hinge anchor, contact) that does
+    int anchor = -1;  // or the block (of an anchor, a contact or a coupling) that does
+    int anchor_row = 0;  // where one multiplier is the load: which of the anchor's
+    int row = -1;        // and its place among the kept rows, as Program::finish finds it
     Vec3 axis = Vec3::UnitZ();  // in the joint's frame, or in frame 1 of the anchor
+    int axis_dof = -1;          // dof whose axis it is, where it is fixed in no frame
     std::function<double(const Program& p, double t, const VecX& q, const VecX& v, Workspace& w)> user_limit;
 
     // Limit over load at a slip speed.

@@ -31,7 +31,7 @@ struct LawState {
     const std::vector<VecX>& user_force;  // of each user's law, as it answered last
 };
 
-struct Viscous {  // C = -coefficient v on dofs, or on the slip velocity along a block
+struct Viscous {  // C = -coefficient v on dofs, or on the slip velocities along a block
     int law = 0;  // index into Program::law_names
     int dof = -1, count = 0, block = -1;
     double coefficient = 0.0;
@@ -40,7 +40,11 @@ struct Viscous {  // C = -coefficient v on dofs, or on the slip velocity along a
 
     template <class Sink>
     void act(const LawState& s, Sink& sink) const {
-        if (block >= 0) return sink.along(block, Vec3(-coefficient * s.values[block].rate[0], 0.0, 0.0));
+        if (block >= 0) {
+            Vec3 force = Vec3::Zero();
+            for (int k = 0; k < s.values[block].rows; ++k) force[k] = -coefficient * s.values[block].rate[k];
+            return sink.along(block, force);
+        }
         for (int k = dof; k < dof + count; ++k) sink.on_dof(k, -coefficient * s.v[k]);
     }
 };

@@ -44,12 +44,13 @@ namespace {
 // Frictional elements, which act along their directions of slip.
 void bind_friction(nb::class_<Builder>& builder) {
     builder
-        .def("add_friction", [](Builder& b, int law, int block, Friction::Load load,
-                                Reaction reaction, int joint, int anchor, const std::vector<double>& axis,
-                                double constant, double mu, double radius, double axial_radius, double inverse_span,
-                                double static_ratio, double stribeck_velocity,
+        .def("add_friction", [](Builder& b, int law, int block, const std::string& name, Friction::Load load,
+                                Reaction reaction, int joint, int anchor, int row, const std::vector<double>& axis,
+                                int axis_dof, double constant, double mu, double radius, double axial_radius,
+                                double inverse_span, double static_ratio, double stribeck_velocity,
                                 const Function<double(double, Numbers, Numbers, ReactionView)>& user_limit) {
             Friction f;
+            f.name = name;
             f.law = law;
             f.block = block;
             f.dim = b.p->blocks[block].total;
@@ -57,7 +58,9 @@ void bind_friction(nb::class_<Builder>& builder) {
             f.reaction = reaction;
             f.joint = joint;
             f.anchor = anchor;
+            f.anchor_row = row;
             f.axis = vec3(axis);
+            f.axis_dof = axis_dof;
             f.constant = constant;
             f.mu = mu;
             f.radius = radius;
@@ -67,8 +70,9 @@ void bind_friction(nb::class_<Builder>& builder) {
             f.stribeck_velocity = stribeck_velocity;
             if (user_limit) f.user_limit = limit_function(*user_limit);
             b.p->frictions.push_back(std::move(f));
-        }, "law"_a, "block"_a, nb::kw_only(), "load"_a = Friction::Load::none, "reaction"_a = Reaction::none,
-           "joint"_a = -1, "anchor"_a = -1, "axis"_a = std::vector<double>{0.0, 0.0, 1.0}, "constant"_a = 0.0,
+        }, "law"_a, "block"_a, nb::kw_only(), "name"_a, "load"_a = Friction::Load::none,
+           "reaction"_a = Reaction::none, "joint"_a = -1, "anchor"_a = -1, "row"_a = 0,
+           "axis"_a = std::vector<double>{0.0, 0.0, 1.0}, "axis_dof"_a = -1, "constant"_a = 0.0,
            "mu"_a = 0.0, "radius"_a = 0.0, "axial_radius"_a = 0.0, "inverse_span"_a = 0.0, "static_ratio"_a = 1.0,
            "stribeck_velocity"_a = 0.0, "user_limit"_a = nb::none());
 }
@@ -153,7 +157,8 @@ void bind_enums(nb::module_& m) {
         .value("revolute", Load::revolute)
         .value("prismatic", Load::prismatic)
         .value("spherical", Load::spherical)
-        .value("contact", Load::contact)
+        .value("planar", Load::planar)
+        .value("multiplier", Load::multiplier)
         .value("user", Load::user);
     nb::enum_<Mode>(m, "Mode", nb::is_arithmetic(), "How a frictional element moves: slip one way or the other, or rest.")
         .value("slip_minus", slip_minus)

@@ -19,7 +19,7 @@ void bind_program(nb::module_& m) {
         .def_prop_ro("power_names", &power_names)
         .def_prop_ro("element_names", [](const Program& p) {
             std::vector<std::string> names;
-            for (const Friction& f : p.frictions) names.push_back(p.law_names[f.law]);
+            for (const Friction& f : p.frictions) names.push_back(f.name);
             return names;
         })
         .def("runner", [](std::shared_ptr<const Program> p) { return Runner(std::move(p)); });

@@ -1,0 +1,312 @@
+"""Friction in the core's program: where it acts, along which directions, and what loads it there."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.constraints import HingeAnchor, JointCoupling, PointAnchor, Rolling
+from pin_nonideal.contacts import PointContact
+from pin_nonideal.core import core
+from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.laws import JointFriction
+
+from .callbacks import ReactionNames
+from .constraints import frames_of
+from .names import Frame, Resolution, words
+
+# Constraint models of Pinocchio that hold a point on a point.
+BALLS = ("PointAnchorConstraintModel", "RigidConstraintModel")
+# Parameters of JointFriction that say something of a bearing, and those that say something of teeth.
+BEARING = ("radius", "axial_radius", "span")
+TEETH = ("lead_angle", "efficiency")
+
+
+class Surroundings(NamedTuple):
+    """What a law may refer to.
+
+    Attributes:
+        where: frames and joints by name.
+        constraints: descriptions of the constraints by name.
+        reactions: names that the user's laws may ask reactions for.
+    """
+
+    where: Resolution
+    constraints: dict[str, object]
+    reactions: ReactionNames
+
+
+class Place(NamedTuple):
+    """Directions along which a law rubs together, and what loads them.
+
+    Attributes:
+        load: what kind of load the limit follows.
+        part: which part of its law this is, in words; empty when it is all.
+        dof: first of the dofs that are the directions, or -1.
+        dofs: number of these.
+        block: of the directions where they are no dofs.
+        joint: that carries the load, or -1.
+        anchor: block that carries it, or -1.
+        row: of the anchor, whose multiplier is the load.
+        axis: of the bearing, in the joint's frame or in frame 1 of the anchor.
+        axis_dof: dof whose axis it is, where no frame carries it; or -1.
+        mu: limit over load; that of the law when None.
+        lever: of what turns [m]: torque over the force that resists sliding, and that speed over the rate.
+    """
+
+    load: core.Load
+    part: str = ""
+    dof: int = -1
+    dofs: int = 0
+    block: int = -1
+    joint: int = -1
+    anchor: int = -1
+    row: int = 0
+    axis: tuple[float, ...] = (0.0, 0.0, 1.0)
+    axis_dof: int = -1
+    mu: float | None = None
+    lever: float = 1.0
+
+
+def rubbing_joint(name: str, who: str, around: Surroundings, *, freedoms: tuple[int, ...] = (1,)) -> int:
+    """Index of a joint that a friction law may act on: one that moves, and is no mimic joint.
+
+    Args:
+        name: of the joint.
+        who: words for messages.
+        around: what the law may refer to.
+        freedoms: numbers of degrees of freedom that the law can do with.
+
+    Raises:
+        InputError, UnknownNameError: there is no such joint.
+    """
+    joint = around.where.joint(name, who, freedoms=freedoms)
+    for c in around.constraints.values():
+        if isinstance(c, JointCoupling) and c.joint1 == name and (c.name or "").endswith("mimic"):
+            raise InputError(
+                f'{who}: joint "{name}" is a mimic joint, driven by "{c.joint2}"; '
+                f'put the friction on "{c.joint2}"'
+            )
+    return joint
+
+
+def lower_joint_friction(law: JointFriction, name: str, out: core.Builder, around: Surroundings) -> None:
+    """Adds friction of a joint of the tree, of an anchor or of a coupling.
+
+    Args:
+        law: the description.
+        name: its unique name.
+        out: the program under construction.
+        around: what it may refer to.
+
+    Raises:
+        InputError, UnknownNameError: what it refers to does not exist, or a parameter has no meaning there.
+    """
+    who, model = words(law, name), around.where.model
+    if model.existJointName(law.joint) or law.joint not in around.constraints:
+        places = _in_joint(law, who, around)
+    else:
+        places = _in_constraint(law, name, out, around)
+    index = out.add_law(name)
+    for place in places:
+        _viscous(law, out, index, place)
+        if law.coulomb or law.preload or law.mu or place.mu:
+            _dry(law, name, out, index, place)
+
+
+def _in_joint(law: JointFriction, who: str, around: Surroundings) -> list[Place]:
+    """Where friction in a joint of the tree acts."""
+    where = around.where
+    model = where.model
+    if not model.existJointName(law.joint) and around.constraints:
+        known = [*list(model.names)[1:], *around.constraints]
+        if not model.existFrame(law.joint, pin.FrameType.FIXED_JOINT):
+            raise UnknownNameError(f'{who}: no joint or anchor "{law.joint}"{nearest(law.joint, known)}')
+    joint = rubbing_joint(law.joint, who, around, freedoms=(1, 2, 3, 6))
+    kind = model.joints[joint].shortname()
+    dof, count = model.joints[joint].idx_v, model.joints[joint].nv
+    _refuse(law, who, TEETH, f'of a JointCoupling, and joint "{law.joint}" is {kind}')
+    if kind == "JointModelUniversal":
+        _check_radius(law, who, core.Load.revolute)
+        axes = [(f"axis {k + 1}", dof + k) for k in range(2)]
+        return [Place(core.Load.revolute, p, d, 1, joint=joint, axis_dof=d) for p, d in axes]
+    if kind in ("JointModelPlanar", "JointModelFreeFlyer", "JointModelTranslation"):
+        return _sliding_and_turning(law, who, joint, kind, dof, count)
+    load, axis = where.bearing(joint)
+    if load is core.Load.none:
+        raise InputError(
+            f'{who}: joint "{law.joint}" must be revolute, prismatic, helical, spherical, universal, planar, '
+            f"translation or free flyer; it is {kind}"
+        )
+    _check_radius(law, who, load)
+    return [Place(load, "", dof, count, joint=joint, axis=tuple(axis))]
+
+
+def _sliding_and_turning(
+    law: JointFriction, who: str, joint: int, kind: str, dof: int, count: int
+) -> list[Place]:
+    """Joints that slide in several directions: planar, translation, free flyer."""
+    planar = kind == "JointModelPlanar"
+    load, carrier = (core.Load.planar, joint) if planar else (core.Load.none, -1)
+    if law.mu and not planar:
+        raise InputError(f'{who}: joint "{law.joint}" carries no load that mu could follow; give coulomb')
+    slides = count if kind == "JointModelTranslation" else 2 if planar else 3
+    if slides == count:
+        return [Place(load, "", dof, count)]
+    places = [Place(load, "sliding", dof, slides, joint=carrier)]
+    if law.radius:
+        places.append(Place(load, "turning", dof + slides, count - slides, joint=carrier, lever=law.radius))
+    return places
+
+
+def _in_constraint(law: JointFriction, name: str, out: core.Builder, around: Surroundings) -> list[Place]:
+    """Where friction in an anchor or a coupling acts."""
+    c: Any = around.constraints[law.joint]
+    who, anchor, where = words(law, name), around.reactions.blocks[law.joint], around.where
+    if isinstance(c, JointCoupling):
+        return [_in_coupling(law, who, name, c, anchor, out, where)]
+    _refuse(law, who, TEETH, f'of a JointCoupling, and "{law.joint}" is a {type(c).__name__}')
+    if isinstance(c, HingeAnchor):
+        _check_radius(law, who, core.Load.revolute)
+        f1, f2 = where.pair(c, who)
+        axis = tuple(where.hinge_axis(c, who))
+        block = out.add_hinge_slip(name, f1, f2, axis=list(axis))
+        return [Place(core.Load.revolute, block=block, anchor=anchor, axis=axis)]
+    ball = isinstance(c, PointAnchor) or type(c).__name__ in BALLS
+    rows = next(rows.count for rows in out.constraints if rows.name == law.joint)
+    if not ball or rows != 3:
+        held = f" that holds {rows} of three directions" if ball else ""
+        raise InputError(
+            f'{who}: "{law.joint}" is a {type(c).__name__}{held}, in which nothing is known to rub; friction '
+            'acts in a HingeAnchor, in a PointAnchor with axes="xyz" and on a JointCoupling'
+        )
+    _check_radius(law, who, core.Load.spherical)
+    block = out.add_turn_slip(name, *frames_of(c, where, who), axes=[0, 1, 2])
+    return [Place(core.Load.spherical, block=block, anchor=anchor)]
+
+
+def _in_coupling(
+    law: JointFriction,
+    who: str,
+    name: str,
+    c: JointCoupling,
+    anchor: int,
+    out: core.Builder,
+    where: Resolution,
+) -> Place:
+    """Where the teeth or threads of a coupling rub: parts a and b of their force go to its joints."""
+    _refuse(law, who, BEARING, f'of a bearing, and "{law.joint}" is a JointCoupling')
+    if law.mu and law.lead_angle is None:
+        raise InputError(
+            f"{who}: mu needs the lead_angle of the thread on a JointCoupling; give it, or an efficiency"
+        )
+    a, b = law.tooth_losses
+    loss = a + b
+    weights = (a / (loss * c.ratio), b / loss) if loss else (0.0, 1.0)
+    j1, j2 = where.joint(c.joint1, who), where.joint(c.joint2, who)
+    block = out.add_coupling_slip(name, j1, j2, weight1=weights[0], weight2=weights[1])
+    return Place(core.Load.multiplier, block=block, anchor=anchor, mu=loss * abs(c.ratio))
+
+
+def _refuse(law: JointFriction, who: str, keys: tuple[str, ...], reason: str) -> None:
+    """Parameters that would say nothing are no part of the law."""
+    for key in keys:
+        if getattr(law, key):
+            raise InputError(f"{who}: {key} is {reason}; leave it out")
+
+
+def _check_radius(law: JointFriction, who: str, load: core.Load) -> None:
+    """A coefficient without a radius would be no friction at all."""
+    radii = {core.Load.revolute: ("radius", "axial_radius"), core.Load.spherical: ("radius",)}.get(load, ())
+    if law.mu and radii and not any(getattr(law, key) for key in radii):
+        needed = " or ".join(radii)
+        raise InputError(
+            f"{who}: mu needs a positive {needed} on a joint that turns, for torque = mu radius force"
+        )
+
+
+def _viscous(law: JointFriction, out: core.Builder, index: int, place: Place) -> None:
+    """The part of a law that grows with the velocity."""
+    if not law.viscous:
+        return
+    coefficient = law.viscous * place.lever**2
+    if place.block >= 0:
+        out.add_viscous(index, coefficient, block=place.block)
+    else:
+        out.add_viscous(index, coefficient, dof=place.dof, count=place.dofs)
+
+
+def _dry(law: JointFriction, name: str, out: core.Builder, index: int, place: Place) -> None:
+    """The part of a law that sticks and slips."""
+    element = f"{name} {place.part}" if place.part else name
+    block = place.block
+    if block < 0:
+        block = out.add_dof_slip(element, dof=place.dof, count=place.dofs)
+    mu = law.mu if place.mu is None else place.mu
+    out.add_friction(
+        index,
+        block,
+        name=element,
+        load=place.load if mu else core.Load.none,
+        reaction=core.Reaction[law.reaction if mu else "none"],
+        joint=place.joint,
+        anchor=place.anchor,
+        row=place.row,
+        axis=list(place.axis),
+        axis_dof=place.axis_dof,
+        constant=(law.coulomb + law.preload) * place.lever,
+        mu=mu * place.lever,
+        radius=law.radius,
+        axial_radius=law.axial_radius,
+        inverse_span=0.0 if law.span is None else 1.0 / law.span,
+        static_ratio=law.static_ratio,
+        stribeck_velocity=(law.stribeck_velocity or 0.0) / place.lever,
+    )
+
+
+def lower_contact_friction(
+    c: PointContact | Rolling, name: str, out: core.Builder, around: Surroundings
+) -> None:
+    """Adds what rubs where a contact presses: sliding, spinning about the normal, and rolling.
+
+    Args:
+        c: the description, of a contact or of a body that rolls.
+        name: its unique name.
+        out: the program under construction.
+        around: what it may refer to.
+    """
+    where, who = around.where, words(c, name)
+    f1, f2, (t1, t2, n) = where.contact(c, who)
+    sliding = getattr(c, "mu", 0.0)
+    if not (sliding or c.torsional or c.rolling):
+        return
+    law = out.add_law(name)
+    level = _turned(f2, np.column_stack([t1, t2, n]))
+    rubs = []
+    if sliding:
+        block = out.add_contact_slip(name, f1, f2, radius=c.radius, tangent1=t1, tangent2=t2, normal=n)
+        rubs.append((name, block, sliding))
+    for part, coefficient, axes in (("torsional", c.torsional, [2]), ("rolling", c.rolling, [0, 1])):
+        if coefficient:
+            block = out.add_turn_slip(f"{name} {part}", f1, level, axes=axes)
+            rubs.append((f"{name} {part}", block, coefficient))
+    for element, block, coefficient in rubs:
+        out.add_friction(
+            law,
+            block,
+            name=element,
+            load=core.Load.multiplier,
+            reaction=core.Reaction.total,
+            anchor=around.reactions.blocks[name],
+            row=2 if isinstance(c, Rolling) else 0,
+            mu=coefficient,
+            static_ratio=getattr(c, "static_ratio", 1.0),
+        )
+
+
+def _turned(frame: Frame, axes: Any) -> Frame:
+    """A frame with other axes, the columns of `axes` in its own."""
+    joint, R, p = frame
+    return joint, (np.reshape(R, (3, 3)) @ axes).ravel().tolist(), p
