@@ -177,6 +177,39 @@ def test_dynamics_tags_become_laws(tmp_path):
     assert [(w.joint, w.viscous, w.coulomb) for w in scene.laws] == [("j", 0.3, 0.2)]
 
 
+@pytest.mark.parametrize(("kind", "slides"), [("planar", 2), ("floating", 3)])
+def test_dynamics_tags_of_joints_that_slide_and_turn(tmp_path, kind, slides):
+    """Each velocity takes the number in its own unit: m v' = -f - d v and J w' = -f - d w."""
+    mass, inertia, d, f, t = 2.0, 0.5, 0.3, 0.2, 0.7
+    tag = f'<dynamics damping="{d}" friction="{f}"/>'
+    text = robot(
+        '<link name="base"/>',
+        link("x", mass=mass, inertia=inertia),
+        joint("j", "base", "x", kind, inside=tag),
+    )
+    scene = pn.load(folder(tmp_path, "gravity: [0, 0, 0]", text))
+    note = (
+        'joint "j" slides and turns: damping 0.3 of the robot\'s file is taken in N s/m and N m s/rad, '
+        "friction 0.2 in N and N m"
+    )
+    assert note in scene.notes
+    v = np.zeros(scene.model.nv)
+    v[1], v[-1] = 1.5, -2.0
+    run = pn.simulate(scene, t, v=v, rtol=1e-11, atol=1e-12)
+    left = [(abs(x) + f / d) * np.exp(-d * t / m) - f / d for x, m in ((v[1], mass), (v[-1], inertia))]
+    assert np.linalg.norm(run.v[-1, :slides]) == pytest.approx(left[0], rel=1e-9)
+    assert run.v[-1, -1] == pytest.approx(-left[1], rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["planar", "floating"])
+def test_a_law_of_robot_yaml_replaces_the_tags_of_such_joints(tmp_path, kind):
+    tag = '<dynamics damping="0.3" friction="0.2"/>'
+    text = robot('<link name="base"/>', link("x"), joint("j", "base", "x", kind, inside=tag))
+    scene = pn.load(folder(tmp_path, "laws:\n  - JointFriction: {joint: j, viscous: 1.0}\n", text))
+    assert [(w.joint, w.viscous, w.coulomb, w.radius) for w in scene.laws] == [("j", 1.0, 0.0, 0.0)]
+    assert any("laws given replace the damping and friction" in note for note in scene.notes)
+
+
 def test_mimic_joints_hand_their_friction_to_the_leader(tmp_path):
     rubbing = '<mimic joint="elbow" multiplier="-2"/><dynamics damping="0.3" friction="0.2"/>'
     follower = '<mimic joint="j"/><dynamics damping="0.5"/>'

@@ -125,30 +125,29 @@ def dissipation(
         taken: laws already given; a JointFriction among them replaces the file's numbers for its joint.
         couplings: constraints of the file; its mimic joints are `JointCoupling` or, when held,
             `PrescribedMotion`.
-        notes: receives a note for each replacement, and for each joint that has no single velocity.
+        notes: receives a note for each replacement, and for each joint that has several velocities.
     """
     given = {law.joint for law in taken if isinstance(law, JointFriction)}
     leaders = {c.joint1: (c.joint2, c.ratio) for c in couplings if isinstance(c, JointCoupling)}
     held = {c.joint for c in couplings if isinstance(c, PrescribedMotion)}
     dry: dict[str, float] = {}
     viscous: dict[str, float] = {}
+    radius: dict[str, float] = {}
     replaced: dict[str, None] = {}
     for j in range(1, model.njoints):
         dofs = slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])
         name, damping, friction = model.names[j], model.damping[dofs], model.upperDryFrictionLimit[dofs]
         if not (damping.any() or friction.any()):
             continue
-        if model.nvs[j] != 1:
-            notes.append(
-                f'joint "{name}" has {model.nvs[j]} axes: damping and friction of the robot\'s file '
-                "are left out"
-            )
+        if model.nvs[j] != 1 and not _slides_and_turns(model, j, damping, friction, notes):
             continue
         ratio = 1.0
         for _ in leaders:
             if name in leaders:
                 ratio *= leaders[name][1]
                 name = leaders[name][0]
+        if model.nvs[j] != 1:
+            radius[name] = 1.0  # so that numbers are the same in both units
         if name in given:
             replaced[name] = None
         elif name not in held:
@@ -158,7 +157,28 @@ def dissipation(
         notes.append(
             "laws given replace the damping and friction of the robot's file in " + ", ".join(replaced)
         )
-    return [JointFriction(n, coulomb=dry[n], viscous=viscous[n], name=f"{n} dynamics") for n in dry]
+    return [
+        JointFriction(n, coulomb=dry[n], viscous=viscous[n], radius=radius.get(n, 0.0), name=f"{n} dynamics")
+        for n in dry
+    ]
+
+
+def _slides_and_turns(
+    model: Model, j: int, damping: NDArray[np.float64], friction: NDArray[np.float64], notes: list[str]
+) -> bool:
+    """Whether the file states one number for all velocities of a joint; notes what is made of it."""
+    name, kind = model.names[j], model.joints[j].shortname()
+    alike = np.ptp(damping) == 0.0 and np.ptp(friction) == 0.0
+    if not alike or kind not in ("JointModelPlanar", "JointModelFreeFlyer"):
+        notes.append(
+            f'joint "{name}" has {model.nvs[j]} axes: damping and friction of the robot\'s file are left out'
+        )
+        return False
+    notes.append(
+        f'joint "{name}" slides and turns: damping {damping[0]:g} of the robot\'s file is taken in N s/m and '
+        f"N m s/rad, friction {friction[0]:g} in N and N m"
+    )
+    return True
 
 
 def _change_joints(robot: RobotFile, table: Table, where: str, notes: list[str], merge: bool) -> None:

@@ -100,9 +100,23 @@ def read_urdf(path: Path, *, free_flyer: bool = False, package_dirs: Sequence[st
         )
     except (ValueError, RuntimeError) as error:
         raise LoadingError(f'"{path}" cannot be read by Pinocchio: {error}') from None
+    _keep_dynamics(model, root, path)
     visual, collision = (_geometry(model, root, path, kind, notes) for kind in ("visual", "collision"))
     motors = [j.get("name", "") for j in root.findall("transmission/joint")]
     return RobotFile(model, visual, collision, _mimics(root, path), [], motors, notes)
+
+
+def _keep_dynamics(model: Model, root: ElementTree.Element, path: Path) -> None:
+    """`<dynamics>` of planar and floating joints, for each dof; Pinocchio's reader keeps those of others."""
+    for joint in root.findall("joint"):
+        dynamics, name = joint.find("dynamics"), joint.get("name", "")
+        if dynamics is None or joint.get("type") not in ("planar", "floating"):
+            continue
+        where, j = f'"{path}": joint "{name}"', model.getJointId(name)
+        dofs = slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])
+        model.damping[dofs] = numbers(dynamics, "damping", 1, (0,), where)[0]
+        friction = numbers(dynamics, "friction", 1, (0,), where)[0]
+        model.upperDryFrictionLimit[dofs], model.lowerDryFrictionLimit[dofs] = friction, -friction
 
 
 def read_mimics(path: Path) -> list[Constraint]:
