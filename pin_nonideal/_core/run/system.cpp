@@ -18,7 +18,7 @@ System::System(const Program& program, Workspace& workspace, bool with_energy)
     : p(program), w(workspace), energy(with_energy), nq(p.mechanism.nq), nv(p.mechanism.nv), nz(p.states),
       nw(with_energy ? power_count(p) : 0), ne(static_cast<int>(p.frictions.size())),
       ns(nq + nv + nz + nw), ny(ns + 2 * ne),
-      q(VecX::Zero(nq)), v(VecX::Zero(nv)), projected_(VecX::Zero(ny)) {}
+      q(VecX::Zero(nq)), v(VecX::Zero(nv)) {}
 
 void System::read(const VecX& y) {
     q = y.head(nq);
@@ -37,21 +37,18 @@ void System::read_law_states(const VecX& y) {
 void System::derivative(double t, const VecX& y, VecX& dy) {
     read(y);
     read_law_states(y);
-    if (!on_constraints) {
-        evaluate(p, w, t, q, v);
-        if (!w.now.rows.blocks.empty()) smallest_pivot = std::min(smallest_pivot, w.now.rows.distance);
-        rate_of_evaluation(t, y, dy);
-        return;
-    }
-    pn::project_and_evaluate(p, w, t, q, v);
-    smallest_pivot = std::min(smallest_pivot, w.now.rows.distance);
-    projected_ = y;
-    write(projected_);
-    rate_of_evaluation(t, projected_, dy);
+    if (on_constraints) pn::project_and_evaluate(p, w, t, q, v);
+    else evaluate(p, w, t, q, v);
+    if (!w.now.rows.blocks.empty()) smallest_pivot = std::min(smallest_pivot, w.now.rows.distance);
+    write_rate(t, dy);
 }
 
 void System::rate_of_evaluation(double t, const VecX& y, VecX& dy) {
     read(y);
+    write_rate(t, dy);
+}
+
+void System::write_rate(double t, VecX& dy) {
     configuration_rate(p.mechanism, q.data(), v.data(), dy.data());
     dy.segment(nq, nv) = w.now.a;
     if (nz > 0) dy.segment(nq + nv, nz) = w.now.dz;

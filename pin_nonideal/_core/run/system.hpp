@@ -45,10 +45,10 @@ struct System {
     void normalize(VecX& y) const;
 
 private:
+    // dy at q and v, from the evaluation there.
+    void write_rate(double t, VecX& dy);
     void watch(double t, VecX& dy);
     double energy_at(const VecX& y);
-
-    VecX projected_;
 };
 
 }  // namespace pn
