@@ -77,7 +77,7 @@ const VecX& holding_forces(const Program& p, Workspace& w) {
     Evaluation& now = w.now;
     if (now.has_holding) return now.holding;
     now.has_holding = true;
-    multiply_M(p.mechanism, now.terms, now.a, now.holding);
+    multiply_M_locked(p.mechanism, now.terms, now.a, now.holding);
     now.holding -= now.F + now.C;
     w.scratch.work.setZero();
     for (int i : now.rows.blocks) add_transpose(p.blocks[i], now.A, now.lam, w.scratch.work);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include <Eigen/Cholesky>
 #include <Eigen/QR>
 
 namespace pn {
@@ -11,25 +12,40 @@ namespace pn {
 namespace {
 
 constexpr double met = 1e-9;  // part of the accelerations in play that counts as none
+// Least root of a pivot of W, scaled to a unit diagonal, with which Cholesky's factor is as good as an orthogonal one.
+constexpr double regular_pivot = 1e-3;
 
-// Least-norm x of W_FF x = r_F on the free elements F; zero on the others.
+// x of W x = r where W, scaled to a unit diagonal, keeps clear of singular; returns whether it does.
+bool solve_regular(const MatX& W, const VecX& r, VecX& x) {
+    const VecX scale = W.diagonal().cwiseSqrt().cwiseInverse();
+    const Eigen::LLT<MatX> factor(scale.asDiagonal() * W * scale.asDiagonal());
+    if (factor.info() != Eigen::Success || !(factor.matrixLLT().diagonal().minCoeff() > regular_pivot)) return false;
+    x.setZero();
+    for (int pass = 0; pass < 2; ++pass)  // the second gives back the digits that the condition costs
+        x += scale.cwiseProduct(factor.solve(scale.cwiseProduct(r - W * x)));
+    return true;
+}
+
+// Least-norm x of W_FF x = r_F on the free elements F; zero on the others, and where nothing responds.
 VecX solve_free(const MatX& W, const VecX& r, const std::vector<char>& is_free) {
     std::vector<int> list;
     for (int i = 0; i < r.size(); ++i)
-        if (is_free[i]) list.push_back(i);
+        if (is_free[i] && W(i, i) > 0.0) list.push_back(i);
     const int n = static_cast<int>(list.size());
     VecX x = VecX::Zero(r.size());
     if (n == 0) return x;
     MatX WF(n, n);
-    VecX rF(n);
+    VecX rF(n), xF(n);
     for (int i = 0; i < n; ++i) {
         rF[i] = r[list[i]];
         for (int j = 0; j < n; ++j) WF(i, j) = W(list[i], list[j]);
     }
-    Eigen::CompleteOrthogonalDecomposition<MatX> cod(n, n);
-    cod.setThreshold(rank_threshold);
-    cod.compute(WF);
-    const VecX xF = cod.solve(rF);
+    if (!solve_regular(WF, rF, xF)) {
+        Eigen::CompleteOrthogonalDecomposition<MatX> cod(n, n);
+        cod.setThreshold(rank_threshold);
+        cod.compute(WF);
+        xF = cod.solve(rF);
+    }
     for (int i = 0; i < n; ++i) x[list[i]] = xF[i];
     return x;
 }

@@ -1,5 +1,7 @@
 #include "friction/continuation.hpp"
 
+#include <optional>
+
 #include "dynamics/projection.hpp"
 #include "dynamics/slip.hpp"
 #include "dynamics/step_start.hpp"
@@ -9,47 +11,58 @@ namespace pn {
 namespace {
 
 constexpr double slack = 1e-9;  // part of the limit, or of the accelerations in play, by which rounding may miss
+constexpr int rounds = 6;       // of modes that are changed where their conditions fail; the program goes on from there
 
-// Whether the elements at rest keep the conditions of their modes in the motion at hand.
-bool keep_conditions(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                     const std::vector<int>& at_rest) {
+// Sets right the modes whose conditions fail in the motion at hand: what is past its limit slips, what is driven against
+// its slip sticks. Returns how many; nothing where one motion does not tell, for elements of several directions or for
+// those that share what they hold.
+std::optional<int> change_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                                const std::vector<int>& at_rest, std::vector<Mode>& modes) {
     const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
+    int changed = 0;
     for (int e : at_rest) {
-        const bool keeps = w.state.mode[e] == sticking
-                               ? friction_force(p, w, e).norm() <= static_limit(p, w, e, t, q, v) * (1.0 + slack)
-                               : slip_rate_along_mode(p, w, e) >= -slack * size;
-        if (!keeps) return false;
+        if (modes[e] == sticking) {
+            const Vec3 force = friction_force(p, w, e);
+            if (force.norm() <= static_limit(p, w, e, t, q, v) * (1.0 + slack)) continue;
+            if (p.frictions[e].dim > 1 || w.now.rows.redundant) return std::nullopt;
+            modes[e] = force[0] < 0.0 ? slip_plus : slip_minus;
+        } else {
+            if (slip_rate_along_mode(p, w, e) >= -slack * size) continue;
+            modes[e] = sticking;
+        }
+        ++changed;
     }
-    return true;
+    return changed;
 }
 
 }  // namespace
 
 bool go_on(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const ModeQuestion& question, int element) {
-    const Friction& friction = p.frictions[element];
-    const Mode before = question.modes[element];
     const bool breaks = !question.breaking.empty();
     // What gives way moves on its own only where no others hold the same freedom.
-    const bool alone = friction.dim == 1 && question.breaking.size() == 1 && !w.now.rows.redundant;
+    const bool alone = p.frictions[element].dim == 1 && question.breaking.size() == 1 && !w.now.rows.redundant;
     if (p.needs_reactions || (breaks && !alone)) return false;
-    std::vector<Mode> trials{sticking};
-    if (breaks) trials = {friction_force(p, w, element)[0] < 0.0 ? slip_plus : slip_minus};
-    else if (friction.dim == 1) trials.push_back(before == slip_plus ? slip_minus : slip_plus);
+    std::vector<Mode> modes = question.modes;
+    for (int e : question.at_rest) modes[e] = sticking;
+    if (breaks) modes[element] = friction_force(p, w, element)[0] < 0.0 ? slip_plus : slip_minus;
     const VecX q_before = q, v_before = v;
-    for (Mode trial : trials) {
-        std::vector<Mode> modes = question.modes;
-        for (int e : question.at_rest) modes[e] = e == element ? trial : sticking;
+    for (int round = 0; round < rounds; ++round) {
         set_modes(p, w, modes);
         try {
             project(p, w, t, q, v);
             begin_step(p, w, t, q, v);
-            if (keep_conditions(p, w, t, q, v, question.at_rest)) return true;
         } catch (const Failure& failure) {
             if (failure.kind != Failure::Kind::inconsistent) throw;
+            break;
         }
+        const std::optional<int> changed = change_modes(p, w, t, q, v, question.at_rest, modes);
+        if (changed == 0) return true;
+        if (!changed) break;
         q = q_before;
         v = v_before;
     }
+    q = q_before;
+    v = v_before;
     return false;
 }
 

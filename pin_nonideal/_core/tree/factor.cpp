@@ -80,6 +80,19 @@ void solve_Rt(const Mechanism& m, const Terms& terms, const std::vector<int>& do
     for (int k : dofs) solve_Rt_row(m, terms, k, x);
 }
 
+void multiply_M_locked(const Mechanism& m, const Terms& terms, const VecX& x, VecX& y) {
+    y.setZero();
+    for (int k = 0; k < m.nv; ++k) {
+        const double* row = terms.M.data() + m.row_offset[k];
+        const int *up = m.ancestors.data() + m.row_offset[k], depth = m.depth[k];
+        const double xk = x[k];
+        if (!terms.locked[k])
+            for (int s = 1; s <= depth; ++s) y[up[s]] += row[s] * xk;
+        else
+            for (int s = 1; s <= depth; ++s) y[k] += row[s] * x[up[s]];
+    }
+}
+
 void multiply_M(const Mechanism& m, const Terms& terms, const VecX& x, VecX& y) {
     y.setZero();
     for (int k = 0; k < m.nv; ++k) {

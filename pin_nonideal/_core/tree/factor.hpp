@@ -15,6 +15,8 @@ void solve_R(const Mechanism& m, const Terms& terms, VecX& x);
 void solve_Rt(const Mechanism& m, const Terms& terms, VecX& x);
 // The latter for the dofs listed, after their ancestors, of an x that is zero elsewhere before.
 void solve_Rt(const Mechanism& m, const Terms& terms, const std::vector<int>& dofs, VecX& x);
+// y := M x on the locked dofs, whose x is zero; on the others y means nothing.
+void multiply_M_locked(const Mechanism& m, const Terms& terms, const VecX& x, VecX& y);
 // y := M x.
 void multiply_M(const Mechanism& m, const Terms& terms, const VecX& x, VecX& y);
 
