@@ -43,7 +43,7 @@ bool shares_load(System& system, double t, const std::vector<int>& resting, int 
     const Program& p = system.p;
     Workspace& w = system.w;
     bool shares = false;
-    if (!w.now.rows.redundant) return shares;
+    if (!p.needs_reactions && !w.now.rows.redundant) return shares;
     for (int e : resting)
         shares |= w.state.mode[e] == sticking &&
                   (e == held || friction_force(p, w, e).norm() >
