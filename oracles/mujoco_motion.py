@@ -14,7 +14,7 @@ import numpy as np
 OFF = mujoco.mjtDisableBit
 CONNECT, WELD = 0, 1
 ROUNDING = 1e-13
-RANK = 1e-9  # singular values of the rows below this part of the largest are none
+RANK = 1e-6  # singular values of the rows below this part of the largest are none: frames are rounded to 1e-8
 
 
 class Instant(NamedTuple):

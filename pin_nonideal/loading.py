@@ -10,22 +10,33 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .checks import choice, sequence
-from .errors import InputError, LoadingError, UnknownNameError, nearest
-from .formats.assembly import Start, scene_arguments
+from .checks import choice, positive, sequence
+from .errors import InputError, LoadingError, nearest
+from .formats.assembly import scene_arguments
+from .formats.example_robots import example_names, example_robot
 from .formats.generators import GENERATORS
 from .formats.robot_yaml import MODEL_KEYS, check_keys, optional_string, read_yaml
-from .formats.urdf import RobotFile, read_mimics, read_urdf
+from .formats.rounding import relaxed
+from .formats.starts import Start
+from .formats.urdf import RobotFile, read_urdf
 from .mjcf.reader import read_mjcf
 from .mjcf.told import ALLOWED
 from .scene import Scene, loaded
-from .types import Model, Table
+from .types import Table
 
-FILE_PARAMETERS = ("free_flyer", "package_dirs", "merge_ball_joints")
+FILE_PARAMETERS = ("free_flyer", "package_dirs", "merge_ball_joints", "density")
+ASSEMBLY = 1e-6  # to which exports of CAD give the frames of loops [m or rad], with some room
 MJCF_PARAMETERS = ("allow", "ctrl")
 
 
-def load(name: str | os.PathLike[str], *, terms: str = "core", q0: Start = None, **parameters: Any) -> Scene:
+def load(
+    name: str | os.PathLike[str],
+    *,
+    terms: str = "core",
+    q0: Start = None,
+    assembly_tolerance: float = ASSEMBLY,
+    **parameters: Any,
+) -> Scene:
     """Loads a robot as a scene.
 
     `name` is one of
@@ -41,13 +52,16 @@ def load(name: str | os.PathLike[str], *, terms: str = "core", q0: Start = None,
 
     Args:
         name: see above.
-        terms: who computes M(q) and the bias forces, see `Scene`.
+        terms: who computes M(q) and the bias forces, as exports of CAD
+            round them: rows that depend on others to this tolerance are left out, which `notes` tell.
         q0: initial configuration in place of the file's: numbers (nq,), a table by joint name that changes
             some of them, or the name of a reference configuration (of a keyframe of an MJCF file, whose
             velocities and controls come along).
+        assembly_tolerance: to which the frames of the file's loops are given [m or rad], see `Scene`.
         **parameters: of a generated robot, such as N for "n_four_bar"; of URDF files and folders:
             `free_flyer` (bool, a floating base), `package_dirs` (folders for package:// paths),
-            `merge_ball_joints` (bool, True); of MJCF files: `allow` (what may be left out although it moves
+            `merge_ball_joints` (bool, True), `density` (of links that state no inertia [kg/m^3], which is
+            then computed from their shapes); of MJCF files: `allow` (what may be left out although it moves
             the robot, such as ("fluid", "muscle")), `ctrl` (controls of the actuators: numbers (nu,), a table
             by actuator's name, or a function (t, q, v) -> (nu,); zero when left out).
 
@@ -70,7 +84,14 @@ def load(name: str | os.PathLike[str], *, terms: str = "core", q0: Start = None,
         given["terms"] = terms
     if q0 is not None:
         given["q0"] = q0 if isinstance(q0, (str, Mapping)) else np.asarray(q0).tolist()
-    scene = Scene(**arguments, terms=terms)
+    if assembly_tolerance != ASSEMBLY:
+        given["assembly_tolerance"] = assembly_tolerance
+    arguments["terms"] = terms
+    scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
+    parts = relaxed(scene, assembly_tolerance)
+    if parts is not None:
+        arguments.update(constraints=parts.constraints, q0=parts.q, notes=(*scene.notes, parts.note))
+        scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
     return loaded(scene, _origin(text, given), found.robot.contact_friction)
 
 
@@ -97,7 +118,7 @@ def _origin(text: str, parameters: Table) -> Table | None:
     if folders is not None:
         listed = [folders] if isinstance(folders, (str, Path)) else folders
         kept["package_dirs"] = [str(Path(folder).resolve()) for folder in listed]
-    own = text in robot_folders() or not path.exists()
+    own = text in (*robot_folders(), *example_names()) or not path.exists()
     try:
         return dict(
             json.loads(json.dumps({"name": text if own else str(path.resolve()), "parameters": kept}))
@@ -110,18 +131,28 @@ def _find(name: str | os.PathLike[str], text: str, parameters: Table) -> Found:
     path = Path(text).expanduser()
     folders = robot_folders()
     if text in folders:
-        return _load_folder(folders[text], parameters)
-    if path.is_dir():
+        return _noting_folder(_load_folder(folders[text], parameters), path)
+    if path.is_dir() and (text not in example_names() or os.sep in text or isinstance(name, Path)):
         return _load_folder(path, parameters)
     if (
         path.is_file()
-        or path.suffix in (".urdf", ".xml", ".mjcf")
+        or path.suffix in (".urdf", ".xacro", ".xml", ".mjcf")
         or isinstance(name, Path)
         or os.sep in text
     ):
         return _load_file(path, parameters)
     check_parameters(parameters, (), text)
-    return Found(_example_robot(text, list(folders)), {}, text)
+    return _noting_folder(Found(example_robot(text, list(folders)), {}, text), path)
+
+
+def _noting_folder(found: Found, path: Path) -> Found:
+    """A robot found by its name, with a note where a folder or file of that name lies there too."""
+    if path.exists():
+        found.robot.notes.append(
+            f'"{path}" of the working directory is not what was loaded, for it is the name of a robot; '
+            f'write "./{path}" for the folder'
+        )
+    return found
 
 
 def robots() -> list[tuple[str, str]]:
@@ -160,6 +191,8 @@ def _file_options(parameters: Table, name: str) -> tuple[Table, bool]:
     options = {k: v for k, v in parameters.items() if k != "merge_ball_joints"}
     if isinstance(options.get("package_dirs"), (str, Path)):
         options["package_dirs"] = [options["package_dirs"]]
+    if options.get("density") is not None:
+        options["density"] = positive("density", options["density"])
     folders = sequence("package_dirs", options.get("package_dirs", []))
     if not all(isinstance(folder, (str, Path)) for folder in folders):
         raise InputError(f"package_dirs must be folders; got {options['package_dirs']!r}")
@@ -177,7 +210,7 @@ def _mjcf_options(parameters: Table, name: str) -> Table:
 def _load_file(path: Path, parameters: Table) -> Found:
     if not path.is_file():
         raise LoadingError(f'no file or folder "{path}"; give a path that exists, or the name of a robot')
-    if path.suffix == ".urdf":
+    if path.suffix in (".urdf", ".xacro"):
         options, merge = _file_options(parameters, path.name)
         return Found(read_urdf(path, **options), {}, path.stem, merge)
     if path.suffix in (".xml", ".mjcf"):
@@ -210,7 +243,7 @@ def _load_folder(folder: Path, parameters: Table) -> Found:
         return _generated(entry, table, parameters, name, yaml_path)
     if "example_robot_data" in entry:
         check_parameters(parameters, (), name)
-        robot = _example_robot(entry["example_robot_data"], [])
+        robot = example_robot(entry["example_robot_data"], [])
         return Found(robot, table, name)
     return _from_urdf(folder, entry, table, parameters, name)
 
@@ -248,42 +281,3 @@ def _generated(entry: Table, table: Table, parameters: Table, name: str, path: P
     check_keys(defaults, known, f'"{path}": model: parameters')
     check_parameters(parameters, known, name)
     return Found(generator(**{**defaults, **parameters}), table, name, True)
-
-
-def _example_robot(name: str, others: list[str]) -> RobotFile:
-    """A robot of example-robot-data, with its reference posture.
-
-    Raises:
-        UnknownNameError: neither this package nor example-robot-data has it.
-        LoadingError: example-robot-data has it but cannot load it.
-    """
-    try:
-        from example_robot_data import robots_loader
-    except ImportError as error:
-        raise LoadingError(
-            f'robot "{name}" may be one of example-robot-data, which cannot be imported ({error}); '
-            "pip install example-robot-data-loaders"
-        ) from None
-    if name not in robots_loader.ROBOTS:
-        raise UnknownNameError(f'no robot "{name}"{nearest(name, [*others, *robots_loader.ROBOTS])}')
-    try:
-        loader = robots_loader.loader(name)
-    except Exception as error:  # the loaders raise whatever their parsers raise
-        raise LoadingError(
-            f'example-robot-data cannot load "{name}": {" ".join(str(error).split())}'
-        ) from error
-    robot = loader.robot
-    notes = []
-    try:
-        mimics = read_mimics(Path(loader.df_path))
-    except LoadingError as error:
-        mimics = []
-        notes.append(f"mimic joints are left free: {error}")
-    constraints = [c for c in mimics if _has_joints(robot.model, c)]
-    q0 = np.array(robot.q0)
-    return RobotFile(robot.model, robot.visual_model, robot.collision_model, constraints, notes=notes, q0=q0)
-
-
-def _has_joints(model: Model, constraint: Any) -> bool:
-    names = [getattr(constraint, key, None) for key in ("joint", "joint1", "joint2")]
-    return all(model.existJointName(n) for n in names if n is not None)

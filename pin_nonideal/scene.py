@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from .actuation import Actuation
-from .checks import array, choice, number, optional_text, sequence
+from .checks import array, choice, nonnegative, number, optional_text, sequence
 from .compilation.analysis import check_model
 from .compilation.lowering import Descriptions
 from .compilation.report import report
@@ -21,6 +21,7 @@ from .equation import Solution
 from .errors import InputError
 from .forces import Force
 from .laws import Law
+from .states.closure import CLOSURE_TOLERANCE
 from .states.configurations import configuration, require_resolved, unit_parts
 from .types import Array, GeometryModel, Model, Table
 
@@ -55,6 +56,8 @@ class Scene:
         licence: its licence.
         terms: who computes M(q), the bias forces and the kinematics: "core", its own pass over the tree, or
             "pinocchio", Pinocchio's crba, nonLinearEffects and computeJointJacobians.
+        assembly_tolerance: to which the frames of loops are given [m or rad]: a gap up to it, in a direction
+            in which no joint moves, is no error.
 
     Raises:
         InputError, UnknownNameError: something does not fit the model.
@@ -88,6 +91,7 @@ class Scene:
         source: str | None = None,
         licence: str | None = None,
         terms: str = "core",
+        assembly_tolerance: float = CLOSURE_TOLERANCE,
     ) -> None:
         if not isinstance(model, pin.Model):
             raise InputError(f"Scene: model must be a pinocchio.Model; got {type(model).__name__}")
@@ -113,7 +117,8 @@ class Scene:
         self.q0 = pin.neutral(model) if q0 is None else self._configuration(q0, "q0")
         self.v0 = np.zeros(model.nv) if v0 is None else self._velocity(v0, "v0")
         said = Descriptions(self.constraints, self.contacts, self.laws, self.forces, actuation, terms)
-        self._compiled = CompiledScene(model, self.q0, self.v0, said)
+        tolerance = nonnegative("Scene: assembly_tolerance", assembly_tolerance)
+        self._compiled = CompiledScene(model, self.q0, self.v0, said, tolerance)
         self.constraint_slices, self.anchor_frames = self._compiled.slices, self._compiled.anchors
         self.element_names = self._compiled.program.element_names
         self.law_names = self._compiled.program.law_names
@@ -308,6 +313,15 @@ class Scene:
         credits = {"source": self.source, "licence": self.licence}
         notes += [f"{key}: {value}" for key, value in credits.items() if value]
         return report(self._compiled, self.name, self._runner.rank, notes)
+
+
+def program_of(scene: Scene) -> core.Program:
+    """The scene as the core knows it.
+
+    Args:
+        scene: the scene.
+    """
+    return scene._compiled.program
 
 
 def loaded(

@@ -27,6 +27,24 @@ def test_unknown_robot_names_the_nearest():
         pn.load("four_baar")
 
 
+def test_a_folder_does_not_shadow_a_name_without_a_word(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("four_bar", "double_pendulum"):
+        (tmp_path / name).mkdir()
+        folder(tmp_path / name)
+        scene = pn.load(name)
+        assert any(f'"{name}" of the working directory is not what was loaded' in n for n in scene.notes)
+        assert list(scene.model.names) != list(pn.load(f"./{name}").model.names)
+
+
+def test_start_by_joint_name_by_numbers_and_by_reference(tmp_path):
+    file = folder(tmp_path)
+    np.testing.assert_array_equal(pn.load(file, q0={"elbow": 0.5}).q0, [0, 0.5])
+    np.testing.assert_array_equal(pn.load(file, q0=[0.1, 0.2]).q0, [0.1, 0.2])
+    with refuses('load: q0: q: no joint "elbw"; nearest: "elbow"', InputError):
+        pn.load(file, q0={"elbw": 0.5})
+
+
 def test_missing_path_is_said(tmp_path):
     with refuses("no file or folder"):
         pn.load(tmp_path / "nowhere.urdf")
@@ -91,12 +109,12 @@ def test_example_robot_data_by_name():
 # mass matrix
 
 
-def test_massless_last_link_names_joint_and_link(tmp_path):
+def test_massless_link_that_a_loop_holds_names_joint_and_link(tmp_path):
     text = robot(*ARM, '<link name="tip"/>', joint("wrist", "lower", "tip"))
     with refuses(
         'joint "wrist" moves no inertia: give link "tip" a mass and a moment of inertia', SingularMassError
     ):
-        pn.load(folder(tmp_path, urdf=text))
+        pn.load(folder(tmp_path, "constraints: [{PointAnchor: {frame1: tip}}]", text))
 
 
 def test_parallel_axes_around_a_massless_link_name_the_joints(tmp_path):

@@ -21,7 +21,8 @@ _core core
 states: placements configurations closure rows projection
 compilation: failures callbacks names constraints friction laws forces lowering analysis scene report
 scene trajectory
-formats: xml shapes model_edit inertia urdf_checks urdf generators robot_yaml assembly
+formats: xml shapes model_edit inertia urdf_checks tidy density urdf generators example_robots robot_yaml \
+starts assembly rounding
 mjcf: compile motion tree tendons forces transmissions actuators equality fields told shapes reader
 loading
 runs: options progress results checkpoint scipy_methods resume

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import re
+import sys
+import types
 from pathlib import Path
 
 import numpy as np
@@ -111,26 +112,6 @@ URDF_REFUSED = {
             *ARM, link("x", inside="<visual><geometry><cone/></geometry></visual>"), joint("j", "base", "x")
         ),
         'link "x": <geometry> must hold one of box, cylinder, capsule, sphere, mesh; got <cone>',
-    ),
-    "material without name": (
-        robot(
-            *ARM,
-            link("x", inside='<visual><geometry><sphere radius="1"/></geometry><material/></visual>'),
-            joint("j", "base", "x"),
-        ),
-        'link "x": every <material> must have a name; one has none',
-    ),
-    "color of two numbers": (
-        robot(*ARM, '<material name="dim"><color rgba="0.5 0.5"/></material>'),
-        'material "dim": rgba must hold 4 numbers; got "0.5 0.5"',
-    ),
-    "joint without limit": (
-        robot(*ARM, link("x"), re.sub("<limit.*?/>", "", joint("j", "base", "x"))),
-        'joint "j": a revolute joint must have a <limit effort="..." velocity="..."/>',
-    ),
-    "limit without effort": (
-        robot(*ARM, link("x"), joint("j", "base", "x").replace('effort="1"', "")),
-        'joint "j": effort is missing in <limit>',
     ),
     "mimic of nothing": (
         robot(*ARM, link("x"), joint("j", "base", "x", inside='<mimic joint="elbo"/>')),
@@ -302,3 +283,137 @@ def test_meshes_are_found_in_package_folders(tmp_path):
     assert len(pn.load(folder(home, urdf=text)).visual_model.geometryObjects) == 0
     scene = pn.load(home, package_dirs=[tmp_path / "packages"])
     assert len(scene.visual_model.geometryObjects) == 1
+
+
+def shape(kind, attributes, inside=""):
+    return f"<visual><geometry><{kind} {attributes}/></geometry>{inside}</visual>"
+
+
+COSMETIC = {
+    "material without name": (link("x", inside=shape("sphere", 'radius="1"', "<material/>")), None),
+    "material without definition": (
+        link("x", inside=shape("sphere", 'radius="1"', '<material name="gold"/>')),
+        'materials that are not defined are left out: "gold"',
+    ),
+    "color of two numbers": (
+        link("x") + '<material name="dim"><color rgba="0.5 0.5"/></material>',
+        'colors that are not four numbers are left out, of materials "dim"',
+    ),
+    "shape of size zero": (
+        link("x", inside=shape("box", 'size="0 0 0"')),
+        'shapes of size zero are left out, in links "x"',
+    ),
+    "inertia negative by rounding": (
+        link("x").replace('ixx="0.1"', 'ixx="-2.4e-35"'),
+        'moments of inertia below zero by rounding are zero, of links "x"',
+    ),
+    "tag of another tool": (
+        link("x") + "<gazebo><speed>3</speed></gazebo>",
+        "elements of other tools are not read: <gazebo>",
+    ),
+    "unbound prefix": (
+        link("x", inside='<xacro:note who="me"/>') + "<drake:thing/>",
+        "elements of other tools are not read: <thing>, <note>",
+    ),
+    "scale of one number": (link("x"), None),
+}
+
+
+@pytest.mark.parametrize(("text", "note"), COSMETIC.values(), ids=COSMETIC)
+def test_cosmetics_are_notes(tmp_path, text, note):
+    file = robot(*ARM, text, joint("j", "base", "x", xyz="0 0.3 0"))
+    scene = pn.load(folder(tmp_path, urdf=file))
+    assert scene.model.nv == 3
+    if note is not None:
+        assert note in scene.notes
+    assert scene.visual_model.ngeoms <= 1
+
+
+LIMITS = {
+    "none": ('<limit effort="1" velocity="1" lower="-3" upper="3"/>', ""),
+    "without effort": ('effort="1"', ""),
+    "negative effort": ('effort="1"', 'effort="-1"'),
+    "turned around": ('lower="-3" upper="3"', 'lower="3" upper="-3"'),
+}
+
+
+@pytest.mark.parametrize(("old", "new"), LIMITS.values(), ids=LIMITS)
+def test_limits_are_mended(tmp_path, old, new):
+    text = robot(*ARM, link("x"), joint("j", "base", "x").replace(old, new))
+    scene = pn.load(folder(tmp_path, urdf=text))
+    assert 'limits that are missing, negative or turned around are mended, of joints "j"' in scene.notes
+
+
+BARE = (
+    '<link name="x"><collision><origin xyz="0.1 0.2 0.3" rpy="0.2 0.1 0.3"/><geometry>{}</geometry>'
+    "</collision></link>"
+)
+
+
+def test_links_without_inertia_take_that_of_their_shapes_when_a_density_is_given(tmp_path):
+    text = robot(*ARM, BARE.format('<box size="0.1 0.2 0.3"/>'), joint("j", "base", "x"))
+    with refuses(
+        "load(..., density=1000.0) computes the inertia of such links from their shapes", pn.SingularMassError
+    ):
+        bare = robot(ARM[0], BARE.format('<box size="0.1 0.2 0.3"/>'), joint("j", "base", "x"))
+        pn.load(folder(tmp_path, urdf=bare))
+    scene = pn.load(folder(tmp_path, urdf=text), density=500.0)
+    inertia = scene.model.inertias[scene.model.getJointId("j")]
+    mass = 500.0 * 0.1 * 0.2 * 0.3
+    assert inertia.mass == pytest.approx(mass, rel=1e-14)
+    np.testing.assert_allclose(inertia.lever, [0.1, 0.2, 0.3], atol=1e-15)
+    squares = np.array([0.1, 0.2, 0.3]) ** 2
+    principal = mass / 12.0 * (squares.sum() - squares)
+    np.testing.assert_allclose(np.linalg.eigvalsh(inertia.inertia), np.sort(principal), rtol=1e-12)
+    assert 'inertias of links "x" are those of their shapes at 500 kg/m^3' in scene.notes
+    with refuses("density must be positive; got -1", pn.InputError):
+        pn.load(tmp_path, density=-1.0)
+
+
+def test_joints_that_move_nothing_are_fixed(tmp_path):
+    text = robot(*ARM, '<link name="tip"/>', joint("wrist", "lower", "tip"))
+    scene = pn.load(folder(tmp_path, urdf=text))
+    assert list(scene.model.names)[1:] == ["shoulder", "elbow"]
+    assert 'joints that move no inertia are fixed: "wrist"' in scene.notes
+    held = folder(tmp_path, "constraints: [{PointAnchor: {frame1: tip}}]", text)
+    with refuses('joint "wrist" moves no inertia', pn.SingularMassError):
+        pn.load(held)
+
+
+def test_a_floating_base_is_proposed_when_nothing_moves(tmp_path):
+    scene = pn.load(folder(tmp_path, urdf=robot(link("base"))))
+    assert "nothing moves: load(..., free_flyer=True) gives the root link a floating base" in scene.notes
+    assert pn.load(tmp_path, free_flyer=True).model.nv == 6
+
+
+def test_packages_are_found_as_ros_finds_them(tmp_path, monkeypatch):
+    mesh = tmp_path / "prefix" / "share" / "arm_meshes" / "hull.stl"
+    mesh.parent.mkdir(parents=True)
+    corners = "vertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0"
+    mesh.write_text(f"solid a\nfacet normal 0 0 1\nouter loop\n{corners}\nendloop\nendfacet\nendsolid a\n")
+    inside = shape("mesh", 'filename="package://arm_meshes/hull.stl" scale=".00254"')
+    text = robot(*ARM, link("x", inside=inside), joint("j", "base", "x"))
+    missing = pn.load(folder(tmp_path, urdf=text))
+    assert 'mesh "package://arm_meshes/hull.stl" was not found; its shape is left out' in missing.notes
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
+    (item,) = pn.load(tmp_path).visual_model.geometryObjects
+    np.testing.assert_allclose(item.meshScale, [0.00254] * 3)
+    monkeypatch.delenv("AMENT_PREFIX_PATH")
+    home = tmp_path / "checkout"  # a package of another name than its folder
+    (home / "urdf").mkdir(parents=True)
+    (home / "package.xml").write_text("<package><name>arm_meshes</name></package>")
+    (home / "hull.stl").write_text(mesh.read_text())
+    (home / "urdf" / "arm.urdf").write_text(text)
+    assert pn.load(home / "urdf" / "arm.urdf").visual_model.ngeoms == 1
+
+
+def test_xacro_is_expanded_or_says_what_to_install(tmp_path, monkeypatch):
+    (tmp_path / "arm.urdf.xacro").write_text(robot(*ARM))
+    monkeypatch.setitem(sys.modules, "xacro", None)
+    with refuses("must be expanded by xacro, which cannot be imported; pip install xacro"):
+        pn.load(tmp_path / "arm.urdf.xacro")
+    expander = types.SimpleNamespace(
+        process_file=lambda path: types.SimpleNamespace(toxml=lambda: Path(path).read_text())
+    )
+    monkeypatch.setitem(sys.modules, "xacro", expander)
+    assert pn.load(tmp_path / "arm.urdf.xacro").model.nv == 2

@@ -64,13 +64,16 @@ def check_model(model: Model) -> None:
         )
 
 
-def idle_rows(model: Model, q0: Array, program: core.Program) -> list[tuple[str, int, str]]:
+def idle_rows(
+    model: Model, q0: Array, program: core.Program, tolerance: float = CLOSURE_TOLERANCE
+) -> list[tuple[str, int, str]]:
     """Rows that can never act: they vanish at every state, or are copies of others.
 
     Args:
         model: pinocchio.Model.
         q0: configuration around which the rows are sampled, (nq,).
         program: the scene with all its rows.
+        tolerance: gap that a row that vanishes may have [m or rad].
 
     Returns:
         (name, row, reason) of each.
@@ -95,7 +98,7 @@ def idle_rows(model: Model, q0: Array, program: core.Program) -> list[tuple[str,
     vanishing = (length <= STRUCTURAL * max(float(length.max()), LEAST_LENGTH)) & ~fixed
     dropped = []
     for row in map(int, np.flatnonzero(vanishing)):
-        _check_vanishing(*owners[row], np.abs(right[row]).max(), np.abs(right).max(), gaps[row])
+        _check_vanishing(*owners[row], np.abs(right[row]).max(), np.abs(right).max(), gaps[row], tolerance)
         dropped.append((*owners[row], "vanishes"))
     keep = ~vanishing
     for first, second in _copies(wide, right, length, keep & ~fixed):
@@ -105,14 +108,16 @@ def idle_rows(model: Model, q0: Array, program: core.Program) -> list[tuple[str,
     return sorted(dropped, key=lambda entry: rows[entry[:2]])
 
 
-def _check_vanishing(name: str, local: int, asked: float, largest: float, gap: float) -> None:
+def _check_vanishing(
+    name: str, local: int, asked: float, largest: float, gap: float, tolerance: float
+) -> None:
     """A row that moves nothing must ask for nothing: no acceleration, and no gap to be closed."""
     if asked > SUM_ROUNDING * max(1.0, largest):
         raise InconsistentConstraintsError(
             f'row {local} of constraint "{name}" moves nothing and asks for the acceleration {asked:.1e}; '
             "the joints leave that direction no freedom: drop the row or free a joint"
         )
-    if gap > CLOSURE_TOLERANCE:
+    if gap > tolerance:
         raise LoopClosureError(
             f'loop "{name}" does not close: gap {gap:.2g} in row {local}, a direction in which no joint '
             "moves; mend the frames' placement",

@@ -24,6 +24,7 @@ class CompiledScene:
         q0: configuration at which `frame2=None` and lengths left out are read, (nq,).
         v0: velocity near which derivatives of the user's constraints are compared, (nv,).
         said: what the scene is made of.
+        tolerance: gap that a row along which nothing moves may have [m or rad].
 
     Raises:
         InputError, UnknownNameError: something does not fit the model.
@@ -40,7 +41,7 @@ class CompiledScene:
         unprojected: names of user constraints without residual and rate.
     """
 
-    def __init__(self, model: Model, q0: Array, v0: Array, said: Descriptions) -> None:
+    def __init__(self, model: Model, q0: Array, v0: Array, said: Descriptions, tolerance: float) -> None:
         self.model, self.q0, self.said = model, q0, said
         try:
             builder = core.Builder(model, core.Provider[said.terms])
@@ -58,7 +59,7 @@ class CompiledScene:
             if isinstance(c, UserConstraint) and c.residual is None and c.rate is None
         ]
         check_user_constraints(model, q0, v0, said.constraints, self.program)
-        self.dropped = idle_rows(model, q0, self.program)
+        self.dropped = idle_rows(model, q0, self.program, tolerance)
         if self.dropped:
             idle = {(name, row) for name, row, _ in self.dropped}
             for block, c in enumerate(self.program.constraints):

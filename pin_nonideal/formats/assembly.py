@@ -5,8 +5,6 @@ Every joint that the table names is looked up here; the Scene looks up the frame
 
 from __future__ import annotations
 
-import dataclasses
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -15,12 +13,11 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.actuation import HoldPosition
-from pin_nonideal.checks import array, nonnegative, number
+from pin_nonideal.checks import nonnegative, number
 from pin_nonideal.constraints import JointCoupling, PrescribedMotion
-from pin_nonideal.errors import InputError, LoadingError, nearest
+from pin_nonideal.errors import InputError, LoadingError, SingularMassError, nearest
 from pin_nonideal.laws import JointFriction
-from pin_nonideal.states.configurations import CIRCLES, unit_parts
-from pin_nonideal.types import Model, Table
+from pin_nonideal.types import GeometryModel, Model, Table
 
 from .inertia import require_positive_mass
 from .model_edit import ball_chains, edit_joints
@@ -41,12 +38,10 @@ from .robot_yaml import (
     pitches,
     strings,
 )
+from .shapes import Shapes
+from .starts import Start, asked_start, initial_state, joint_index, vector
 from .urdf import RobotFile
-
-# A quaternion this close to unit length is normalized; one farther away is a mistake.
-UNIT_TOLERANCE = 1e-3
-
-Start = Sequence[float] | NDArray[np.float64] | Mapping[str, Any] | str | None
+from .xml import listed
 
 
 def scene_arguments(
@@ -71,22 +66,27 @@ def scene_arguments(
     notes = [*robot.notes, *strings(table, "notes", where)]
     _change_joints(robot, table, where, notes, merge)
     _place_base(robot, table, where)
+    _propose_floating(robot.model, notes)
     if "gravity" in table:
         robot.model.gravity = pin.Motion(
-            np.array(_vector(table["gravity"], 3, f"{where}: gravity")), np.zeros(3)
+            np.array(vector(table["gravity"], 3, f"{where}: gravity")), np.zeros(3)
         )
-    q0, v0 = _initial(robot, table.get("initial"), where)
+    q0, v0 = initial_state(robot, table.get("initial"), where)
     q0, v0 = _lock(robot, table, q0, v0, where)
+    q0, v0 = _fix_idle(robot, names_in(table), q0, v0, notes)
     if start is not None:
-        q0, v0 = _started(robot, q0, v0, start)
+        q0, v0 = asked_start(robot, q0, v0, start)
     robot.constraints = [c for c in robot.constraints if _still_moves(robot.model, c, where)]
     motors = strings(table, "name_mot", where) or [m for m in robot.motors if robot.model.existJointName(m)]
     for motor in motors:
-        _joint(robot.model, motor, f"{where}: name_mot")
+        joint_index(robot.model, motor, f"{where}: name_mot")
     if motors:
         notes.append("actuated joints: " + ", ".join(motors))
     laws = descriptions(table.get("laws"), LAWS, f"{where}: laws")
-    require_positive_mass(robot.model, q0, name)
+    try:
+        require_positive_mass(robot.model, q0, name)
+    except SingularMassError as error:
+        raise SingularMassError(f"{error}; {robot.advice}" if robot.advice else str(error)) from None
     return {
         "model": robot.model,
         "constraints": [
@@ -194,16 +194,23 @@ def _change_joints(robot: RobotFile, table: Table, where: str, notes: list[str],
         notes.append(
             f"three revolute joints with massless links between are merged into a ball joint each: {balls}"
         )
-    _exchange(robot, lambda geometries: edit_joints(robot.model, geometries, chains, types, screws))
+    model = robot.model
+    _exchange(robot, lambda geometries: edit_joints(model, geometries, chains, types, screws))
     robot.q0 = robot.v0 = None
 
 
 def _exchange(robot: RobotFile, edit: Callable[[list[Any]], tuple[Any, Iterable[Any]]]) -> None:
     """Puts an edited model and its geometries in the place of the robot's own."""
-    given = [key for key in ("visual", "collision") if getattr(robot, key) is not None]
-    robot.model, edited = edit([getattr(robot, key) for key in given])
-    for key, geometry in zip(given, edited, strict=True):
-        setattr(robot, key, geometry)
+    robot.model, _ = edit([])
+    _edit_shapes(robot, lambda geometry: next(iter(edit([geometry])[1])))
+
+
+def _edit_shapes(robot: RobotFile, edit: Callable[[GeometryModel], GeometryModel]) -> None:
+    """Edits the robot's shapes, those that are not read yet when they are."""
+    for key in ("visual", "collision"):
+        shapes = getattr(robot, key)
+        if shapes is not None:
+            setattr(robot, key, shapes.edited(edit) if isinstance(shapes, Shapes) else edit(shapes))
 
 
 def _place_base(robot: RobotFile, table: Table, where: str) -> None:
@@ -215,7 +222,7 @@ def _place_base(robot: RobotFile, table: Table, where: str) -> None:
     if not isinstance(entry, dict):
         raise LoadingError(f"{where} must be a table with the keys xyz, rpy; got {entry!r}")
     check_keys(entry, ("xyz", "rpy"), where)
-    xyz, rpy = (np.array(_vector(entry.get(k, [0, 0, 0]), 3, f"{where}: {k}")) for k in ("xyz", "rpy"))
+    xyz, rpy = (np.array(vector(entry.get(k, [0, 0, 0]), 3, f"{where}: {k}")) for k in ("xyz", "rpy"))
     base, model = pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz), robot.model
     for j in range(1, model.njoints):
         if model.parents[j] == 0:
@@ -223,106 +230,14 @@ def _place_base(robot: RobotFile, table: Table, where: str) -> None:
     for frame in list(model.frames)[1:]:
         if frame.parentJoint == 0:
             frame.placement = base * frame.placement
-    for geometry in (robot.visual, robot.collision):
-        for shape in geometry.geometryObjects if geometry is not None else ():
+
+    def mounted(geometry: GeometryModel) -> GeometryModel:
+        for shape in geometry.geometryObjects:
             if shape.parentJoint == 0:
                 shape.placement = base * shape.placement
+        return geometry
 
-
-def _joint(model: Model, name: Any, where: str) -> int:
-    if not isinstance(name, str) or not model.existJointName(name):
-        raise LoadingError(f'{where}: no joint "{name}"{nearest(str(name), list(model.names)[1:])}')
-    return int(model.getJointId(name))
-
-
-def _vector(value: Any, size: int, where: str) -> list[float]:
-    try:
-        return [float(x) for x in array(where, value, (size,))]
-    except InputError as error:
-        raise LoadingError(str(error)) from None
-
-
-def _initial(robot: RobotFile, initial: Any, where: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Initial q and v: the file's own, changed joint by joint by the table."""
-    model = robot.model
-    q0 = pin.neutral(model) if robot.q0 is None else np.array(robot.q0, dtype=float)
-    v0 = np.zeros(model.nv) if robot.v0 is None else np.array(robot.v0, dtype=float)
-    if initial is None:
-        return q0, v0
-    where = f"{where}: initial"
-    if not isinstance(initial, dict):
-        raise LoadingError(f"{where} must be a table with the keys q, v, reference; got {initial!r}")
-    check_keys(initial, ("q", "v", "reference"), where)
-    if "reference" in initial:
-        known = [entry.key() for entry in model.referenceConfigurations]
-        if initial["reference"] not in known:
-            asked = str(initial["reference"])
-            raise LoadingError(f'{where}: no reference configuration "{asked}"{nearest(asked, known)}')
-        q0 = np.array(model.referenceConfigurations[initial["reference"]])
-    for key, state, first, size in (("q", q0, model.idx_qs, model.nqs), ("v", v0, model.idx_vs, model.nvs)):
-        given = initial.get(key) or {}
-        if isinstance(given, list):
-            state[:] = _vector(given, state.size, f"{where}: {key}")
-            given = {}
-        if not isinstance(given, dict):
-            raise LoadingError(f"{where}: {key} must be a table by joint name or a full list; got {given!r}")
-        for name, value in given.items():
-            j = _joint(model, name, f"{where}: {key}")
-            state[first[j] : first[j] + size[j]] = _joint_value(
-                model, j, key, value, f'{where}: {key} of "{name}"'
-            )
-    return _with_unit_quaternions(model, q0, where), v0
-
-
-def _started(
-    robot: RobotFile, q0: NDArray[np.float64], v0: NDArray[np.float64], start: Start
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The configuration that the caller of `load` asks for, with the velocity of a keyframe.
-
-    Raises:
-        InputError: it does not fit the model.
-    """
-    if isinstance(start, str) and start in robot.keyframes:
-        keyframe = robot.keyframes[start]
-        keyframe.apply()
-        return np.array(keyframe.q), np.array(keyframe.v)
-    key, value = ("reference", start) if isinstance(start, str) else ("q", start)
-    if not isinstance(value, (str, Mapping)):
-        value = np.asarray(value).tolist()
-    kept = dataclasses.replace(robot, q0=q0, v0=v0)
-    try:
-        return _initial(kept, {key: dict(value) if isinstance(value, Mapping) else value}, "load: q0")[0], v0
-    except LoadingError as error:
-        raise InputError(str(error).replace("load: q0: initial", "load: q0")) from None
-
-
-def _joint_value(model: Model, j: int, key: str, value: Any, where: str) -> list[float]:
-    """Values of one joint; an angle may stand for its cosine and sine."""
-    size = model.nqs[j] if key == "q" else model.nvs[j]
-    values = list(value) if isinstance(value, (list, tuple)) else [value]
-    turns = key == "q" and model.joints[j].shortname().startswith(CIRCLES)
-    if turns and len(values) == model.nvs[j]:
-        try:
-            angle = number(where, values[-1])
-        except InputError as error:
-            raise LoadingError(str(error)) from None
-        values = [*values[:-1], float(np.cos(angle)), float(np.sin(angle))]
-    return _vector(values, size, where)
-
-
-def _with_unit_quaternions(model: Model, q: NDArray[np.float64], where: str) -> NDArray[np.float64]:
-    """Quaternions (and cosine-sine pairs) of unit length.
-
-    Raises:
-        LoadingError: one is far from unit length.
-    """
-    for joint, part in unit_parts(model):
-        length = math.hypot(*q[part])
-        if abs(length - 1.0) > UNIT_TOLERANCE:
-            what = "quaternion [x, y, z, w]" if part.stop - part.start == 4 else "cosine and sine"
-            raise LoadingError(f'{where}: {what} of joint "{joint}" must have length 1; got {length:g}')
-        q[part] /= length
-    return q
+    _edit_shapes(robot, mounted)
 
 
 def _lock(
@@ -335,8 +250,60 @@ def _lock(
         raise LoadingError(f"{where}: model: locked must be a list of joint names; got {locked!r}")
     if not locked:
         return q0, v0
+    indices = [joint_index(robot.model, n, f"{where}: model: locked") for n in locked]
+    return _reduced(robot, indices, q0, v0)
+
+
+def _propose_floating(model: Model, notes: list[str]) -> None:
+    """A robot that stands on nothing and has no joint was meant to float."""
+    if model.nv == 0:
+        notes.append("nothing moves: load(..., free_flyer=True) gives the root link a floating base")
+
+
+def _fix_idle(
+    robot: RobotFile, named: set[str], q0: NDArray[np.float64], v0: NDArray[np.float64], notes: list[str]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Fixes the joints that move no inertia at all, where neither a loop nor another joint hangs on them."""
     model = robot.model
-    indices = [_joint(model, n, f"{where}: model: locked") for n in locked]
+    idle = [j for j in range(1, model.njoints) if _moves_nothing(model, j)]
+    idle = [j for j in idle if not names_on(model, j) & named]
+    leaders = {c.joint2 for c in robot.constraints if isinstance(c, JointCoupling)}
+    names = {model.names[j] for j in idle}
+    followers = {c.joint1: c.joint2 for c in robot.constraints if isinstance(c, JointCoupling)}
+    lead = {n for n in names & leaders if any(f not in names for f, to in followers.items() if to == n)}
+    idle = [j for j in idle if model.names[j] not in lead]
+    if not idle or len(idle) == model.njoints - 1:
+        return q0, v0
+    names = {str(model.names[j]) for j in idle}
+    notes.append(f"joints that move no inertia are fixed: {listed(sorted(names))}")
+    robot.constraints = [c for c in robot.constraints if not names & set(map(str, vars(c).values()))]
+    return _reduced(robot, idle, q0, v0)
+
+
+def _moves_nothing(model: Model, joint: int) -> bool:
+    """Whether no link beyond a joint has mass or inertia, and no joint there a rotor's."""
+    beyond = list(model.subtrees[joint])
+    dofs = [i for j in beyond for i in range(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])]
+    bare = all(model.inertias[j].mass == 0.0 and not model.inertias[j].inertia.any() for j in beyond)
+    return bare and not model.armature[dofs].any()
+
+
+def names_on(model: Model, joint: int) -> set[str]:
+    """Names of a joint and of all frames beyond it.
+
+    Args:
+        model: pinocchio.Model.
+        joint: index.
+    """
+    beyond = set(model.subtrees[joint])
+    return {str(f.name) for f in model.frames if f.parentJoint in beyond} | {str(model.names[joint])}
+
+
+def _reduced(
+    robot: RobotFile, indices: list[int], q0: NDArray[np.float64], v0: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Fixes joints where they are at q0; returns the configuration and velocity of the others."""
+    model = robot.model
     kept = [j for j in range(1, model.njoints) if j not in indices]
     none = [np.zeros(0)]
     q = np.concatenate([q0[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]] for j in kept] or none)
@@ -397,7 +364,7 @@ def _by_joint(model: Model, table: Mapping[Any, Any], where: str, *, signed: boo
     """An array of shape (nv,) from values by joint name."""
     result = np.zeros(model.nv)
     for name, value in table.items():
-        j = _joint(model, name, where)
+        j = joint_index(model, name, where)
         what = f'{where} of "{name}"'
         try:
             result[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = (

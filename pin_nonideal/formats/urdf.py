@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -20,6 +21,9 @@ from pin_nonideal.errors import LoadingError, nearest
 from pin_nonideal.timefunctions import Constant
 from pin_nonideal.types import Array, GeometryModel, Model
 
+from .density import add_inertias, without_inertia
+from .shapes import Shapes
+from .tidy import tidy
 from .urdf_checks import check_urdf
 from .xml import numbers, parse_xml, read_text
 
@@ -55,6 +59,7 @@ class RobotFile:
         laws: nonideal laws that the file itself states, beside those that the model holds.
         actuation: what drives the joints, or None.
         keyframes: states that the file names.
+        advice: what may help where the mass matrix is singular, "" for nothing.
         contact_friction: coefficients of sliding, spinning and rolling by the geometry's name.
     """
 
@@ -70,27 +75,38 @@ class RobotFile:
     laws: list[Any] = field(default_factory=list)
     actuation: Any = None
     keyframes: dict[str, Keyframe] = field(default_factory=dict)
+    advice: str = ""
     contact_friction: dict[str, tuple[float, float, float]] = field(default_factory=dict)
 
 
-def read_urdf(path: Path, *, free_flyer: bool = False, package_dirs: Sequence[str | Path] = ()) -> RobotFile:
+def read_urdf(
+    path: Path,
+    *,
+    free_flyer: bool = False,
+    package_dirs: Sequence[str | Path] = (),
+    density: float | None = None,
+) -> RobotFile:
     """Reads a URDF file.
 
     Args:
         path: the file.
         free_flyer: give the root link a floating base, joint "root_joint".
         package_dirs: folders that hold the packages of `package://` paths; the file's own folder and those
-            above it, and ROS_PACKAGE_PATH, are searched as well.
+            above it, and the paths of ROS, are searched as well.
+        density: of links that state no inertia [kg/m^3], which is then that of their shapes.
 
     Raises:
         LoadingError: the file is malformed, holds a loop, or a link or joint that cannot be.
     """
-    text = read_text(path)
-    root = parse_xml(text, path, "robot")
+    root = parse_xml(urdf_text(path), path, "robot")
     name = root.get("name") or path.parent.name
     root.set("name", name)
+    notes = tidy(root)
     check_urdf(root, path)
-    notes = _resolve_meshes(root, path, package_dirs)
+    notes += _resolve_meshes(root, path, package_dirs)
+    bare = without_inertia(root)
+    if density is not None:
+        add_inertias(root, density, notes)
     xml = ElementTree.tostring(root, encoding="unicode")
     try:
         model = (
@@ -101,9 +117,39 @@ def read_urdf(path: Path, *, free_flyer: bool = False, package_dirs: Sequence[st
     except (ValueError, RuntimeError) as error:
         raise LoadingError(f'"{path}" cannot be read by Pinocchio: {error}') from None
     _keep_dynamics(model, root, path)
-    visual, collision = (_geometry(model, root, path, kind, notes) for kind in ("visual", "collision"))
+    visual, collision = (_shapes(model.copy(), root, path, kind) for kind in ("visual", "collision"))
     motors = [j.get("name", "") for j in root.findall("transmission/joint")]
-    return RobotFile(model, visual, collision, _mimics(root, path), [], motors, notes)
+    robot = RobotFile(model, visual, collision, constraints=_mimics(root, path), motors=motors, notes=notes)
+    if bare and density is None:
+        robot.advice = "load(..., density=1000.0) computes the inertia of such links from their shapes"
+    return robot
+
+
+def _shapes(model: Model, root: ElementTree.Element, path: Path, kind: str) -> Shapes:
+    """Geometry of one kind, read when something asks for it."""
+    notes: list[str] = []
+    return Shapes(cache(lambda: _geometry(model, root, path, kind, notes)), notes)
+
+
+def urdf_text(path: Path) -> str:
+    """The text of a URDF file; a `.xacro` file is expanded by the xacro package.
+
+    Raises:
+        LoadingError: it cannot be read, or cannot be expanded.
+    """
+    if path.suffix != ".xacro":
+        return read_text(path)
+    try:
+        import xacro
+    except ImportError:
+        raise LoadingError(
+            f'"{path}" must be expanded by xacro, which cannot be imported; pip install xacro, or expand the '
+            "file: xacro FILE > robot.urdf"
+        ) from None
+    try:
+        return str(xacro.process_file(str(path)).toxml())
+    except Exception as error:  # xacro raises whatever its macros raise
+        raise LoadingError(f'"{path}" cannot be expanded by xacro: {" ".join(str(error).split())}') from None
 
 
 def _keep_dynamics(model: Model, root: ElementTree.Element, path: Path) -> None:
@@ -184,16 +230,32 @@ def find_mesh(filename: str, folder: Path, package_dirs: Sequence[str | Path] = 
     for scheme in ("package://", "model://"):
         if filename.startswith(scheme):
             inner = filename[len(scheme) :].lstrip("/")
-            without_package = inner.partition("/")[2] or inner
-            ros = [Path(p) for p in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if p]
+            package, _, rest = inner.partition("/")
+            rest = rest or inner
             parents = folder.resolve().parents
-            candidates = [folder / inner, folder / without_package]
-            candidates += [base / inner for base in (*map(Path, package_dirs), *ros, *parents)]
-            candidates += [base / without_package for base in (*map(Path, package_dirs), *parents[:2])]
+            candidates = [folder / inner, folder / rest]
+            candidates += [base / inner for base in (*map(Path, package_dirs), *_ros_folders(), *parents)]
+            candidates += [base / rest for base in (*map(Path, package_dirs), *parents[:2])]
+            candidates += [base / rest for base in (folder.resolve(), *parents) if _is_package(base, package)]
             break
     else:
         candidates = [folder / filename.removeprefix("file://")]
     return next((c.resolve() for c in candidates if c.is_file()), None)
+
+
+def _ros_folders() -> list[Path]:
+    """Folders in which ROS looks for packages: ROS 1's own list, and the shares of ROS 2's prefixes."""
+    first = [Path(p) for p in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if p]
+    second = [Path(p) / "share" for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
+    return [*first, *second]
+
+
+def _is_package(folder: Path, name: str) -> bool:
+    """Whether a folder is the ROS package of that name, whatever it is called itself."""
+    try:
+        return f"<name>{name}</name>" in (folder / "package.xml").read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return False
 
 
 def _geometry(model: Model, root: ElementTree.Element, path: Path, kind: str, notes: list[str]) -> Any:

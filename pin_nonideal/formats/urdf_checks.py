@@ -37,9 +37,6 @@ def check_urdf(root: ElementTree.Element, path: Path) -> None:
         _check_link(link, path)
     for joint in root.findall("joint"):
         _check_joint(joint, path)
-    for material in root.iter("material"):
-        for color in material.findall("color"):
-            numbers(color, "rgba", 4, None, f'"{path}": material "{material.get("name")}"')
 
 
 def _check_tree(root: ElementTree.Element, path: Path) -> None:
@@ -148,9 +145,6 @@ def _check_shape(shape: ElementTree.Element, where: str) -> None:
             )
     if inner[0].tag == "mesh" and not inner[0].get("filename"):
         raise LoadingError(f"{where}: filename is missing in <mesh>")
-    for material in shape.findall("material"):
-        if not material.get("name"):
-            raise LoadingError(f"{where}: every <material> must have a name; one has none")
 
 
 def _check_joint(joint: ElementTree.Element, path: Path) -> None:
@@ -166,8 +160,6 @@ def _check_joint(joint: ElementTree.Element, path: Path) -> None:
     if kind in ("revolute", "continuous", "prismatic", "planar") and not axis.any():
         raise LoadingError(f"{where}: axis must have a direction; got 0 0 0")
     limit = joint.find("limit")
-    if kind in ("revolute", "prismatic") and limit is None:
-        raise LoadingError(f'{where}: a {kind} joint must have a <limit effort="..." velocity="..."/>')
     if limit is not None:
         for key in ("effort", "velocity"):
             numbers(limit, key, 1, None, where)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -10,6 +11,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from pin_nonideal.errors import LoadingError
+
+FOREIGN = "unbound:"  # namespace that stands for a prefix which a file does not declare
 
 
 def read_text(path: Path) -> str:
@@ -37,12 +40,31 @@ def parse_xml(text: str, path: Path, root: str) -> ElementTree.Element:
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise LoadingError(f'"{path}" must not declare a DOCTYPE or entities; remove them')
     try:
-        element = ElementTree.fromstring(text)
+        element = ElementTree.fromstring(_bound(text, root))
     except ElementTree.ParseError as error:
         raise LoadingError(f'"{path}" is truncated or not XML: {error}; export it again') from None
     if element.tag != root:
         raise LoadingError(f'"{path}" must have the root element <{root}>; got <{element.tag}>')
     return element
+
+
+def _bound(text: str, root: str) -> str:
+    """The text with every prefix of its tags and attributes declared: tools leave their own unbound."""
+    used = set(re.findall(r"</?([\w.-]+):[\w.-]", text)) | set(re.findall(r"\s([\w.-]+):[\w.-]+\s*=", text))
+    declared = set(re.findall(r"xmlns:([\w.-]+)\s*=", text))
+    unbound = sorted(used - declared - {"xmlns", "xml"})
+    names = "".join(f' xmlns:{prefix}="{FOREIGN}{prefix}"' for prefix in unbound)
+    return re.sub(rf"<{root}(?=[\s/>])", f"<{root}{names}", text, count=1) if unbound else text
+
+
+def listed(names: Iterable[str]) -> str:
+    """Up to four quoted names, and how many more.
+
+    Args:
+        names: each counts once.
+    """
+    once = list(dict.fromkeys(names))
+    return ", ".join(f'"{name}"' for name in once[:4]) + (f" and {len(once) - 4} more" if once[4:] else "")
 
 
 def numbers(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pin_nonideal.errors import LoadingError
+from pin_nonideal.formats.xml import listed
 
 from .actuators import acts, carriable
 from .equality import TENDON, equality_name
@@ -79,10 +80,6 @@ def tell(mujoco: Any, tree: Tree, tendons: list[Tendon | None], told: Told) -> N
     _tell_world(mujoco, tree, told)
 
 
-def _names(names: list[str]) -> str:
-    return ", ".join(f'"{name}"' for name in names[:4]) + (f" and {len(names) - 4} more" if names[4:] else "")
-
-
 def _tell_actuators(tree: Tree, tendons: list[Tendon | None], told: Told) -> None:
     m = tree.compiled
     names = [
@@ -92,10 +89,10 @@ def _tell_actuators(tree: Tree, tendons: list[Tendon | None], told: Told) -> Non
     working = [a for a in range(m.nactuator) if acts(m, a)]
     sticking = [names[a] for a in working if m.actuator_trntype[a] == BODY]
     if sticking:
-        told.note(f"adhesion actuators {_names(sticking)} pull on contacts, which are not carried over")
+        told.note(f"adhesion actuators {listed(sticking)} pull on contacts, which are not carried over")
     muscles = [names[a] for a in working if MUSCLE in (m.actuator_gaintype[a], m.actuator_biastype[a])]
     if muscles:
-        told.active("muscle", f"muscles {_names(muscles)}")
+        told.active("muscle", f"muscles {listed(muscles)}")
     others = [
         names[a]
         for a in working
@@ -103,7 +100,7 @@ def _tell_actuators(tree: Tree, tendons: list[Tendon | None], told: Told) -> Non
     ]
     if others:
         told.active(
-            "actuator", f"actuators with a controller, a delay or a law of their own {_names(others)}"
+            "actuator", f"actuators with a controller, a delay or a law of their own {listed(others)}"
         )
     wrapped = [
         names[a]
@@ -113,10 +110,10 @@ def _tell_actuators(tree: Tree, tendons: list[Tendon | None], told: Told) -> Non
         and names[a] not in muscles
     ]
     if wrapped:
-        told.active("tendon", f"actuators on tendons that wrap {_names(wrapped)}")
+        told.active("tendon", f"actuators on tendons that wrap {listed(wrapped)}")
     early = [names[a] for a in working if m.actuator_actearly[a] and m.actuator_dyntype[a]]
     if early:
-        told.note(f"actearly of {_names(early)} shifts activations by MuJoCo's time step, and is left out")
+        told.note(f"actearly of {listed(early)} shifts activations by MuJoCo's time step, and is left out")
 
 
 def _tell_tendons(tree: Tree, tendons: list[Tendon | None], told: Told) -> None:
@@ -133,27 +130,27 @@ def _tell_tendons(tree: Tree, tendons: list[Tendon | None], told: Told) -> None:
     active = [names[i] for i in wrapping if moving[i]]
     idle = [names[i] for i in wrapping if not moving[i]]
     if active:
-        told.active("tendon", f"springs, damping or friction of tendons that wrap {_names(active)}")
+        told.active("tendon", f"springs, damping or friction of tendons that wrap {listed(active)}")
     if idle:
-        told.note(f"tendons that wrap around geoms are left out: {_names(idle)}")
+        told.note(f"tendons that wrap around geoms are left out: {listed(idle)}")
     inertia = m.tendon_armature + actuator_share(m, m.actuator_armature[:, None], joints=False)[:, 0]
     heavy = [names[i] for i in np.flatnonzero(inertia)]
     if heavy:
-        told.active("tendon", f"armature of tendons {_names(heavy)}, which no mass matrix of a tree holds")
+        told.active("tendon", f"armature of tendons {listed(heavy)}, which no mass matrix of a tree holds")
     plastic = [names[i] for i in range(m.ntendon) if m.tendon_plasticadr[i] >= 0]
     plastic += [tree.joint_name(j) for j in range(m.njnt) if m.jnt_plasticadr[j] >= 0]
     if plastic:
-        told.active("plasticity", f"springs that yield {_names(plastic)}")
+        told.active("plasticity", f"springs that yield {listed(plastic)}")
 
 
 def _tell_bodies(tree: Tree, told: Told) -> None:
     m = tree.compiled
     if m.nmocap:
         names = [tree.body_names[b] for b in np.flatnonzero(m.body_mocapid >= 0)]
-        told.note(f"mocap bodies {_names(names)} are held where they start")
+        told.note(f"mocap bodies {listed(names)} are held where they start")
     elliptic = np.unique(m.geom_bodyid[m.geom_fluid[:, 0] > 0.0])
     if elliptic.size:
-        what = f"fluid forces on ellipsoids of bodies {_names([tree.body_names[b] for b in elliptic])}"
+        what = f"fluid forces on ellipsoids of bodies {listed([tree.body_names[b] for b in elliptic])}"
         moving = any(tree.bodies[b][0] for b in elliptic)
         if moving and (m.opt.density or m.opt.viscosity):
             told.active("fluid", what)
@@ -227,13 +224,13 @@ def _tell_limits(tree: Tree, told: Told) -> None:
     m = tree.compiled
     limited = [tree.joint_name(j) for j in np.flatnonzero(m.jnt_limited).tolist()]
     if limited:
-        told.note(f"ranges of joints play no part in the motion, they pass them: {_names(limited)}")
+        told.note(f"ranges of joints play no part in the motion, they pass them: {listed(limited)}")
     balls = [tree.joint_name(j) for j in np.flatnonzero(m.jnt_limited).tolist() if m.jnt_type[j] == BALL]
     if balls:
-        told.note(f"ranges of ball joints have no place in the model: {_names(balls)}")
+        told.note(f"ranges of ball joints have no place in the model: {listed(balls)}")
     tendons = [tendon_name(tree, i) for i in np.flatnonzero(m.tendon_limited).tolist()]
     if tendons:
-        told.note(f"ranges of tendons are left out: {_names(tendons)}")
+        told.note(f"ranges of tendons are left out: {listed(tendons)}")
 
 
 def _tell_world(mujoco: Any, tree: Tree, told: Told) -> None:
@@ -249,7 +246,7 @@ def _tell_world(mujoco: Any, tree: Tree, told: Told) -> None:
     ]
     if floating:
         told.note(
-            f"armature of free joints {_names(floating)}: MuJoCo gives it no Coriolis force along the "
+            f"armature of free joints {listed(floating)}: MuJoCo gives it no Coriolis force along the "
             "world's axes; a given force makes it the same here"
         )
     unknown = [f for f in dir(m) if not f.startswith("_") and not callable(getattr(m, f)) and not known(f)]

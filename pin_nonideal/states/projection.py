@@ -51,6 +51,34 @@ def nearest_state(model: Model, program: core.Program, q: Array, v: Array, t: fl
     return on, v_on
 
 
+def nearest_closure(
+    model: Model, program: core.Program, runner: core.Runner, q: Array, enough: float
+) -> tuple[Array, float]:
+    """The configuration near q with the smallest gaps that are found, whether closed or not.
+
+    Args:
+        model: pinocchio.Model.
+        program: the scene as the core knows it.
+        runner: a workspace of it.
+        q: configuration, (nq,).
+        enough: gap that needs no search from farther away [m or rad].
+
+    Returns:
+        The configuration, (nq,), and its largest gap [m or rad].
+    """
+    zero = np.zeros(model.nv)
+    try:
+        on, _, before, after, _ = runner.project(q, zero, 0.0, FAR)
+    except core.CoreFailure:
+        before = after = np.inf
+    if min(before, after) > enough:
+        on, after = close_loops(
+            model, _holonomic_rows(program, runner, model.nv, 0.0), _mass(model, runner), q
+        )
+        before = np.inf
+    return (on, after) if after <= before else (q, before)
+
+
 def nearest_states(
     model: Model, program: core.Program, q: Array, v: Array, t: float, threads: int
 ) -> tuple[Array, Array]:

@@ -1,0 +1,59 @@
+"""Loops whose frames an export has rounded: dependent rows give way, and the run starts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pin_nonideal as pn
+from pin_nonideal.errors import LoopClosureError
+
+ROUNDED = 3e-8  # what an export of CAD leaves of the place of a pin [m]
+TOLERANCE = 1e-5  # of accelerations: rounding over the crank's length, times a few rad/s^2
+
+
+def parallelogram(path, beside=0.0, tilt=0.0):
+    """Three parallel cranks on one coupler: the third adds no row, but for what is rounded.
+
+    Args:
+        path: the file.
+        beside: places of the pins of the second and third crank beside the plane [m].
+        tilt: of the second and third axis [rad].
+    """
+    cranks = "".join(
+        f'<body name="crank{i}" pos="{i} 0 0"><joint name="turn{i}" axis="0 1 {tilt * (i > 0)}"/>'
+        '<geom type="capsule" fromto="0 0 0 0.1 0 1" size="0.02"/>'
+        f'<site name="tip{i}" pos="0.1 {beside * (i > 0)} 1"/>{COUPLER if i == 0 else ""}</body>'
+        for i in range(3)
+    )
+    pins = "".join(f'<connect name="pin{i}" site1="hole{i}" site2="tip{i}"/>' for i in (1, 2))
+    path.write_text(f"<mujoco><worldbody>{cranks}</worldbody><equality>{pins}</equality></mujoco>")
+    return path
+
+
+COUPLER = """<body name="coupler" pos="0.1 0 1"><joint name="swing" axis="0 1 0"/>
+    <geom type="capsule" fromto="0 0 0 2 0 0" size="0.02"/><site name="hole1" pos="1 0 0"/>
+    <site name="hole2" pos="2 0 0"/></body>"""
+
+
+@pytest.mark.parametrize(("beside", "tilt"), [(ROUNDED, 0.0), (ROUNDED, ROUNDED)])
+def test_rows_that_depend_on_others_to_the_rounding_are_left_out(tmp_path, beside, tilt):
+    exact = pn.load(parallelogram(tmp_path / "exact.xml"))
+    scene = pn.load(parallelogram(tmp_path / "rounded.xml", beside, tilt))
+    assert not any("assembly" in note for note in exact.notes)
+    (note,) = [note for note in scene.notes if "within the tolerance of the assembly (1e-06)" in note]
+    assert "depend on others and are left out" in note
+    q, v = scene.initial_state()
+    theirs, ours = exact.solve(*exact.initial_state()), scene.solve(q, v)
+    assert ours.rank == theirs.rank == 3
+    np.testing.assert_allclose(ours.a, theirs.a, atol=TOLERANCE)
+    run, same = pn.simulate(scene, 0.5), pn.simulate(exact, 0.5)
+    np.testing.assert_allclose(run.q[-1], same.q[-1], atol=TOLERANCE)
+
+
+def test_a_gap_beyond_the_tolerance_is_an_open_loop(tmp_path):
+    with pytest.raises(LoopClosureError, match=r'loop "pin1" does not close: gap 0\.0001 in row 1'):
+        pn.load(parallelogram(tmp_path / "wide.xml", 1e-4))
+    scene = pn.load(parallelogram(tmp_path / "wide.xml", 1e-4), assembly_tolerance=1e-3)
+    assert any("within the tolerance of the assembly (0.001)" in note for note in scene.notes)
+    scene.initial_state()
