@@ -22,6 +22,7 @@ from .trajectory import Trajectory
 from .types import Table
 
 EXIT_ERROR = 2
+EXIT_UNREAD = 141  # 128 and the number of SIGPIPE, as shells show it
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 
 # Samples per second of simulated time when pictures are asked for: a replay page shows no more.
@@ -42,13 +43,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _parser().error(f"unrecognized arguments: {' '.join(rest)}")
     options.rest = rest
     try:
-        return int(options.command(options))
+        code = int(options.command(options))
+        sys.stdout.flush()
+        return code
     except RunInterrupted as error:
         print(f"pin-nonideal: interrupted: {error}", file=sys.stderr)
         return EXIT_INTERRUPTED
     except KeyboardInterrupt:
         print("pin-nonideal: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
+    except BrokenPipeError:  # the reader of the output, such as `head`, has had enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_UNREAD
     except PinNonidealError as error:
         print(f"pin-nonideal: error: {error}", file=sys.stderr)
         return EXIT_ERROR

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,6 +12,8 @@ from pathlib import Path
 from typing import IO
 
 from .errors import InputError, OutputError
+
+PART = ".part"  # end of the name of a file that is still being written
 
 
 def file_path(what: str, value: object) -> Path:
@@ -33,29 +37,77 @@ def file_path(what: str, value: object) -> Path:
 def whole_file(path: Path, what: str) -> Iterator[IO[bytes]]:
     """A stream into a temporary file beside `path`, renamed at the end, so that no half of it is ever seen.
 
+    A symbolic link stays and its target is written; a file that is there keeps its permissions; what a killed
+    process left half written of the same file is taken away.
+
     Args:
         path: the file; an older one stays until the new one is complete.
         what: words for the message.
 
     Raises:
-        OutputError: the folder does not exist or cannot be written, or `path` is a folder.
+        OutputError: the folder does not exist or cannot be written, or `path` is a folder, device or pipe.
     """
+    target = Path(os.path.realpath(path))
     try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:40]}.", suffix=".part")
+        mode = _mode_of(target, path, what)
+        _remove_left_over(target)
+        handle, temporary = tempfile.mkstemp(
+            dir=target.parent, prefix=_part(target, os.getpid()), suffix=PART
+        )
     except OSError as error:
+        if isinstance(error, OutputError):
+            raise
         raise OutputError(_cannot_write(path, what, error)) from error
     try:
         with os.fdopen(handle, "wb") as stream:
             yield stream
             stream.flush()
             os.fsync(stream.fileno())  # on the disk before it bears its name
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
+        os.chmod(temporary, mode)
+        os.replace(temporary, target)
     except BaseException as error:
         Path(temporary).unlink(missing_ok=True)
         if isinstance(error, OSError):
             raise OutputError(_cannot_write(path, what, error)) from error
         raise
+
+
+def _mode_of(target: Path, path: Path, what: str) -> int:
+    """Permissions of the file that is there, or of a new one.
+
+    Raises:
+        OutputError: a device, a pipe or a socket is there.
+    """
+    if not target.exists():
+        return 0o666 & ~_umask()
+    mode = target.stat().st_mode
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise OutputError(f'cannot write {what} to "{path}": it is a device or a pipe; name a file')
+    return stat.S_IMODE(mode)
+
+
+def _part(target: Path, process: int) -> str:
+    """Beginning of the name of a file that a process is still writing."""
+    return f".{target.name[:40]}.{process}."
+
+
+def _remove_left_over(target: Path) -> None:
+    """Takes away half-written files of processes that are gone."""
+    pattern = re.compile(re.escape(f".{target.name[:40]}.") + r"(\d+)\..*" + re.escape(PART))
+    for entry in list(os.scandir(target.parent)):
+        found = pattern.fullmatch(entry.name)
+        if found is not None and not _is_running(int(found[1])):
+            Path(entry.path).unlink(missing_ok=True)
+
+
+def _is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (PermissionError, OverflowError):
+        pass
+    return True
 
 
 def _cannot_write(path: Path, what: str, error: OSError) -> str:

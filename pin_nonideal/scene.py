@@ -113,9 +113,12 @@ class Scene:
             for what, value in (("source", source), ("licence", licence))
         )
         check_model(model)
+        self._as_made = model.copy()
         self._unit_parts = tuple(unit_parts(model))
-        self.q0 = pin.neutral(model) if q0 is None else self._configuration(q0, "q0")
-        self.v0 = np.zeros(model.nv) if v0 is None else self._velocity(v0, "v0")
+        self._q0: Array = pin.neutral(model) if q0 is None else self._configuration(q0, "q0")
+        self._v0 = np.zeros(model.nv) if v0 is None else self._velocity(v0, "v0")
+        for state in (self._q0, self._v0):
+            state.setflags(write=False)
         said = Descriptions(self.constraints, self.contacts, self.laws, self.forces, actuation, terms)
         tolerance = nonnegative("Scene: assembly_tolerance", assembly_tolerance)
         self._compiled = CompiledScene(model, self.q0, self.v0, said, tolerance)
@@ -138,6 +141,16 @@ class Scene:
             f'<Scene "{self.name}": nv {self.model.nv}, {len(self.constraints)} constraints, '
             f"{len(self.laws)} laws, {len(self.contacts)} contacts>"
         )
+
+    @property
+    def q0(self) -> Array:
+        """Initial configuration, (nq,), read-only: loops are closed and frames are held from it."""
+        return self._q0
+
+    @property
+    def v0(self) -> Array:
+        """Initial velocity, (nv,), read-only."""
+        return self._v0
 
     @property
     def visual_model(self) -> GeometryModel | None:
@@ -167,7 +180,20 @@ class Scene:
     # --- states ---------------------------------------------------------------------------------------------
 
     def _configuration(self, q: ArrayLike, what: str) -> Array:
+        self._require_unchanged()
         return configuration(self.model, q, what, self._unit_parts)
+
+    def _require_unchanged(self) -> None:
+        """The core has taken the model's numbers when the scene was made.
+
+        Raises:
+            InputError: the model is no longer what it was.
+        """
+        if self.model != self._as_made:
+            raise InputError(
+                f'the model of scene "{self.name}" was changed after the scene was made, which has its own '
+                "numbers; make a new Scene of the changed model"
+            )
 
     def _velocity(self, v: ArrayLike, what: str) -> Array:
         return np.array(array(what, v, (self.model.nv,)))
@@ -182,6 +208,7 @@ class Scene:
             LoopClosureError: the loops cannot be closed.
             InputError: a coordinate is too large to move.
         """
+        self._require_unchanged()
         if self._closed is None:
             self._closed = self._project(self.q0, self.v0, 0.0)
         return self._closed[0].copy(), self._closed[1].copy()

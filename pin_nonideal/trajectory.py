@@ -264,6 +264,18 @@ def _check_arrays(arrays: Table, source: Path) -> None:
         LoadingError: one does not.
     """
     rows = arrays["t"].shape[:1]
+    t = arrays["t"]
+    if t.dtype.kind in "fi" and t.ndim == 1:
+        if not np.isfinite(t).all():
+            raise LoadingError(
+                f'"{source}" is no trajectory: t must be finite; it holds {t[~np.isfinite(t)][0]}'
+            )
+        early = np.flatnonzero(np.diff(t) < 0.0)
+        if early.size:
+            i = int(early[0])
+            raise LoadingError(
+                f'"{source}" is no trajectory: t must not fall; t[{i + 1}] = {t[i + 1]:g} follows {t[i]:g}'
+            )
     for key, x in arrays.items():
         if x.dtype.kind not in "fi":
             raise LoadingError(f'"{source}" is no trajectory: {key} must hold numbers; got {x.dtype.name}')

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,14 +39,23 @@ def checked(function: Callable[..., Any], who: str, *shapes: tuple[int, ...]) ->
         except RunError:
             raise
         except Exception as error:
-            raise UserFunctionError(f"{who} raised {type(error).__name__}: {error}") from error
+            raise _failed(f"{who} raised {type(error).__name__}: {error}", arguments) from error
         parts = (value,) if len(shapes) == 1 else value
         if not isinstance(parts, (tuple, list)) or len(parts) != len(shapes):
-            raise UserFunctionError(f"{who} must return {len(shapes)} values; got {type(value).__name__}")
-        results = [_numbers(part, shape, who) for part, shape in zip(parts, shapes, strict=True)]
+            raise _failed(f"{who} must return {len(shapes)} values; got {type(value).__name__}", arguments)
+        try:
+            results = [_numbers(part, shape, who) for part, shape in zip(parts, shapes, strict=True)]
+        except UserFunctionError as error:
+            raise _failed(str(error), arguments) from None
         return results[0] if len(shapes) == 1 else tuple(results)
 
     return call
+
+
+def _failed(message: str, arguments: Sequence[Any]) -> UserFunctionError:
+    """The error of a function whose first argument is the time, which it tells."""
+    time = float(arguments[0]) if arguments and isinstance(arguments[0], float) else None
+    return UserFunctionError(message if time is None else f"{message} (at t = {time:.6g} s)", time=time)
 
 
 def _numbers(part: Any, shape: tuple[int, ...], who: str) -> Array:

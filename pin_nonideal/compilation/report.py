@@ -30,6 +30,12 @@ def report(scene: CompiledScene, name: str, rank: int, notes: Sequence[str]) -> 
         lines.append(f"  constraint {name}: {s.stop - s.start} rows")
     for name in scene.program.law_names:
         lines.append(f"  law {name}")
+    lines += [f"  force {_label(force)}" for force in scene.said.forces]
+    if scene.said.actuation is not None:
+        lines.append(f"  actuation {_label(scene.said.actuation)}")
+    limited = [str(model.names[i]) for i in range(1, model.njoints) if _limited(model, i)]
+    if limited:
+        lines.append(f"  limits, which the motion may pass: {', '.join(limited)}")
     lines.append(f"rows {rows}, rank {rank}, mobility {model.nv - rank}")
     for name, row, reason in scene.dropped:
         lines.append(f"  left out: row {row} of {name}: {reason}")
@@ -38,6 +44,15 @@ def report(scene: CompiledScene, name: str, rank: int, notes: Sequence[str]) -> 
         lines.append(f"  redundant: {redundant} further rows, decided at every step")
     lines.append("skipped: " + (", ".join(_skipped(scene)) or "nothing"))
     return "\n".join([*lines, *notes])
+
+
+def _label(said: object) -> str:
+    """What a force or an actuation is called: its name and kind, or what it acts on."""
+    kind = type(said).__name__
+    name = getattr(said, "name", None) or getattr(said, "joint", None) or getattr(said, "frame", None)
+    if kind in ("ndarray", "list", "tuple"):
+        return "constant torques"
+    return f"{name} ({kind})" if isinstance(name, str) else {"function": "function (t, q, v)"}.get(kind, kind)
 
 
 def _skipped(scene: CompiledScene) -> list[str]:

@@ -43,6 +43,9 @@ from .starts import Start, asked_start, initial_state, joint_index, vector
 from .urdf import RobotFile
 from .xml import listed
 
+# Beyond this a base loses a tenth of a micrometer to floating-point numbers [m or rad].
+FARTHEST = 1e9
+
 
 def scene_arguments(
     robot: RobotFile, table: Table, name: str, *, merge: bool = True, start: Start = None
@@ -223,6 +226,8 @@ def _place_base(robot: RobotFile, table: Table, where: str) -> None:
         raise LoadingError(f"{where} must be a table with the keys xyz, rpy; got {entry!r}")
     check_keys(entry, ("xyz", "rpy"), where)
     xyz, rpy = (np.array(vector(entry.get(k, [0, 0, 0]), 3, f"{where}: {k}")) for k in ("xyz", "rpy"))
+    if np.abs([*xyz, *rpy]).max() > FARTHEST:
+        raise LoadingError(f"{where}: xyz and rpy must be at most {FARTHEST:g} (m, rad); got {entry!r}")
     base, model = pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz), robot.model
     for j in range(1, model.njoints):
         if model.parents[j] == 0:

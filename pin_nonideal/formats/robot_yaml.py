@@ -73,6 +73,8 @@ def read_yaml(path: Path) -> Table:
         raise LoadingError(f'"{path}" cannot be read as plain YAML: {_one_line(error)}') from None
     except RecursionError:
         raise LoadingError(f'"{path}" is nested too deeply; a robot.yaml is a flat table') from None
+    if table is None:  # an empty file: a robot without extras
+        table = {}
     if not isinstance(table, dict):
         raise LoadingError(f'"{path}" must be a table of keys; got {_kind(table)}')
     check_keys(table, (*COMMUNITY_KEYS, *OWN_KEYS), f'"{path}"')
@@ -100,6 +102,17 @@ def _loader() -> Any:
                 seen.add(key.value)
             return super().construct_mapping(node, deep)
 
+        def construct_scalar(self, node: Any) -> Any:
+            surprising = re.fullmatch(
+                r"[-+]?(0[0-7_]+|[0-9][0-9_]*(:[0-5]?[0-9])+(\.[0-9_]*)?)", str(node.value)
+            )
+            if surprising and node.style is None and node.tag.endswith((":int", ":float")):
+                line = node.start_mark.line + 1
+                raise yaml.YAMLError(
+                    f"{node.value} is octal or sexagesimal in YAML (line {line}); write decimals, or a text"
+                )
+            return super().construct_scalar(node)
+
     number = re.compile(r"^[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$")
     Loader.add_implicit_resolver("tag:yaml.org,2002:float", number, list("-+.0123456789"))
     return Loader
@@ -110,7 +123,8 @@ def _one_line(error: Exception) -> str:
 
 
 def _kind(value: object) -> str:
-    return "nothing" if value is None else f"a {type(value).__name__}"
+    kind = type(value).__name__
+    return "nothing" if value is None else f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
 
 
 def check_keys(table: Mapping[Any, Any], known: Iterable[str], where: str) -> None:

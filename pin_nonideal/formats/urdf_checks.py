@@ -152,7 +152,8 @@ def _check_joint(joint: ElementTree.Element, path: Path) -> None:
     where = f'"{path}": joint "{joint.get("name")}"'
     kind = joint.get("type")
     if kind not in (*MOVING, "fixed"):
-        raise LoadingError(f'{where}: type must be one of {", ".join(MOVING)}, fixed; got "{kind}"')
+        found = "none" if kind is None else f'"{kind}"'
+        raise LoadingError(f"{where}: type must be one of {', '.join(MOVING)}, fixed; got {found}")
     origin = joint.find("origin")
     numbers(origin, "xyz", 3, (0, 0, 0), where)
     numbers(origin, "rpy", 3, (0, 0, 0), where)

@@ -1,0 +1,149 @@
+"""Output files: links are followed, permissions stay, devices are left alone, left-over parts go."""
+
+from __future__ import annotations
+
+import os
+import stat
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import pin_nonideal as pn
+from pin_nonideal.errors import InputError, LoadingError, OutputError, UserFunctionError
+from pin_nonideal.files import whole_file
+
+from .refusals import refuses
+from .small_robots import folder, joint, link, robot
+
+
+def write(path, content=b"new"):
+    with whole_file(path, "the run") as stream:
+        stream.write(content)
+
+
+def test_a_link_stays_and_its_target_is_written(tmp_path):
+    target, link_to = tmp_path / "data" / "run.npz", tmp_path / "run.npz"
+    target.parent.mkdir()
+    target.write_bytes(b"old")
+    link_to.symlink_to(target)
+    write(link_to)
+    assert link_to.is_symlink()
+    assert target.read_bytes() == b"new"
+
+
+def test_permissions_stay(tmp_path):
+    path = tmp_path / "run.npz"
+    path.write_bytes(b"old")
+    path.chmod(0o640)
+    write(path)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o640
+
+
+def test_devices_and_pipes_are_left_alone(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for path in (pipe, tmp_path / "null"):
+        if path.name == "null":
+            path.symlink_to("/dev/null")
+        with refuses("it is a device or a pipe; name a file", OutputError):
+            write(path)
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+
+
+def test_parts_of_killed_processes_are_taken_away(tmp_path):
+    code = (
+        "import os, sys\nfrom pathlib import Path\nfrom pin_nonideal.files import whole_file\n"
+        "with whole_file(Path(sys.argv[1]), 'x') as s:\n    s.write(b'half')\n    s.flush()\n"
+        "    os.kill(os.getpid(), 9)\n"
+    )
+    path = tmp_path / "run.npz"
+    subprocess.run([sys.executable, "-c", code, str(path)], check=False)
+    assert len(list(tmp_path.iterdir())) == 1
+    other = tmp_path / f".run.npz.{os.getpid()}.abc.part"  # of a process that goes on
+    other.write_bytes(b"")
+    write(path)
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([path.name, other.name])
+
+
+def test_a_list_that_is_not_read_to_its_end_ends_quietly():
+    command = f"{sys.executable} -m pin_nonideal.cli list | head -1"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+
+
+def test_times_of_a_saved_run_are_checked(tmp_path):
+    run = pn.simulate(pn.load("four_bar"), 0.01)
+    for change, words in (
+        (np.nan, "t must be finite; it holds nan"),
+        (-1.0, "t must not fall; t[1] = -1 follows 0"),
+    ):
+        run.save(tmp_path / "run.npz")
+        with np.load(tmp_path / "run.npz") as file:
+            arrays = dict(file)
+        arrays["t"][1] = change
+        np.savez(tmp_path / "bad.npz", **arrays)
+        with refuses(words, LoadingError):
+            pn.Trajectory.load(tmp_path / "bad.npz")
+
+
+def test_a_model_that_is_changed_after_the_scene_was_made_is_refused(tmp_path):
+    scene = pn.load(folder(tmp_path))
+    scene.model.inertias[1].mass = 7.0
+    for act in (
+        lambda: pn.simulate(scene, 0.1),
+        lambda: scene.solve(scene.q0, scene.v0),
+        scene.initial_state,
+    ):
+        with refuses("was changed after the scene was made", InputError):
+            act()
+    with pytest.raises(ValueError, match="read-only"):
+        scene.q0[0] = 1.0
+
+
+YAML = {
+    "octal": (
+        "gravity: [0, 0, -012]",
+        "-012 is octal or sexagesimal in YAML (line 1); write decimals, or a text",
+    ),
+    "sexagesimal": ("initial: {q: {elbow: 1:30}}", "1:30 is octal or sexagesimal in YAML (line 1)"),
+    "far base": ("model: {base: {xyz: [1e300, 0, 0]}}", "xyz and rpy must be at most 1e+09 (m, rad); got"),
+    "kind": ("notes: 3", "must be a list of names; got 3"),
+    "number": ("3", "must be a table of keys; got an int"),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), YAML.values(), ids=YAML)
+def test_numbers_that_mean_something_else_in_yaml_are_refused(tmp_path, text, message):
+    with refuses(message):
+        pn.load(folder(tmp_path, text))
+
+
+def test_an_empty_table_is_a_robot_without_extras(tmp_path):
+    assert pn.load(folder(tmp_path, "")).model.nv == 2
+
+
+def test_errors_of_functions_tell_the_time(tmp_path):
+    def torque(t, q, v):
+        if t > 0.05:
+            raise RuntimeError("out of reach")
+        return np.zeros(2)
+
+    scene = pn.load(folder(tmp_path))
+    with pytest.raises(UserFunctionError, match=r"out of reach \(at t = 0\.0\d+ s\)") as caught:
+        pn.simulate(pn.Scene(scene.model, actuation=torque), 1.0)
+    assert 0.05 < caught.value.time <= 1.0
+
+
+def test_info_lists_forces_actuation_and_limits(tmp_path):
+    text = robot(link("base"), link("a"), joint("turn", "base", "a", limits='lower="-1" upper="2"'))
+    yaml = "forces: [{JointSpring: {joint: turn, stiffness: 2.0}}]\nactuation: {torques: {turn: 1.0}}"
+    said = pn.load(folder(tmp_path, yaml, text)).report()
+    for line in (
+        "  force turn (JointSpring)",
+        "  actuation constant torques",
+        "  limits, which the motion may pass: turn",
+    ):
+        assert line in said
