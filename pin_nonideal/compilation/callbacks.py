@@ -55,7 +55,7 @@ def checked(function: Callable[..., Any], who: str, *shapes: tuple[int, ...]) ->
 def _failed(message: str, arguments: Sequence[Any]) -> UserFunctionError:
     """The error of a function whose first argument is the time, which it tells."""
     time = float(arguments[0]) if arguments and isinstance(arguments[0], float) else None
-    return UserFunctionError(message if time is None else f"{message} (at t = {time:.6g} s)", time=time)
+    return UserFunctionError(message if time is None else f"{message} (at t = {time:.6g} s)")
 
 
 def _numbers(part: Any, shape: tuple[int, ...], who: str) -> Array:
