@@ -12,6 +12,15 @@ pinocchio_version: str
 
 state_layout: str
 
+class Solutions(enum.Enum):
+    """What is shown of the motions under friction that a paradox leaves."""
+
+    not_told = 0
+
+    none = 1
+
+    several = 2
+
 class FailureKind(enum.Enum):
     """Why an evaluation or a run could not go on."""
 
@@ -26,25 +35,31 @@ class FailureKind(enum.Enum):
     paradox = 3
     """elements: frictional elements; value: determinant"""
 
-    closure = 4
+    not_converged = 4
+    """elements: frictional elements whose modes were not found"""
+
+    closure = 5
     """elements: the block of rows; value: gap"""
 
-    step_size = 5
+    step_size = 6
     """value: number of steps so far, when it would never end"""
 
-    stiff = 6
+    stiff = 7
     """elements: the degree of freedom; value: rate"""
 
-    steps = 7
+    steps = 8
     """value: number of steps, which is all that the run may take"""
 
-    interrupted = 8
+    interrupted = 9
 
 class CoreFailure(Exception):
     kind: FailureKind
     time: float
     elements: list[int]
     value: float
+    solutions: Solutions
+    limits: list[NDArray[numpy.float64]]
+    accelerations: list[NDArray[numpy.float64]]
 
 class ReactionView:
     @property
@@ -246,6 +261,9 @@ class Instant:
     @property
     def limits(self) -> list[float]: ...
 
+    @property
+    def unique(self) -> bool | None: ...
+
 class Runner:
     def acceleration(self, q: object, v: object, t: float, tau: object | None, out: object) -> None: ...
 
@@ -261,6 +279,12 @@ class Runner:
 
     @property
     def rank(self) -> int: ...
+
+    @property
+    def continues(self) -> bool: ...
+
+    @continues.setter
+    def continues(self, arg: bool, /) -> None: ...
 
     @property
     def factorization(self) -> tuple[float, bool, bool, bool]: ...
@@ -288,14 +312,22 @@ class EventKind(enum.Enum):
     """What happened between two smooth stretches of a run."""
 
     stick = 0
+    """an element comes to rest"""
 
     slip = 1
+    """what stuck gives way"""
 
     reverse = 2
+    """slip turns round"""
 
     pull = 3
+    """the normal force of a contact turns negative"""
 
     chatter = 4
+    """a cluster of events is bridged by time stepping"""
+
+    several = 5
+    """from here on the laws allow other motions too"""
 
 class Event:
     @property

@@ -18,6 +18,7 @@ import pin_nonideal as pn
 from .errors import InputError, OutputError, PinNonidealError, RunError, RunInterrupted
 from .loading import robots
 from .plotting import picture_format
+from .scene import SEVERAL
 from .trajectory import Trajectory
 from .types import Table
 
@@ -90,6 +91,11 @@ def _parser() -> argparse.ArgumentParser:
         "(default: nothing; forces,energy with --html or --plot)",
     )
     run.add_argument(
+        "--several",
+        choices=SEVERAL,
+        help="where friction allows several motions: stop (default), or go on with the nearest",
+    )
+    run.add_argument(
         "--html", type=Path, metavar="FILE", help="write the replay, one page that needs no network"
     )
     run.add_argument("--plot", type=Path, metavar="FILE", help="write a figure (.png, .pdf, .svg)")
@@ -142,7 +148,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _simulation_settings(options: argparse.Namespace) -> Table:
     """Keyword arguments of `simulate`: what was given on the command line, and the defaults of pictures."""
-    given = {key: getattr(options, key) for key in ("method", "rtol", "atol", "dt", "output_dt")}
+    given = {key: getattr(options, key) for key in ("method", "rtol", "atol", "dt", "output_dt", "several")}
     settings = {key: value for key, value in given.items() if value is not None}
     pictures = options.html is not None or options.plot is not None
     if pictures and options.output_dt is None:

@@ -58,6 +58,9 @@ class Solution:
         lam: multipliers of the rows of A, (m,).
         rank: number of independent rows of A, the paper's k.
         modes: mode of each frictional element of a scene, +1 or -1 for slip, 0 for stick; empty without any.
+        unique: whether this is the only motion that constraints and laws allow: True where it is shown, False
+            where another one is known, None where neither is (functions of the user's read the reactions,
+            or many elements load each other strongly).
     """
 
     a: Array
@@ -66,6 +69,7 @@ class Solution:
     lam: Array
     rank: int
     modes: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
+    unique: bool | None = True
 
 
 def solve(

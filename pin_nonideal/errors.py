@@ -82,13 +82,27 @@ class FrictionParadoxError(RunError):
     Attributes:
         time: time of the paradox [s].
         element: name of the frictional element, or names joined by commas.
-        determinant: det(I - d lam' / d lam) of the implicit reaction equation.
+        determinant: det(I - d lam' / d lam) of the implicit reaction equation, the least of its solutions.
+        solutions: accelerations (nv,) of two motions that satisfy all laws; empty where there is none, or
+            where it is not told.
+        limits: friction limits of the elements in each of them [N m or N].
     """
 
-    def __init__(self, message: str, *, element: str, determinant: float, time: float | None = None) -> None:
+    def __init__(
+        self,
+        message: str,
+        *,
+        element: str,
+        determinant: float,
+        time: float | None = None,
+        solutions: Iterable[Any] = (),
+        limits: Iterable[Any] = (),
+    ) -> None:
         super().__init__(message, time=time)
         self.element = element
         self.determinant = determinant
+        self.solutions = tuple(solutions)
+        self.limits = tuple(limits)
 
 
 class StepSizeError(RunError):

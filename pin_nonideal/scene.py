@@ -28,6 +28,8 @@ from .types import Array, GeometryModel, Model, Table
 Rest = ParamSpec("Rest")
 Result = TypeVar("Result")
 
+# What to do where laws and dynamics allow several motions.
+SEVERAL = ("error", "continue")
 TERMS = tuple(provider.name for provider in core.Provider)
 
 
@@ -262,6 +264,7 @@ class Scene:
         *,
         tau: ArrayLike | None = None,
         modes: Sequence[int] | None = None,
+        several: str = "error",
     ) -> Solution:
         """Eq. (40) at one state: acceleration, both parts of the force of constraint, multipliers, modes.
 
@@ -271,6 +274,8 @@ class Scene:
             t: time [s].
             tau: joint torques instead of the scene's actuation, (nv,).
             modes: mode of each frictional element, +1, -1 or 0; by velocity and complementarity when None.
+            several: what to do where the laws allow several motions: "error", or "continue" with the one of
+                least friction.  What may stick or slip at rest sticks either way.
 
         Returns:
             The Solution; `lam` holds all rows in the order of `constraint_slices`, zero for dropped ones.
@@ -279,6 +284,7 @@ class Scene:
             InputError: wrong shapes or numbers.
             InconsistentConstraintsError, FrictionParadoxError, SingularMassError: there is no solution.
         """
+        self._runner.continues = choice("solve: several", several, SEVERAL) == "continue"
         given = None
         if modes is not None:
             asked = np.asarray(modes, dtype=object)
@@ -290,9 +296,17 @@ class Scene:
             given = [core.Mode(int(m)) for m in asked]
         now = self._call(self._runner.solve, q, v, t, tau, given)
         used = np.array(now.modes, dtype=np.int8)
-        return Solution(now.a, now.F_ideal, now.F_nonideal, now.lam, now.rank, used)
+        return Solution(now.a, now.F_ideal, now.F_nonideal, now.lam, now.rank, used, now.unique)
 
-    def acceleration(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike | None = None, t: float = 0.0) -> Array:
+    def acceleration(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike | None = None,
+        t: float = 0.0,
+        *,
+        several: str = "error",
+    ) -> Array:
         """Just the acceleration, for loops of one's own.
 
         Args:
@@ -300,6 +314,7 @@ class Scene:
             v: velocity, (nv,).
             tau: joint torques instead of the scene's actuation, (nv,).
             t: time [s].
+            several: "error" or "continue" where the laws allow several motions, as in `solve`.
 
         Returns:
             a, (nv,).
@@ -309,6 +324,7 @@ class Scene:
             InconsistentConstraintsError, FrictionParadoxError, SingularMassError: there is no solution.
         """
         a = np.empty(self._nv)
+        self._runner.continues = choice("acceleration: several", several, SEVERAL) == "continue"
         try:  # arrays of the right shape go straight to the core, which checks sizes, lengths and finiteness
             self._runner.acceleration(q, v, t, tau, a)
         except (TypeError, ValueError, core.CoreFailure):

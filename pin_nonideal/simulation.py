@@ -33,6 +33,7 @@ def simulate(
     output_dt: float | None = None,
     max_steps: float | None = None,
     record: str | Sequence[str] = (),
+    several: str = "error",
     progress: bool | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     checkpoint_interval: float = 60.0,
@@ -59,6 +60,10 @@ def simulate(
         max_steps: most steps that the run may take; when None as many as it takes, but a stiff scene stops as
             soon as an explicit method would take 100,000 more.
         record: any of "a", "forces", "energy", "power", or names of fields that they fill.
+        several: what to do where the laws allow several motions: "error" stops with a FrictionParadoxError
+            that shows two; "continue" goes on with the one nearest to the motion before (at the start, that
+            of least friction), and an event of kind "several" says from when on.  What rests and might slip
+            as well goes on resting either way, with such an event.
         progress: progress bar on standard error; None shows it on a terminal only.
         checkpoint: file that the run is kept in, so that `resume` goes on with it should it be killed; None
             for none.  It is replaced whole, at the start, at the end, on Ctrl-C between two steps, and every
@@ -78,7 +83,7 @@ def simulate(
     """
     if not isinstance(scene, Scene):
         raise InputError(f"simulate: scene must be a Scene; got {type(scene).__name__}")
-    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, max_steps, record)
+    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, max_steps, record, several)
     q0, v0 = (
         scene.project(q, v, options.t0) if (q is not None or v is not None or t0) else scene.initial_state()
     )
@@ -119,6 +124,7 @@ def rollout(
     output_dt: float | None = None,
     max_steps: float | None = None,
     record: str | Sequence[str] = (),
+    several: str = "error",
     threads: int = 1,
 ) -> list[Trajectory]:
     """Runs many initial states in native threads; each result is bitwise that of its own `simulate`.
@@ -138,6 +144,7 @@ def rollout(
         output_dt: time between samples [s]; every accepted step when None.
         max_steps: as in `simulate`.
         record: as in `simulate`.
+        several: "error" or "continue", as in `simulate`.
         threads: number of native threads.
 
     Returns:
@@ -159,7 +166,7 @@ def rollout(
     starts_v = array("rollout: v", v, (None, scene.model.nv))
     if len(starts_q) != len(starts_v):
         raise InputError(f"rollout: q and v must have as many rows; got {len(starts_q)} and {len(starts_v)}")
-    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, max_steps, record)
+    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, max_steps, record, several)
     if method in SCIPY:
         raise InputError(f'rollout: method must be one of the core\'s; "{method}" runs in SciPy')
     begin = time.perf_counter()

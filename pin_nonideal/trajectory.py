@@ -35,7 +35,8 @@ class Event:
     Attributes:
         time: when [s].
         kind: "stick", "slip" or "reverse" of a frictional element, "pull" of a contact whose normal force
-            turned negative, "chatter" where a cluster of events was bridged by time stepping.
+            turned negative, "chatter" where a cluster of events was bridged by time stepping, "several" from
+            where on the laws allow other motions too.
         element: name of the law or contact.
     """
 

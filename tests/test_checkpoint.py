@@ -300,7 +300,7 @@ def test_a_damaged_header(written):
 def states_of(scene, duration):
     """What the core hands over to be written, and the options to read it with."""
     states = []
-    options = run_options(scene, duration, 0.0, "dop853", 1e-6, None, None, None, None, ())
+    options = run_options(scene, duration, 0.0, "dop853", 1e-6, None, None, None, None, (), "error")
     q, v = scene.initial_state()
     scene._compiled.program.runner().simulate(q, v, options, save=states.append)
     return states, options

@@ -109,7 +109,9 @@ class TestPendulum:
     @pytest.mark.parametrize(("angle", "rate"), STATES)
     def test_paradox(self, angle, rate):
         """With c1 = 1.25 the equation has two solutions or none."""
-        with pytest.raises(pn.FrictionParadoxError, match="has no solution or several at t = 0 s") as caught:
+        with pytest.raises(
+            pn.FrictionParadoxError, match=r"has (no|several) solutions? at t = 0 s"
+        ) as caught:
             self.scene(0.75).solve([angle], [rate])
         assert caught.value.element == "JointFriction(pin)"
         assert np.isfinite(caught.value.determinant)

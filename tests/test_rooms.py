@@ -37,12 +37,12 @@ math: lanes unrolled spatial angles timefunction roots
 tree: mechanism model_extraction liegroup body_terms pinocchio_pass own_pass terms factor
 constraints: geometry coordinates kinds kind block row_layout row_system orthogonal row_factor rank redundancy
 forces: given_forces laws mode friction
-dynamics: failure program workspace given_forces law_forces solution reactions split slip implicit power \
-evaluation projection step_start
+dynamics: failure program reaction_equation reaction_roots workspace given_forces law_forces solution \
+reactions split slip unknowns uniqueness implicit power evaluation projection step_start
 friction: box_program cone_program problem modes continuation
 run: archive method step outside_step step_control runge_kutta system semi_implicit_euler error_norm stepper \
 moreau recorder checkpoint stiffness event_search event_location events simulation followed_run
-python: failures arrays callbacks builder constraints runner options runs followed program module
+python: arrays failures callbacks builder constraints runner options runs followed program module
 """
 
 

@@ -56,7 +56,7 @@ def named_failure(failure: core.CoreFailure, model: Model, program: core.Program
         return NonFiniteError(f"acceleration is not finite at t = {t:.4g} s", time=t)
     if kind is kinds.paradox:
         elements = ", ".join(program.element_names[i] for i in failure.elements)
-        return _paradox(elements or ", ".join(program.law_names), value, t)
+        return _paradox(elements or ", ".join(program.law_names), failure)
     if kind is kinds.closure:
         name = program.constraints[failure.elements[0]].name
         return opened(name, {name: value}, t)
@@ -89,13 +89,22 @@ def _joint_of(model: Model, dof: int) -> int:
     return next(i for i, j in enumerate(model.joints) if i and j.idx_v <= dof < j.idx_v + j.nv)
 
 
-def _paradox(element: str, determinant: float, t: float) -> RunError:
+def _paradox(element: str, failure: core.CoreFailure) -> RunError:
+    shown, t = core.Solutions, failure.time
+    found, way_out = {
+        shown.several: ("several solutions", ', go on with the nearer one by several="continue",'),
+        shown.none: ("no solution", ","),
+    }.get(failure.solutions, ("no solution or several", ","))
+    limits = " and ".join(", ".join(f"{x:.4g}" for x in each) for each in failure.limits)
     return FrictionParadoxError(
-        f'friction of "{element}" has no solution or several at t = {t:.4g} s: '
-        f'det(I - d lam\'/d lam) = {determinant:.3g}; reduce mu, or use reaction="ideal"',
+        f'friction of "{element}" has {found} at t = {t:.4g} s: '
+        + (f"limits of {limits} (N m or N), " if limits else "")
+        + f'det(I - d lam\'/d lam) = {failure.value:.3g}; reduce mu{way_out} or use reaction="ideal"',
         element=element,
-        determinant=determinant,
+        determinant=failure.value,
         time=t,
+        solutions=failure.accelerations,
+        limits=failure.limits,
     )
 
 

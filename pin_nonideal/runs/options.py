@@ -12,7 +12,7 @@ from pin_nonideal.actuation import SampledControl
 from pin_nonideal.checks import array, choice, count, label, nonnegative, number, positive, sequence
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError
-from pin_nonideal.scene import Scene
+from pin_nonideal.scene import SEVERAL, Scene
 from pin_nonideal.types import Array
 
 # Whether each chooses its own steps.
@@ -49,6 +49,7 @@ class RunOptions:
         forces: whether forces and multipliers are.
         energy: whether the ledger is.
         power: whether powers are.
+        several: "error" or "continue" where the laws allow several motions.
     """
 
     method: str
@@ -63,6 +64,7 @@ class RunOptions:
     forces: bool
     energy: bool
     power: bool
+    several: str
 
 
 def run_options(
@@ -76,6 +78,7 @@ def run_options(
     output_dt: float | None,
     max_steps: float | None,
     record: str | Sequence[str],
+    several: str,
 ) -> RunOptions:
     """Options of a run, checked.
 
@@ -90,6 +93,7 @@ def run_options(
         output_dt: time between samples [s], or None.
         max_steps: most accepted steps, infinite too, or None.
         record: names of what to record.
+        several: "error" or "continue".
 
     Raises:
         InputError: one is wrong, or they do not go together.
@@ -142,6 +146,7 @@ def run_options(
         forces="forces" in groups,
         energy="energy" in groups,
         power="power" in groups,
+        several=choice("simulate: several", several, SEVERAL),
     )
 
 

@@ -4,10 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "dynamics/law_forces.hpp"
-#include "dynamics/slip.hpp"
 #include "dynamics/solution.hpp"
 #include "dynamics/split.hpp"
+#include "dynamics/uniqueness.hpp"
 
 namespace pn {
 
@@ -18,202 +17,69 @@ constexpr double newton_tolerance = 3.2e-14;  // the same behind a linear solve
 constexpr double stalled = 1e-12;             // Newton's error that no longer falls is rounding where it is below this
 constexpr double slow_change = 1e-13;         // a change that contracts slowly is followed where it is above this
 constexpr double good_contraction = 0.25;     // slower fixed points go to Newton's method
-constexpr double difference = 1e-7;           // part of the unknowns' size: square root of the rounding, with a margin
-constexpr double least_determinant_told = 1e-8;  // differences tell no smaller one from zero
-constexpr double least_size = 1e-300;         // of unknowns that are all zero
 constexpr int fixed_point_limit = 30, newton_limit = 30;
-constexpr int most_mixed = 6;                 // laws whose mixtures of branches are all looked at; else one by one
-constexpr double same_solution = 1e-9;        // relative residual at which a point is a solution
-constexpr double other_solution = 1e-6;       // relative distance beyond which it is another one
+// So few unknowns take no more motions with the equation as arrays than by iteration.
+constexpr int few_unknowns = 2;
+// The growth of the equation below which a proof of uniqueness is kept for as many steps as there are unknowns: one
+// motion a step is what it costs then. Over so short a time no growth comes from here to one.
+constexpr double safe_growth = 0.5;
 
-struct Implicit {
-    const Program& p;
-    Workspace& w;
-    double t;
-    const VecX &q, &v;
-    int n = 0;
+struct Implicit : Unknowns {
+    using Unknowns::Unknowns;
 
-    Implicit(const Program& program, Workspace& workspace, double time, const VecX& q_, const VecX& v_)
-        : p(program), w(workspace), t(time), q(q_), v(v_), n(count()) {}
-
-    int nv() const { return p.mechanism.nv; }
-
-    bool is_unknown(size_t e) const { return p.frictions[e].reaction == Reaction::total && slips(w.state.mode[e]); }
-
-    double load(size_t e) { return w.now.load[e] = load_limit(p, w, p.frictions[e], t, q, v); }
-
-    // Number of unknowns.
-    int count() const {
-        int k = 0;
-        each_unknown([&](size_t) { ++k; }, [&](const UserLaw&) { k += nv(); });
-        return k;
+    bool is_due() const {
+        const RunState& state = w.state;
+        return state.steps_since >= (state.unique == Uniqueness::shown && state.growth < safe_growth ? n : 1);
     }
 
-    // Calls the first for each slipping element, then the second for each law, in the order of the unknowns.
-    template <class OnElement, class OnLaw>
-    void each_unknown(const OnElement& on_element, const OnLaw& on_law) const {
-        for (size_t e = 0; e < p.frictions.size(); ++e)
-            if (is_unknown(e)) on_element(e);
-        each_law<UserLaw>(p.laws, [&](const UserLaw& law) { if (law.reaction == Reaction::total) on_law(law); });
-    }
-
-    void set(const VecX& y) {
-        int k = 0;
-        each_unknown([&](size_t e) { w.now.limit[e] = y[k++]; },
-                     [&](const UserLaw& law) { w.now.user_C[law.index] = y.segment(k, nv()); k += nv(); });
-    }
-
-    // The motion for the limits and user forces in the workspace.
-    void motion() {
-        w.now.C = w.now.base_C;
-        add_slip_forces(p, w, true, w.now.C);
-        each_unknown([](size_t) {}, [&](const UserLaw& law) { w.now.C += w.now.user_C[law.index]; });
-        w.scratch.trial = w.now.F + w.now.C;
-        solve_acceleration(p, w, w.scratch.trial);
-    }
-
-    void image(const VecX& y, VecX& g) {
-        set(y);
-        motion();
-        // A stage that has run away is no case for the laws, a user's above all.
-        if (!std::isfinite(w.now.a.squaredNorm())) throw Failure(Failure::Kind::not_finite, t);
-        int k = 0;
-        each_unknown([&](size_t e) { g[k++] = limit_under(p, w, e, load(e)); },
-                     [&](const UserLaw& law) { g.segment(k, nv()) = ask(p, law, w, t, q, v); k += nv(); });
-        ++w.counters.iterations;
-    }
-
-    std::vector<int> unknown_elements() const {
-        std::vector<int> list;
-        each_unknown([&](size_t e) { list.push_back(static_cast<int>(e)); }, [](const UserLaw&) {});
-        return list;
-    }
-
-    [[noreturn]] void paradox(double determinant) const {
-        throw Failure(Failure::Kind::paradox, t, unknown_elements(), determinant);
-    }
-
-    // dg/dy by differences, scaled by the unknowns' size.
-    void differentiate(const VecX& y, const VecX& g, double size) {
-        w.scratch.jacobian.resize(n, n);
-        VecX shifted = y, image_there(n);
-        const double h = difference * std::max(size, least_size);
-        for (int k = 0; k < n; ++k) {
-            shifted[k] = y[k] + h;
-            image(shifted, image_there);
-            w.scratch.jacobian.col(k) = (image_there - g) / h;
-            shifted[k] = y[k];
-        }
-    }
-
-    // Unknowns of one law, [first, last): a friction's limit or a user law's force.
-    std::vector<std::pair<int, int>> groups() const {
-        std::vector<std::pair<int, int>> list;
-        int k = 0;
-        each_unknown([&](size_t) { list.emplace_back(k, k + 1); ++k; },
-                     [&](const UserLaw&) { list.emplace_back(k, k + nv()); k += nv(); });
-        return list;
-    }
-
-    // What a friction's limit is without any load.
-    VecX constants() const {
-        VecX c = VecX::Zero(n);
-        int k = 0;
-        each_unknown([&](size_t e) { c[k++] = limit_under(p, w, e, p.frictions[e].constant); }, [](const UserLaw&) {});
-        return c;
-    }
-
-    // Laws grow with |load|, which has two branches: beyond the kink a law's rows of dg/dy change their sign. Calls
-    // `look` with dg/dy of each mixture of branches, and the rows that it mirrors, until it returns true.
-    template <class Look>
-    void each_mixture(const MatX& J, const Look& look) const {
-        const auto laws = groups();
-        const int m = static_cast<int>(laws.size());
-        const bool all = m <= most_mixed;
-        for (int mixture = 1; mixture < (all ? 1 << m : m + 1); ++mixture) {
-            MatX other = J;
-            VecX mirrored = VecX::Zero(n);
-            for (int i = 0; i < m; ++i) {
-                if (all ? !(mixture >> i & 1) : i + 1 != mixture) continue;
-                const int first = laws[i].first, count = laws[i].second - first;
-                other.middleRows(first, count) *= -1.0;
-                mirrored.segment(first, count).setOnes();
-            }
-            if (look(other, mirrored)) return;
-        }
-    }
-
-    // Least det(I - dg/dy) over the mixtures of branches.
-    double least_determinant(const MatX& J) const {
-        const MatX I = MatX::Identity(n, n);
-        double least = (I - J).determinant();
-        each_mixture(J, [&](const MatX& other, const VecX&) {
-            least = std::min(least, (I - other).determinant());
-            return false;
-        });
-        return least;
-    }
-
-    // y is the only solution when every mixture of branches contracts, which |dg/dy| tells; else another one is looked
-    // for in each mixture that turns the equation over.
-    void check_uniqueness(const VecX& y, double size) {
-        const MatX I = MatX::Identity(n, n), J = w.scratch.jacobian;
-        const double here = (I - J).determinant();
-        w.now.determinant = here;
-        if (!(here > least_determinant_told)) paradox(std::min(here, 0.0));  // what cannot be told from zero is zero
-        const VecX bound = (I - J.cwiseAbs()).partialPivLu().solve(VecX::Ones(n));
-        if ((bound.array() > 0.0).all()) return;
-        const VecX c = constants();
-        each_mixture(J, [&](const MatX& other, const VecX& mirrored) {
-            const double there = (I - other).determinant();
-            if (there > 0.0) return false;
-            const VecX beyond = 2.0 * mirrored.cwiseProduct(c - y);
-            if (there == 0.0 || leads_elsewhere(y, y + (I - other).partialPivLu().solve(beyond), size)) paradox(there);
-            return false;
-        });
-    }
-
-    // Whether Newton's method from `start` finds a solution that is not y.
-    bool leads_elsewhere(const VecX& y, VecX start, double size) {
-        VecX g(n);
-        try {
-            for (int it = 0; it < newton_limit; ++it) {
-                image(start, g);
-                const VecX residual = g - start;
-                const double scale = std::max({size, start.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});
-                if (residual.cwiseAbs().maxCoeff() <= same_solution * scale)
-                    return (start - y).cwiseAbs().maxCoeff() > other_solution * scale;
-                differentiate(start, g, scale);
-                start += (MatX::Identity(n, n) - w.scratch.jacobian).partialPivLu().solve(residual);
-            }
-        } catch (const Failure& failure) {
-            if (failure.kind != Failure::Kind::not_finite) throw;
-        }
-        return false;
-    }
-
-    void newton(VecX& y, VecX& g, double size) {
+    // The equation as arrays, its solution near y, and whether that is the only one.
+    void solve_bearings(VecX& y) {
+        ReactionEquation& arrays = w.scratch.equation;
+        ReactionNewton& newton = w.scratch.newton;
+        equation(y, arrays);
+        if (!arrays.finite()) throw Failure(Failure::Kind::not_finite, t);
+        VecX& before = w.scratch.before;
+        before = y;
+        const bool solved = newton.solve(arrays, y);
+        const bool regular = solved && newton.factorize(arrays, y) > least_determinant_told;
+        if (!regular || is_due()) decide(*this, arrays, before, y, solved);
+        w.now.determinant = newton.factorize(arrays, y);
         double last = std::numeric_limits<double>::infinity();
+        for (int it = 0; it < newton_limit; ++it) {  // what rounding left in the arrays
+            image(y, newton.image);
+            newton.residual = newton.image - y;
+            const double error = newton.residual.cwiseAbs().maxCoeff();
+            if (error <= reaction_tolerance * y.cwiseAbs().maxCoeff() || error >= last) return;
+            last = error;
+            newton.step = newton.factor.solve(newton.residual);
+            y += newton.step;
+        }
+    }
+
+    // With functions of the user's among the unknowns.
+    void solve_laws(VecX& y) {
+        VecX g(n);
+        double size = 0.0, last = std::numeric_limits<double>::infinity();
+        MatX& J = w.scratch.jacobian;
         for (int it = 0; it < newton_limit; ++it) {
             image(y, g);
             const VecX residual = g - y;
             size = std::max({size, y.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});
             const double error = residual.cwiseAbs().maxCoeff();
             if (!g.allFinite()) throw Failure(Failure::Kind::not_finite, t);
+            differentiate(*this, y, g, size, J);
             if (error <= newton_tolerance * size || (it > 3 && error <= stalled * size && error >= last)) {
-                differentiate(y, g, size);
-                check_uniqueness(y, size);
+                look_for_others(*this, y, J, size);
                 image(y, g);
                 return;
             }
             last = error;
-            differentiate(y, g, size);
-            const VecX step = (MatX::Identity(n, n) - w.scratch.jacobian).partialPivLu().solve(residual);
-            if (!step.allFinite()) paradox(0.0);  // exactly between one solution and none
+            const VecX step = (MatX::Identity(n, n) - J).partialPivLu().solve(residual);
+            if (!step.allFinite()) throw Failure(Failure::Kind::paradox, t, elements(), 0.0);  // between one and none
             y += step;
         }
-        w.now.determinant = least_determinant(w.scratch.jacobian);
-        paradox(w.now.determinant);
+        w.now.determinant = least_determinant(*this, J);
+        throw Failure(Failure::Kind::paradox, t, elements(), w.now.determinant);
     }
 
     // Fixed-point steps from the solution before; false where they contract slowly.
@@ -247,10 +113,10 @@ struct Implicit {
     // Places of the unknowns among those of all elements and laws, which a warm start keeps.
     template <class Exchange>
     void exchange(const Exchange& swap) const {
-        const int elements = static_cast<int>(p.frictions.size());
+        const int elements = static_cast<int>(p.frictions.size()), nv = p.mechanism.nv;
         int k = 0;
-        each_unknown([&](size_t e) { swap(k++, static_cast<int>(e), 1); },
-                     [&](const UserLaw& law) { swap(k, elements + law.index * nv(), nv()); k += nv(); });
+        each([&](size_t e) { swap(k++, static_cast<int>(e), 1); },
+             [&](const UserLaw& law) { swap(k, elements + law.index * nv, nv); k += nv; });
     }
 
     void solve() {
@@ -258,12 +124,15 @@ struct Implicit {
         y.setZero();
         if (w.state.warm) exchange([&](int k, int place, int count) { y.segment(k, count) = kept.segment(place, count); });
         w.state.warm = false;  // what a failure leaves is no start for the next evaluation
-        if (!iterate()) {
-            VecX start = y.head(n), g(n);
-            newton(start, g, 0.0);
-            y.head(n) = start;
-            set(start);
-            motion();
+        const bool arrays = bearings && (n <= few_unknowns || is_due());
+        if (arrays || !iterate()) {
+            VecX& solution = w.scratch.solution;
+            solution = y.head(n);
+            if (bearings) solve_bearings(solution);
+            else solve_laws(solution);
+            y.head(n) = solution;
+        } else if (!bearings) {
+            w.state.unique = Uniqueness::not_shown;
         }
         exchange([&](int k, int place, int count) { kept.segment(place, count) = y.segment(k, count); });
     }
@@ -306,6 +175,7 @@ void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, co
     Implicit implicit{p, w, t, q, v};
     if (implicit.n == 0) implicit.motion();
     else implicit.solve();
+    if (implicit.n == 0) w.state.unique = Uniqueness::shown;
     w.state.warm = true;
 }
 

@@ -50,7 +50,7 @@ static void size(const Program& p, const Evaluation& now, Scratch& scratch) {
     scratch.position_start = VecX::Zero(p.mechanism.nq);
     scratch.position_lam_steps.assign(projection_limit, scratch.position_lam);
     scratch.ideal_locked.assign(nv, 0);
-    scratch.unknown = scratch.image = VecX::Zero(p.unknowns());
+    scratch.unknown = scratch.image = scratch.shifted = VecX::Zero(p.unknowns());
     scratch.subtree_force = now.body_force;
     scratch.law_force.assign(p.law_names.size(), VecX::Zero(nv));
 }
@@ -81,6 +81,7 @@ void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes) {
     w.state.mode.values_ = modes;
     for (size_t e = 0; e < modes.size(); ++e)
         if (modes[e] == unloaded) w.now.slip_force[e] = Vec3::Zero();
+    w.state.steps_since = never_decided;
     w.now.renew();
     select_rows(p, w);
 }

@@ -4,6 +4,7 @@
 
 #include "constraints/rank.hpp"
 #include "dynamics/program.hpp"
+#include "dynamics/reaction_equation.hpp"
 
 namespace pn {
 
@@ -13,6 +14,10 @@ constexpr int projection_limit = 12;
 struct Counters {
     long evaluations = 0, factorizations = 0, projections = 0, iterations = 0;
 };
+
+// Whether the motion is the only one that the laws allow; where functions of the user's are among them it is never shown.
+enum class Uniqueness : signed char { shown, not_shown, several };
+constexpr int never_decided = 1 << 30;
 
 // What the next step needs of those before it, beside the state (q, v) itself and the choice of independent rows.
 struct RunState {
@@ -27,6 +32,9 @@ struct RunState {
     bool warm = false;
     VecX third_order_lam;         // multipliers of third order in the step, over its cube
     bool ideal_decided = false;   // which rows are independent without what sticks, over this step
+    Uniqueness unique = Uniqueness::shown;  // of the motion in these modes, as decided last
+    double growth = 0.0;                    // bound on that of the implicit reaction equation there
+    int steps_since = never_decided;        // then
 };
 
 // What joints, anchors and contacts carry in the motion at hand (dynamics/reactions.hpp).
@@ -58,6 +66,8 @@ struct Evaluation {
     VecX dz;
     VecX v;                           // velocity, where laws act
     double speed = 0.0;               // largest of it
+    bool several = false;             // what was at rest might slip as well as stick
+    int several_element = 0;          // whose friction differs most between several motions
     double determinant = 1.0;         // of the implicit reaction equation
     std::vector<Force> body_force;    // given forces on bodies
     VecX override_torque;
@@ -74,7 +84,10 @@ struct Scratch {
     // took.
     VecX position_start, position_lam;
     std::vector<VecX> position_lam_steps;
-    VecX unknown, image;  // of the implicit reaction equation
+    VecX unknown, image, shifted;  // of the implicit reaction equation
+    VecX before, solution;
+    ReactionEquation equation;
+    ReactionNewton newton;
     MatX jacobian;
     std::vector<Force> subtree_force;
     std::vector<VecX> law_force;  // of each law, for its power
@@ -85,6 +98,7 @@ struct Workspace {
     Evaluation now;
     Scratch scratch;
     Counters counters;
+    bool continues = false;  // where several motions are possible: with the one nearest to the motion before
 
     explicit Workspace(const Program& p);
 };

@@ -2,9 +2,17 @@
 
 #include <nanobind/stl/vector.h>
 
+#include "python/arrays.hpp"
+
 namespace pn {
 
 static PyObject* core_failure = nullptr;  // the exception's type, alive as long as the module
+
+static nb::list arrays(const std::vector<VecX>& all) {
+    nb::list list;
+    for (const VecX& x : all) list.append(to_numpy(x));
+    return list;
+}
 
 nb::object failure_object(const Failure& failure) {
     nb::object error = nb::handle(core_failure)();
@@ -12,16 +20,25 @@ nb::object failure_object(const Failure& failure) {
     error.attr("time") = failure.time;
     error.attr("elements") = failure.elements;
     error.attr("value") = failure.value;
+    error.attr("solutions") = failure.solutions;
+    error.attr("limits") = arrays(failure.limits);
+    error.attr("accelerations") = arrays(failure.accelerations);
     return error;
 }
 
 void bind_failures(nb::module_& m) {
     using Kind = Failure::Kind;
+    using Solutions = Failure::Solutions;
+    nb::enum_<Solutions>(m, "Solutions", "What is shown of the motions under friction that a paradox leaves.")
+        .value("not_told", Solutions::not_told)
+        .value("none", Solutions::none)
+        .value("several", Solutions::several);
     nb::enum_<Kind>(m, "FailureKind", "Why an evaluation or a run could not go on.")
         .value("singular_mass", Kind::singular_mass, "elements: the degree of freedom")
         .value("inconsistent", Kind::inconsistent, "elements: blocks of rows; value: residual")
         .value("not_finite", Kind::not_finite)
         .value("paradox", Kind::paradox, "elements: frictional elements; value: determinant")
+        .value("not_converged", Kind::not_converged, "elements: frictional elements whose modes were not found")
         .value("closure", Kind::closure, "elements: the block of rows; value: gap")
         .value("step_size", Kind::step_size, "value: number of steps so far, when it would never end")
         .value("stiff", Kind::stiff, "elements: the degree of freedom; value: rate")

@@ -26,6 +26,7 @@ struct type_caster<pn::Options> {
             value.max_steps = nanobind::cast<long>(from.attr("max_steps"));
             pn::read_into(from.attr("atol"), value.atol);
             value.record = {wanted("a"), wanted("forces"), wanted("energy"), wanted("power")};
+            value.continues = nanobind::cast<std::string>(from.attr("several")) == "continue";
             return true;
         } catch (const std::exception&) {
             return false;

@@ -95,6 +95,7 @@ Instant Runner::solve(const Array& q_in, const Array& v_in, double t, const std:
                       const std::optional<std::vector<Mode>>& modes) {
     set(q_in, v_in, tau);
     choose_modes(t, modes);
+    const Uniqueness unique = w->now.several ? Uniqueness::several : w->state.unique;
     Instant out;
     for (size_t e = 0; e < p->frictions.size(); ++e) {
         const int element = static_cast<int>(e);
@@ -114,6 +115,8 @@ Instant Runner::solve(const Array& q_in, const Array& v_in, double t, const std:
     out.lam = to_numpy(split.lam);
     out.lam_ideal = to_numpy(split.lam_ideal);
     out.rank = constraint_rank();
+    if (unique == Uniqueness::several) out.unique = false;
+    else if (unique == Uniqueness::shown) out.unique = true;
     return out;
 }
 
@@ -211,7 +214,8 @@ nb::class_<Runner> bind_runner(nb::module_& m) {
         .def_ro("rank", &Instant::rank)
         .def_ro("modes", &Instant::modes)
         .def_ro("friction", &Instant::friction, own)
-        .def_ro("limits", &Instant::limits);
+        .def_ro("limits", &Instant::limits)
+        .def_ro("unique", &Instant::unique);
     nb::class_<Runner> runner(m, "Runner");
     runner
         .def("acceleration", &Runner::acceleration, "q"_a, "v"_a, "t"_a, "tau"_a.none(), "out"_a)
@@ -221,6 +225,8 @@ nb::class_<Runner> bind_runner(nb::module_& m) {
         .def("project", &Runner::project, "q"_a, "v"_a, "t"_a, "far"_a)
         .def("time_evaluations", &Runner::time_evaluations, "q"_a, "v"_a, "t"_a, "count"_a)
         .def_prop_ro("rank", &Runner::constraint_rank)
+        // Where several motions are possible: goes on with the one nearest to that before, and does not fail.
+        .def_prop_rw("continues", [](Runner& r) { return r.w->continues; }, [](Runner& r, bool on) { r.w->continues = on; })
         // How the rows were factored last: smallest pivot, orthogonal road taken, redundant, refined.
         .def_prop_ro("factorization", [](Runner& r) {
             const RowSystem& s = r.w->now.rows;

@@ -19,6 +19,7 @@ struct Instant {
     std::vector<Mode> modes;
     std::vector<Numbers> friction;  // force of each element along its directions
     std::vector<double> limits;
+    std::optional<bool> unique;  // nothing: not shown
 };
 
 // A run that has ended.

@@ -206,12 +206,8 @@ static nb::typed<nb::list, std::optional<Outcome>> rollout(const Program& p, con
 
 static void bind_outcome(nb::module_& m) {
     using R = Recording;
-    nb::enum_<Event::Kind>(m, "EventKind", "What happened between two smooth stretches of a run.")
-        .value("stick", Event::Kind::stick)
-        .value("slip", Event::Kind::slip)
-        .value("reverse", Event::Kind::reverse)
-        .value("pull", Event::Kind::pull)
-        .value("chatter", Event::Kind::chatter);
+    nb::enum_<Event::Kind> kinds(m, "EventKind", "What happened between two smooth stretches of a run.");
+    for (const EventKind& each : event_kinds) kinds.value(each.name, each.kind, each.meaning);
     nb::class_<Event>(m, "Event")
         .def_ro("time", &Event::time)
         .def_ro("kind", &Event::kind)

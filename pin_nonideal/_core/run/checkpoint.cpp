@@ -21,16 +21,16 @@ void fields(Archive& a, Modes& x) {
 
 static void fields(Archive& a, RunState& x) {
     auto& [mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm,
-           third_order_lam, ideal_decided] = x;
+           third_order_lam, ideal_decided, unique, growth, steps_since] = x;
     a(mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm, third_order_lam,
-      ideal_decided);
+      ideal_decided, unique, growth, steps_since);
 }
 
 static void fields(Archive& a, Progress& x) {
     auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, recent_events, slip_at_start,
-           pulls, stiff_steps, quiet_steps] = x;
-    a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, slip_at_start, pulls, stiff_steps,
-      quiet_steps);
+           pulls, several, stiff_steps, quiet_steps] = x;
+    a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, slip_at_start, pulls, several,
+      stiff_steps, quiet_steps);
     a.list(recent_events);
 }
 
@@ -91,7 +91,7 @@ void from_bytes(const std::string& bytes, System& system, Progress& progress, Re
     a.end();
     const int elements = static_cast<int>(std::max(system.p.frictions.size(), system.p.blocks.size()));
     for (const Event& e : out.events)
-        a.require(e.kind >= Event::Kind::stick && e.kind <= Event::Kind::chatter && e.element >= 0 && e.element < elements);
+        a.require(static_cast<size_t>(e.kind) < std::size(event_kinds) && e.element >= 0 && e.element < elements);
     a.require(progress.samples >= 0 && progress.next_period >= 0);
     try {
         evaluate_anew(system, progress, std::vector<char>(system.w.now.rows.active));

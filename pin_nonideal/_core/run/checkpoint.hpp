@@ -20,6 +20,7 @@ struct Progress {
     std::vector<double> recent_events;  // times, for the count of those that come too thick
     std::vector<double> slip_at_start;  // of the step, by element
     std::vector<char> pulls;            // by contact
+    bool several = false;               // the laws allow other motions too, which was told
     long stiff_steps = 0, quiet_steps = 0;  // near the border of stability, and since then away from it
 };
 

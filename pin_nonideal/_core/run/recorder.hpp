@@ -14,8 +14,22 @@ namespace pn {
 
 struct Event {
     double time;
-    enum class Kind { stick, slip, reverse, pull, chatter } kind;
-    int element;
+    enum class Kind { stick, slip, reverse, pull, chatter, several } kind;
+    int element;  // of friction; of a pull the block of the contact
+};
+
+// All kinds in order, as Python names them.
+struct EventKind {
+    Event::Kind kind;
+    const char *name, *meaning;
+};
+constexpr EventKind event_kinds[] = {
+    {Event::Kind::stick, "stick", "an element comes to rest"},
+    {Event::Kind::slip, "slip", "what stuck gives way"},
+    {Event::Kind::reverse, "reverse", "slip turns round"},
+    {Event::Kind::pull, "pull", "the normal force of a contact turns negative"},
+    {Event::Kind::chatter, "chatter", "a cluster of events is bridged by time stepping"},
+    {Event::Kind::several, "several", "from here on the laws allow other motions too"},
 };
 
 struct Recording {

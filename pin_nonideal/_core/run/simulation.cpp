@@ -38,6 +38,9 @@ constexpr int chatter_events = 60;
 constexpr double chatter_time = 1e-4;
 constexpr int chatter_steps = 50;
 
+// Part of a step to which the instant is found from which on several motions are possible.
+constexpr double several_width = 1e-12;
+
 // Part of a step of time stepping that is not worth one of its own.
 constexpr double least_part = 1e-9;
 // Times closer than this part of them, or this many seconds, are the same.
@@ -60,6 +63,7 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       locator(system, stepper, slip_at_start, pulls), moreau(system),
       recorder(system, options.record, recording), sample_(VecX::Zero(system.ny)) {
     y = rate = configured_y = sample_;
+    w.continues = options.continues;
     slip_at_start.assign(p.frictions.size(), 0.0);
     pulls.assign(p.contacts.size(), 0);
 }
@@ -80,6 +84,7 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
     switch_modes(system, t, y, rate, std::nullopt);
     emit(t, y, true);
     report_pulls(std::nullopt);
+    report_several(false);
     h = options.dt;
     if (options.method.adaptive()) {
         h = norm.initial_step(options.method.order, t, y, rate, t_end - t);
@@ -248,9 +253,10 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     rate = stepper.end_rate();
     configured_now();
     if (!event || !event->changes_modes()) report_pulls(event);
-    emit_inside_step();
+    emit_inside_step(report_several(true));
     if (!event) return;
     if (event->changes_modes()) change_modes(*event);
+    report_several(false);
     if (event->kind != FoundEvent::Kind::reversal) return;
     recent_events.push_back(t);
     bridge_cluster(event->index);
@@ -308,25 +314,32 @@ void Simulation::emit(double at, const VecX& state, bool evaluated) {
     recorder.sample(at, state, moved_energy, evaluated);
 }
 
-// Samples of the output grid before the step's end, from its interpolant.
-void Simulation::emit_inside_step() {
-    const bool places = !w.now.rows.blocks.empty() || options.record.evaluates() || p.constraints > 0;
-    while (options.output_dt > 0.0 && next_sample() < t - same_time(t)) {
-        const double at = next_sample();
-        stepper.make_interpolant();
-        stepper.interpolate((at - stepper.t0) / stepper.h, sample_);
-        if (!w.now.rows.blocks.empty()) {
-            system.read(sample_);
-            project(p, w, at, system.q, system.v);
-            system.write(sample_);
+void Simulation::emit_between(double at) {
+    stepper.make_interpolant();
+    stepper.interpolate((at - stepper.t0) / stepper.h, sample_);
+    if (!w.now.rows.blocks.empty()) {
+        system.read(sample_);
+        project(p, w, at, system.q, system.v);
+        system.write(sample_);
+    }
+    if (!w.now.rows.blocks.empty() || options.record.evaluates() || p.constraints > 0) {
+        configured_t = at;
+        configured_y = sample_;
+    }
+    emit(at, sample_, false);
+}
+
+void Simulation::emit_inside_step(std::optional<double> between) {
+    const double end = t - same_time(t);
+    while (options.output_dt > 0.0 && next_sample() < end) {
+        if (between && *between < next_sample()) {
+            emit_between(*between);
+            between.reset();
         }
-        if (places) {
-            configured_t = at;
-            configured_y = sample_;
-        }
-        emit(at, sample_, false);
+        emit_between(next_sample());
         ++samples;
     }
+    if (between && *between < end) emit_between(*between);
 }
 
 // A maintained contact that would have to pull, told once each time it begins.
@@ -337,6 +350,37 @@ void Simulation::report_pulls(const std::optional<FoundEvent>& event) {
         if (pull && !pulls[i]) out.events.push_back({t, Event::Kind::pull, p.contacts[i]});
         pulls[i] = pull;
     }
+}
+
+// Where the laws begin to allow other motions too, told once each time; returns when, where that lies inside the step.
+std::optional<double> Simulation::report_several(bool after_step) {
+    const bool before = several;
+    several = w.state.unique == Uniqueness::several || w.now.several;
+    if (before || !several) return std::nullopt;
+    const int element = w.now.several_element;
+    const double at = after_step && w.state.unique == Uniqueness::several ? last_unique() : t;
+    out.events.push_back({at, Event::Kind::several, element});
+    return at;
+}
+
+// Halves the step just taken, on its interpolant, toward the last instant at which its motion is the only one. The
+// workspace is left as it was.
+double Simulation::last_unique() {
+    const RunState kept = w.state;
+    stepper.make_interpolant();
+    double low = 0.0, high = 1.0;
+    while (high - low > several_width) {
+        const double mid = 0.5 * (low + high);
+        stepper.interpolate(mid, sample_);
+        system.read(sample_);
+        w.state.steps_since = never_decided;
+        evaluate(p, w, stepper.t0 + mid * stepper.h, system.q, system.v);
+        (w.state.unique == Uniqueness::several ? high : low) = mid;
+    }
+    w.state = kept;
+    system.read(y);
+    evaluate(p, w, t, system.q, system.v);
+    return stepper.t0 + high * stepper.h;
 }
 
 // --- Time stepping --------------------------------------------------------------------------------------------------
@@ -361,6 +405,7 @@ void Simulation::step_in_time(double stop, double dt) {
         if (before[e] != w.state.mode[e])
             out.events.push_back({t, kind_of_change(before[e], w.state.mode[e]), e});
     report_pulls(std::nullopt);
+    report_several(false);
     const bool on_grid = options.output_dt > 0.0 && next_sample() <= t + same_time(t);
     samples += on_grid;
     if (options.output_dt == 0.0 || on_grid || t >= t_end) emit(t, y, true);

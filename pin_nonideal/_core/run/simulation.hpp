@@ -22,6 +22,7 @@ struct Options {
     VecX atol;                                      // 2 nv + states
     long max_steps = 0;                             // 0: as many as it takes, and fewer of a stiff scene
     RecordOptions record;
+    bool continues = false;  // where several motions are possible: with the one nearest to that before; else it fails
     std::function<void(double t)> tick;  // progress and interruption, called now and then between steps
     std::function<void(const std::string& state)> save;  // writes a checkpoint; empty: none
     Clock::duration save_interval{};                     // of wall time
@@ -66,8 +67,13 @@ protected:
     double next_sample() const { return options.t0 + samples * options.output_dt; }
 
     void emit(double at, const VecX& state, bool evaluated);
-    void emit_inside_step();
+    // A sample inside the step just taken, from its interpolant.
+    void emit_between(double at);
+    // Samples of the output grid inside the step just taken, and one at a time between.
+    void emit_inside_step(std::optional<double> between);
     void report_pulls(const std::optional<FoundEvent>& event);
+    std::optional<double> report_several(bool after_step);
+    double last_unique();
     void configured_now();
 
     void change_modes(const FoundEvent& event);

@@ -2,7 +2,7 @@
 
 const MODE_COLORS = { "1": "#fb923c", "-1": "#60a5fa", "0": "#475569" };
 const MODE_NAMES = { "1": "slip +", "-1": "slip −", "0": "stick" };
-const EVENT_COLORS = { stick: "#475569", slip: "#ea580c", reverse: "#7c3aed", pull: "#dc2626", chatter: "#0891b2" };
+const EVENT_COLORS = { stick: "#475569", slip: "#ea580c", reverse: "#7c3aed", pull: "#dc2626", chatter: "#0891b2", several: "#db2777" };
 const BAND = 11; // height of a band with its gap [pixels]
 
 class Timeline {

@@ -1,0 +1,229 @@
+"""The implicit reaction equation y = g(y) of slipping friction by inverse dynamics, and all its roots.
+
+y holds the friction limit of each element.  Given y, everything slips the way that its velocity says, the
+motion is affine in y, and so is every load vector: g_i(y) = c_i + sum_k w_k |b_k + P_k y|.  The roots come
+from a dense scan of all y >= 0, mapped onto a unit box, and from Newton's method in every cell of it where
+all components change their sign.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+
+from .frames import Frames
+from .given import applied_force, mass_matrix
+from .rows import rows
+
+# Points of the scan along each axis, by the number of unknowns: some 10^4 values of g in all.
+SCAN = {1: 4001, 2: 101, 3: 25}
+MOST_CELLS = 150  # of those, by lot
+STARTS = 40  # of Newton's method beside the scan
+SOLVED = 1e-12  # relative residual of a root
+SAME = 1e-7  # relative distance of two roots that are one
+# Beside a number of solutions that changes: a determinant, or a scan's least residual, of this size or less.
+DOUBTFUL = 1e-4
+
+
+@dataclass
+class Equation:
+    """c and, for each norm of a load, its element, weight w, offset b (3,) and columns P (3, n)."""
+
+    constant: np.ndarray
+    element: list[int] = field(default_factory=list)
+    weight: list[float] = field(default_factory=list)
+    offset: list[np.ndarray] = field(default_factory=list)
+    columns: list[np.ndarray] = field(default_factory=list)
+
+    @property
+    def n(self):
+        return len(self.constant)
+
+    def image(self, y):
+        """g at many points, (m, n)."""
+        g = np.broadcast_to(self.constant, y.shape).copy()
+        for i, w, b, P in zip(self.element, self.weight, self.offset, self.columns, strict=True):
+            g[:, i] += w * np.linalg.norm(b + y @ P.T, axis=1)
+        return g
+
+    def slope(self, y):
+        """dg/dy at one point."""
+        J = np.zeros((self.n, self.n))
+        for i, w, b, P in zip(self.element, self.weight, self.offset, self.columns, strict=True):
+            load = b + P @ y
+            J[i] += w * load @ P / max(np.linalg.norm(load), 1e-300)
+        return J
+
+    def steepest(self):
+        """Largest size of dg_i/dy_j over all y."""
+        L = np.zeros((self.n, self.n))
+        for i, w, P in zip(self.element, self.weight, self.columns, strict=True):
+            L[i] += w * np.linalg.norm(P, axis=0)
+        return L
+
+    def scale(self):
+        """Friction of the loads that are there without any."""
+        return np.maximum(self.image(np.zeros((1, self.n)))[0], 1e-12)
+
+    def polished(self, y):
+        """The root that Newton's method finds from y, or None."""
+        for _ in range(60):
+            residual = self.image(y[None])[0] - y
+            if not np.isfinite(residual).all() or np.abs(y).max() > 1e12:
+                return None
+            if np.abs(residual).max() <= SOLVED * np.abs(y).max():
+                return y if (y >= -SOLVED * np.abs(y).max()).all() else None
+            try:
+                y = y + np.linalg.solve(np.eye(self.n) - self.slope(y), residual)
+            except np.linalg.LinAlgError:
+                return None
+        return None
+
+    def roots(self, rng):
+        """All solutions y, (k, n), and whether their number is in doubt by rounding or the scan's width."""
+        scale, points = self.scale(), SCAN[self.n]
+        axis = (np.arange(points) + 0.31) / points
+        grid = np.stack(np.meshgrid(*[axis / (1.0 - axis)] * self.n, indexing="ij"), axis=-1) * scale
+        F = (self.image(grid.reshape(-1, self.n)).reshape(grid.shape) - grid) / (scale + grid)
+        turns = np.ones((points - 1,) * self.n, dtype=bool)
+        for i in range(self.n):
+            low, high = np.full(turns.shape, np.inf), np.full(turns.shape, -np.inf)
+            for corner in itertools.product((slice(None, -1), slice(1, None)), repeat=self.n):
+                low, high = np.minimum(low, F[(*corner, i)]), np.maximum(high, F[(*corner, i)])
+            turns &= (low <= 0.0) & (high >= 0.0)
+        cells = np.argwhere(turns)
+        if len(cells) > MOST_CELLS:
+            cells = cells[rng.choice(len(cells), MOST_CELLS, replace=False)]
+        starts = [grid[tuple(cell)] for cell in cells]
+        starts += [scale * 10.0 ** rng.uniform(-2.0, 3.0, self.n) for _ in range(STARTS)]
+        found = []
+        for start in starts:
+            y = self.polished(start)
+            if y is not None and not any(np.abs(y - x).max() <= SAME * np.abs(x).max() for x in found):
+                found.append(y)
+        dets = [np.linalg.det(np.eye(self.n) - self.slope(y)) for y in found]
+        touches = not found and float(np.abs(F).max(axis=-1).min()) < DOUBTFUL
+        infinite = abs(np.linalg.det(np.eye(self.n) - self.steepest())) < DOUBTFUL
+        doubtful = touches or infinite or any(abs(d) < DOUBTFUL for d in dets)
+        return np.array(found).reshape(-1, self.n), doubtful
+
+
+def equation(scene, q, v, t=0.0):
+    """The equation of a scene in which every frictional element slips.
+
+    Args:
+        scene: with JointFriction at joints of the tree, or at hinge anchors and nowhere else.
+        q: configuration.
+        v: velocity.
+        t: time [s].
+    """
+    slips, laws = _slips(scene, q, v), scene.laws
+    n = len(laws)
+    motions = [_loads(scene, q, v, t, -np.asarray(slips).T @ y) for y in (np.zeros(n), *np.eye(n))]
+    made = Equation(np.zeros(n))
+    for i, law in enumerate(laws):
+        factor = 1.0
+        if law.stribeck_velocity is not None:
+            speed = np.linalg.norm(_speed(scene, law, q, v))
+            factor += (law.static_ratio - 1.0) * np.exp(-((speed / law.stribeck_velocity) ** 2))
+        made.constant[i] = factor * (law.coulomb + law.preload)
+        for k, (weight, offset) in enumerate(motions[0][0][i]):
+            made.element.append(i)
+            made.weight.append(factor * weight)
+            made.offset.append(offset)
+            made.columns.append(np.column_stack([motions[1 + j][0][i][k][1] - offset for j in range(n)]))
+    return made
+
+
+def acceleration(scene, q, v, y, t=0.0):
+    """Of the motion under friction of these limits."""
+    return _loads(scene, q, v, t, -np.asarray(_slips(scene, q, v)).T @ y)[1]
+
+
+def _speed(scene, law, q, v):
+    """Slip velocity of an element."""
+    anchor = {c.name: c for c in scene.constraints}.get(law.joint)
+    if anchor is None:
+        joint = scene.model.joints[scene.model.getJointId(law.joint)]
+        return v[joint.idx_v : joint.idx_v + joint.nv]
+    return np.atleast_1d(_turning(scene, anchor, q, v) @ v)
+
+
+def _turning(scene, anchor, q, v):
+    """Row of the relative turning rate about a hinge anchor's axis."""
+    frames = Frames(scene.model, q, v)
+    one, two = frames(anchor.frame1), frames(anchor.frame2)
+    return one.R[:, 2] @ (one.Jw - two.Jw)
+
+
+def _slips(scene, q, v):
+    """Generalized direction of each element's slip, (n, nv)."""
+    anchors = {c.name: c for c in scene.constraints}
+    found = []
+    for law in scene.laws:
+        u = _speed(scene, law, q, v)
+        if law.joint in anchors:
+            found.append(np.sign(u[0]) * _turning(scene, anchors[law.joint], q, v))
+            continue
+        joint = scene.model.joints[scene.model.getJointId(law.joint)]
+        row = np.zeros(scene.model.nv)
+        row[joint.idx_v : joint.idx_v + joint.nv] = u / np.linalg.norm(u)
+        found.append(row)
+    return found
+
+
+def _loads(scene, q, v, t, C):
+    """(weight, vector) of each norm in each element's load, and the acceleration, under the force C."""
+    model, data = scene.model, scene.model.createData()
+    M, given = mass_matrix(model, q), applied_force(scene, Frames(model, q, v), t)
+    bias = pin.nonLinearEffects(model, data, q, v)
+    A, b = rows(scene, q, v, t)
+    if len(A):
+        K = np.block([[M, -A.T], [A, np.zeros((len(A), len(A)))]])
+        x = np.linalg.solve(K, np.concatenate([given - bias + C, b]))
+        a, lam = x[: model.nv], x[model.nv :]
+        return [_anchor_loads(law, lam[scene.constraint_slices[law.joint]]) for law in scene.laws], a
+    a = np.linalg.solve(M, given - bias + C)
+    pin.framesForwardKinematics(model, data, q)
+    outside = [pin.Force.Zero() for _ in range(model.njoints)]
+    for force in scene.forces:
+        placement = data.oMf[model.getFrameId(force.frame)]
+        joint = model.frames[model.getFrameId(force.frame)].parentJoint
+        value = np.asarray(force.value, float)
+        at_joint = pin.SE3(data.oMi[joint].rotation.T, np.zeros(3)).act(pin.Force(value[:3], value[3:]))
+        lever = data.oMi[joint].actInv(placement.translation)
+        outside[joint] += pin.Force(at_joint.linear, at_joint.angular + np.cross(lever, at_joint.linear))
+    pin.rnea(model, data, q, v, a, outside)
+    return [_joint_loads(model, law, data.f[model.getJointId(law.joint)]) for law in scene.laws], a
+
+
+def _joint_loads(model, law, f):
+    joint = model.joints[model.getJointId(law.joint)]
+    if joint.nv == 3:
+        return [(law.mu * law.radius, f.linear.copy())]
+    axis = _axis(joint)
+    axial = (f.linear @ axis) * axis
+    if joint.shortname().startswith("JointModelP"):
+        moment = [(law.mu / law.span, f.angular.copy())] if law.span else []
+        return [(law.mu, f.linear - axial), *moment]
+    bending = f.angular - (f.angular @ axis) * axis
+    bends = [(law.mu * law.radius / law.span, bending)] if law.span else []
+    return [(law.mu * law.radius, f.linear - axial), *bends, (law.mu * law.axial_radius, axial)]
+
+
+def _axis(joint):
+    """Of a joint of one degree of freedom, in its own frame."""
+    data = joint.createData()
+    joint.calc(data, np.zeros(joint.nq), np.zeros(joint.nv))
+    S = np.asarray(data.S).reshape(6, -1)[:, 0]
+    part = S[:3] if np.linalg.norm(S[:3]) > 0.5 else S[3:]
+    return part / np.linalg.norm(part)
+
+
+def _anchor_loads(law, lam):
+    axial = np.array([0.0, 0.0, lam[2]])  # hinges of the anchors turn about z
+    bends = [(law.mu * law.radius / law.span, np.array([*lam[3:], 0.0]))] if law.span else []
+    return [(law.mu * law.radius, np.array([*lam[:2], 0.0])), *bends, (law.mu * law.axial_radius, axial)]

@@ -1,0 +1,196 @@
+#include "dynamics/uniqueness.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/reaction_roots.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr double difference = 1e-7;      // part of the unknowns' size: square root of the rounding, with a margin
+constexpr double least_size = 1e-300;    // of unknowns that are all zero
+constexpr int newton_limit = 30;
+constexpr int most_mixed = 6;            // laws whose mixtures of branches are all looked at; else one by one
+constexpr double same_solution = 1e-9;   // relative residual at which a point is a solution
+constexpr double other_solution = 1e-6;  // relative distance beyond which it is another one
+
+using Solutions = Failure::Solutions;
+
+Failure paradox(const Unknowns& u, double determinant, Solutions solutions = Solutions::not_told) {
+    Failure failure(Failure::Kind::paradox, u.t, u.elements(), determinant);
+    failure.solutions = solutions;
+    return failure;
+}
+
+// The failure that shows the motions of two solutions.
+Failure two_motions(Unknowns& u, double determinant, const VecX& one, const VecX& other) {
+    Failure failure = paradox(u, determinant, Solutions::several);
+    for (const VecX& y : {one, other}) {
+        u.set(y);
+        u.motion();
+        failure.limits.push_back(y.head(failure.elements.size()));
+        failure.accelerations.push_back(u.w.now.a);
+    }
+    return failure;
+}
+
+double determinant_at(const ReactionEquation& equation, const VecX& y) {
+    return ReactionNewton().factorize(equation, y);
+}
+
+// Those where a small change of the loads changes little come first, of them those near `start`.
+void sort_by_distance(const ReactionEquation& equation, const VecX& start, std::vector<VecX>& roots) {
+    VecX size = start;
+    for (const VecX& y : roots) size = size.cwiseMax(y);
+    size = size.cwiseMax(least_size);
+    const auto rank = [&](const VecX& y) {
+        return std::pair(determinant_at(equation, y) < least_determinant_told,
+                         (y - start).cwiseQuotient(size).cwiseAbs().maxCoeff());
+    };
+    std::sort(roots.begin(), roots.end(), [&](const VecX& y, const VecX& x) { return rank(y) < rank(x); });
+}
+
+}  // namespace
+
+void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, VecX& y, bool solved) {
+    RunState& state = u.w.state;
+    MatX L;
+    equation.steepest(L);
+    state.growth = growth(L);
+    state.steps_since = 0;
+    const bool contracts = state.growth < 1.0 - least_determinant_told;
+    state.unique = contracts ? Uniqueness::shown : Uniqueness::not_shown;
+    if (contracts && solved) return;
+    ReactionRoots roots = all_roots(equation);
+    std::vector<VecX>& found = roots.y;
+    const double edge = std::min(1.0 - state.growth, 0.0);
+    if (!roots.complete && solved && found.empty()) found.push_back(y);
+    if (found.empty() && !roots.complete) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
+    if (found.empty()) throw paradox(u, edge, roots.at_edge ? Solutions::not_told : Solutions::none);
+    sort_by_distance(equation, start, found);
+    double least = HUGE_VAL;
+    for (const VecX& root : found) least = std::min(least, determinant_at(equation, root));
+    y = found.front();
+    if (found.size() == 1 && !roots.at_edge) {
+        if (roots.complete) state.unique = Uniqueness::shown;
+        return;
+    }
+    state.unique = Uniqueness::several;
+    VecX::Index most = 0;
+    (found.back() - y).cwiseQuotient((found.back() + y).cwiseMax(least_size)).cwiseAbs().maxCoeff(&most);
+    u.w.now.several_element = u.elements()[most];
+    if (u.w.continues && determinant_at(equation, y) > least_determinant_told) return;
+    if (found.size() == 1) throw paradox(u, std::min(least, edge));
+    throw two_motions(u, least, found[0], found[1]);
+}
+
+void differentiate(Unknowns& u, const VecX& y, const VecX& g, double size, MatX& J) {
+    J.resize(u.n, u.n);
+    VecX shifted = y, image_there(u.n);
+    const double h = difference * std::max(size, least_size);
+    for (int k = 0; k < u.n; ++k) {
+        shifted[k] = y[k] + h;
+        u.image(shifted, image_there);
+        J.col(k) = (image_there - g) / h;
+        shifted[k] = y[k];
+    }
+}
+
+namespace {
+
+// Unknowns of one law, [first, last): a friction's limit or a user law's force.
+std::vector<std::pair<int, int>> groups(const Unknowns& u) {
+    std::vector<std::pair<int, int>> list;
+    const int nv = u.p.mechanism.nv;
+    int k = 0;
+    u.each([&](size_t) { list.emplace_back(k, k + 1); ++k; },
+           [&](const UserLaw&) { list.emplace_back(k, k + nv); k += nv; });
+    return list;
+}
+
+// What a friction's limit is without any load.
+VecX constants(const Unknowns& u) {
+    VecX c = VecX::Zero(u.n);
+    int k = 0;
+    u.each([&](size_t e) { c[k++] = limit_under(u.p, u.w, static_cast<int>(e), u.p.frictions[e].constant); },
+           [](const UserLaw&) {});
+    return c;
+}
+
+// Laws mostly grow with |load|, which has two branches: beyond the kink a law's rows of dg/dy change their sign. Calls
+// `look` with dg/dy of each mixture of branches, and the rows that it mirrors.
+template <class Look>
+void each_mixture(const Unknowns& u, const MatX& J, const Look& look) {
+    const auto laws = groups(u);
+    const int m = static_cast<int>(laws.size());
+    const bool all = m <= most_mixed;
+    for (int mixture = 1; mixture < (all ? 1 << m : m + 1); ++mixture) {
+        MatX other = J;
+        VecX mirrored = VecX::Zero(u.n);
+        for (int i = 0; i < m; ++i) {
+            if (all ? !(mixture >> i & 1) : i + 1 != mixture) continue;
+            const int first = laws[i].first, count = laws[i].second - first;
+            other.middleRows(first, count) *= -1.0;
+            mirrored.segment(first, count).setOnes();
+        }
+        look(other, mirrored);
+    }
+}
+
+// Whether Newton's method from `start` finds a solution that is not y; there it leaves `start`.
+bool leads_elsewhere(Unknowns& u, const VecX& y, VecX& start, double size) {
+    VecX g(u.n);
+    MatX J;
+    try {
+        for (int it = 0; it < newton_limit; ++it) {
+            u.image(start, g);
+            const VecX residual = g - start;
+            const double scale = std::max({size, start.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});
+            if (residual.cwiseAbs().maxCoeff() <= same_solution * scale)
+                return (start - y).cwiseAbs().maxCoeff() > other_solution * scale;
+            differentiate(u, start, g, scale, J);
+            start += (MatX::Identity(u.n, u.n) - J).partialPivLu().solve(residual);
+        }
+    } catch (const Failure& failure) {
+        if (failure.kind != Failure::Kind::not_finite) throw;
+    }
+    return false;
+}
+
+}  // namespace
+
+double least_determinant(const Unknowns& u, const MatX& J) {
+    const MatX I = MatX::Identity(u.n, u.n);
+    double least = (I - J).determinant();
+    each_mixture(u, J, [&](const MatX& other, const VecX&) { least = std::min(least, (I - other).determinant()); });
+    return least;
+}
+
+void look_for_others(Unknowns& u, VecX& y, const MatX& J, double size) {
+    RunState& state = u.w.state;
+    const MatX I = MatX::Identity(u.n, u.n);
+    const double here = (I - J).determinant();
+    const bool regular = here > least_determinant_told;
+    u.w.now.determinant = here;
+    state.unique = Uniqueness::not_shown;
+    if (std::abs(here) <= least_determinant_told) throw paradox(u, std::min(here, 0.0));  // not told from zero: it is zero
+    const VecX bound = (I - J.cwiseAbs()).partialPivLu().solve(VecX::Ones(u.n));
+    if ((bound.array() > 0.0).all()) return;
+    const VecX c = constants(u), solution = y;
+    each_mixture(u, J, [&](const MatX& other, const VecX& mirrored) {
+        const double there = (I - other).determinant();
+        if ((regular && there > 0.0) || state.unique == Uniqueness::several) return;
+        if (there == 0.0) throw paradox(u, there);
+        VecX elsewhere = solution + (I - other).partialPivLu().solve(2.0 * mirrored.cwiseProduct(c - solution));
+        if (!leads_elsewhere(u, solution, elsewhere, size)) return;
+        if (!u.w.continues) throw two_motions(u, std::min(here, there), solution, elsewhere);
+        state.unique = Uniqueness::several;
+        if (!u.elements().empty()) u.w.now.several_element = u.elements().front();
+        if (!regular) y = elsewhere;
+    });
+    if (!regular && state.unique != Uniqueness::several) throw paradox(u, here);
+}
+
+}  // namespace pn

@@ -1,0 +1,37 @@
+// The unknowns y of the implicit reaction equation y = g(y): the limits of slipping frictions and the forces of users'
+// laws. Given y the motion follows from the factors at hand, the motion gives the loads, and these an image g(y).
+#pragma once
+
+#include "dynamics/law_forces.hpp"
+#include "dynamics/slip.hpp"
+
+namespace pn {
+
+struct Unknowns {
+    const Program& p;
+    Workspace& w;
+    double t;
+    const VecX &q, &v;
+    int n = 0;
+    bool bearings = true;  // no function of the user's is among them: a ReactionEquation says all
+
+    Unknowns(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
+
+    // Calls the first for each slipping element, then the second for each law, in the order of the unknowns.
+    template <class OnElement, class OnLaw>
+    void each(const OnElement& on_element, const OnLaw& on_law) const {
+        for (size_t e = 0; e < p.frictions.size(); ++e)
+            if (p.frictions[e].reaction == Reaction::total && slips(w.state.mode[e])) on_element(e);
+        each_law<UserLaw>(p.laws, [&](const UserLaw& law) { if (law.reaction == Reaction::total) on_law(law); });
+    }
+    std::vector<int> elements() const;
+
+    void set(const VecX& y);
+    // The motion for the limits and user forces in the workspace.
+    void motion();
+    void image(const VecX& y, VecX& g);
+    // g as arrays, by the motion for each unknown in turn. Steps are as large as the unknowns: g hides only lengths.
+    void equation(const VecX& y, ReactionEquation& found);
+};
+
+}  // namespace pn
