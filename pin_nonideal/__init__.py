@@ -35,6 +35,7 @@ from .forces import *
 from .laws import *
 from .loading import load, robots
 from .plotting import plot
+from .records import LawRecord
 from .replay import replay
 from .runs.resume import resume
 from .scene import Scene
@@ -49,6 +50,7 @@ __all__ = [
     "FrictionParadoxError",
     "InconsistentConstraintsError",
     "InputError",
+    "LawRecord",
     "LoadingError",
     "LoopClosureError",
     "NonFiniteError",

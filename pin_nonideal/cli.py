@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--record",
         metavar="NAMES",
-        help="what to record, separated by commas: a, forces, energy, power "
+        help="what to record, separated by commas: a, forces, laws, reactions, energy, power "
         "(default: nothing; forces,energy with --html or --plot)",
     )
     run.add_argument(

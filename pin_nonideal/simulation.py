@@ -59,7 +59,8 @@ def simulate(
         output_dt: time between samples [s]; every accepted step when None.  Events are samples as well.
         max_steps: most steps that the run may take; when None as many as it takes, but a stiff scene stops as
             soon as an explicit method would take 100,000 more.
-        record: any of "a", "forces", "energy", "power", or names of fields that they fill.
+        record: any of "a", "forces" (which include "laws"), "laws", "reactions", "energy", "power", or names
+            of fields that they fill.
         several: what to do where the laws allow several motions: "error" stops with a FrictionParadoxError
             that shows two; "continue" goes on with the one nearest to the motion before (at the start, that
             of least friction), and an event of kind "several" says from when on.  What rests and might slip

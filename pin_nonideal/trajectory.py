@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import LoadingError
+from .checks import choice
+from .errors import InputError, LoadingError, UnknownNameError, nearest
 from .files import file_path, whole_file
+from .records import LawRecord
 from .types import Array, Table
 
 FORMAT = 1
@@ -25,7 +27,10 @@ UNREADABLE: tuple[type[Exception], ...] = (OSError, ValueError, LookupError, Typ
 UNREADABLE += (EOFError, RuntimeError, tokenize.TokenError, zipfile.BadZipFile, zlib.error)
 REQUIRED = ("t", "q", "v", "violation", "violation_rate")
 LEDGER = ("kinetic", "potential", "total", "balance")  # columns of every ledger of energy
-OPTIONAL = ("a", "F_ideal", "F_nonideal", "lam", "lam_ideal", "z", "modes")
+OPTIONAL = ("a", "F_ideal", "F_nonideal", "lam", "lam_ideal", "z", "modes", "limits")
+# By name, with one row or number a sample: of these a file holds a table, or nothing.
+GROUPS = ("energy", "power", "law_forces", "reactions")
+LISTS = ("element_names", "element_laws", "law_names", "law_dofs")
 
 
 @dataclass(frozen=True)
@@ -89,10 +94,18 @@ class Trajectory:
         power: power by column [W]: "actuation", "forces", "constraints", each law.  Record "power".
         z: states of laws, (nt, nz), or None without any.
         modes: mode of each frictional element, +1 or -1 for slip, 0 for stick, (nt, ne).
+        limits: of each frictional element in its mode [N or N m], (nt, ne); record "laws" or "forces".
+        law_forces: part of C of each law by name, on the degrees of freedom `law_dofs`; record "laws" or
+            "forces".  See `law`.
+        reactions: by name of joint, anchor and contact [N; N m], (nt, 12): [force; moment] in its own axes,
+            then in world axes; record "reactions".  See `reaction`.
         events: events in order of time.
         stats: counters.
         scene: the scene that ran; None after `load` and in another process.
         element_names: names of the columns of `modes`.
+        element_laws: which law each of them belongs to.
+        law_names: names of the laws.
+        law_dofs: degrees of freedom that each law acts on.
         name: of the scene.
     """
 
@@ -110,10 +123,16 @@ class Trajectory:
     power: dict[str, Array] | None = None
     z: Array | None = None
     modes: NDArray[np.int8] | None = None
+    limits: Array | None = None
+    law_forces: dict[str, Array] | None = None
+    reactions: dict[str, Array] | None = None
     events: list[Event] = field(default_factory=list)
     stats: Stats = field(default_factory=Stats)
     scene: Any = None
     element_names: list[str] = field(default_factory=list)
+    element_laws: list[int] = field(default_factory=list)
+    law_names: list[str] = field(default_factory=list)
+    law_dofs: list[list[int]] = field(default_factory=list)
     name: str = ""
 
     def __getstate__(self) -> Table:
@@ -145,6 +164,55 @@ class Trajectory:
             lines.append(f"  events: {counts}")
         lines.append(f"  wall time {s.wall_s:.3g} s")
         return "\n".join(lines)
+
+    def law(self, name: str) -> LawRecord:
+        """What one law did.
+
+        Args:
+            name: of a law of the scene, or of a contact that rubs.
+
+        Returns:
+            Its record; what was not recorded is None.
+
+        Raises:
+            UnknownNameError: there is no such law.
+        """
+        if name not in self.law_names:
+            raise UnknownNameError(f'no law "{name}" in this run{nearest(name, self.law_names)}')
+        index, force, power = self.law_names.index(name), None, None
+        if self.law_forces is not None:
+            force = np.zeros(self.v.shape)
+            force[:, self.law_dofs[index]] = self.law_forces[name]
+            power = np.einsum("ij,ij->i", force, self.v)
+        if self.power is not None:  # after three columns of the scene
+            power = list(self.power.values())[len(self.power) - len(self.law_names) + index]
+        own = [e for e, law in enumerate(self.element_laws) if law == index]
+        columns = own[0] if len(own) == 1 else own
+        limit = self.limits[:, columns] if own and self.limits is not None else None
+        mode = self.modes[:, columns] if own and self.modes is not None else None
+        return LawRecord(name, force, power, limit, mode)
+
+    def reaction(self, name: str, axes: str = "own") -> Array:
+        """What a joint, an anchor or a contact carries, all forces in it included: [force; moment], (nt, 6).
+
+        A joint's is exerted on the body that it moves, about its origin; it contains the drive and the
+        friction of the joint.  That of an anchor or contact is exerted on the body of frame1, about the
+        origin of frame1; it contains the friction of its laws.
+
+        Args:
+            name: of a joint of the model, or of an anchor or contact, which goes before a joint of its name.
+            axes: "own", the joint frame's or those of frame2, or "world".
+
+        Raises:
+            InputError: the run did not record "reactions", or `axes` is neither.
+            UnknownNameError: nothing of that name carries a wrench.
+        """
+        if self.reactions is None:
+            raise InputError(f'reaction("{name}") needs a run with record="reactions"')
+        if name not in self.reactions:
+            raise UnknownNameError(f'no joint, anchor or contact "{name}"{nearest(name, self.reactions)}')
+        begin = 6 * ("own", "world").index(choice("reaction: axes", axes, ("own", "world")))
+        return self.reactions[name][:, begin : begin + 6]
 
     def first(self, count: int) -> Trajectory:
         """The first samples of a run.
@@ -181,19 +249,17 @@ class Trajectory:
             target = target.with_name(target.name + ".npz")
         arrays: Table = {key: getattr(self, key) for key in REQUIRED}
         arrays |= {key: getattr(self, key) for key in OPTIONAL if getattr(self, key) is not None}
-        for group in ("energy", "power"):
-            table = getattr(self, group)
-            if table is not None:
-                arrays |= {f"{group}/{i}": x for i, x in enumerate(table.values())}
+        tables = {group: getattr(self, group) for group in GROUPS}
+        for group, table in tables.items():
+            arrays |= {f"{group}/{i}": x for i, x in enumerate((table or {}).values())}
         header = {
             "format": FORMAT,
             "name": self.name,
-            "element_names": self.element_names,
             "events": [[e.time, e.kind, e.element] for e in self.events],
             "stats": vars(self.stats),
-            "energy": None if self.energy is None else list(self.energy),
-            "power": None if self.power is None else list(self.power),
         }
+        header |= {key: getattr(self, key) for key in LISTS}
+        header |= {group: None if table is None else list(table) for group, table in tables.items()}
         arrays["header"] = np.array(json.dumps(header))
         with whole_file(target, "the trajectory") as stream:
             np.savez_compressed(stream, **arrays)
@@ -225,17 +291,17 @@ class Trajectory:
                 raise LoadingError(f'"{source}" is no complete trajectory: {", ".join(missing)} missing')
             _check_arrays(arrays, source)
             fields: Table = {key: arrays.get(key) for key in (*REQUIRED, *OPTIONAL)}
-            for group in ("energy", "power"):
-                if header[group] is not None:
+            for group in GROUPS:
+                if header.get(group) is not None:  # files of earlier versions have fewer
                     if group == "energy":
                         _check_ledger(header[group], source)
                     fields[group] = {name: arrays[f"{group}/{i}"] for i, name in enumerate(header[group])}
+            fields |= {key: list(header.get(key, ())) for key in LISTS}
             events = [Event(float(t), str(kind), str(element)) for t, kind, element in header["events"]]
             return cls(
                 **fields,
                 events=events,
                 stats=Stats(**header["stats"]),
-                element_names=list(header["element_names"]),
                 name=str(header["name"]),
             )
         except LoadingError:
@@ -280,7 +346,7 @@ def _check_arrays(arrays: Table, source: Path) -> None:
     for key, x in arrays.items():
         if x.dtype.kind not in "fi":
             raise LoadingError(f'"{source}" is no trajectory: {key} must hold numbers; got {x.dtype.name}')
-        columns = 2 if key in ("q", "v", *OPTIONAL) else 1
+        columns = 2 if key in ("q", "v", *OPTIONAL) or key.startswith(("law_forces/", "reactions/")) else 1
         if x.ndim != columns:
             shape = "a table" if columns == 2 else "one column"
             raise LoadingError(f'"{source}" is no trajectory: {key} must be {shape}; got shape {x.shape}')

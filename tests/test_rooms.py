@@ -20,7 +20,7 @@ timefunctions constraints laws contacts forces actuation
 _core core
 states: placements configurations closure rows projection
 compilation: failures callbacks names constraints friction laws forces lowering analysis scene report
-scene trajectory
+scene records trajectory
 formats: xml shapes model_edit inertia urdf_checks tidy density urdf generators example_robots robot_yaml \
 starts assembly rounding
 mjcf: compile motion tree tendons forces transmissions actuators equality fields told shapes reader

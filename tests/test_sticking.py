@@ -377,3 +377,36 @@ def test_a_robot_on_four_feet_comes_to_rest(friction, sway):
     rise = max(np.diff(run.energy[joint]).max() for joint in joints)
     assert rise < 1e-11  # J of 0.1: of work integrated to the tolerance, by joints that hardly move
     assert np.abs(run.energy["balance"]).max() < 1e-8
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+def test_slip_that_turns_in_a_dead_point_stops_nothing(rtol):
+    """A crank that goes round: its rocker rests for an instant, where friction in its pin cannot hold it."""
+    lengths = (0.3, 0.8, 0.6)
+    model, joint = empty(), 0
+    for k, length in enumerate(lengths):
+        place = pin.SE3(np.eye(3), np.array([lengths[k - 1] if k else 0.0, 0.0, 0.0]))
+        solid = np.diag([1e-3, length**2 / 12.0, length**2 / 12.0])
+        joint = body(
+            model,
+            joint,
+            hinge(0.0, 1.0, 0.0),
+            f"j{k}",
+            1.0,
+            place=place,
+            lever=(0.5 * length, 0.0, 0.0),
+            inertia=solid,
+        )
+    frame(model, "tip", joint, pin.SE3(np.eye(3), np.array([lengths[2], 0.0, 0.0])))
+    frame(model, "ground", 0, pin.SE3(np.eye(3), np.array([0.7, 0.0, 0.0])))
+    scene = pn.Scene(
+        model,
+        constraints=[pn.HingeAnchor("tip", "ground", axis="y", name="pin")],
+        laws=[pn.JointFriction("pin", coulomb=0.2)],
+        q0=[-1.2, 0.9, 1.4],
+        v0=[3.0, 0.0, 0.0],
+    )
+    run = pn.simulate(scene, 0.5, rtol=rtol, atol=0.01 * rtol, record="energy")
+    assert [event.kind for event in run.events] == ["reverse", "reverse"]
+    assert run.v[:, 0].min() > 4.0
+    assert np.abs(run.energy["balance"]).max() < 10.0 * rtol

@@ -233,7 +233,7 @@ def _viscous(law: JointFriction, out: core.Builder, index: int, place: Place) ->
         return
     coefficient = law.viscous * place.lever**2
     if place.block >= 0:
-        out.add_viscous(index, coefficient, block=place.block)
+        out.add_viscous(index, coefficient, block=place.block, anchor=place.anchor)
     else:
         out.add_viscous(index, coefficient, dof=place.dof, count=place.dofs)
 

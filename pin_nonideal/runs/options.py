@@ -20,7 +20,7 @@ METHODS = {method.name: method.adaptive for method in core.methods()}
 # Those of SciPy, and of them those that go on from a state that was put in place.
 SCIPY = tuple(method.name for method in core.methods() if method.outside)
 ONE_STEP = tuple(method.name for method in core.methods() if method.outside and method.one_step)
-RECORDS = ("a", "forces", "energy", "power")
+RECORDS = ("a", "forces", "energy", "power", "laws", "reactions")
 FIELDS = {"F_ideal": "forces", "F_nonideal": "forces", "lam": "forces", "lam_ideal": "forces"}
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-8, 1e-10
 # Times are floating-point numbers: a step of fewer of their spacings is off by more than a percent, and one
@@ -49,6 +49,8 @@ class RunOptions:
         forces: whether forces and multipliers are.
         energy: whether the ledger is.
         power: whether powers are.
+        laws: whether the forces of each law are, and limits of friction.
+        reactions: whether the wrenches that joints and anchors carry are.
         several: "error" or "continue" where the laws allow several motions.
     """
 
@@ -64,6 +66,8 @@ class RunOptions:
     forces: bool
     energy: bool
     power: bool
+    laws: bool
+    reactions: bool
     several: str
 
 
@@ -146,6 +150,8 @@ def run_options(
         forces="forces" in groups,
         energy="energy" in groups,
         power="power" in groups,
+        laws="laws" in groups or "forces" in groups,
+        reactions="reactions" in groups,
         several=choice("simulate: several", several, SEVERAL),
     )
 

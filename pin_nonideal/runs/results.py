@@ -93,6 +93,10 @@ def shaped(scene: Scene, outcome: core.Outcome, options: RunOptions, wall: float
         fields["F_nonideal"] = outcome.F_nonideal.reshape(nt, nv)
         fields["lam"] = outcome.lam.reshape(nt, program.rows)
         fields["lam_ideal"] = outcome.lam_ideal.reshape(nt, program.rows)
+    if options.laws:
+        fields |= _of_laws(scene, outcome)
+    if options.reactions:
+        fields["reactions"] = _reactions(scene, outcome)
     if options.power or options.energy:
         columns = _columns(program)
     if options.power:
@@ -123,9 +127,34 @@ def shaped(scene: Scene, outcome: core.Outcome, options: RunOptions, wall: float
         ),
         scene=scene,
         element_names=list(elements),
+        element_laws=list(program.element_laws),
+        law_names=list(program.law_names),
         name=scene.name,
         **fields,
     )
+
+
+def _of_laws(scene: Scene, outcome: core.Outcome) -> Table:
+    """Forces of the laws on the degrees of freedom that each acts on, and limits of the elements."""
+    program, nt = scene._compiled.program, len(outcome.t)
+    supports = program.law_supports
+    ends = np.cumsum([len(dofs) for dofs in supports])
+    parts = np.split(outcome.law_forces.reshape(nt, int(ends[-1]) if len(ends) else 0), ends[:-1], axis=1)
+    elements = len(scene.element_names)
+    return {
+        "law_forces": dict(zip(program.law_names, parts, strict=False)),
+        "law_dofs": [list(dofs) for dofs in supports],
+        "limits": outcome.limits.reshape(nt, elements) if elements else None,
+    }
+
+
+def _reactions(scene: Scene, outcome: core.Outcome) -> dict[str, Array]:
+    """Wrenches of joints, then of anchors and contacts, in their own axes and in world axes."""
+    program = scene._compiled.program
+    joints = [str(name) for name in scene.model.names][1:]
+    names = [*joints, *(program.constraints[block].name for block in program.reaction_blocks)]
+    wrenches = outcome.reactions.reshape(len(outcome.t), len(names), 12)
+    return {name: wrenches[:, k] for k, name in enumerate(names)}
 
 
 def _event(scene: Scene, event: core.Event) -> Event:

@@ -1,5 +1,7 @@
 #include "dynamics/law_forces.hpp"
 
+#include <algorithm>
+
 namespace pn {
 
 namespace {
@@ -40,6 +42,22 @@ struct BodyForces {
     void on_state(int, double) {}
 };
 
+// Dofs on which something may act.
+struct ActedOn {
+    const Program& p;
+    std::vector<char>& dofs;
+
+    void on_dof(int dof, double) { dofs[dof] = 1; }
+    void on_body(int joint, const Force&) {
+        for (int dof : p.mechanism.dofs_of(joint)) dofs[dof] = 1;
+    }
+    void along(int block, const Vec3&) {
+        for (int dof : p.blocks[block].support) dofs[dof] = 1;
+    }
+    void on_all(const VecX&) { std::fill(dofs.begin(), dofs.end(), char(1)); }
+    void on_state(int, double) {}
+};
+
 LawState law_state(const Workspace& w, const VecX& v) {
     return {w.now.terms, w.now.values, v, w.state.z, w.now.user_C};
 }
@@ -60,6 +78,22 @@ void add_smooth_forces(const Program& p, Workspace& w, double t, const VecX& q, 
         std::visit([&](const auto& law) {
             if (law.reaction == Reaction::none) law.act(state, sink);  // Eq. (9)
         }, each);
+}
+
+std::vector<std::vector<int>> law_supports(const Program& p) {
+    const Workspace anywhere(p);
+    std::vector<std::vector<char>> on(p.law_names.size(), std::vector<char>(p.mechanism.nv, 0));
+    for (const Law& each : p.laws)
+        std::visit([&](const auto& law) {
+            ActedOn sink{p, on[law.law]};
+            law.act(law_state(anywhere, anywhere.now.v), sink);
+        }, each);
+    for (const Friction& f : p.frictions) ActedOn{p, on[f.law]}.along(f.block, Vec3::Zero());
+    std::vector<std::vector<int>> supports(on.size());
+    for (size_t l = 0; l < on.size(); ++l)
+        for (int dof = 0; dof < p.mechanism.nv; ++dof)
+            if (on[l][dof]) supports[l].push_back(dof);
+    return supports;
 }
 
 void add_forces_by_law(const Program& p, const Workspace& w, const VecX& v, std::vector<VecX>& force) {

@@ -9,6 +9,8 @@ namespace pn {
 const VecX& ask(const Program& p, const UserLaw& law, Workspace& w, double t, const VecX& q, const VecX& v);
 // Adds C of every law that does not read reactions.
 void add_smooth_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& C);
+// Dofs on which each law acts, wherever the mechanism is, ascending.
+std::vector<std::vector<int>> law_supports(const Program& p);
 // Adds C of each law at the evaluation in the workspace to that of its column.
 void add_forces_by_law(const Program& p, const Workspace& w, const VecX& v, std::vector<VecX>& force);
 // Adds the forces of smooth laws on bodies to those that the joints carry.

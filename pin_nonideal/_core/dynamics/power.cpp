@@ -1,7 +1,9 @@
 #include "dynamics/power.hpp"
 
 #include "dynamics/law_forces.hpp"
+#include "dynamics/reactions.hpp"
 #include "dynamics/slip.hpp"
+#include "dynamics/solution.hpp"
 
 namespace pn {
 
@@ -11,6 +13,26 @@ std::vector<std::string> power_names(const Program& p) {
     std::vector<std::string> names(std::begin(scene_powers), std::end(scene_powers));
     names.insert(names.end(), p.law_names.begin(), p.law_names.end());
     return names;
+}
+
+// Of each law, without what sticks, which has no power.
+static void moving_law_forces(const Program& p, Workspace& w, const VecX& v, std::vector<VecX>& force) {
+    for (VecX& each : force) each.setZero();
+    add_forces_by_law(p, w, v, force);
+    for (size_t e = 0; e < p.frictions.size(); ++e) add_slip_force(p, w, e, force[p.frictions[e].law]);
+}
+
+void law_forces(const Program& p, Workspace& w, const VecX& v, std::vector<VecX>& force) {
+    moving_law_forces(p, w, v, force);
+    for (size_t e = 0; e < p.frictions.size(); ++e) {
+        if (w.state.mode[e] != sticking) continue;
+        const Friction& f = p.frictions[e];
+        const Block& block = p.blocks[f.block];
+        if (block.dof >= 0)
+            for (int k = 0; k < f.dim; ++k) force[f.law][block.dof + k] += holding_forces(p, w)[block.dof + k];
+        else if (w.now.rows.block_used[f.block])
+            add_transpose(block, w.now.A, reactions(p, w).lam, force[f.law]);
+    }
 }
 
 void powers(const Program& p, Workspace& w, const VecX& v, double* out) {
@@ -24,9 +46,7 @@ void powers(const Program& p, Workspace& w, const VecX& v, double* out) {
     }
     if (!p.has_laws()) return;
     std::vector<VecX>& force = w.scratch.law_force;
-    for (VecX& each : force) each.setZero();
-    add_forces_by_law(p, w, v, force);
-    for (size_t e = 0; e < p.frictions.size(); ++e) add_slip_force(p, w, e, force[p.frictions[e].law]);
+    moving_law_forces(p, w, v, force);
     for (size_t l = 0; l < p.law_names.size(); ++l) out[first_law_power + l] = v.dot(force[l]);
 }
 

@@ -1,4 +1,4 @@
-// Power of the forces at the evaluation in the workspace: what the ledger integrates.
+// Forces of the laws and power of all forces at the evaluation in the workspace: what the ledger integrates.
 #pragma once
 
 #include <iterator>
@@ -14,6 +14,8 @@ constexpr const char* scene_powers[] = {"actuation", "forces", "constraints"};
 constexpr int first_law_power = std::size(scene_powers);
 int power_count(const Program& p);
 std::vector<std::string> power_names(const Program& p);
+// C of each law, what sticks by it included; they add up to C of the split.
+void law_forces(const Program& p, Workspace& w, const VecX& v, std::vector<VecX>& force);
 void powers(const Program& p, Workspace& w, const VecX& v, double* out);
 
 }  // namespace pn

@@ -44,17 +44,10 @@ void Program::finish() {
         f.row = anchor.row + static_cast<int>(kept - anchor.kept.begin());
         if (kept == anchor.kept.end()) f.load = Friction::Load::none;
     }
-    for (const Friction& f : frictions) {
-        needs_reactions |= f.reaction != Reaction::none;
-        needs_joint_reactions |= f.reaction != Reaction::none && f.joint > 0;
-    }
+    for (const Friction& f : frictions) needs_reactions |= f.reaction != Reaction::none;
     // Kinds stand together, so that the order of their descriptions decides no sum.
     std::stable_sort(laws.begin(), laws.end(), [](const Law& a, const Law& b) { return a.index() < b.index(); });
-    each_law<UserLaw>(laws, [&](const UserLaw& law) {
-        needs_reactions |= law.reaction != Reaction::none;
-        needs_joint_reactions |= law.reaction != Reaction::none;
-    });
-    for (const Friction& f : frictions) needs_joint_reactions |= f.load == Friction::Load::user;
+    each_law<UserLaw>(laws, [&](const UserLaw& law) { needs_reactions |= law.reaction != Reaction::none; });
     for (int i = 0; i < constraints; ++i) {
         moves_in_time |= pn::moves_in_time(blocks[i].kind);
         affine_rates &= blocks[i].affine_rate;

@@ -34,7 +34,6 @@ struct Program {
     // What the scene does not need is not computed.
     bool has_laws() const { return !frictions.empty() || !laws.empty(); }
     bool needs_reactions = false;        // some law reads them
-    bool needs_joint_reactions = false;  // of tree joints
     bool driven = false;                 // forces or actuation
     bool has_body_forces = false;        // given forces that act on bodies
     bool moves_in_time = false;          // some constraint moves by itself

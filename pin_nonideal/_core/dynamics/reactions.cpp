@@ -52,15 +52,19 @@ const Reactions& reactions(const Program& p, Workspace& w) {
     Reactions& r = w.now.reactions;
     if (r.current) return r;
     r.current = true;
+    r.swept = false;
     share_multipliers(p.layout, p.blocks, w.now.B, w.now.rows, w.now.lam, r.lam);
-    if (!p.needs_joint_reactions) return r;
-    gather_body_forces(p, w, r.body);
-    sweep_tree(p.mechanism, w.now, r);
     return r;
 }
 
 Force joint_wrench(const Program& p, Workspace& w, int joint) {
-    const Reactions& r = reactions(p, w);
+    reactions(p, w);
+    Reactions& r = w.now.reactions;
+    if (!r.swept) {
+        r.swept = true;
+        gather_body_forces(p, w, r.body);
+        sweep_tree(p.mechanism, w.now, r);
+    }
     const Body& b = w.now.terms.body[joint];
     const int parent = p.mechanism.joints[joint].parent;
     Force f = b.f;
@@ -85,6 +89,47 @@ Force anchor_wrench(const Program& p, Workspace& w, int index) {
         f.ang += lam * unit.couple;
     }
     return f;
+}
+
+namespace {
+
+// Forces along rows as one wrench about a point.
+struct WrenchAbout {
+    const Evaluation& now;
+    Vec3 origin;
+    Force sum{Vec3::Zero(), Vec3::Zero()};
+
+    void add(int block, int row, double size) {
+        if (!now.values[block].geometric) return;
+        const Wrench& unit = now.values[block].wrench[row];
+        const Vec3 force = size * unit.force;
+        sum += Force{force, size * unit.couple + (unit.point - origin).cross(force)};
+    }
+    void along(int block, const Vec3& f) {
+        for (int k = 0; k < now.values[block].rows; ++k) add(block, k, f[k]);
+    }
+    void on_dof(int, double) {}
+};
+
+}  // namespace
+
+Force carried_wrench(const Program& p, Workspace& w, int index) {
+    const Reactions& r = reactions(p, w);
+    const Evaluation& now = w.now;
+    const Block& own = p.blocks[index];
+    const Frame& frame = *frames(own.kind).first;
+    const Body& body = now.terms.body[frame.joint];
+    WrenchAbout wrench{now, body.ref + body.p + body.R * frame.p};
+    for (size_t k = 0; k < own.kept.size(); ++k) wrench.add(index, own.kept[k], r.lam[own.row + k]);
+    for (size_t e = 0; e < p.frictions.size(); ++e) {
+        const Friction& f = p.frictions[e];
+        if (f.anchor != index) continue;
+        for (int k = 0; k < f.dim; ++k)
+            wrench.add(f.block, k, w.state.mode[e] == sticking ? r.lam[p.blocks[f.block].row + k] : now.slip_force[e][k]);
+    }
+    const LawState state{now.terms, now.values, now.v, w.state.z, now.user_C};
+    each_law<Viscous>(p.laws, [&](const Viscous& law) { if (law.anchor == index) law.act(state, wrench); });
+    return wrench.sum;
 }
 
 }  // namespace pn

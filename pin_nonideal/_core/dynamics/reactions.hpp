@@ -12,5 +12,8 @@ const Reactions& reactions(const Program& p, Workspace& w);
 // an anchor on the body of frame 1, about the anchor's point.
 Force joint_wrench(const Program& p, Workspace& w, int joint);
 Force anchor_wrench(const Program& p, Workspace& w, int block);
+// All that passes from the one body of an anchor or contact to the other, its friction included, about the origin of
+// frame 1.
+Force carried_wrench(const Program& p, Workspace& w, int block);
 
 }  // namespace pn

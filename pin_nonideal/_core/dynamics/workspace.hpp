@@ -40,6 +40,7 @@ struct RunState {
 // What joints, anchors and contacts carry in the motion at hand (dynamics/reactions.hpp).
 struct Reactions {
     bool current = false;  // made of that motion
+    bool swept = false;    // through the joints of the tree as well
     VecX lam;              // by kept row; least norm among redundant rows
     std::vector<Force> body;  // external forces on each body, then their subtree sums
     std::vector<Motion> motion;

@@ -35,6 +35,7 @@ struct Viscous {  // C = -coefficient v on dofs, or on the slip velocities along
     int law = 0;  // index into Program::law_names
     int dof = -1, count = 0, block = -1;
     double coefficient = 0.0;
+    int anchor = -1;  // block of the anchor that the block belongs to
     static constexpr int states = 0;
     static constexpr Reaction reaction = Reaction::none;
 
@@ -102,8 +103,8 @@ struct Drag {  // force -coefficient |u|^(exponent - 1) u at the origin of a fra
     void act(const LawState& s, Sink& sink) const {
         const Body& body = s.terms.body[frame.joint];
         const Vec3 x = body.ref + body.p + body.R * frame.p, u = velocity_at(body, x);
-        if (u.norm() == 0.0 || frame.joint == 0) return;
-        const Vec3 f = force(u);
+        if (frame.joint == 0) return;
+        const Vec3 f = u.norm() == 0.0 ? u : force(u);
         sink.on_body(frame.joint, Force{f, (x - body.ref).cross(f)});
     }
 };

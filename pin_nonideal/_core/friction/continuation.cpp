@@ -10,6 +10,9 @@ namespace pn {
 
 namespace {
 
+// What sticks from now on loses slip of rounding. In a dead point of a loop, where slip turns while all else moves on,
+// that slip could stop everything: a velocity that changes by this part moves.
+constexpr double least_speed = 1e-6;
 constexpr double slack = 1e-9;  // part of the limit, or of the accelerations in play, by which rounding may miss
 constexpr int rounds = 6;       // of modes that are changed where their conditions fail; the program goes on from there
 
@@ -50,6 +53,7 @@ bool go_on(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const Mod
         set_modes(p, w, modes);
         try {
             project(p, w, t, q, v);
+            if ((v - v_before).cwiseAbs().maxCoeff() > least_speed * (1.0 + v_before.cwiseAbs().maxCoeff())) break;
             begin_step(p, w, t, q, v);
         } catch (const Failure& failure) {
             if (failure.kind != Failure::Kind::inconsistent) throw;

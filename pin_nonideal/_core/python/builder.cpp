@@ -80,9 +80,9 @@ void bind_friction(nb::class_<Builder>& builder) {
 void bind_laws(nb::class_<Builder>& builder) {
     builder
         .def("add_law", &Builder::add_law, "name"_a)
-        .def("add_viscous", [](Builder& b, int law, double coefficient, int dof, int count, int block) {
-            b.p->add(Viscous{law, dof, count, block, coefficient});
-        }, "law"_a, "coefficient"_a, nb::kw_only(), "dof"_a = -1, "count"_a = 1, "block"_a = -1)
+        .def("add_viscous", [](Builder& b, int law, double coefficient, int dof, int count, int block, int anchor) {
+            b.p->add(Viscous{law, dof, count, block, coefficient, anchor});
+        }, "law"_a, "coefficient"_a, nb::kw_only(), "dof"_a = -1, "count"_a = 1, "block"_a = -1, "anchor"_a = -1)
         .def("add_drag", [](Builder& b, int law, const FrameTuple& frame, double coefficient, double exponent) {
             b.p->add(Drag{law, frame_of(frame), coefficient, exponent});
         }, "law"_a, "frame"_a, "coefficient"_a, "exponent"_a)

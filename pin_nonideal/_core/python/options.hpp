@@ -25,7 +25,8 @@ struct type_caster<pn::Options> {
             value.output_dt = number("output_dt");
             value.max_steps = nanobind::cast<long>(from.attr("max_steps"));
             pn::read_into(from.attr("atol"), value.atol);
-            value.record = {wanted("a"), wanted("forces"), wanted("energy"), wanted("power")};
+            value.record = {wanted("a"), wanted("forces"), wanted("energy"), wanted("power"),
+                            wanted("laws"), wanted("reactions")};
             value.continues = nanobind::cast<std::string>(from.attr("several")) == "continue";
             return true;
         } catch (const std::exception&) {

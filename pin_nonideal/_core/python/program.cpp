@@ -4,6 +4,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "dynamics/law_forces.hpp"
 #include "dynamics/power.hpp"
 #include "python/constraints.hpp"
 #include "python/runner.hpp"
@@ -17,6 +18,13 @@ void bind_program(nb::module_& m) {
         .def_prop_ro("states", [](const Program& p) { return p.states; })
         .def_prop_ro("law_names", [](const Program& p) { return p.law_names; })
         .def_prop_ro("power_names", &power_names)
+        .def_prop_ro("law_supports", &law_supports)
+        .def_prop_ro("reaction_blocks", &reaction_blocks)
+        .def_prop_ro("element_laws", [](const Program& p) {
+            std::vector<int> laws;
+            for (const Friction& f : p.frictions) laws.push_back(f.law);
+            return laws;
+        })
         .def_prop_ro("element_names", [](const Program& p) {
             std::vector<std::string> names;
             for (const Friction& f : p.frictions) names.push_back(f.name);

@@ -41,10 +41,10 @@ static void fields(Archive& a, Event& x) {
 
 static void fields(Archive& a, Recording& x) {
     // A run that failed or raised has no next step.
-    auto& [t, q, v, violation, violation_rate, acceleration, F_ideal, F_nonideal, lam, lam_ideal, energy, power, z, modes,
-           events, steps, rejected, failure, error] = x;
+    auto& [t, q, v, violation, violation_rate, acceleration, F_ideal, F_nonideal, lam, lam_ideal, energy, power, z,
+           law_forces, limits, reactions, modes, events, steps, rejected, failure, error] = x;
     for (auto* samples : {&t, &q, &v, &violation, &violation_rate, &acceleration, &F_ideal, &F_nonideal, &lam, &lam_ideal,
-                          &energy, &power, &z})
+                          &energy, &power, &z, &law_forces, &limits, &reactions})
         a.list(*samples);
     a.list(modes);
     a.list(events);

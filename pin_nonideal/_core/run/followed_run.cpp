@@ -33,6 +33,12 @@ MatX FollowedRun::jacobian(double at, const VecX& y_outside) {
     return out;
 }
 
+// Events came too thick a moment ago: implicit steps go over them with the modes as they are.
+bool FollowedRun::bridges_cluster() const {
+    return !out.events.empty() && out.events.back().kind == Event::Kind::chatter &&
+           t < out.events.back().time + chatter_time;
+}
+
 bool FollowedRun::follow(double end, const OutsideStep::Interpolant& interpolant) {
     between_steps();
     moved_energy = moved_before_;
@@ -40,7 +46,7 @@ bool FollowedRun::follow(double end, const OutsideStep::Interpolant& interpolant
     stepper.start_rate() = rate;
     stepper.follow(t, end - t, interpolant);
     system.project_and_evaluate(end, stepper.y1, stepper.end_rate());
-    const std::optional<FoundEvent> event = locate_event();
+    const std::optional<FoundEvent> event = bridges_cluster() ? std::nullopt : locate_event();
     accept({stepper.h, end, true}, event);
     record(event);
     system.on_constraints = w.now.rows.distance < near_singular && !w.now.rows.blocks.empty();

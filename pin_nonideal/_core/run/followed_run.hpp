@@ -23,6 +23,8 @@ public:
     VecX state_rate() const { return rate.head(system.ns); }
 
 private:
+    bool bridges_cluster() const;
+
     VecX inside_, inside_rate_;
     double moved_before_ = 0.0;  // energy, by projections that the integrator went on from
 };

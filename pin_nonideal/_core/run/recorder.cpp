@@ -2,6 +2,8 @@
 
 #include "dynamics/evaluation.hpp"
 #include "dynamics/power.hpp"
+#include "dynamics/reactions.hpp"
+#include "dynamics/slip.hpp"
 
 namespace pn {
 
@@ -11,6 +13,37 @@ void Recorder::reserve(size_t samples) {
     const std::pair<std::vector<double>*, int> widths[] = {
         {&out.t, 1}, {&out.q, system.nq}, {&out.v, system.nv}, {&out.violation, 1}, {&out.violation_rate, 1}};
     for (const auto& [values, width] : widths) values->reserve(samples * width);
+}
+
+std::vector<int> reaction_blocks(const Program& p) {
+    std::vector<int> blocks;
+    for (int i = 0; i < p.constraints; ++i)
+        if (frames(p.blocks[i].kind).first) blocks.push_back(i);
+    return blocks;
+}
+
+void Recorder::record_laws(double t) {
+    std::vector<VecX>& force = w.scratch.law_force;
+    law_forces(p, w, system.v, force);
+    for (size_t l = 0; l < force.size(); ++l)
+        for (int dof : supports_[l]) out.law_forces.push_back(force[l][dof]);
+    for (size_t e = 0; e < p.frictions.size(); ++e)
+        out.limits.push_back(w.state.mode[e] == sticking ? static_limit(p, w, e, t, system.q, system.v)
+                                                         : w.now.limit[e]);
+}
+
+void Recorder::record_reactions() {
+    const auto record = [&](const Force& f, const Mat3& axes) {
+        for (const Vec3& part : {transpose_times(axes, f.lin), transpose_times(axes, f.ang), f.lin, f.ang})
+            for (int k = 0; k < 3; ++k) out.reactions.push_back(part[k]);
+    };
+    const std::vector<Body>& body = w.now.terms.body;
+    for (size_t joint = 1; joint < p.mechanism.joints.size(); ++joint)
+        record(joint_wrench(p, w, static_cast<int>(joint)), body[joint].R);
+    for (int block : reaction_blocks(p)) {
+        const Frame& frame = *frames(p.blocks[block].kind).second;
+        record(carried_wrench(p, w, block), body[frame.joint].R * frame.R);
+    }
 }
 
 void Recorder::sample(double t, const VecX& y, double moved_energy, bool evaluated) {
@@ -36,6 +69,8 @@ void Recorder::sample(double t, const VecX& y, double moved_energy, bool evaluat
         powers(p, w, system.v, power_.data());
         append(out.power, power_);
     }
+    if (options.laws) record_laws(t);
+    if (options.reactions) record_reactions();
     if (options.energy) {
         out.energy.push_back(kinetic_energy(p.mechanism, w.now.terms, system.v));
         out.energy.push_back(potential_energy(p.mechanism, w.now.terms));

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "dynamics/law_forces.hpp"
 #include "dynamics/split.hpp"
 #include "run/system.hpp"
 
@@ -35,6 +36,9 @@ constexpr EventKind event_kinds[] = {
 struct Recording {
     std::vector<double> t, q, v, violation, violation_rate;
     std::vector<double> a, F_ideal, F_nonideal, lam, lam_ideal, energy, power, z;
+    // Of each law on the dofs that it acts on, law by law; of each element; of each joint, then of each block that
+    // reaction_blocks tells, [force; moment] in its own axes and in world axes.
+    std::vector<double> law_forces, limits, reactions;
     std::vector<std::int8_t> modes;
     std::vector<Event> events;
     long steps = 0, rejected = 0;
@@ -43,14 +47,16 @@ struct Recording {
 };
 
 struct RecordOptions {
-    bool a = false, forces = false, energy = false, power = false;
-    bool evaluates() const { return a || forces || energy || power; }
+    bool a = false, forces = false, energy = false, power = false, laws = false, reactions = false;
+    bool evaluates() const { return a || forces || energy || power || laws || reactions; }
 };
 
 class Recorder {
 public:
     Recorder(System& system, const RecordOptions& options, Recording& out)
-        : p(system.p), w(system.w), system(system), options(options), out(out) {}
+        : p(system.p), w(system.w), system(system), options(options), out(out) {
+        if (options.laws) supports_ = law_supports(p);
+    }
     // Room for so many samples.
     void reserve(size_t samples);
     // The state at t; moved_energy was moved by projection so far. The workspace is evaluated there when `evaluated`, and
@@ -58,6 +64,9 @@ public:
     void sample(double t, const VecX& y, double moved_energy, bool evaluated);
 
 private:
+    void record_laws(double t);
+    void record_reactions();
+
     const Program& p;
     Workspace& w;
     System& system;
@@ -65,6 +74,10 @@ private:
     Recording& out;
     VecX power_;
     Split split_;
+    std::vector<std::vector<int>> supports_;  // of the laws
 };
+
+// Constraints and contacts that act between two frames, and so carry a wrench.
+std::vector<int> reaction_blocks(const Program& p);
 
 }  // namespace pn

@@ -33,9 +33,8 @@ constexpr long steps_a_tick = 16;
 // Room for samples is taken at once up to this number; longer runs may stop before they fill it.
 constexpr double most_reserved = 1e5;
 
-// Chatter: this many events within this time [s] make the run go on by time stepping for a while, in so many steps.
+// Chatter: this many events within its time make the run go on by time stepping for a while, in so many steps.
 constexpr int chatter_events = 60;
-constexpr double chatter_time = 1e-4;
 constexpr int chatter_steps = 50;
 
 // Part of a step to which the instant is found from which on several motions are possible.
@@ -278,8 +277,9 @@ void Simulation::bridge_cluster(int element) {
     if (recent_events.size() > chatter_events) recent_events.erase(recent_events.begin());
     if (recent_events.size() < chatter_events || t - recent_events.front() > chatter_time) return;
     recent_events.clear();
-    stiffness.require_time_steps(chatter_time / chatter_steps);
+    if (!options.method.outside()) stiffness.require_time_steps(chatter_time / chatter_steps);
     out.events.push_back({t, Event::Kind::chatter, element});
+    if (options.method.outside()) return;  // whose steps go on without a look at events
     const double stop = std::min(t_end, t + chatter_time);
     while (t < stop) step_in_time(stop, chatter_time / chatter_steps);
     switch_modes(system, t, y, rate, std::nullopt);

@@ -34,6 +34,8 @@ void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, co
 // when the state does not fit.
 void resume(const Program& p, Workspace& w, const std::string& state, const Options& options, Recording& out);
 
+constexpr double chatter_time = 1e-4;  // for which events that come too thick are stepped over [s]
+
 class Simulation : protected Progress {
 public:
     Simulation(const Program& p, Workspace& w, const Options& options, Recording& out);

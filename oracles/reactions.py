@@ -1,0 +1,64 @@
+"""What joints carry, by Pinocchio's recursive Newton-Euler pass, with loops cut."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+
+class CutTree:
+    """A model at one state and its motion, with forces on its bodies added one by one.
+
+    Wrenches are [force; moment] about a point, in world axes.
+    """
+
+    def __init__(self, model, q, v, a):
+        self.model, self.data, self.state = model, model.createData(), (q, v, a)
+        pin.forwardKinematics(model, self.data, q, v, a)
+        pin.updateFramePlacements(model, self.data)
+        self.external = [pin.Force.Zero() for _ in range(model.njoints)]
+
+    def placement(self, frame):
+        """World placement of a frame, or of a joint's."""
+        return self.data.oMf[self.model.getFrameId(frame)]
+
+    def joint(self, frame):
+        """Index of the joint whose body a frame is on."""
+        return self.model.frames[self.model.getFrameId(frame)].parentJoint
+
+    def velocity(self, frame):
+        """Of a frame's origin, world axes."""
+        of = self.model.getFrameId(frame)
+        return pin.getFrameVelocity(self.model, self.data, of, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).linear
+
+    def push(self, joint, wrench, point):
+        """Adds a wrench on the body of a joint."""
+        at_point = pin.SE3(np.eye(3), np.asarray(point, dtype=float))
+        in_world = at_point.act(pin.Force(np.asarray(wrench, dtype=float)))
+        self.external[joint] += self.data.oMi[joint].actInv(in_world)
+
+    def push_frames(self, frame1, frame2, wrench):
+        """The same on the body of frame1 at its origin, the opposite on that of frame2 (None: the world)."""
+        point = self.placement(frame1).translation
+        for frame, sign in ((frame1, 1.0), (frame2, -1.0)):
+            if frame is not None:
+                self.push(self.joint(frame), sign * np.asarray(wrench), point)
+
+    def generalized(self, frame1, frame2, wrench):
+        """The generalized force of such a pair, (nv,)."""
+        pin.computeJointJacobians(self.model, self.data, self.state[0])
+        point, total = self.placement(frame1).translation, np.zeros(self.model.nv)
+        for frame, sign in ((frame1, 1.0), (frame2, -1.0)):
+            if frame is None:
+                continue
+            joint = self.joint(frame)
+            J = pin.getJointJacobian(self.model, self.data, joint, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+            lever = point - self.data.oMi[joint].translation
+            force, moment = wrench[:3], wrench[3:] + np.cross(lever, wrench[:3])
+            total += sign * J.T @ np.concatenate([force, moment])
+        return total
+
+    def joint_wrenches(self):
+        """What crosses each joint onto its body, in the joint's axes about its origin, (njoints - 1, 6)."""
+        pin.rnea(self.model, self.data, *self.state, self.external)
+        return np.array([self.data.f[i].vector for i in range(1, self.model.njoints)])
