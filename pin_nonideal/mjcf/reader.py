@@ -5,7 +5,7 @@ What is carried over is exact; what cannot be carried is a note or an error (`to
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -52,8 +52,9 @@ def read_mjcf(path: Path, *, allow: Collection[str] = (), ctrl: Control = None) 
     told = Told(f'"{path}"', allow, notes)
     robot, tree = translate(mujoco, compiled, path.stem, told)
     told.require()
-    shapes = cache(partial(_shapes, path, frozenset(absent)))
-    robot.visual, robot.collision = Shapes(lambda: shapes()[0]), Shapes(lambda: shapes()[1])
+    again = cache(partial(_with_meshes, path))
+    drawn, solid = (cache(partial(_shapes, again, absent, visual=kind)) for kind in (True, False))
+    robot.visual, robot.collision = Shapes(drawn), Shapes(solid)
     if robot.actuation is not None:
         robot.actuation.set_control(ctrl)
     for key, name in enumerate(tree.key_names):
@@ -116,10 +117,14 @@ def _apply_key(actuators: Actuators | None, compiled: Any, key: int, ctrl: Contr
         actuators.set_control(compiled.key_ctrl[key] if ctrl is None else ctrl, compiled.key_act[key])
 
 
-def _shapes(path: Path, absent: frozenset[int]) -> tuple[GeometryModel, GeometryModel]:
-    """Drawn and colliding shapes, meshes included: read anew, for nothing else needs them."""
-    mujoco = mujoco_module(path)
+def _with_meshes(path: Path) -> tuple[Tree, frozenset[int]]:
+    """The file read anew, meshes included, which nothing but its shapes needs; and what was not found."""
     compiled = compile_mjcf(path, meshes=True)
-    tree = build_tree(mujoco, compiled.model, path.stem)
-    drawn, solid = (read_shapes(tree, absent | compiled.absent, visual=kind) for kind in (True, False))
-    return drawn, solid
+    return build_tree(mujoco_module(path), compiled.model, path.stem), compiled.absent
+
+
+def _shapes(
+    again: Callable[[], tuple[Tree, frozenset[int]]], absent: frozenset[int], *, visual: bool
+) -> GeometryModel:
+    tree, lost = again()
+    return read_shapes(tree, absent | lost, visual=visual)

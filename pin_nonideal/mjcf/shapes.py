@@ -44,7 +44,7 @@ def read_shapes(tree: Tree, left_out: Collection[int], *, visual: bool) -> Geome
         color = np.array(m.mat_rgba[m.geom_matid[g]] if m.geom_matid[g] >= 0 else m.geom_rgba[g], dtype=float)
         solid = bool(m.geom_contype[g] or m.geom_conaffinity[g]) or g in paired
         shown = m.geom_group[g] < SHOWN_GROUPS and color[3] > 0.0
-        shape = None if g in left_out or not (shown if visual else solid) else _shape(m, g)
+        shape = None if g in left_out or not (shown if visual else solid) else _shape(m, g, solid=not visual)
         if shape is None:
             continue
         body = int(m.geom_bodyid[g])
@@ -59,7 +59,7 @@ def read_shapes(tree: Tree, left_out: Collection[int], *, visual: bool) -> Geome
     return result
 
 
-def _shape(m: Any, g: int) -> Any:
+def _shape(m: Any, g: int, *, solid: bool) -> Any:
     """A coal geometry, None for what has none (signed distance functions of plugins)."""
     import coal
 
@@ -80,22 +80,24 @@ def _shape(m: Any, g: int) -> Any:
     if kind == MESH:
         start, first = int(m.mesh_vertadr[data]), int(m.mesh_faceadr[data])
         vertices = m.mesh_vert[start : start + m.mesh_vertnum[data]]
-        return _triangles(vertices, m.mesh_face[first : first + m.mesh_facenum[data]])
-    return _height_field(m, data) if kind == HFIELD else None
+        return _triangles(vertices, m.mesh_face[first : first + m.mesh_facenum[data]], solid=solid)
+    return _height_field(m, data, solid=solid) if kind == HFIELD else None
 
 
-def _triangles(vertices: Any, faces: Any) -> Any:
+def _triangles(vertices: Any, faces: Any, *, solid: bool) -> Any:
+    """A mesh; the tree of its bounding boxes, which takes longest, only where it may collide."""
     import coal
 
     mesh = coal.BVHModelOBBRSS()
     mesh.beginModel(len(faces), len(vertices))
     mesh.addVertices(np.array(vertices, dtype=float))
     mesh.addTriangles(np.array(faces, dtype=np.uint64))
-    mesh.endModel()
+    if solid:
+        mesh.endModel()
     return mesh
 
 
-def _height_field(m: Any, data: int) -> Any:
+def _height_field(m: Any, data: int, *, solid: bool) -> Any:
     """A height field as the triangles of its surface."""
     rows, columns = int(m.hfield_nrow[data]), int(m.hfield_ncol[data])
     start, (x, y, height, _) = int(m.hfield_adr[data]), m.hfield_size[data]
@@ -104,7 +106,9 @@ def _height_field(m: Any, data: int) -> Any:
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     lower = np.column_stack([corner, corner + 1, corner + columns])
     upper = np.column_stack([corner + 1, corner + columns + 1, corner + columns])
-    return _triangles(np.column_stack([across.ravel(), along.ravel(), z]), np.vstack([lower, upper]))
+    return _triangles(
+        np.column_stack([across.ravel(), along.ravel(), z]), np.vstack([lower, upper]), solid=solid
+    )
 
 
 def _pairs(m: Any, geoms: list[int]) -> list[tuple[int, int]]:
