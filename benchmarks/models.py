@@ -106,7 +106,7 @@ def verdict(name: str) -> Verdict:
             differences(name, scene, needed == "allow"),
             any("tolerance of the assembly" in n for n in scene.notes),
         )
-    except pn.PinNonidealError as error:
+    except (pn.PinNonidealError, MemoryError) as error:
         return Verdict("wrong", needed, " ".join(str(error).split()), len(scene.notes))
     rounded = any("tolerance of the assembly" in note for note in scene.notes)
     right = apart <= (ROUNDED if rounded else RIGHT)

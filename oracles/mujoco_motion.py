@@ -12,7 +12,9 @@ import mujoco
 import numpy as np
 
 OFF = mujoco.mjtDisableBit
-CONNECT, WELD = 0, 1
+CONNECT, WELD, JOINT, TENDON = range(
+    4
+)  # of MuJoCo's mjtEq; those after are of flexes, which no scene carries
 ROUNDING = 1e-13
 RANK = 1e-6  # singular values of the rows below this part of the largest are none: frames are rounded to 1e-8
 
@@ -173,7 +175,7 @@ def _rows_at(model, qpos):
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     mujoco.mj_tendon(model, data)
-    rows = [_equality(model, data, i) for i in np.flatnonzero(data.eq_active)]
+    rows = [_equality(model, data, i) for i in np.flatnonzero(data.eq_active) if model.eq_type[i] <= TENDON]
     return np.vstack([np.zeros((0, model.nv)), *rows])
 
 
@@ -186,7 +188,7 @@ def _equality(model, data, i):
     for k in (one, two):
         if k < 0:
             continue
-        if kind == 2:
+        if kind == JOINT:
             rows.append(np.eye(model.nv)[model.jnt_dofadr[k]])
             at = model.jnt_qposadr[k]
             lengths.append(data.qpos[at] - model.qpos0[at])

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import stat
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -87,6 +89,19 @@ def test_times_of_a_saved_run_are_checked(tmp_path):
         np.savez(tmp_path / "bad.npz", **arrays)
         with refuses(words, LoadingError):
             pn.Trajectory.load(tmp_path / "bad.npz")
+
+
+def test_a_scene_that_does_not_fit_a_run_is_refused(tmp_path):
+    run = pn.simulate(pn.load("four_bar"), 0.01)
+    other = dataclasses.replace(run, scene=pn.load("five_bar"))
+    for show in (pn.replay, pn.plot):
+        with refuses('needs the scene of the run: scene "five_bar" has nq', InputError):
+            show(other, tmp_path / "x.html")
+
+
+def test_the_page_of_robots_says_what_the_list_says():
+    page = (Path(__file__).parent.parent / "docs" / "robots.md").read_text(encoding="utf-8")
+    assert [name for name, said in pn.robots() if f"| `{name}` | {said} |" not in page] == []
 
 
 def test_a_model_that_is_changed_after_the_scene_was_made_is_refused(tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
+import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
@@ -46,9 +47,20 @@ def compare(path, seed=0, states=2, spread=0.4, **parameters):
         same(scene.solve(theirs.q, theirs.v).a, theirs.a, max(1.0, EPS * condition / ROUNDING))
 
 
+@pytest.mark.slow
+@settings(max_examples=300, deadline=None, phases=[Phase.generate], derandomize=True)
+@given(text=mjcf_files(), seed=st.integers(0, 1000))
+def test_many_random_files(tmp_path_factory, text, seed):
+    compare_file(tmp_path_factory, text, seed)
+
+
 @settings(max_examples=60, deadline=None, phases=[Phase.generate], derandomize=True)
 @given(text=mjcf_files(), seed=st.integers(0, 1000))
 def test_random_files(tmp_path_factory, text, seed):
+    compare_file(tmp_path_factory, text, seed)
+
+
+def compare_file(tmp_path_factory, text, seed):
     path = tmp_path_factory.mktemp("mjcf") / "robot.xml"
     path.write_text(text)
     try:

@@ -164,7 +164,9 @@ def read_transmission(tree: Tree, actuator: int, tendons: list[Tendon | None]) -
             return OnFree(at + 3, dof, gear, kind == JOINT_IN_PARENT, nv)
         if m.jnt_type[one] == BALL:
             return OnBall(at, dof, gear[:3], kind == JOINT_IN_PARENT, nv)
-        return Geared(FixedTendon(np.eye(tree.model.nq)[at], np.eye(nv)[dof]), float(gear[0]))
+        coordinate, row = np.zeros(tree.model.nq), np.zeros(nv)
+        coordinate[at] = row[dof] = 1.0
+        return Geared(FixedTendon(coordinate, row), float(gear[0]))
     if kind == TENDON:
         tendon = tendons[one]
         return None if tendon is None else Geared(tendon, float(gear[0]))

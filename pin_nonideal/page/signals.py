@@ -269,7 +269,7 @@ def check_scene(run: Trajectory, what: str) -> None:
         what: what needs the scene, for the message.
 
     Raises:
-        InputError: it is no run, or it has no scene.
+        InputError: it is no run, or it has no scene, or one that does not fit.
     """
     if not all(hasattr(run, name) for name in ("t", "q", "v", "scene")):
         raise InputError(f"{what} shows a Trajectory, what `simulate` returns; got {type(run).__name__}")
@@ -277,6 +277,12 @@ def check_scene(run: Trajectory, what: str) -> None:
         raise InputError(
             f"{what} needs the scene of the run, which a trajectory read from a file has not: "
             "pass dataclasses.replace(run, scene=scene)"
+        )
+    sizes, model = (run.q.shape[1], run.v.shape[1]), run.scene.model
+    if sizes != (model.nq, model.nv):
+        raise InputError(
+            f'{what} needs the scene of the run: scene "{run.scene.name}" has nq {model.nq} and nv '
+            f"{model.nv}, the run has {sizes[0]} and {sizes[1]}"
         )
 
 
