@@ -87,8 +87,13 @@ def wrong(kind, seed, rtol):
     return abs(run.v[-1] @ row - exact) / (ALLOWED * rtol)
 
 
-# At a loose tolerance a step may hold both the beginning and the end of a slip of a contact (docs/limits.md).
-CASES = [(kind, rtol) for kind in KINDS for rtol in (1e-8, 1e-6) if (kind, rtol) != ("contact", 1e-6)]
+CASES = [(kind, rtol) for kind in KINDS for rtol in (1e-8, 1e-6)]
+
+
+@pytest.mark.parametrize("seed", [13, 91, 178, 351, 556, 809, 860])
+def test_a_contact_that_slips_for_less_than_a_step(seed):
+    """At a loose tolerance a step may hold both the beginning and the end of a slip."""
+    assert wrong("contact", seed, 1e-6) < 1.0
 
 
 @pytest.mark.parametrize(("kind", "rtol"), CASES)

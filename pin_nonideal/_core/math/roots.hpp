@@ -37,13 +37,13 @@ double root_between(double low, double margin_low, double high, double margin_hi
     return high;
 }
 
-// The same for a margin that is zero at the start: where it has risen before it falls, the root after that; else the
-// start, from where it goes the wrong way at once.
+// The same for a margin that is zero at the start: where it has risen above `least` before it falls, the root after that;
+// else the start, from where it goes the wrong way at once.
 template <class Margin>
-double root_after_start(double high, double margin_high, const Margin& margin) {
+double root_after_start(double high, double margin_high, double least, const Margin& margin) {
     for (int it = 0; it < start_halvings; ++it) {
         const double low = 0.5 * high, margin_low = margin(low);
-        if (margin_low > 0.0) return root_between(low, margin_low, high, margin_high, margin);
+        if (margin_low > least) return root_between(low, margin_low, high, margin_high, margin);
         high = low;
         margin_high = margin_low;
     }

@@ -20,8 +20,6 @@ constexpr double limit_rounding = 1e-12, share_rounding = 1e-9;
 constexpr double times_parabola = 3.0, range_between = 0.02;
 // Part of the speed of rest by which an element that has just begun to slip may lie on the other side.
 constexpr double fresh_slip = 1e-3;
-// Slip that begins with less than this part of the most that it has in a step is slip that begins there.
-constexpr double rest_part = 0.05;
 // A least speed between two stages counts as a dip below zero where it is below this part of the speeds' range: the
 // cubics through the stages miss the motion by less.
 constexpr double dip_part = 0.02;
@@ -107,10 +105,6 @@ bool EventSearch::dips(int e) const {
         most = std::max(most, speed(i));
         below |= i > 0 && i < stepper_.stages && speed(i) < below_rest;
     }
-    // Slip of several directions that begins in this step first turns into its direction: that it comes to rest again
-    // shows where it has risen before.
-    if (p.frictions[e].dim > 1 && speed(0) < rest_part * most)
-        return below && speed(by_time_[1]) > 0.0 && speed(by_time_[2]) > 0.0;
     if (below) return true;
     for (size_t k = 0; k + 1 < by_time_.size(); ++k) {
         const int i = by_time_[k], j = by_time_[k + 1];
@@ -202,10 +196,20 @@ double EventSearch::first_crossing(const Watch& watch, Source source) {
     double g[location_grid + 1];
     g[0] = margin_at(0.0);
     const double speed = system_.velocity(stepper_.y0).cwiseAbs().maxCoeff();
-    const double rest = watch.kind == Watch::Kind::slip ? rest_speed * (1.0 + speed) : 0.0;  // it has just begun
+    const bool slips = watch.kind == Watch::Kind::slip;
+    const double rest = slips ? rest_speed * (1.0 + speed) : 0.0;
+    bool begins = g[0] <= rest;
     for (int k = 1; k <= location_grid; ++k) {
         g[k] = margin_at(k * apart);
-        if (g[k] < 0.0 && k == 1 && g[0] <= rest) return root_after_start(apart, g[1], margin_at);
+        if (begins && g[k] < 0.0) {
+            // Slip of several directions that has just begun may first turn into its own; it has come to rest again
+            // where it rose before.
+            const bool turns = slips && p.frictions[watch.index].dim > 1;
+            const double part = k > 1 ? 0.0 : root_after_start(apart, g[1], turns ? rest : 0.0, margin_at);
+            if (part > 0.0 || !turns) return part;
+            continue;
+        }
+        begins = false;
         if (g[k] < 0.0) return root_between((k - 1) * apart, g[k - 1], k * apart, g[k], margin_at);
         if (k == 1 || g[k - 1] > g[k - 2] || g[k - 1] > g[k]) continue;
         if (g[k - 1] > parabola_part * (g[k - 2] - 2.0 * g[k - 1] + g[k])) continue;
