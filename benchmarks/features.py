@@ -2,7 +2,8 @@
 
 The mechanism is the planar five-bar, which still moves when one of its joints sticks.  Steps are steps of
 rk4, four evaluations each, so that what a step needs beside them shows.  What is absent, or stated and never
-acts, is timed beside the scene without it.
+acts, is timed beside the scene without it.  What an event costs shows in chains whose hinges stick and slip,
+beside the same chains with viscous hinges, which have none.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 import pin_nonideal as pn
 
@@ -22,6 +24,11 @@ from .problems import Problem
 
 DT = 1e-3
 STEPS = 200
+
+# Chains of links of 1 m and 1 kg, released level; their hinges rub with so much [N m], or [N m s].
+LINKS = (10, 20, 50, 100)
+COULOMB, VISCOUS = 5.0, 1e-3
+CHAIN_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
@@ -137,7 +144,42 @@ def absent(rounds: int, say: Callable[[str], None]) -> list[dict[str, Any]]:
     return rows
 
 
+def chain(links: int, **friction: float) -> pn.Scene:
+    """A chain from the ground along x, each hinge about y with this friction."""
+    model = pin.Model()
+    rod = pin.Inertia(1.0, np.array([0.5, 0.0, 0.0]), np.diag([1e-3, 1.0, 1.0]) / 12.0)
+    for k in range(links):
+        place = pin.SE3(np.eye(3), np.array([float(k > 0), 0.0, 0.0]))
+        model.appendBodyToJoint(
+            model.addJoint(k, pin.JointModelRY(), place, f"hinge{k}"), rod, pin.SE3.Identity()
+        )
+    return pn.Scene(model, laws=[pn.JointFriction(name, **friction) for name in model.names[1:]])
+
+
+def events(quick: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
+    """Evaluations and time of an event, beside those of the steps."""
+    rows = []
+    for links in LINKS[:2] if quick else LINKS:
+        scenes = {"rough": chain(links, coulomb=COULOMB), "smooth": chain(links, viscous=VISCOUS)}
+        calls = {name: partial(pn.simulate, s, CHAIN_SECONDS, progress=False) for name, s in scenes.items()}
+        rough, smooth = calls["rough"](), calls["smooth"]()
+        times = timing.paired(
+            {name: timing.per_call(call) for name, call in calls.items()}, 2 if quick else 5
+        )
+        steps, smooth_steps = (run.stats.steps + run.stats.rejected for run in (rough, smooth))
+        own = steps / smooth_steps  # what the steps cost without events
+        count = len(rough.events)
+        evaluations = (rough.stats.evaluations - own * smooth.stats.evaluations) / count
+        seconds = (times["rough"].best - own * times["smooth"].best) / count
+        step = times["smooth"].best / smooth_steps
+        rows.append(
+            {"links": links, "events": count, "evaluations": evaluations, "time": seconds, "step": step}
+        )
+        say(f"  {links} links: {count} events of {evaluations:.1f} evaluations, {seconds * 1e6:.0f} us each")
+    return rows
+
+
 def measure(quick: bool, say: Callable[[str], None] = print) -> dict[str, Any]:
-    """What features add, and what absent ones cost."""
+    """What features add, what absent ones cost, and what an event does."""
     rounds = 10 if quick else 60
-    return {"added": added(rounds, say), "absent": absent(rounds, say)}
+    return {"added": added(rounds, say), "absent": absent(rounds, say), "events": events(quick, say)}

@@ -48,6 +48,10 @@ FEATURES = """## Cost of each feature
 
 Features added one at a time to the five-bar; a step is one of rk4, with its four evaluations.
 """
+EVENTS = """Cost of an event: chains of links of 1 m and 1 kg whose hinges rub with 5 N m, released level, over
+1 s by dop853 at its default tolerance. An event costs what the run takes beyond as many steps of the same
+chain with viscous hinges, which has none; several hinges may stick or slip at one instant.
+"""
 BATCHES = """## Batches
 
 Semi-implicit Euler at 2 ms from many states: `pn.rollout` against `mujoco.rollout` with its default
@@ -161,12 +165,23 @@ def features(results: dict[str, Any]) -> str:
         rows.append((row["feature"], scaled(row["evaluation"]) + signs[0], scaled(row["step"]) + signs[1]))
         before = row
     idle = [(row["absent"], row["against"], f"{row['ratio']:.2f}") for row in results["absent"]]
+    events = [
+        (
+            str(row["links"]),
+            str(row["events"]),
+            f"{row['evaluations']:.1f}",
+            *map(scaled, (row["time"], row["step"])),
+        )
+        for row in results["events"]
+    ]
     return "\n".join(
         (
             FEATURES,
             table(("scene", "evaluation", "step"), rows),
             "What is absent, or stated and never acts:\n",
             table(("stated, or absent", "evaluation over", "ratio"), idle),
+            EVENTS,
+            table(("links", "events", "evaluations an event", "time an event", "time a step"), events),
         )
     )
 

@@ -33,9 +33,10 @@ constexpr double beyond = 2.0;     // part of a step: none of it
 constexpr double parabola_part = 0.25;
 constexpr double slope_part = 1e-4;  // of the step, over which the rate of a margin is a difference
 constexpr double doubted_part = 1e-2;  // of the change of a share, to which an interpolant of low order tells it
-// What the shares' rates tell is confirmed in so many evaluations, to this part of the step.
+// What the shares' rates tell is confirmed in so many evaluations, until a correction is this part of the step: what is
+// left is the square of it, and the step taken again corrects that.
 constexpr int confirmations = 3;
-constexpr double confirmed_width = 1e-6;
+constexpr double confirmed_width = 1e-4;
 
 }  // namespace
 
