@@ -48,9 +48,9 @@ FEATURES = """## Cost of each feature
 
 Features added one at a time to the five-bar; a step is one of rk4, with its four evaluations.
 """
-EVENTS = """Cost of an event: chains of links of 1 m and 1 kg whose hinges rub with 5 N m, released level, over
-1 s by dop853 at its default tolerance. An event costs what the run takes beyond as many steps of the same
-chain with viscous hinges, which has none; several hinges may stick or slip at one instant.
+EVENTS = """Cost of an event: chains of links of 1 m and 1 kg whose hinges rub with 5 N m, released level,
+over 1 s by dop853 at its default tolerance. An event costs what the run takes beyond as many steps of the
+same chain with viscous hinges, which has none; several hinges may stick or slip at one instant.
 """
 BATCHES = """## Batches
 
