@@ -18,18 +18,18 @@ constexpr double stalled = 1e-12;             // Newton's error that no longer f
 constexpr double slow_change = 1e-13;         // a change that contracts slowly is followed where it is above this
 constexpr double good_contraction = 0.25;     // slower fixed points go to Newton's method
 constexpr int fixed_point_limit = 30, newton_limit = 30;
-// So few unknowns take no more motions with the equation as arrays than by iteration.
-constexpr int few_unknowns = 2;
-// The growth of the equation below which a proof of uniqueness is kept for as many steps as there are unknowns: one
-// motion a step is what it costs then. Over so short a time no growth comes from here to one.
+// The growth of the equation below which a proof of uniqueness is kept for as many steps as there are unknowns, and these
+// at least: it costs about one motion a step then. Over so short a time no growth comes from here to one.
 constexpr double safe_growth = 0.5;
+constexpr int kept_steps = 4;
 
 struct Implicit : Unknowns {
     using Unknowns::Unknowns;
 
     bool is_due() const {
         const RunState& state = w.state;
-        return state.steps_since >= (state.unique == Uniqueness::shown && state.growth < safe_growth ? n : 1);
+        if (state.unique == Uniqueness::not_shown) return state.steps_since == never_decided;  // it was tried in vain
+        return state.steps_since >= (state.growth < safe_growth ? std::max(n, kept_steps) : 1);
     }
 
     // The equation as arrays, its solution near y, and whether that is the only one.
@@ -124,8 +124,7 @@ struct Implicit : Unknowns {
         y.setZero();
         if (w.state.warm) exchange([&](int k, int place, int count) { y.segment(k, count) = kept.segment(place, count); });
         w.state.warm = false;  // what a failure leaves is no start for the next evaluation
-        const bool arrays = bearings && (n <= few_unknowns || is_due());
-        if (arrays || !iterate()) {
+        if ((bearings && is_due()) || !iterate()) {
             VecX& solution = w.scratch.solution;
             solution = y.head(n);
             if (bearings) solve_bearings(solution);

@@ -10,7 +10,7 @@ constexpr double newton_rounding = 1e-15;  // of the residual, over the solution
 constexpr double stalled = 1e-12;          // the same where rounding is worse: it no longer falls
 constexpr int growth_passes = 200;
 constexpr double safe_growth = 0.5;      // nobody asks by how much it lies below this
-constexpr double growth_settled = 1e-3;  // part by which the bound may lie above the eigenvalue
+constexpr double growth_settled = 1e-4;  // part of the bound by which a pass improves it in the end
 constexpr double kept_weight = 1e-2;     // of the weights before, so that none becomes zero and none alternates
 
 void ReactionEquation::resize(int size, int vectors) {
@@ -72,16 +72,16 @@ bool ReactionNewton::solve(const ReactionEquation& equation, VecX& y) {
     return false;
 }
 
-// max (L u)_i / u_i over any positive u is such a bound (Collatz and Wielandt), and min (L u)_i / u_i lies below it.
+// max (L u)_i / u_i over any positive u is such a bound (Collatz and Wielandt).
 double growth(const MatX& L) {
     double best = L.rowwise().sum().maxCoeff();
     if (best <= safe_growth) return best;
     VecX u = VecX::Ones(L.rows());
     for (int pass = 0; pass < growth_passes; ++pass) {
         const VecX next = L * u;
-        const VecX ratio = next.cwiseQuotient(u);
-        best = std::min(best, ratio.maxCoeff());
-        if (best <= safe_growth || best - ratio.minCoeff() <= growth_settled * best) break;
+        const double before = best;
+        best = std::min(best, next.cwiseQuotient(u).maxCoeff());
+        if (best <= safe_growth || (pass > 0 && before - best <= growth_settled * best)) break;
         u = next + kept_weight * best * u;
         u /= u.maxCoeff();
     }

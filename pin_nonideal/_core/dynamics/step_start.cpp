@@ -91,7 +91,7 @@ void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const V
 }
 
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v) {
-    w.state.steps_since = std::min(w.state.steps_since + 1, never_decided);
+    if (w.state.steps_since != never_decided) ++w.state.steps_since;
     const bool chosen = configure_step(p, w);
     const bool moved = project_velocity(p, w, t, v);
     move_step(p, w, t, v, chosen);
