@@ -9,7 +9,7 @@ import pytest
 import pin_nonideal as pn
 from oracles.threads import Screw
 
-from .mechanisms import GRAVITY, TIGHT, assert_close, body, empty
+from .mechanisms import GRAVITY, TIGHT, again, assert_close, body, empty
 from .refusals import refuses
 
 # Accelerations and forces follow from a system of two equations: relative error of rounding.
@@ -235,6 +235,16 @@ def test_the_order_of_a_list_decides_nothing():
         )
         results.append(scene.acceleration([0.0, 0.0], [1.0, 2.0]))
     np.testing.assert_allclose(results[0], results[1], rtol=1e-12)
+
+
+def test_forces_balance_where_joint_and_teeth_stick():
+    """What holds the joint is all that the teeth, which share with it, leave over."""
+    laws = [pn.JointFriction("one", coulomb=5.0), pn.JointFriction("mesh", efficiency=0.7, coulomb=0.2)]
+    torque = np.array([1.5, -0.8])
+    scene = again(gears(laws[0], actuation=torque), laws=laws)
+    s = scene.solve([0.0, 0.0], [0.0, 0.0], modes=[0, 0])
+    assert_close(s.a, 0.0, 1e-15)
+    assert_close(s.F_ideal + s.F_nonideal, -torque, 1e-14)
 
 
 REFUSED = [

@@ -60,8 +60,10 @@ void split_forces(const Program& p, Workspace& w, Split& out) {
         const bool constraint = static_cast<int>(i) < p.constraints;
         add_transpose(p.blocks[i], w.now.A, shared, constraint ? total : out.C);  // C holds what sticks as well
     }
+    VecX left_over = VecX::Zero(nv);  // of the multipliers, by the shares; what locks a dof carries that as well
+    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.A, lam - shared, left_over);
     for (int dof = 0; dof < nv; ++dof)
-        if (w.now.terms.locked[dof]) out.C[dof] += holding_forces(p, w)[dof];
+        if (w.now.terms.locked[dof]) out.C[dof] += holding_forces(p, w)[dof] + left_over[dof];
     {
         const IdealMotion ideal(p, w);
         share_multipliers(p.layout, p.blocks, w.now.B, w.now.rows, w.now.lam, shared);

@@ -71,6 +71,7 @@ void Runner::set(const Array& q_in, const Array& v_in, const std::optional<Array
 
 void Runner::choose_modes(double t, const std::optional<std::vector<Mode>>& modes) {
     if (!modes) return resolve_modes(*p, *w, t, q, v, first_question(*p, *w, t, q, v));
+    first_question(*p, *w, t, q, v);  // which way what slips goes
     set_modes(*p, *w, *modes);
     w->state.warm = false;
     begin_step(*p, *w, t, q, v);
