@@ -6,6 +6,7 @@ is compared with differences elsewhere.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,8 @@ import pin_nonideal as pn
 UNDIRECTED = 1e-8
 # Part of the forces in play to which the equation of motion is balanced by what was recorded.
 BALANCED = 1e-9
+# Part of a limit by which shares of a load may pass it, and starts from which such shares are sought.
+SHARED, STARTS = 1e-9, 20
 
 
 @dataclass
@@ -36,9 +39,12 @@ class Conditions:
     Args:
         scene: its laws, constraints and forces are of the kinds in tests/random_mechanisms.py.
         slips: name of each element to a function (data, v) -> its slip velocity.
+        places: name of an element that is not all of its law in a joint or hinge, to that law's name and a
+            function (instant, wrenches) -> what its load adds to the constant part of the limit.
     """
 
-    def __init__(self, scene, slips):
+    def __init__(self, scene, slips, places=None):
+        self.places = places or {}
         self.scene, self.slips, self.model = scene, slips, scene.model
         self.data, self.runner = scene.model.createData(), scene._compiled.program.runner()
         self.laws = {law.name: law for law in scene.laws}
@@ -62,9 +68,13 @@ class Conditions:
         slips, limits, directions = {}, {}, []
         for name, slip in self.slips.items():
             slips[name] = slip(self.data, total.v)
-            law = self.laws[name]
+            law = self.law_of(name)
             instant = ideal if getattr(law, "reaction", "total") == "ideal" else total
-            limits[name] = self._limit(law, instant, loads)
+            if name in self.places:
+                load = self.places[name][1](instant, loads[law.reaction])
+                limits[name] = law.coulomb + law.preload + load
+            else:
+                limits[name] = self._limit(law, instant, loads)
             directions.append(np.column_stack([slip(self.data, e) for e in np.eye(self.model.nv)]))
         rows = self.runner.rows(total.q, total.v, float(total.t))[0].reshape(-1, self.model.nv)
         pull = rows.T @ total.lam
@@ -79,6 +89,10 @@ class Conditions:
             size,
         )
 
+    def law_of(self, name):
+        """The law that an element belongs to."""
+        return self.laws[self.places[name][0] if name in self.places else name]
+
     def _share(self, friction, directions, slips, limits, modes, rows, speed, size):
         """Forces of the elements that make up the generalized friction force.
 
@@ -86,8 +100,6 @@ class Conditions:
         where they are redundant, with each other or with the constraints, any share within their limits will
         do.
         """
-        from scipy.optimize import linprog
-
         forces, left, names = {}, friction.copy(), list(slips)
         for name, S, mode in zip(slips, directions, modes, strict=True):
             u = slips[name]
@@ -101,14 +113,16 @@ class Conditions:
         np.testing.assert_allclose(S.T @ x, left, rtol=0.0, atol=BALANCED * size)
         both = np.vstack([S, rows])
         if np.linalg.matrix_rank(both, tol=1e-8) < np.linalg.matrix_rank(rows, tol=1e-8) + len(S):
-            most = [
-                self.static_limit(names[k], limits) + BALANCED * size for k in stuck for _ in directions[k]
-            ]
             basis = np.linalg.svd(both.T, full_matrices=False)[0][:, : np.linalg.matrix_rank(both, tol=1e-8)]
-            bounds = [(-x, x) for x in most] + [(None, None)] * len(rows)
-            found = linprog(np.zeros(len(both)), A_eq=basis.T @ both.T, b_eq=basis.T @ left, bounds=bounds)
-            assert found.success, f"no friction within the limits holds {[names[k] for k in stuck]}"
-            x = found.x
+            slipping = [modes[k] != 0 for k in stuck]
+            most = [
+                self.kinetic_limit(names[k], slips[names[k]], limits)
+                if moves
+                else self.static_limit(names[k], limits) + BALANCED * size
+                for k, moves in zip(stuck, slipping, strict=True)
+            ]
+            x = shares(basis.T @ both.T, basis.T @ left, [len(directions[k]) for k in stuck], most, slipping)
+            assert x is not None, f"no friction within the limits holds {[names[k] for k in stuck]}"
         for k in stuck:
             forces[names[k]], x = x[: len(directions[k])], x[len(directions[k]) :]
         return forces
@@ -120,7 +134,7 @@ class Conditions:
 
     def _stribeck(self, name, slip):
         """Factor of the limit while it slips."""
-        law = self.laws[name]
+        law = self.law_of(name)
         if isinstance(law, pn.UserFriction) or law.stribeck_velocity is None:
             return 1.0
         return 1.0 + (law.static_ratio - 1.0) * np.exp(-((np.linalg.norm(slip) / law.stribeck_velocity) ** 2))
@@ -131,7 +145,7 @@ class Conditions:
 
     def static_limit(self, name, limits):
         """Largest force with which an element can stick."""
-        return limits[name] * getattr(self.laws[name], "static_ratio", 1.0)
+        return limits[name] * getattr(self.law_of(name), "static_ratio", 1.0)
 
     def _limit(self, law, instant, loads):
         """Limit for the load, before the static ratio or Stribeck's factor."""
@@ -171,6 +185,8 @@ class Conditions:
             outside[joint] += pin.Force(local.linear, local.angular + np.cross(lever, local.linear))
 
         for c in self.scene.constraints:
+            if isinstance(c, pn.JointCoupling):
+                continue
             one, two = (self.model.getFrameId(f) for f in (c.frame1, c.frame2))
             lam = instant.lam[self.scene.constraint_slices[c.name]]
             x1, x2 = (self.data.oMf[f].translation for f in (one, two))
@@ -217,10 +233,10 @@ class Conditions:
                 J = pin.computeFrameJacobian(self.model, self.data, instant.q, frame, pin.LOCAL_WORLD_ALIGNED)
                 C += J[:3].T @ self._drag(law, frame)
                 continue
-            if isinstance(law, pn.JointFriction) and law.viscous:
-                slip = self.slips[law.name]
-                S = np.column_stack([slip(self.data, e) for e in np.eye(self.model.nv)])
-                C -= law.viscous * S.T @ slip(self.data, v)
+            for name, slip in self.slips.items():
+                if law.name == self.law_of(name).name and getattr(law, "viscous", 0.0):
+                    S = np.column_stack([slip(self.data, e) for e in np.eye(self.model.nv)])
+                    C -= law.viscous * S.T @ slip(self.data, v)
             if isinstance(law, pn.SigmoidFriction):
                 dof = self.model.joints[self.model.getJointId(law.joint)].idx_v
                 C[dof] -= law.phi1 / (1.0 + np.exp(-law.phi2 * v[dof])) - law.phi1 / 2.0
@@ -231,6 +247,41 @@ class Conditions:
                 C[dof] -= law.stiffness * z[state] + law.damping * rate
                 state += 1
         return C
+
+
+def shares(A, b, dims, most, slipping):
+    """Forces f, and free multipliers behind them, with A (f, lam) = b and |f_e| <= most_e, or None.
+
+    Args:
+        A: rows of full rank.
+        b: right-hand side.
+        dims: directions of each element; their forces come first among the unknowns.
+        most: largest force of each element.
+        slipping: elements whose force is as large as that.
+    """
+    from scipy.optimize import least_squares, linprog
+
+    if max(dims) == 1:
+        bounds = [(-x, x) for x in most] + [(None, None)] * (A.shape[1] - len(most))
+        found = linprog(np.zeros(A.shape[1]), A_eq=A, b_eq=b, bounds=bounds)
+        return found.x if found.success else None
+    x0 = np.linalg.lstsq(A, b, rcond=None)[0]
+    free = np.linalg.svd(A)[2][len(A) :].T
+    first = np.cumsum([0, *dims])
+    parts = [slice(i, j) for i, j in itertools.pairwise(first)]
+
+    def beyond(y):
+        x = x0 + free @ y
+        sizes = [np.linalg.norm(x[part]) / limit - 1.0 for part, limit in zip(parts, most, strict=True)]
+        return [size if moves else max(size, 0.0) for size, moves in zip(sizes, slipping, strict=True)]
+
+    starts = np.random.default_rng(0).normal(0.0, 1.0, (STARTS, free.shape[1]))
+    starts[0] = 0.0
+    for start in starts * max(most):
+        found = least_squares(beyond, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        if np.abs(found.fun).max() < SHARED:
+            return x0 + free @ found.x
+    return None
 
 
 class _Wrenches:
