@@ -26,6 +26,7 @@ SOLVED = 1e-12  # relative residual of a root
 SAME = 1e-7  # relative distance of two roots that are one
 # Beside a number of solutions that changes: a determinant, or a scan's least residual, of this size or less.
 DOUBTFUL = 1e-4
+UNLOADED = 1e-10  # friction limit of a bearing that nothing loads [N m or N]
 
 
 @dataclass
@@ -107,7 +108,8 @@ class Equation:
         dets = [np.linalg.det(np.eye(self.n) - self.slope(y)) for y in found]
         touches = not found and float(np.abs(F).max(axis=-1).min()) < DOUBTFUL
         infinite = abs(np.linalg.det(np.eye(self.n) - self.steepest())) < DOUBTFUL
-        doubtful = touches or infinite or any(abs(d) < DOUBTFUL for d in dets)
+        unloaded = (self.image(np.zeros((1, self.n))) < UNLOADED).any()  # what rounding leaves may go any way
+        doubtful = touches or infinite or unloaded or any(abs(d) < DOUBTFUL for d in dets)
         return np.array(found).reshape(-1, self.n), doubtful
 
 

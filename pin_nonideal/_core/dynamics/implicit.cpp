@@ -32,6 +32,22 @@ struct Implicit : Unknowns {
         return state.steps_since >= (state.growth < safe_growth ? std::max(n, kept_steps) : 1);
     }
 
+    // Whether the equation contracts, with y its solution; the motion is then again that of y.
+    bool contracts(const VecX& y) {
+        ReactionEquation& arrays = w.scratch.equation;
+        equation(y, arrays);
+        if (!arrays.finite()) throw Failure(Failure::Kind::not_finite, t);
+        arrays.steepest(w.scratch.jacobian);
+        const double bound = growth(w.scratch.jacobian);
+        if (!(bound < 1.0 - least_determinant_told)) return false;
+        w.state.growth = bound;
+        w.state.steps_since = 0;
+        w.state.unique = Uniqueness::shown;
+        set(y);
+        motion();
+        return true;
+    }
+
     // The equation as arrays, its solution near y, and whether that is the only one.
     void solve_bearings(VecX& y) {
         ReactionEquation& arrays = w.scratch.equation;
@@ -124,7 +140,7 @@ struct Implicit : Unknowns {
         y.setZero();
         if (w.state.warm) exchange([&](int k, int place, int count) { y.segment(k, count) = kept.segment(place, count); });
         w.state.warm = false;  // what a failure leaves is no start for the next evaluation
-        if ((bearings && is_due()) || !iterate()) {
+        if (!iterate() || (bearings && is_due() && !contracts(y))) {
             VecX& solution = w.scratch.solution;
             solution = y.head(n);
             if (bearings) solve_bearings(solution);
