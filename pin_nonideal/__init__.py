@@ -15,6 +15,7 @@ from .constraints import *
 from .contacts import *
 from .equation import Solution, solve
 from .errors import (
+    FrictionConvergenceError,
     FrictionParadoxError,
     InconsistentConstraintsError,
     InputError,
@@ -47,6 +48,7 @@ from .version import __version__ as __version__
 
 __all__ = [
     "Event",
+    "FrictionConvergenceError",
     "FrictionParadoxError",
     "InconsistentConstraintsError",
     "InputError",

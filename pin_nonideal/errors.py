@@ -105,6 +105,19 @@ class FrictionParadoxError(RunError):
         self.limits = tuple(limits)
 
 
+class FrictionConvergenceError(RunError):
+    """Modes of friction at rest were not found, and none of it proves that there are none.
+
+    Attributes:
+        time: when it happened [s].
+        element: name of the frictional element at rest, or names joined by commas.
+    """
+
+    def __init__(self, message: str, *, element: str, time: float | None = None) -> None:
+        super().__init__(message, time=time)
+        self.element = element
+
+
 class StepSizeError(RunError):
     """Steps as short as the asked tolerance needs lead nowhere, or the run may take no more of them."""
 

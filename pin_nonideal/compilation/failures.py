@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from pin_nonideal.core import core
 from pin_nonideal.errors import (
+    FrictionConvergenceError,
     FrictionParadoxError,
     InconsistentConstraintsError,
     LoopClosureError,
@@ -57,6 +58,8 @@ def named_failure(failure: core.CoreFailure, model: Model, program: core.Program
     if kind is kinds.paradox:
         elements = ", ".join(program.element_names[i] for i in failure.elements)
         return _paradox(elements or ", ".join(program.law_names), failure)
+    if kind is kinds.not_converged:
+        return _unresolved(", ".join(program.element_names[i] for i in failure.elements), t)
     if kind is kinds.closure:
         name = program.constraints[failure.elements[0]].name
         return opened(name, {name: value}, t)
@@ -105,6 +108,15 @@ def _paradox(element: str, failure: core.CoreFailure) -> RunError:
         time=t,
         solutions=failure.accelerations,
         limits=failure.limits,
+    )
+
+
+def _unresolved(element: str, t: float) -> RunError:
+    return FrictionConvergenceError(
+        f'whether "{element}" sticks or slips was not found at t = {t:.4g} s, which proves nothing; '
+        "take shorter steps, change an initial value a little, or give `modes` to solve",
+        element=element,
+        time=t,
     )
 
 

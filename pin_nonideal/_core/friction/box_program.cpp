@@ -99,6 +99,10 @@ VecX active_set(const MatX& W, const VecX& alpha0, const VecX& s) {
 
 }  // namespace
 
+VecX least_norm_solution(const MatX& W, const VecX& r) {
+    return solve_free(W, r, std::vector<char>(r.size(), 1));
+}
+
 // Block principal pivoting, single (least index) once it fails to make progress.
 VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s) {
     const int n = static_cast<int>(s.size());

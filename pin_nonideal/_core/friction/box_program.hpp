@@ -9,6 +9,9 @@ namespace pn {
 // Responses below this part of the largest are none; rank_tolerance_sticking is its square root.
 constexpr double rank_threshold = 1e-13;
 
+// x of least norm with W x = r, W symmetric without negative eigenvalues; of a part of r where no x gives all of it.
+VecX least_norm_solution(const MatX& W, const VecX& r);
+
 VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s);
 
 }  // namespace pn

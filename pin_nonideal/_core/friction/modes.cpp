@@ -9,21 +9,21 @@
 #include "dynamics/solution.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/cone_program.hpp"
-#include "friction/problem.hpp"
+#include "friction/rest_branches.hpp"
+#include "friction/rest_problem.hpp"
+#include "friction/rest_solver.hpp"
 
 namespace pn {
 
 namespace {
 
-constexpr int breaking_passes = 20;       // after these, what reached its limit may stick again
-constexpr int outer_limit = 100;          // of limits that depend on the load
-constexpr int outer_patience = 6;         // after these, modes that stay the same are tried as they are
-constexpr int most_enumerated = 8;        // elements whose combinations of modes are all tried at last
-constexpr double limit_tolerance = 1e-12; // relative change of the limits at which the outer iteration ends
 constexpr double slack = 1e-9;            // part of the limit by which a mode may miss its condition by rounding
-constexpr double at_limit = 1e-13;        // part of the limit by which a program's force may miss it
+constexpr double at_limit = 1e-13;        // part of the limit by which rounding may miss it
 constexpr double no_acceleration = 1e-12; // part of the accelerations in play that is rounding
+constexpr double limit_tolerance = 1e-12; // relative change of the limits at which the turns end
 constexpr double least_limit = 1e-300;    // a limit of zero divides by this
+constexpr int most_turns = 100;           // of forces and limits
+constexpr double unsolved = 10.0;         // what the equation lacks leaves so much in the accelerations
 
 bool contains(const std::vector<int>& list, int e) { return std::find(list.begin(), list.end(), e) != list.end(); }
 
@@ -35,94 +35,165 @@ struct Search {
     const VecX &q, &v;
     const ModeQuestion& question;
     const std::vector<int>& list;  // of the elements at rest
-    double determinant = HUGE_VAL;  // least of the modes in which the reactions have no solution or several
+    std::vector<int> slipping;     // those whose limits follow their load
 
-    bool breaks(size_t i, bool released) const { return released && contains(question.breaking, list[i]); }
+    Search(const Program& program, Workspace& workspace, double time, const VecX& q_, const VecX& v_,
+           const ModeQuestion& asked)
+        : p(program), w(workspace), t(time), q(q_), v(v_), question(asked), list(asked.at_rest) {
+        for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
+            if (!contains(list, e) && slips(asked.modes[e]) && p.frictions[e].reaction == Reaction::total)
+                slipping.push_back(e);
+    }
 
-    void apply(const std::vector<Mode>& modes) {
-        std::vector<Mode> all = question.modes;
-        for (size_t i = 0; i < list.size(); ++i) all[list[i]] = modes[i];
-        set_modes(p, w, all);
-        w.state.warm = false;
+    void apply(const std::vector<Mode>& modes, bool limits_known) {
+        set_modes(p, w, modes);
+        w.state.warm = limits_known;
+        if (limits_known) {  // among all that these modes allow: the others are no motions from rest
+            w.state.unique = Uniqueness::shown;
+            w.state.growth = 1.0;
+            w.state.steps_since = -1;
+        }
         begin_step(p, w, t, q, v);
     }
 
-    void clear_forces() {
-        for (int e : list) w.now.slip_force[e] = Vec3::Zero();
-        w.now.reactions.current = false;
-    }
-
-    // Whether the motion under these modes, loads and all, keeps the conditions that they stand for; the workspace
-    // ends evaluated there.
-    bool hold(const FrictionProblem& problem, const std::vector<Mode>& modes, bool released) {
-        try {
-            clear_forces();
-            apply(modes);
-        } catch (const Failure& failure) {
-            if (failure.kind != Failure::Kind::paradox) throw;
-            determinant = std::min(determinant, failure.value);
-            return false;
-        }
-        const VecX alpha = problem.slip_accelerations(p, w);
+    // Whether the motion under the modes that the question suggests keeps the conditions that they stand for, where
+    // that makes it the only one: no limit depends on the load. The workspace ends evaluated there.
+    bool keeps_suggestion() {
+        if (p.needs_reactions || !question.breaking.empty()) return false;
+        apply(question.modes, false);
         const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
-        for (size_t i = 0, at = 0; i < list.size(); at += problem.dims[i], ++i) {
-            if (modes[i] == sticking) {
-                const double limit = static_limit(p, w, list[i], t, q, v);
-                const double force = friction_force(p, w, list[i]).norm();
-                if (force > limit * (1.0 + slack)) return false;
-                if (breaks(i, released) && force >= limit * (1.0 - slack)) return false;
-            } else if (problem.dims[i] > 1 || modes[i] * alpha[at] < -slack * size) {
-                return false;
-            }
-        }
-        return true;
+        return std::all_of(list.begin(), list.end(), [&](int e) {
+            if (w.state.mode[e] == sticking)
+                return friction_force(p, w, e).norm() <= static_limit(p, w, e, t, q, v) * (1.0 + at_limit);
+            return p.frictions[e].dim == 1 && slip_rate_along_mode(p, w, e) >= -slack * size;
+        });
     }
 
-    // All combinations of modes in turn, those that stick first; true at the first that holds.
-    bool enumerate(const FrictionProblem& problem, bool released) {
-        const int n = static_cast<int>(list.size());
-        if (n > most_enumerated || problem.rows != n) return false;
-        int combinations = 1;
-        for (int i = 0; i < n; ++i) combinations *= 3;
-        constexpr Mode in_turn[] = {sticking, slip_plus, slip_minus};
-        std::vector<Mode> modes(n);
-        for (int combination = 0; combination < combinations; ++combination) {
-            for (int i = 0, rest = combination; i < n; ++i, rest /= 3)
-                modes[i] = in_turn[rest % 3];
-            if (hold(problem, modes, released)) return true;
-        }
-        return false;
+    // What an element at rest does under a force at or below its limit; its direction of slip stays in the workspace.
+    Mode mode_of(int e, const VecX& force, const VecX& slip, double limit, bool slides) {
+        const bool gives_way = contains(question.breaking, e) && force.norm() >= limit * (1.0 - slack);
+        if (!gives_way && !slides) return sticking;
+        const VecX direction = slides ? VecX(slip.normalized()) : VecX(-force.normalized());
+        Vec3 along;
+        for (int k = 0; k < direction.size(); ++k) along[k] = direction[k];
+        if (direction.size() > 1) w.state.slip_direction[e] = w.state.last_direction[e] = along;
+        return direction.size() > 1 || along[0] > 0.0 ? slip_plus : slip_minus;
     }
 
-    // Modes that the forces f of the program mean: what is below its limit sticks.
-    std::vector<Mode> modes_of(const FrictionProblem& problem, const VecX& f, const VecX& limits, bool released) {
+    // Modes that the forces f of a program mean: what is below its limit sticks.
+    std::vector<Mode> modes_of(const FrictionProblem& problem, const VecX& f, const VecX& limits) {
         const VecX alpha = problem.alpha0 + problem.W * f;
-        const double size = problem.alpha0.cwiseAbs().maxCoeff() + least_limit;
-        std::vector<Mode> modes(list.size(), sticking);
+        const double size = problem.alpha0.cwiseAbs().maxCoeff();
+        std::vector<Mode> modes = question.modes;
         for (size_t i = 0, at = 0; i < list.size(); at += problem.dims[i], ++i) {
-            const int dim = problem.dims[i];
-            const auto force = f.segment(at, dim), slip = alpha.segment(at, dim);
-            const bool gives_way = breaks(i, released) && force.norm() >= limits[i] * (1.0 - slack);
+            const VecX force = f.segment(at, problem.dims[i]), slip = alpha.segment(at, problem.dims[i]);
             const bool slides = force.norm() >= limits[i] * (1.0 - at_limit) && slip.norm() > no_acceleration * size;
-            if (!gives_way && !slides) continue;
-            const VecX direction = slides ? VecX(slip.normalized()) : VecX(-force.normalized());
-            modes[i] = dim > 1 || direction[0] > 0.0 ? slip_plus : slip_minus;
-            if (dim == 1) continue;
-            Vec3& along = w.state.slip_direction[list[i]];
-            along = Vec3::Zero();
-            for (int k = 0; k < dim; ++k) along[k] = direction[k];
-            w.state.last_direction[list[i]] = along;
+            modes[list[i]] = mode_of(list[i], force, slip, limits[i], slides);
         }
         return modes;
     }
 
-    // The motion under the forces f of the elements, and the limits that its loads give: the kinetic one for what
+    // The same of a solution of the equation of rest, which is as exact as what it lacks.
+    std::vector<Mode> modes_of(const RestEquation& equation, const VecX& x) {
+        VecX alpha, limits;
+        equation.respond(x, alpha, limits);
+        const double noise = no_acceleration + unsolved * equation.error(x);
+        std::vector<Mode> modes = question.modes;
+        for (size_t i = 0; i < list.size(); ++i) {
+            const RestElement& e = equation.elements[i];
+            const VecX force = x.segment(e.row, e.dim), slip = alpha.segment(e.row, e.dim);
+            const bool at_its_limit = force.norm() >= limits[i] * (1.0 - at_limit) ||
+                                      (force - e.rho * slip).norm() > limits[i] * (1.0 + at_limit);
+            const bool accelerates = e.rho * slip.norm() > noise * equation.force_in_play(i, x, limits);
+            modes[list[i]] = mode_of(list[i], force, slip, limits[i], !e.may_stick || (at_its_limit && accelerates));
+        }
+        return modes;
+    }
+
+    // Forces of all elements for the factors of their limits at hand, among all motions of a few elements; of more the
+    // one in which all stick, or else any.
+    bool find(const RestProblem& problem, VecX& x) {
+        const RestEquation& equation = problem.equation;
+        const AllMotions all = all_motions(equation);
+        if (all.complete) return choose(problem, all.forces, x);
+        VecX held = equation.holding_forces();
+        if (!refine_rest(equation, held) || !all_stick(equation, held)) return solve_rest(equation, x);
+        x = held;
+        return true;
+    }
+
+    // What rested goes on resting: of several motions the one in which all that sticks in any other sticks, and more.
+    bool choose(const RestProblem& problem, const std::vector<VecX>& motions, VecX& x) {
+        const RestEquation& equation = problem.equation;
+        proven = true;
+        if (motions.empty()) return false;
+        for (const VecX& one : motions) {
+            const bool stickiest = std::all_of(motions.begin(), motions.end(), [&](const VecX& other) {
+                return &other == &one || sticks_more(equation.sticks(one), equation.sticks(other));
+            });
+            if (!stickiest) continue;
+            w.now.several = motions.size() > 1;
+            w.now.several_element = list.front();
+            x = one;
+            return true;
+        }
+        double determinant = HUGE_VAL;
+        for (const VecX& one : motions) determinant = std::min(determinant, equation.determinant(one));
+        paradox(problem, determinant, motions);
+    }
+
+    // `motions`: forces of some that are possible, of which two are shown.
+    [[noreturn]] void paradox(const RestProblem& problem, double determinant, const std::vector<VecX>& motions) const {
+        Failure failure(Failure::Kind::paradox, t, list, determinant);
+        failure.solutions = motions.empty() ? Failure::Solutions::none : Failure::Solutions::several;
+        for (size_t i = 0; i < std::min<size_t>(2, motions.size()); ++i) {
+            VecX alpha, limits;
+            problem.equation.respond(motions[i], alpha, limits);
+            failure.limits.push_back(limits.head(list.size()));
+            failure.accelerations.push_back(problem.acceleration(motions[i]));
+        }
+        throw failure;
+    }
+
+    bool all_stick(const RestEquation& equation, const VecX& x) const {
+        const std::vector<bool> sticks = equation.sticks(x);
+        return std::all_of(sticks.begin(), sticks.begin() + list.size(), [](bool one) { return one; });
+    }
+
+    static bool sticks_more(const std::vector<bool>& one, const std::vector<bool>& other) {
+        for (size_t i = 0; i < one.size(); ++i)
+            if (other[i] && !one[i]) return false;
+        return one != other;
+    }
+
+    // What begins to slip has its kinetic limit from then on. Returns whether something just did.
+    bool release(const RestProblem& problem, RestEquation& equation, const std::vector<Mode>& modes) {
+        bool any = false;
+        for (size_t i = 0; i < list.size(); ++i) {
+            RestElement& e = equation.elements[i];
+            if (!e.may_stick || !slips(modes[list[i]]) || e.factor == problem.sliding_factor(i)) continue;
+            e.factor = problem.sliding_factor(i);
+            any = true;
+        }
+        return any;
+    }
+
+    // The motion of these modes, which have just been found together with the limits.
+    void settle(const RestEquation& equation, const VecX& x, const std::vector<Mode>& modes) {
+        VecX alpha, limits;
+        equation.respond(x, alpha, limits);
+        for (size_t i = 0; i < equation.elements.size(); ++i)
+            w.state.unknown[i < list.size() ? list[i] : slipping[i - list.size()]] = limits[i];
+        apply(modes, proven);
+    }
+
+    // The motion under the forces f of the elements at rest, and the limits that its loads give: the kinetic one for what
     // slips. Returns their largest relative change.
     double follow(FrictionProblem& problem, const VecX& f, const std::vector<Mode>& modes, VecX& limits) {
         VecX C = VecX::Zero(p.mechanism.nv);
         problem.add_forces(p, w, f, C);
         C = w.now.C_smooth + C;
-        solve_with_laws(p, w, t, w.now.terms.q, v, C);
+        solve_with_laws(p, w, t, q, v, C);
         const VecX driven = problem.alpha0;
         problem.alpha0 = problem.slip_accelerations(p, w) - problem.W * f;
         for (int i = 0; i < problem.rows; ++i)
@@ -131,53 +202,79 @@ struct Search {
         for (size_t i = 0; i < list.size(); ++i) {
             const Friction& friction = p.frictions[list[i]];
             double limit = static_limit(p, w, list[i], t, q, v);
-            if (modes[i] != sticking) limit = friction.kinetic_limit(w.now.load[list[i]], 0.0);
+            if (modes[list[i]] != sticking) limit = friction.kinetic_limit(w.now.load[list[i]], 0.0);
             change = std::max(change, std::abs(limit - limits[i]) / std::max(limit, least_limit));
             limits[i] = limit;
         }
         return change;
     }
 
-    // The problem without any friction of the elements, and first limits from the load there.
-    FrictionProblem pose(const std::vector<Mode>& unloaded_modes, VecX& limits) {
-        clear_forces();
-        apply(unloaded_modes);
+    // Limits and forces in turn, each motion with the loads that it has; false where they do not come to rest soon.
+    bool take_turns(std::vector<Mode>& modes) {
         FrictionProblem problem(p, w, list);
         problem.clean(p, w);
         problem.alpha0 = problem.slip_accelerations(p, w);
-        for (size_t i = 0; i < list.size(); ++i) limits[i] = static_limit(p, w, list[i], t, q, v);
         const double noise = no_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
         for (int i = 0; i < problem.rows; ++i)  // what the constraints hold still has no slip acceleration
             if (problem.W(i, i) == 0.0 && std::abs(problem.alpha0[i]) <= noise) problem.alpha0[i] = 0.0;
-        return problem;
+        VecX limits(list.size());
+        for (size_t i = 0; i < list.size(); ++i) limits[i] = static_limit(p, w, list[i], t, q, v);
+        double change = 0.0;
+        for (int turn = 0; turn < most_turns; ++turn) {
+            const VecX f = friction_program(problem.W, problem.alpha0, problem.dims, limits);
+            const std::vector<Mode> next = modes_of(problem, f, limits);
+            if (next == modes && change <= limit_tolerance) return true;
+            modes = next;
+            change = follow(problem, f, modes, limits);
+        }
+        return false;
+    }
+
+    // Elements at rest without friction; `all`: those that slip under a load of their own as well.
+    void unload(bool all) {
+        std::vector<Mode> modes = question.modes;
+        for (int e : list) modes[e] = unloaded;
+        if (all)
+            for (int e : slipping) modes[e] = unloaded;
+        for (int e : list) w.now.slip_force[e] = Vec3::Zero();
+        apply(modes, false);
     }
 
     void run() {
-        const std::vector<Mode> unloaded_modes(list.size(), unloaded);
-        VecX limits(list.size());
-        FrictionProblem problem = pose(unloaded_modes, limits);
-        std::vector<Mode> modes = unloaded_modes;
-        double change = 0.0;
-        for (int it = 0; it < outer_limit; ++it) {
-            const VecX f = friction_program(problem.W, problem.alpha0, problem.dims, limits);
-            const bool released = it < breaking_passes;
-            const auto next = modes_of(problem, f, limits, released);
-            const bool same = next == modes;
-            modes = next;
-            if (same && change <= limit_tolerance) break;
-            if (same && it >= outer_patience && it % outer_patience == 0) {  // limits that converge slowly
-                if (hold(problem, modes, released)) return;
-                apply(unloaded_modes);
-            }
-            if (it + 1 == outer_limit) {
-                if (enumerate(problem, released)) return;
-                throw Failure(Failure::Kind::paradox, t, list, std::min(determinant, w.now.determinant));
-            }
-            change = follow(problem, f, modes, limits);
+        if (keeps_suggestion()) return;
+        unload(false);
+        std::vector<Mode> modes = question.modes;
+        for (int e : list) modes[e] = unloaded;
+        bool found = false;
+        try {
+            found = take_turns(modes);
+        } catch (const Failure& failure) {  // loads that no motion has, under forces on the way
+            if (failure.kind != Failure::Kind::paradox) throw;
         }
-        clear_forces();
-        apply(modes);
+        if (p.needs_reactions && look_further(found)) return;
+        if (!found) throw Failure(Failure::Kind::not_converged, t, list);
+        apply(modes, false);
     }
+
+    // Where loads may leave several motions or none, or where turns found none. Returns whether it knows better.
+    bool look_further(bool found) {
+        unload(true);
+        RestProblem problem(p, w, t, q, v, list, slipping);
+        RestEquation& equation = problem.equation;
+        if (found && (contraction(equation) < 1.0 || !is_searched(equation))) return false;
+        VecX x = VecX::Zero(equation.n);
+        bool solved = find(problem, x);
+        if (!solved && release(problem, equation, std::vector<Mode>(p.frictions.size(), slip_plus)))
+            solved = find(problem, x);
+        while (solved && release(problem, equation, modes_of(equation, x))) solved = find(problem, x);
+        if (found && !proven) return false;
+        if (!solved && proven)
+            paradox(problem, std::min(0.0, equation.determinant_far_away()), {});
+        if (solved) settle(equation, x, modes_of(equation, x));
+        return solved;
+    }
+
+    bool proven = false;  // that there is no motion, or which there are
 };
 
 }  // namespace
@@ -199,8 +296,12 @@ void follow_velocity(const Program& p, Workspace& w, int e, ModeQuestion& questi
 ModeQuestion question(const Program& p, Workspace& w, const VecX& v, int also) {
     ModeQuestion asked{w.state.mode, {}, {}};
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
-        if (e == also || at_rest(p, w, e, v)) asked.at_rest.push_back(e);
-        else follow_velocity(p, w, e, asked);
+        if (e != also && !at_rest(p, w, e, v)) {
+            follow_velocity(p, w, e, asked);
+            continue;
+        }
+        asked.at_rest.push_back(e);
+        if (e == also) asked.modes[e] = sticking;
     }
     return asked;
 }
@@ -211,7 +312,7 @@ ModeQuestion first_question(const Program& p, Workspace& w, double t, const VecX
     w.state.warm = false;
     update_kinematics(p, w, t, q, v);
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
-        asked.modes[e] = slip_plus;
+        asked.modes[e] = sticking;
         if (hardly_slips(p, w, e, v)) asked.at_rest.push_back(e);
         else follow_velocity(p, w, e, asked);
     }
@@ -220,7 +321,8 @@ ModeQuestion first_question(const Program& p, Workspace& w, double t, const VecX
 
 void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                    const ModeQuestion& question) {
-    if (!question.at_rest.empty()) return Search{p, w, t, q, v, question, question.at_rest}.run();
+    w.now.several = false;
+    if (!question.at_rest.empty()) return Search(p, w, t, q, v, question).run();
     set_modes(p, w, question.modes);
     begin_step(p, w, t, q, v);
 }

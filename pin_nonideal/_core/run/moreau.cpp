@@ -107,7 +107,7 @@ void Moreau::solve_friction(const FrictionProblem& problem, double t) {
         if (pass > 0 && (change <= load_tolerance * largest || !p.needs_reactions)) return;
         force_ = friction_program(problem.W, problem.alpha0, problem.dims, limit_);
         force_limit_ = limit_;
-        if (pass + 1 == load_passes) throw Failure(Failure::Kind::paradox, t, elements_, change);
+        if (pass + 1 == load_passes) throw Failure(Failure::Kind::not_converged, t, elements_);
     }
 }
 

@@ -1,0 +1,68 @@
+"""When a body on feet gives way: the largest load that some friction within the feet's limits holds.
+
+The normal forces are those that the plane exerts on a rigid body, shared by least norm among more than three feet, as the
+package documents; friction tilts the body and changes them, linearly.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize
+
+
+class Stance:
+    """Feet of one body on the plane z = 0.
+
+    Args:
+        feet: their places about the center of mass, (n, 3).
+        weight: of the body [N].
+        mu: friction that holds, static over kinetic included.
+        load: force of the growing load per second, at `at` [N/s].
+        at: where it acts, about the center of mass.
+        couple: moment of the load per second [N m/s].
+    """
+
+    def __init__(self, feet, weight, mu, load, at, couple):
+        self.feet, self.mu, n = np.asarray(feet, float), mu, len(feet)
+        self.load, self.couple = np.asarray(load, float), np.cross(at, load) + couple
+        presses = np.array([np.ones(n), self.feet[:, 1], -self.feet[:, 0]])  # force z, moments x and y
+        share = np.linalg.pinv(presses)
+        self.normal0 = share @ [weight, 0.0, 0.0]
+        self.normal_t = share @ [-self.load[2], -self.couple[0], -self.couple[1]]
+        # Friction (fx, fy) at a foot has the moments (-z fy, z fx) about x and y.
+        z, none = self.feet[:, 2], np.zeros(n)
+        self.normal_f = -share @ np.array(
+            [np.zeros(2 * n), np.ravel([none, -z], order="F"), np.ravel([z, none], order="F")]
+        )
+        x, y = self.feet[:, 0], self.feet[:, 1]
+        self.holds = np.array(
+            [np.ravel([none + 1, none], order="F"), np.ravel([none, none + 1], order="F"), np.ravel([-y, x], order="F")]
+        )
+
+    def normals(self, f, t):
+        return self.normal0 + self.normal_t * t + self.normal_f @ f
+
+    def gives_way(self, guess):
+        """The time, and the normal forces then."""
+        n = len(self.feet)
+        against = np.array([self.load[0], self.load[1], self.couple[2]])
+
+        def room(x):
+            normals, f = self.normals(x[:-1], x[-1] * guess), x[:-1].reshape(n, 2)
+            return np.concatenate([self.mu**2 * normals**2 - (f**2).sum(axis=1), normals])
+
+        found = minimize(
+            lambda x: -x[-1],
+            np.append(np.zeros(2 * n), 0.5),
+            jac=lambda x: np.append(np.zeros(2 * n), -1.0),
+            constraints=[
+                {"type": "eq", "fun": lambda x: self.holds @ x[:-1] + against * x[-1] * guess},
+                {"type": "ineq", "fun": room},
+            ],
+            bounds=[(None, None)] * (2 * n) + [(0.0, None)],
+            method="SLSQP",
+            options={"maxiter": 500, "ftol": 1e-15},
+        )
+        t = found.x[-1] * guess
+        lacks = max(-room(found.x).min(), np.abs(self.holds @ found.x[:-1] + against * t).max())
+        return t, self.normals(found.x[:-1], t), lacks

@@ -1,0 +1,238 @@
+#include "friction/rest_equation.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include "friction/box_program.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr double difference = 1e-7;      // part of the forces: square root of the rounding, with a margin
+constexpr double least_size = 1e-300;    // of forces that are all zero
+constexpr double safe_pivot = 1e-8;      // of the Cholesky factor of W, beside its diagonal
+constexpr double null_response = 1e-13;  // eigenvalues of W below this part of the largest are none
+constexpr double unmoved = 1e-9;         // part of the loads that what moves nothing may change
+
+constexpr double limit_rounding = 1e-9;  // part of the limit by which a force that holds may pass it
+constexpr double far = 1e9;              // of forces without end, beside those that limits and accelerations ask for
+constexpr int most_signs = 6;            // elements whose ways of slipping are combined
+
+auto part(const VecX& x, const RestElement& e) { return x.segment(e.row, e.dim); }
+
+// G with W = G G^T, and the loads' derivatives times G^-T; false where forces that move nothing change a load.
+bool energy_factor(const RestEquation& equation, MatX& G, MatX& loads) {
+    const MatX& W = equation.W;
+    const Eigen::LLT<MatX> cholesky(W);
+    if (cholesky.info() == Eigen::Success) {
+        G = cholesky.matrixL();
+        if ((G.diagonal().array().square() > safe_pivot * W.diagonal().array()).all()) {
+            loads = cholesky.matrixL().solve(equation.loads.transpose()).transpose();
+            return true;
+        }
+    }
+    const Eigen::SelfAdjointEigenSolver<MatX> eigen(W);
+    const double least = null_response * eigen.eigenvalues().cwiseAbs().maxCoeff();
+    const int null = static_cast<int>((eigen.eigenvalues().array() <= least).count()), n = equation.n;
+    const MatX along = eigen.eigenvectors().rightCols(n - null);
+    const VecX root = eigen.eigenvalues().tail(n - null).cwiseSqrt();
+    const MatX unmoving = equation.loads * eigen.eigenvectors().leftCols(null);
+    if (unmoving.size() > 0 && unmoving.cwiseAbs().maxCoeff() > unmoved * equation.loads.cwiseAbs().maxCoeff())
+        return false;
+    G = along * root.asDiagonal();
+    loads = equation.loads * along * root.cwiseInverse().asDiagonal();
+    return true;
+}
+
+}  // namespace
+
+void RestEquation::respond(const VecX& x, VecX& alpha, VecX& limits) const {
+    limits.resize(elements.size());
+    if (ask) {
+        ask(x, alpha, limits);
+    } else {
+        alpha = alpha0;
+        alpha.noalias() += W * x;
+        const VecX vectors = still + loads * x;
+        for (size_t i = 0; i < elements.size(); ++i) {
+            const RestElement& e = elements[i];
+            limits[i] = e.constant;
+            for (int k = e.vector; k < e.vector + e.vectors; ++k) limits[i] += vectors.segment<3>(3 * k).norm();
+        }
+    }
+    for (size_t i = 0; i < elements.size(); ++i) limits[i] *= elements[i].factor;
+    if (frozen > 0.0) limits += frozen * (fixed - limits);
+}
+
+void RestEquation::differentiate(const VecX& x, MatX& dalpha, MatX& dlimits) const {
+    const int count = static_cast<int>(elements.size());
+    dlimits.setZero(count, n);
+    if (ask) {
+        dalpha.resize(n, n);
+        VecX alpha, limits, alpha_there(n), limits_there(count), shifted = x;
+        respond(x, alpha, limits);
+        const double h = difference * std::max({x.cwiseAbs().maxCoeff(), limits.cwiseAbs().maxCoeff(), least_size});
+        for (int k = 0; k < n; ++k) {
+            shifted[k] = x[k] + h;
+            respond(shifted, alpha_there, limits_there);
+            dalpha.col(k) = (alpha_there - alpha) / h;
+            dlimits.col(k) = (limits_there - limits) / h;
+            shifted[k] = x[k];
+        }
+        return;
+    }
+    dalpha = W;
+    const VecX vectors = still + loads * x;
+    for (int i = 0; i < count; ++i) {
+        const RestElement& e = elements[i];
+        for (int k = e.vector; k < e.vector + e.vectors; ++k) {
+            const Eigen::Vector3d vector = vectors.segment<3>(3 * k);
+            const double length = vector.norm();
+            if (length > 0.0) dlimits.row(i) += vector.transpose() / length * loads.middleRows<3>(3 * k);
+        }
+        dlimits.row(i) *= (1.0 - frozen) * e.factor;
+    }
+}
+
+VecX RestEquation::residual(const VecX& x) const {
+    VecX alpha, limits, out(n);
+    respond(x, alpha, limits);
+    for (size_t i = 0; i < elements.size(); ++i) {
+        const RestElement& e = elements[i];
+        if (!e.may_stick) {
+            out.segment(e.row, e.dim) = part(x, e) + limits[i] * e.direction;
+            continue;
+        }
+        const VecX asked = part(x, e) - e.rho * part(alpha, e);
+        const double length = asked.norm();
+        if (length <= limits[i]) out.segment(e.row, e.dim) = e.rho * part(alpha, e);
+        else out.segment(e.row, e.dim) = part(x, e) - limits[i] / length * asked;
+    }
+    return out;
+}
+
+double RestEquation::force_in_play(size_t i, const VecX& x, const VecX& limits) const {
+    const RestElement& e = elements[i];
+    return std::max({limits[i], part(x, e).norm(), e.rho * part(alpha0, e).norm(), least_size});
+}
+
+double RestEquation::error(const VecX& x) const {
+    VecX alpha, limits;
+    respond(x, alpha, limits);
+    const VecX lack = residual(x);
+    double worst = 0.0;
+    for (size_t i = 0; i < elements.size(); ++i)
+        worst = std::max(worst, part(lack, elements[i]).norm() / force_in_play(i, x, limits));
+    return std::isfinite(worst) ? worst : HUGE_VAL;
+}
+
+MatX RestEquation::jacobian(const VecX& x) const {
+    VecX alpha, limits;
+    MatX dalpha, dlimits, J(n, n);
+    respond(x, alpha, limits);
+    differentiate(x, dalpha, dlimits);
+    for (size_t i = 0; i < elements.size(); ++i) {
+        const RestElement& e = elements[i];
+        auto rows = J.middleRows(e.row, e.dim);
+        const MatX unit = MatX::Identity(n, n).middleRows(e.row, e.dim);
+        const VecX asked = part(x, e) - e.rho * part(alpha, e);
+        const double length = asked.norm();
+        if (!e.may_stick) {
+            rows = unit + e.direction * dlimits.row(i);
+        } else if (length <= limits[i]) {
+            rows = e.rho * dalpha.middleRows(e.row, e.dim);
+        } else {
+            const VecX along = asked / length;
+            const MatX across = MatX::Identity(e.dim, e.dim) - along * along.transpose();
+            rows = unit - along * dlimits.row(i) -
+                   limits[i] / length * across * (unit - e.rho * dalpha.middleRows(e.row, e.dim));
+        }
+    }
+    return J;
+}
+
+VecX RestEquation::holding_forces() const {
+    VecX x = VecX::Zero(n), alpha, limits;
+    respond(x, alpha, limits);
+    std::vector<int> rows;
+    for (size_t i = 0; i < elements.size(); ++i) {
+        const RestElement& e = elements[i];
+        if (!e.may_stick) x.segment(e.row, e.dim) = -limits[i] * e.direction;
+        for (int k = 0; e.may_stick && k < e.dim; ++k) rows.push_back(e.row + k);
+    }
+    const VecX driven = alpha0 + W * x;
+    const MatX own = W(rows, rows);
+    x(rows) = least_norm_solution(own, -driven(rows));
+    return x;
+}
+
+std::vector<bool> RestEquation::sticks(const VecX& x) const {
+    VecX alpha, limits;
+    respond(x, alpha, limits);
+    std::vector<bool> out;
+    for (size_t i = 0; i < elements.size(); ++i) {
+        const RestElement& e = elements[i];
+        out.push_back(e.may_stick && (part(x, e) - e.rho * part(alpha, e)).norm() <= limits[i] * (1.0 + limit_rounding));
+    }
+    return out;
+}
+
+double RestEquation::determinant(const VecX& x) const {
+    RestEquation still_limits = *this;
+    VecX alpha;
+    respond(x, alpha, still_limits.fixed);
+    still_limits.frozen = 1.0;
+    return jacobian(x).determinant() / still_limits.jacobian(x).determinant();
+}
+
+double RestEquation::determinant_far_away() const {
+    VecX alpha, limits;
+    respond(VecX::Zero(n), alpha, limits);
+    MatX dalpha, dlimits;
+    const int count = static_cast<int>(elements.size());
+    double least = HUGE_VAL;
+    for (int signs = 0; signs < 1 << std::min(count, most_signs); ++signs) {
+        VecX x = VecX::Zero(n);
+        for (int i = 0; i < count; ++i) {
+            const RestElement& e = elements[i];
+            const double size = limits[i] + e.rho * part(alpha, e).norm(), sign = signs >> i & 1 ? 1.0 : -1.0;
+            x.segment(e.row, e.dim) = far * (e.may_stick ? VecX(sign * size * VecX::Unit(e.dim, 0))
+                                                         : VecX(-size * e.direction));
+        }
+        differentiate(x, dalpha, dlimits);
+        MatX slope = MatX::Zero(count, count);
+        for (int i = 0; i < count; ++i)
+            for (int j = 0; j < count; ++j)
+                slope(i, j) = dlimits.row(i).segment(elements[j].row, elements[j].dim).dot(part(x, elements[j]).normalized());
+        least = std::min(least, (MatX::Identity(count, count) - slope).determinant());
+    }
+    return least;
+}
+
+double contraction(const RestEquation& equation) {
+    if (!equation.loaded()) return 0.0;
+    MatX G, loads;
+    if (equation.ask || !energy_factor(equation, G, loads)) return HUGE_VAL;
+    const int count = static_cast<int>(equation.elements.size());
+    VecX l = VecX::Zero(count), g(count);
+    for (int i = 0; i < count; ++i) {
+        const RestElement& e = equation.elements[i];
+        for (int k = e.vector; k < e.vector + e.vectors; ++k) l[i] += e.factor * loads.middleRows<3>(3 * k).norm();
+        g[i] = G.middleRows(e.row, e.dim).norm();
+    }
+    // sum l_i |G_i u| one by one, or by Cauchy and Schwarz with the weights l_i / g_i.
+    const double one_by_one = l.dot(g);
+    VecX root = VecX::Zero(equation.n);
+    for (int i = 0; i < count; ++i)
+        if (g[i] > 0.0)
+            root.segment(equation.elements[i].row, equation.elements[i].dim).setConstant(std::sqrt(l[i] / g[i]));
+    const MatX weighted = root.asDiagonal() * equation.W * root.asDiagonal();
+    const double largest = weighted.cwiseAbs().rowwise().sum().maxCoeff();  // bound of the eigenvalues
+    return std::min(one_by_one, std::sqrt(one_by_one * largest));
+}
+
+}  // namespace pn

@@ -1,0 +1,139 @@
+#include "friction/rest_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/QR>
+
+#include "friction/cone_program.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr double solved = 1e-13;          // largest error of the equation, as part of each element's forces
+constexpr double rounding = 1e-10;        // the same where no step makes it smaller any more
+constexpr double good_contraction = 0.5;  // of limits and forces in turn; slower ones go to Newton's method
+constexpr int most_turns = 40, most_newton = 40, most_halvings = 12;
+constexpr double enough = 1e-4;           // part of the decrease that a Newton step promises
+constexpr double first_stretch = 0.25, least_stretch = 1e-4;  // of the path
+
+// Limits and forces in turn: for given limits the forces are a convex program.
+struct Turns {
+    const RestEquation& equation;
+    std::vector<int> dims, rows;
+    MatX W;
+    VecX alpha, limits;
+
+    explicit Turns(const RestEquation& e) : equation(e) {
+        for (const RestElement& element : e.elements) {
+            if (!element.may_stick) continue;
+            dims.push_back(element.dim);
+            for (int k = 0; k < element.dim; ++k) rows.push_back(element.row + k);
+        }
+        const int count = static_cast<int>(rows.size());
+        W.resize(count, count);
+        for (int i = 0; i < count; ++i)
+            for (int j = 0; j < count; ++j) W(i, j) = e.W(rows[i], rows[j]);
+    }
+
+    // The forces that the limits under x allow.
+    VecX next(const VecX& x) {
+        equation.respond(x, alpha, limits);
+        VecX out = x, held(dims.size());
+        int free = 0;
+        for (size_t i = 0; i < equation.elements.size(); ++i) {
+            const RestElement& e = equation.elements[i];
+            if (e.may_stick) held[free++] = limits[i];
+            else out.segment(e.row, e.dim) = -limits[i] * e.direction;
+        }
+        VecX before = out;
+        for (int r : rows) before[r] = 0.0;
+        const VecX driven = alpha + equation.W * (before - x);  // what the others leave
+        VecX own(rows.size());
+        for (size_t k = 0; k < rows.size(); ++k) own[k] = driven[rows[k]];
+        const VecX forces = friction_program(W, own, dims, held);
+        for (size_t k = 0; k < rows.size(); ++k) out[rows[k]] = forces[k];
+        return out;
+    }
+
+    bool iterate(VecX& x) {
+        double last = HUGE_VAL;
+        for (int it = 0; it < most_turns; ++it) {
+            x = next(x);
+            const double error = equation.error(x);
+            if (error <= solved) return true;
+            if (!(error < HUGE_VAL) || (it > 2 && error > good_contraction * last)) return false;
+            last = error;
+        }
+        return false;
+    }
+};
+
+VecX newton_step(const RestEquation& equation, const VecX& x, const VecX& lack) {
+    const MatX J = equation.jacobian(x);
+    const Eigen::PartialPivLU<MatX> lu(J);
+    if (lu.rcond() > rank_threshold) return lu.solve(lack);
+    Eigen::CompleteOrthogonalDecomposition<MatX> cod(J.rows(), J.cols());
+    cod.setThreshold(rank_threshold);
+    cod.compute(J);
+    return cod.solve(lack);
+}
+
+bool follow_path(const RestEquation& equation, VecX& x) {
+    RestEquation partly = equation;
+    VecX alpha;
+    equation.respond(x, alpha, partly.fixed);
+    partly.frozen = 1.0;
+    if (!Turns(partly).iterate(x)) return false;
+    double stretch = first_stretch;
+    while (partly.frozen > 0.0) {
+        VecX ahead = x;
+        const double before = partly.frozen;
+        partly.frozen = std::max(0.0, before - stretch);
+        if (refine_rest(partly, ahead)) {
+            x = ahead;
+            stretch *= 2.0;
+            continue;
+        }
+        partly.frozen = before;
+        stretch *= 0.25;
+        if (stretch < least_stretch) return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+bool refine_rest(const RestEquation& equation, VecX& x) {
+    double error = equation.error(x);
+    for (int it = 0; it < most_newton && error > solved; ++it) {
+        const VecX step = newton_step(equation, x, equation.residual(x));
+        double length = 1.0, there = HUGE_VAL;
+        VecX ahead;
+        for (int halving = 0; halving < most_halvings; ++halving, length *= 0.5) {
+            ahead = x - length * step;
+            there = equation.error(ahead);
+            if (there < (1.0 - enough * length) * error) break;
+        }
+        if (!(there < error)) break;
+        x = ahead;
+        error = there;
+    }
+    return error <= rounding;
+}
+
+bool solve_rest(const RestEquation& equation, VecX& x) {
+    if (equation.n == 0) return true;
+    const VecX guess = x;
+    if (Turns(equation).iterate(x)) return true;
+    bool found = refine_rest(equation, x);
+    if (!found) found = refine_rest(equation, x = guess);
+    if (!found) found = follow_path(equation, x = guess);
+    if (!found) return false;
+    const VecX at_limits = Turns(equation).next(x);  // what slips has its limit, to the last bit
+    if (equation.error(at_limits) <= solved + equation.error(x)) x = at_limits;
+    return true;
+}
+
+}  // namespace pn

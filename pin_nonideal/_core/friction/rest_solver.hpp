@@ -1,0 +1,14 @@
+// One solution of the equation of rest, from a first guess: limits and forces in turn, then Newton's method, then a path
+// from limits that stand still to those that follow the load.
+#pragma once
+
+#include "friction/rest_equation.hpp"
+
+namespace pn {
+
+// Forces x in place of the guess; false if none was found, which is no proof that there is none.
+bool solve_rest(const RestEquation& equation, VecX& x);
+// Newton's method alone, near a solution.
+bool refine_rest(const RestEquation& equation, VecX& x);
+
+}  // namespace pn

@@ -1,0 +1,139 @@
+"""Modes at rest of joints that rub under their load, against every combination of modes with a scan of the loads."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import pin_nonideal as pn
+from oracles.rest_modes import Close, RestingTree
+from oracles.stance import Stance
+
+from .mechanisms import GRAVITY, empty, frame
+from .random_loaded_trees import loaded_tree
+
+# A fold of the equation of rest costs half the digits of a force near it.
+MOTION = 1e-7
+# Of the time at which a stance gives way, and of the conditions that the optimizer leaves open [N or N^2].
+GIVE_WAY = 1e-6
+CONVERGED = 1e-6
+# Normal force below which a foot is about to lift [N].
+PRESSED = 1e-3
+
+
+def stickiest(solutions):
+    """The motion in which all that sticks in any other sticks, and more; None where there is no such one."""
+    stuck = [frozenset(np.flatnonzero(np.equal(modes, 0))) for modes, _ in solutions]
+    for k, own in enumerate(stuck):
+        if all(own > other for i, other in enumerate(stuck) if i != k):
+            return solutions[k]
+    return None
+
+
+def check(seed, joints):
+    """One, several or no motion, as the scan says; returns how many, or None where it cannot tell."""
+    model, laws, q, tau = loaded_tree(seed, joints)
+    tree, rest = RestingTree(model, laws, q, tau), np.zeros(model.nv)
+    try:
+        solutions = tree.solutions()
+    except Close:
+        return None
+    scene, best = pn.Scene(model, laws=laws), stickiest(solutions)
+    if best is None:
+        with pytest.raises(pn.FrictionParadoxError):
+            scene.solve(q, rest, tau=tau)
+        return len(solutions)
+    s = scene.solve(q, rest, tau=tau)
+    assert tuple(s.modes) == best[0]
+    expected = tree.a0 + tree.response @ best[1]
+    np.testing.assert_allclose(s.a, expected, rtol=0.0, atol=MOTION * (1.0 + np.abs(tree.a0).max()))
+    return len(solutions)
+
+
+@pytest.mark.parametrize("first", range(0, 300, 50))
+def test_one_loaded_joint(first):
+    """Drawers and journals, loaded up to and beyond the paradox."""
+    counts = [check(seed, 1) for seed in range(first, first + 50)]
+    assert counts.count(1) > 20
+
+
+@pytest.mark.parametrize("first", range(0, 20, 5))
+def test_two_loaded_joints(first):
+    for seed in range(first, first + 5):
+        check(seed, 2)
+
+
+@pytest.mark.stress
+def test_many_loaded_joints():
+    counts = [check(seed, 1) for seed in range(10_000)] + [check(seed, 2) for seed in range(1000)]
+    print({k: counts.count(k) for k in set(counts)})
+    assert counts.count(0) > 10
+    assert counts.count(3) > 10
+
+
+def block_on_feet(points, wrench, at, mu, static_ratio=1.0):
+    """A body that stands on feet, pulled by a wrench (t -> force, moment) at a point."""
+    model = empty()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "block")
+    inertia = pin.Inertia(10.0, np.zeros(3), 0.3 * np.eye(3))
+    model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    for k, point in enumerate(points):
+        frame(model, f"foot{k}", joint, pin.SE3(np.eye(3), np.array(point)))
+    frame(model, "pull", joint, pin.SE3(np.eye(3), np.array(at)))
+    q = pin.neutral(model)
+    q[2] = -points[0][2]
+    contacts = [pn.PointContact(f"foot{k}", mu=mu, static_ratio=static_ratio) for k in range(len(points))]
+    return pn.Scene(model, contacts=contacts, forces=[pn.Wrench("pull", wrench)], q0=q)
+
+
+def random_stance(seed, static_ratio):
+    """A body on three to six feet with a growing pull, and the load that no friction within the limits holds."""
+    rng = np.random.default_rng(seed)
+    count, height = int(rng.integers(3, 7)), rng.uniform(0.05, 0.4)
+    turns = np.sort(rng.uniform(0.0, 2.0 * np.pi, count)) if seed % 2 else 2.0 * np.pi * np.arange(count) / count
+    reach = rng.uniform(0.2, 0.5, count)
+    feet = np.column_stack([reach * np.cos(turns), reach * np.sin(turns), np.full(count, -height)])
+    mu, couple = rng.uniform(0.2, 0.6), np.array([0.0, 0.0, rng.uniform(-5.0, 5.0)])
+    way = rng.uniform(0.0, 2.0 * np.pi)
+    load = 60.0 * np.array([np.cos(way), np.sin(way), 0.0])
+    at = feet[0] * (seed % 3 == 0)
+    scene = block_on_feet(feet, lambda t: [*(load * t), *(couple * t)], at, mu, static_ratio)
+    return scene, Stance(feet, 10.0 * GRAVITY, static_ratio * mu, load, at, couple)
+
+
+def check_stance(seed, static_ratio, beyond):
+    """It gives way at the optimum, and nothing fails up to `beyond` seconds later; None where a foot would lift."""
+    scene, stance = random_stance(seed, static_ratio)
+    time, normals, lacks = stance.gives_way(1.0)
+    if normals.min() < PRESSED or lacks > CONVERGED:
+        return None
+    run = pn.simulate(scene, time + beyond)
+    first = min(event.time for event in run.events if event.kind == "slip")
+    assert first == pytest.approx(time, rel=GIVE_WAY)
+    return run.stats.steps
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_stances(seed):
+    check_stance(seed, 1.15, 0.01)
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("static_ratio", [1.0, 1.15])
+def test_many_stances(static_ratio):
+    steps = [check_stance(seed, static_ratio, 1.0) for seed in range(1000)]
+    told = [count for count in steps if count is not None]
+    print(len(told), "stances, steps at most", max(told), "and in the middle", np.median(told))
+    assert len(told) > 300
+
+
+def test_four_feet_give_way_together():
+    """A star of feet, pulled at one of them: they let go at the load that no forces within their limits hold."""
+    star = [(0.3 * np.cos(x), 0.3 * np.sin(x), -0.3) for x in np.arange(4) * np.pi / 2]
+    scene = block_on_feet(star, lambda t: [0.0, 60.0 * t, 0.0, 0.0, 0.0, 0.0], star[0], 0.5)
+    run = pn.simulate(scene, 0.6)
+    slips = [event.time for event in run.events if event.kind == "slip"]
+    assert slips
+    before = scene.solve(*scene.project(), min(slips) - 1e-9)
+    assert (before.modes == 0).all()
