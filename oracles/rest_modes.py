@@ -1,7 +1,8 @@
-"""All motions that dry friction allows a tree of joints at rest: every combination of modes, with a scan of its loads.
+"""All motions that dry friction allows a tree of joints at rest: every combination of modes, loads scanned.
 
-A joint that rubs sticks, or slips one way with the friction that its own load gives.  Loads are sums of lengths of
-vectors, each linear in the friction forces; what is linear comes from Pinocchio's M and inverse dynamics alone.
+A joint that rubs sticks, or slips one way with the friction that its own load gives.  Loads are sums of
+lengths of vectors, each linear in the friction forces; what is linear comes from Pinocchio's M and inverse
+dynamics alone.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ HALVINGS = 60
 CLOSE = 1e-5
 
 
-class Close(Exception):
+class CloseError(Exception):
     """Two cases lie too near each other to be told apart."""
 
 
@@ -31,7 +32,7 @@ def joint_axis(model, joint):
 
 
 def bearing(model, law, wrench):
-    """Vectors whose lengths add up to the load of a law's bearing, from the wrench (force, moment) in its joint."""
+    """Vectors whose lengths add up to the load of a bearing, from the wrench (force, moment) in its joint."""
     joint = model.getJointId(law.joint)
     axis, f, m = joint_axis(model, joint), wrench[:3], wrench[3:]
     across = np.eye(3) - np.outer(axis, axis)
@@ -87,7 +88,7 @@ class RestingTree:
         """(modes, f) of all motions.
 
         Raises:
-            Close: a case is too near another one.
+            CloseError: a case is too near another one.
         """
         found = []
         for modes in itertools.product((0, 1, -1), repeat=len(self.alpha0)):
@@ -96,13 +97,13 @@ class RestingTree:
                 scale = np.abs(self.alpha0) + np.abs(self.W) @ np.abs(f)
                 room = np.where(modes, modes * alpha / scale, 1.0 - np.abs(f) / (self.static_ratio * limits))
                 if np.abs(room).min() < CLOSE:
-                    raise Close
+                    raise CloseError
                 if room.min() > 0.0:
                     found.append((modes, f))
         return found
 
     def forces(self, modes):
-        """Friction forces of all motions in which what sticks has no acceleration and what slips is at its limit."""
+        """Friction forces of all motions in which what sticks stays and what slips is at its limit."""
         S, B = np.flatnonzero(modes == 0), np.flatnonzero(modes)
 
         def of(y):  # limits y of what slips, (len(B), k)
@@ -140,20 +141,24 @@ def fixed_points(image, n, size):
 
         def left(y0, branch=branch):
             y1 = inner(y0, branch)
-            return np.where(np.isfinite(y1), image(np.array([y0, np.where(np.isfinite(y1), y1, 0.0)]))[0] - y0, np.nan)
+            return np.where(
+                np.isfinite(y1), image(np.array([y0, np.where(np.isfinite(y1), y1, 0.0)]))[0] - y0, np.nan
+            )
 
         grid = refined(left, outer)
         values = left(grid)
         for k in np.flatnonzero(values[:-1] * values[1:] < 0.0):
-            y0 = brentq(lambda y, left=left: left(np.array([y]))[0], grid[k], grid[k + 1], xtol=1e-15, rtol=1e-14)
+            y0 = brentq(
+                lambda y, left=left: left(np.array([y]))[0], grid[k], grid[k + 1], xtol=1e-15, rtol=1e-14
+            )
             found.append(np.array([y0, inner(np.array([y0]), branch)[0]]))
         seen = np.isfinite(values)
         low = np.nanmin(np.abs(values) / (grid + size), initial=np.inf)
         if low < CLOSE and not len(found):
-            raise Close
+            raise CloseError
         for k in np.flatnonzero(seen[:-1] != seen[1:]):  # where both branches meet and end
             if abs(values[k if seen[k] else k + 1]) < 0.02 * (size + grid[k]):
-                raise Close
+                raise CloseError
     return found
 
 

@@ -1,7 +1,7 @@
 """When a body on feet gives way: the largest load that some friction within the feet's limits holds.
 
-The normal forces are those that the plane exerts on a rigid body, shared by least norm among more than three feet, as the
-package documents; friction tilts the body and changes them, linearly.
+The normal forces are those that the plane exerts on a rigid body, shared by least norm among more than three
+feet, as the package documents; friction tilts the body and changes them, linearly.
 """
 
 from __future__ import annotations
@@ -36,7 +36,11 @@ class Stance:
         )
         x, y = self.feet[:, 0], self.feet[:, 1]
         self.holds = np.array(
-            [np.ravel([none + 1, none], order="F"), np.ravel([none, none + 1], order="F"), np.ravel([-y, x], order="F")]
+            [
+                np.ravel([none + 1, none], order="F"),
+                np.ravel([none, none + 1], order="F"),
+                np.ravel([-y, x], order="F"),
+            ]
         )
 
     def normals(self, f, t):

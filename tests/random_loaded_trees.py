@@ -1,4 +1,4 @@
-"""Random trees of drawers and journals whose friction follows their load, far beyond what bearings are built for."""
+"""Random trees of drawers and journals whose friction follows their load, beyond what bearings are for."""
 
 from __future__ import annotations
 
@@ -36,4 +36,9 @@ def loaded_tree(seed, joints):
                 span=10.0 ** rng.uniform(-1.0, 0.5),
             )
         )
-    return model, laws, rng.standard_normal(model.nq), rng.standard_normal(model.nv) * 10.0 ** rng.uniform(-1.0, 1.5)
+    return (
+        model,
+        laws,
+        rng.standard_normal(model.nq),
+        rng.standard_normal(model.nv) * 10.0 ** rng.uniform(-1.0, 1.5),
+    )

@@ -1,4 +1,4 @@
-"""Modes at rest of joints that rub under their load, against every combination of modes with a scan of the loads."""
+"""Modes at rest under load, against every combination of modes with a scan of the loads."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from oracles.rest_modes import Close, RestingTree
+from oracles.rest_modes import CloseError, RestingTree
 from oracles.stance import Stance
 
 from .mechanisms import GRAVITY, empty, frame
@@ -37,7 +37,7 @@ def check(seed, joints):
     tree, rest = RestingTree(model, laws, q, tau), np.zeros(model.nv)
     try:
         solutions = tree.solutions()
-    except Close:
+    except CloseError:
         return None
     scene, best = pn.Scene(model, laws=laws), stickiest(solutions)
     if best is None:
@@ -46,6 +46,7 @@ def check(seed, joints):
         return len(solutions)
     s = scene.solve(q, rest, tau=tau)
     assert tuple(s.modes) == best[0]
+    assert s.unique is (len(solutions) == 1)
     expected = tree.a0 + tree.response @ best[1]
     np.testing.assert_allclose(s.a, expected, rtol=0.0, atol=MOTION * (1.0 + np.abs(tree.a0).max()))
     return len(solutions)
@@ -88,10 +89,12 @@ def block_on_feet(points, wrench, at, mu, static_ratio=1.0):
 
 
 def random_stance(seed, static_ratio):
-    """A body on three to six feet with a growing pull, and the load that no friction within the limits holds."""
+    """A body on three to six feet with a growing pull, and the load that no friction holds."""
     rng = np.random.default_rng(seed)
     count, height = int(rng.integers(3, 7)), rng.uniform(0.05, 0.4)
-    turns = np.sort(rng.uniform(0.0, 2.0 * np.pi, count)) if seed % 2 else 2.0 * np.pi * np.arange(count) / count
+    turns = (
+        np.sort(rng.uniform(0.0, 2.0 * np.pi, count)) if seed % 2 else 2.0 * np.pi * np.arange(count) / count
+    )
     reach = rng.uniform(0.2, 0.5, count)
     feet = np.column_stack([reach * np.cos(turns), reach * np.sin(turns), np.full(count, -height)])
     mu, couple = rng.uniform(0.2, 0.6), np.array([0.0, 0.0, rng.uniform(-5.0, 5.0)])
@@ -103,7 +106,7 @@ def random_stance(seed, static_ratio):
 
 
 def check_stance(seed, static_ratio, beyond):
-    """It gives way at the optimum, and nothing fails up to `beyond` seconds later; None where a foot would lift."""
+    """It gives way at the optimum, and nothing fails `beyond` seconds later; None where a foot would lift."""
     scene, stance = random_stance(seed, static_ratio)
     time, normals, lacks = stance.gives_way(1.0)
     if normals.min() < PRESSED or lacks > CONVERGED:
@@ -129,7 +132,7 @@ def test_many_stances(static_ratio):
 
 
 def test_four_feet_give_way_together():
-    """A star of feet, pulled at one of them: they let go at the load that no forces within their limits hold."""
+    """A star of feet, pulled at one of them: until they let go all of them stick."""
     star = [(0.3 * np.cos(x), 0.3 * np.sin(x), -0.3) for x in np.arange(4) * np.pi / 2]
     scene = block_on_feet(star, lambda t: [0.0, 60.0 * t, 0.0, 0.0, 0.0, 0.0], star[0], 0.5)
     run = pn.simulate(scene, 0.6)

@@ -39,7 +39,8 @@ constraints: geometry coordinates kinds kind block row_layout row_system orthogo
 forces: given_forces laws mode friction
 dynamics: failure program reaction_equation reaction_roots workspace given_forces law_forces solution \
 reactions split slip unknowns uniqueness implicit power evaluation projection step_start
-friction: box_program cone_program rest_equation rest_solver rest_branches problem rest_problem modes continuation
+friction: box_program cone_program rest_equation rest_solver rest_branches problem rest_problem modes \
+continuation
 run: archive method step outside_step step_control runge_kutta system semi_implicit_euler error_norm stepper \
 moreau recorder checkpoint stiffness event_search event_location events simulation followed_run
 python: arrays failures callbacks builder constraints runner options runs followed program module

@@ -251,23 +251,32 @@ struct Search {
         } catch (const Failure& failure) {  // loads that no motion has, under forces on the way
             if (failure.kind != Failure::Kind::paradox) throw;
         }
-        if (p.needs_reactions && look_further(found)) return;
+        if (p.needs_reactions && look_further(found, found && !released_early(modes))) return;
         if (!found) throw Failure(Failure::Kind::not_converged, t, list);
         apply(modes, false);
     }
 
-    // Where loads may leave several motions or none, or where turns found none. Returns whether it knows better.
-    bool look_further(bool found) {
+    // Turns give what slips in one of them its kinetic limit: what holds in the end may have slipped on the way.
+    bool released_early(const std::vector<Mode>& modes) const {
+        return std::any_of(list.begin(), list.end(), [&](int e) {
+            const Friction& friction = p.frictions[e];
+            return slips(modes[e]) && friction.holding_limit(1.0) > friction.kinetic_limit(1.0, 0.0);
+        });
+    }
+
+    // Where loads may leave several motions or none, or where turns found none to be trusted. Returns whether it knows
+    // better.
+    bool look_further(bool found, bool trusted) {
         unload(true);
         RestProblem problem(p, w, t, q, v, list, slipping);
         RestEquation& equation = problem.equation;
-        if (found && (contraction(equation) < 1.0 || !is_searched(equation))) return false;
+        if (trusted && (contraction(equation) < 1.0 || !is_searched(equation))) return false;
         VecX x = VecX::Zero(equation.n);
         bool solved = find(problem, x);
         if (!solved && release(problem, equation, std::vector<Mode>(p.frictions.size(), slip_plus)))
             solved = find(problem, x);
         while (solved && release(problem, equation, modes_of(equation, x))) solved = find(problem, x);
-        if (found && !proven) return false;
+        if (trusted && !proven) return false;
         if (!solved && proven)
             paradox(problem, std::min(0.0, equation.determinant_far_away()), {});
         if (solved) settle(equation, x, modes_of(equation, x));
