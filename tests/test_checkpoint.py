@@ -26,6 +26,7 @@ from .mechanisms import again
 from .random_trees import add
 from .refusals import refuses
 from .same_run import assert_same_run
+from .standing import balls
 
 ALL = ("a", "forces", "energy", "power")
 
@@ -76,6 +77,7 @@ RUNS = {
         {"record": "forces", "output_dt": 0.05},
     ),
     "rolling": (lambda: pn.load("rolling_disk"), 0.5, {"output_dt": 0.1}),
+    "slow slip": (lambda: balls(2)[0], 1.0, {"output_dt": 0.02, "record": ALL}),
 }
 
 

@@ -41,8 +41,9 @@ dynamics: failure program reaction_equation reaction_roots workspace given_force
 reactions split slip unknowns uniqueness implicit power evaluation projection step_start
 friction: box_program cone_program rest_equation rest_solver rest_branches problem rest_problem modes \
 continuation
-run: archive method step outside_step step_control runge_kutta system semi_implicit_euler error_norm stepper \
-moreau recorder checkpoint stiffness event_search event_location events simulation followed_run
+run: archive method step outside_step step_control runge_kutta system semi_implicit_euler error_norm \
+collocation stepper moreau recorder checkpoint stiffness event_search event_location events simulation \
+followed_run
 python: arrays failures callbacks builder constraints runner options runs followed program module
 """
 

@@ -108,6 +108,7 @@ Vec3 friction_force(const Program& p, Workspace& w, int e) {
 static Vec3 force_direction(const Program& p, Workspace& w, int e) {
     const Friction& f = p.frictions[e];
     if (f.dim == 1) return Vec3(-w.state.mode[e], 0.0, 0.0);
+    if (w.state.seeks_directions) return -w.state.last_direction[e];
     const Vec3 u = slip_velocity(w.now, f);
     const double speed = u.norm();
     if (speed > directed_speed * (1.0 + w.now.speed))

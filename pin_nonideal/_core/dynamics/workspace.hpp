@@ -24,6 +24,7 @@ struct RunState {
     Modes mode;
     // For elements of two or three directions: of the step's start, and where slip last had a clear direction.
     std::vector<Vec3> slip_direction, last_direction;
+    bool seeks_directions = false;  // steps find last_direction themselves: slip is too slow to tell it
     bool indeterminate = false;   // what sticks shares its load in several ways: one multiplier says little
     VecX z;                       // states of laws, at the stage evaluated last
     VecX held_torque;             // of sampled control

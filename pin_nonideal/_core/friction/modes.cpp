@@ -24,6 +24,7 @@ constexpr double limit_tolerance = 1e-12; // relative change of the limits at wh
 constexpr double least_limit = 1e-300;    // a limit of zero divides by this
 constexpr int most_turns = 100;           // of forces and limits
 constexpr double unsolved = 10.0;         // what the equation lacks leaves so much in the accelerations
+constexpr double beyond = 1e-6;           // part of the load by which it is raised to see slip begin
 
 bool contains(const std::vector<int>& list, int e) { return std::find(list.begin(), list.end(), e) != list.end(); }
 
@@ -69,15 +70,23 @@ struct Search {
         });
     }
 
-    // What an element at rest does under a force at or below its limit; its direction of slip stays in the workspace.
-    Mode mode_of(int e, const VecX& force, const VecX& slip, double limit, bool slides) {
+    // What an element at rest does under a force at or below its limit; its direction of slip, that of the acceleration
+    // where this tells it, stays in the workspace.
+    Mode mode_of(int e, const VecX& force, const VecX& slip, double limit, bool slides, bool told) {
         const bool gives_way = contains(question.breaking, e) && force.norm() >= limit * (1.0 - slack);
         if (!gives_way && !slides) return sticking;
-        const VecX direction = slides ? VecX(slip.normalized()) : VecX(-force.normalized());
+        const VecX direction = told ? VecX(slip.normalized()) : VecX(-force.normalized());
         Vec3 along;
         for (int k = 0; k < direction.size(); ++k) along[k] = direction[k];
         if (direction.size() > 1) w.state.slip_direction[e] = w.state.last_direction[e] = along;
         return direction.size() > 1 || along[0] > 0.0 ? slip_plus : slip_minus;
+    }
+
+    // Slip accelerations a little beyond the load at which elements give way: there they are rounding, and forces of
+    // elements that share a load tell the directions in which all begin to move together only to its root.
+    VecX onset_accelerations(const FrictionProblem& problem, const VecX& limits) const {
+        const VecX more = (1.0 + beyond) * problem.alpha0;
+        return more + problem.W * friction_program(problem.W, more, problem.dims, limits);
     }
 
     // Modes that the forces f of a program mean: what is below its limit sticks.
@@ -85,10 +94,16 @@ struct Search {
         const VecX alpha = problem.alpha0 + problem.W * f;
         const double size = problem.alpha0.cwiseAbs().maxCoeff();
         std::vector<Mode> modes = question.modes;
+        VecX onset;
         for (size_t i = 0, at = 0; i < list.size(); at += problem.dims[i], ++i) {
             const VecX force = f.segment(at, problem.dims[i]), slip = alpha.segment(at, problem.dims[i]);
             const bool slides = force.norm() >= limits[i] * (1.0 - at_limit) && slip.norm() > no_acceleration * size;
-            modes[list[i]] = mode_of(list[i], force, slip, limits[i], slides);
+            const bool slowly = problem.dims[i] > 1 && force.norm() >= limits[i] * (1.0 - slack) &&
+                                slip.norm() < beyond * size;
+            if (slowly && onset.size() == 0) onset = onset_accelerations(problem, limits);
+            const VecX begins = slowly ? VecX(onset.segment(at, problem.dims[i])) : slip;
+            const bool told = (slides || slowly) && begins.norm() > no_acceleration * size;
+            modes[list[i]] = mode_of(list[i], force, begins, limits[i], slides, told);
         }
         return modes;
     }
@@ -105,7 +120,8 @@ struct Search {
             const bool at_its_limit = force.norm() >= limits[i] * (1.0 - at_limit) ||
                                       (force - e.rho * slip).norm() > limits[i] * (1.0 + at_limit);
             const bool accelerates = e.rho * slip.norm() > noise * equation.force_in_play(i, x, limits);
-            modes[list[i]] = mode_of(list[i], force, slip, limits[i], !e.may_stick || (at_its_limit && accelerates));
+            const bool slides = !e.may_stick || (at_its_limit && accelerates);
+            modes[list[i]] = mode_of(list[i], force, slip, limits[i], slides, slides);
         }
         return modes;
     }

@@ -20,17 +20,17 @@ void fields(Archive& a, Modes& x) {
 }
 
 static void fields(Archive& a, RunState& x) {
-    auto& [mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm,
-           third_order_lam, ideal_decided, unique, growth, steps_since] = x;
-    a(mode, slip_direction, last_direction, indeterminate, z, held_torque, has_held, unknown, warm, third_order_lam,
-      ideal_decided, unique, growth, steps_since);
+    auto& [mode, slip_direction, last_direction, seeks_directions, indeterminate, z, held_torque, has_held, unknown,
+           warm, third_order_lam, ideal_decided, unique, growth, steps_since] = x;
+    a(mode, slip_direction, last_direction, seeks_directions, indeterminate, z, held_torque, has_held, unknown, warm,
+      third_order_lam, ideal_decided, unique, growth, steps_since);
 }
 
 static void fields(Archive& a, Progress& x) {
     auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, recent_events, slip_at_start,
-           pulls, several, stiff_steps, quiet_steps] = x;
+           pulls, several, stiff_steps, quiet_steps, turning_steps] = x;
     a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, slip_at_start, pulls, several,
-      stiff_steps, quiet_steps);
+      stiff_steps, quiet_steps, turning_steps);
     a.list(recent_events);
 }
 

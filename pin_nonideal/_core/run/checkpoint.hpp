@@ -22,6 +22,7 @@ struct Progress {
     std::vector<char> pulls;            // by contact
     bool several = false;               // the laws allow other motions too, which was told
     long stiff_steps = 0, quiet_steps = 0;  // near the border of stability, and since then away from it
+    int turning_steps = 0;  // in a row that were stiff while slip turned; negative: not to be counted yet
 };
 
 std::string to_bytes(Workspace& w, Progress& progress, Recording& out);

@@ -42,15 +42,7 @@ constexpr double confirmed_width = 1e-4;
 
 EventSearch::EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls)
     : system_(system), stepper_(stepper), p(system.p), w(system.w), pulls_(pulls), probe_(VecX::Zero(system.ny)),
-      probe_rate_(probe_) {
-    for (int i = 0; i < stepper.stages; ++i)
-        if (i == 0 || (stepper.method.C && stepper.method.C[i] < 1.0)) by_time_.push_back(i);
-    std::stable_sort(by_time_.begin(), by_time_.end(), [&](int i, int j) { return time_of(i) < time_of(j); });
-    by_time_.push_back(stepper.stages);
-    // Of stages at one instant the last is the best.
-    const auto same = [&](int i, int j) { return time_of(i) == time_of(j); };
-    by_time_.erase(by_time_.begin(), std::unique(by_time_.rbegin(), by_time_.rend(), same).base());
-}
+      probe_rate_(probe_) {}
 
 double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
     if (watch.kind == Watch::Kind::contact) return w.now.lam[p.blocks[p.contacts[watch.index]].row];
@@ -62,27 +54,23 @@ double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
 
 // --- What may have crossed ------------------------------------------------------------------------------------------
 
-// Part of the step at which a stage stands, or its end.
-double EventSearch::time_of(int stage) const {
-    return stage == 0 ? 0.0 : stage < stepper_.stages ? stepper_.method.C[stage] : 1.0;
-}
-
 double EventSearch::noise() const {
     return fresh_slip * rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff());
 }
 
 // Whether what sticks is past its limit at the step's end, or may have been inside, between two stages.
 bool EventSearch::may_reach_limit(int e) {
-    const auto share = [&](size_t k) { return system_.share(stepper_.rates[by_time_[k]], e); };
+    const std::vector<Stepper::Look>& looks = stepper_.looks();
+    const auto share = [&](size_t k) { return system_.share(*looks[k].rate, e); };
     double least = share(0), most = least, rise = 0.0;
-    for (size_t k = 1; k < by_time_.size(); ++k) {
+    for (size_t k = 1; k < looks.size(); ++k) {
         least = std::min(least, share(k));
         most = std::max(most, share(k));
     }
     const double range = most - least;
     if (range <= share_rounding) return most > 1.0 + share_rounding || least < -1.0 - share_rounding;
-    for (size_t k = 2; k < by_time_.size(); ++k) {
-        const double t0 = time_of(by_time_[k - 2]), t1 = time_of(by_time_[k - 1]), t2 = time_of(by_time_[k]);
+    for (size_t k = 2; k < looks.size(); ++k) {
+        const double t0 = looks[k - 2].part, t1 = looks[k - 1].part, t2 = looks[k].part;
         rise = std::max({rise, rise_between(t0, share(k - 2), t1, share(k - 1), t2, share(k)),
                          rise_between(t0, -share(k - 2), t1, -share(k - 1), t2, -share(k))});
     }
@@ -96,22 +84,21 @@ bool EventSearch::may_stop(int e) const { return slip_along_mode(p, w, e) < -noi
 // tell where one may have been below zero in between.
 bool EventSearch::dips(int e) const {
     if (stepper_.method.order < 2) return false;
-    const std::vector<VecX>& rates = stepper_.rates;
-    const auto speed = [&](int i) { return system_.slip(rates[i], e); };
+    const std::vector<Stepper::Look>& looks = stepper_.looks();
+    const auto speed = [&](size_t k) { return system_.slip(*looks[k].rate, e); };
     const double below_rest = -noise();
     double least = HUGE_VAL, most = -HUGE_VAL;
     bool below = false;
-    for (int i : by_time_) {
-        least = std::min(least, speed(i));
-        most = std::max(most, speed(i));
-        below |= i > 0 && i < stepper_.stages && speed(i) < below_rest;
+    for (size_t k = 0; k < looks.size(); ++k) {
+        least = std::min(least, speed(k));
+        most = std::max(most, speed(k));
+        below |= k > 0 && k + 1 < looks.size() && speed(k) < below_rest;
     }
     if (below) return true;
-    for (size_t k = 0; k + 1 < by_time_.size(); ++k) {
-        const int i = by_time_[k], j = by_time_[k + 1];
-        const double length = (time_of(j) - time_of(i)) * stepper_.h;
-        const double inside = least_inside(speed(i), length * system_.slip_rate(rates[i], e), speed(j),
-                                           length * system_.slip_rate(rates[j], e));
+    for (size_t k = 0; k + 1 < looks.size(); ++k) {
+        const double length = (looks[k + 1].part - looks[k].part) * stepper_.h;
+        const double inside = least_inside(speed(k), length * system_.slip_rate(*looks[k].rate, e), speed(k + 1),
+                                           length * system_.slip_rate(*looks[k + 1].rate, e));
         if (inside < dip_part * (most - least)) return true;
     }
     return false;
@@ -154,9 +141,14 @@ double EventSearch::share_error(int e) const {
     const Method& method = stepper_.method;
     const bool further = method.further_stages > 0;
     double error = 0.0;
+    if (stepper_.collocates()) {  // its polynomial misses the rates at the step's ends alone
+        for (const Stepper::Look& look : stepper_.looks())
+            error = std::max(error, std::abs(interpolated_share(e, look.part) - system_.share(*look.rate, e)));
+        return error;
+    }
     if (!further)
-        for (int i : by_time_)
-            error = std::max(error, doubted_part * std::abs(system_.share(stepper_.rates[i], e) -
+        for (const Stepper::Look& look : stepper_.looks())
+            error = std::max(error, doubted_part * std::abs(system_.share(*look.rate, e) -
                                                             system_.share(stepper_.rates[0], e)));
     for (int k = further ? 0 : 1; k < (further ? method.further_stages : method.stages); ++k) {
         const double part = further ? method.C_further[k] : method.C[k];
@@ -269,6 +261,7 @@ std::optional<Crossing> EventSearch::first() {
         earliest = confirmed(earliest);
         sure = true;
     }
+    stepper_.end_directions();
     system_.read(stepper_.y1);
     system_.read_law_states(stepper_.y1);
     evaluate(p, w, stepper_.t0 + stepper_.h, system_.q, system_.v);

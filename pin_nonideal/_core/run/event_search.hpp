@@ -41,7 +41,6 @@ private:
     // whole evaluation.
     enum class Source { velocities, shares, kinematics, evaluation };
 
-    double time_of(int stage) const;
     double noise() const;
     bool may_reach_limit(int element);
     bool may_stop(int element) const;
@@ -62,7 +61,6 @@ private:
     const Program& p;
     Workspace& w;
     const std::vector<char>& pulls_;
-    std::vector<int> by_time_;  // stages before the step's end, and that end
     double doubt_ = 0.0;        // of the share that is looked at
     VecX probe_, probe_rate_;
 };

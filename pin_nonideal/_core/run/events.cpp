@@ -51,7 +51,21 @@ bool shares_load(System& system, double t, const std::vector<int>& resting, int 
     return shares;
 }
 
+// Slip of several directions that begins from rest has no velocity to tell its direction: steps seek it.
+void seek_directions(System& system, const std::vector<int>& resting, bool sought) {
+    const auto begins = [&](int e) { return system.p.frictions[e].dim > 1 && slips(system.w.state.mode[e]); };
+    bool& seeks = system.w.state.seeks_directions;
+    seeks = system.seeks_directions &&
+            ((seeks && sought && turning(system)) || std::any_of(resting.begin(), resting.end(), begins));
+}
+
 }  // namespace
+
+bool turning(const System& system) {
+    for (int e = 0; e < system.ne; ++e)
+        if (system.p.frictions[e].dim > 1 && slips(system.w.state.mode[e])) return true;
+    return false;
+}
 
 Event::Kind kind_of_change(Mode before, Mode after) {
     return after == sticking ? Event::Kind::stick : before == sticking ? Event::Kind::slip : Event::Kind::reverse;
@@ -75,6 +89,7 @@ std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, con
     if (event && event->kind == FoundEvent::Kind::released_together) asked.breaking = asked.at_rest;
     else if (held >= 0) asked.breaking = {held};
     if (!event || !go_on(p, w, t, system.q, system.v, asked, event->index)) resolve_together(system, t, asked);
+    seek_directions(system, asked.at_rest, event.has_value());
     system.write(y);
     w.state.indeterminate = shares_load(system, t, asked.at_rest, held);
     system.rate_of_evaluation(t, y, dy);
@@ -95,7 +110,9 @@ void remember_directions(System& system, std::vector<double>& slip) {
         if (f.dim == 1 || !slips(w.state.mode[e])) continue;
         const Vec3 u = slip_velocity(w.now, f);
         slip[e] = u.norm();
-        if (slip[e] > directed_slip) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
+        const Vec3& n = w.state.last_direction[e];
+        if (w.state.seeks_directions) w.state.slip_direction[e] = n;
+        else if (slip[e] > directed_slip) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
     }
 }
 

@@ -14,6 +14,9 @@ namespace pn {
 // where there was no event.
 std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event);
 
+// Whether some element of several directions slips.
+bool turning(const System& system);
+
 // Kind of the event in which the mode of an element changes so.
 Event::Kind kind_of_change(Mode before, Mode after);
 

@@ -39,6 +39,12 @@ constexpr int chatter_steps = 50;
 
 // Part of a step to which the instant is found from which on several motions are possible.
 constexpr double several_width = 1e-12;
+// Of the step: where directions of slip relax faster, stability holds the explicit methods short (at 3 to 6); it is
+// believed after some steps in a row, and asked again some steps after it turned out otherwise.
+constexpr double stiff = 2.5;
+constexpr int stiff_in_a_row = 6, patience = 20;
+// Where directions are not found in a step of this length [s], the method asked for has to find a way.
+constexpr double shortest_sought = 1e-9;
 
 // Part of a step of time stepping that is not worth one of its own.
 constexpr double least_part = 1e-9;
@@ -56,8 +62,8 @@ double whole_lengths(double time, double length) {
 
 Simulation::Simulation(const Program& program, Workspace& workspace, const Options& run_options, Recording& recording)
     : p(program), w(workspace), options(run_options), out(recording), t_end(options.t0 + options.duration),
-      system(program, workspace, options.record.energy), stepper(options.method, system),
-      norm(system, options.rtol, options.atol), control(options.method, options.rtol),
+      system(program, workspace, options.record.energy), norm(system, options.rtol, options.atol),
+      stepper(options.method, system, norm), control(options.method, options.rtol),
       stiffness(system, stepper, *this, t_end, run_options.max_steps),
       locator(system, stepper, slip_at_start, pulls), moreau(system),
       recorder(system, options.record, recording), sample_(VecX::Zero(system.ny)) {
@@ -221,12 +227,16 @@ std::optional<double> Simulation::try_step(double size) {
     }
     if (!stepper.y1.allFinite()) throw Failure(Failure::Kind::not_finite, t + size);
     if (control.needs_detour(system.smallest_pivot, start_pivot, w.now.rows.distance)) return std::nullopt;
-    const bool needs_end = options.method.first_same_as_last;
-    double error = needs_end ? 0.0 : stepper.error(norm);
-    if (!(error <= 1.0)) return error;
+    const bool needs_end = options.method.first_same_as_last && !stepper.collocates();
+    double error = needs_end ? 0.0 : stepper.error();
+    if (!(error <= 1.0)) {
+        w.state.seeks_directions &= !stepper.collocates() || size > shortest_sought;
+        return error;
+    }
     system.project_and_evaluate(t + size, stepper.y1, stepper.end_rate());
     stepper.learn();
-    if (needs_end) error = stepper.error(norm);
+    if (needs_end) error = stepper.error();
+    turns_stiffly = options.method.adaptive() && turning(system) && stepper.stiffness() > stiff;
     return error;
 }
 
@@ -253,12 +263,31 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     configured_now();
     if (!event || !event->changes_modes()) report_pulls(event);
     emit_inside_step(report_several(true));
+    stepper.end_directions();
+    choose_stepper();
     if (!event) return;
     if (event->changes_modes()) change_modes(*event);
     report_several(false);
     if (event->kind != FoundEvent::Kind::reversal) return;
     recent_events.push_back(t);
     bridge_cluster(event->index);
+}
+
+// By collocation as long as directions relax fast beside the next step; by the method asked for until its stability has
+// held the steps short several times in a row.
+void Simulation::choose_stepper() {
+    stepper.forget();
+    bool& seeks = w.state.seeks_directions;
+    const double next = options.method.adaptive() ? h : options.dt;
+    if (stepper.collocates()) {
+        seeks = turning(system) && (stepper.h == 0.0 || stepper.stiffness() * next > stiff * stepper.h);
+        turning_steps = seeks ? 0 : -patience;
+    } else if (turning_steps < 0) {
+        ++turning_steps;
+    } else {
+        turning_steps = turns_stiffly ? turning_steps + 1 : 0;
+        seeks |= turning_steps == stiff_in_a_row;
+    }
 }
 
 void Simulation::change_modes(const FoundEvent& event) {
@@ -281,6 +310,7 @@ void Simulation::bridge_cluster(int element) {
     out.events.push_back({t, Event::Kind::chatter, element});
     if (options.method.outside()) return;  // whose steps go on without a look at events
     const double stop = std::min(t_end, t + chatter_time);
+    w.state.seeks_directions = false;
     while (t < stop) step_in_time(stop, chatter_time / chatter_steps);
     switch_modes(system, t, y, rate, std::nullopt);
     configured_now();

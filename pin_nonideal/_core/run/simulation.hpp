@@ -78,6 +78,7 @@ protected:
     double last_unique();
     void configured_now();
 
+    void choose_stepper();
     void change_modes(const FoundEvent& event);
     void bridge_cluster(int element);
     // One step of time stepping, not beyond `stop`.
@@ -89,14 +90,15 @@ protected:
     Recording& out;
     const double t_end;
     System system;
-    Stepper stepper;
     ErrorNorm norm;
+    Stepper stepper;
     StepControl control;
     StiffnessGuard stiffness;
     EventLocator locator;
     Moreau moreau;
     Recorder recorder;
     VecX sample_;
+    bool turns_stiffly = false;  // the step just taken
     long ticks = 0;
     Clock::time_point next_save;
     std::optional<Failure> opened;  // a loop that a trial of this step could not close

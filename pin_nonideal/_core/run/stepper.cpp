@@ -1,12 +1,26 @@
 #include "run/stepper.hpp"
 
+#include <algorithm>
+
 namespace pn {
 
-Stepper::Stepper(const Method& chosen, System& system)
-    : Step(chosen.stages, chosen.rates(), system.ny), method(chosen), system_(system) {
+Stepper::Stepper(const Method& chosen, System& system, ErrorNorm& norm)
+    : Step(chosen.stages, chosen.rates(), system.ny), method(chosen), system_(system), norm_(norm),
+      collocation_(*this, system, norm) {
     if (method.scheme == Method::Scheme::runge_kutta) scheme_.emplace<RungeKutta>(method, *this);
     if (method.scheme == Method::Scheme::semi_implicit_euler) scheme_.emplace<SemiImplicitEuler>(*this);
     if (method.outside()) scheme_.emplace<OutsideStep>(method, *this);
+    system.seeks_directions = !method.outside();
+    for (int i = 0; i < stages; ++i)
+        if (i == 0 || (method.C && method.C[i] < 1.0)) looks_.push_back({i == 0 ? 0.0 : method.C[i], &rates[i]});
+    std::stable_sort(looks_.begin(), looks_.end(), [](const Look& a, const Look& b) { return a.part < b.part; });
+    // Of stages at one instant the last is the best.
+    const auto same = [](const Look& a, const Look& b) { return a.part == b.part; };
+    looks_.erase(looks_.begin(), std::unique(looks_.rbegin(), looks_.rend(), same).base());
+    collocation_looks_.push_back({0.0, &rates[0]});
+    for (int i = 0; i + 1 < Collocation::stages; ++i)
+        collocation_looks_.push_back({Collocation::part(i), &collocation_.rate(i)});
+    for (auto* list : {&looks_, &collocation_looks_}) list->push_back({1.0, &end_rate()});
 }
 
 // Calls `use` with the stepper that the method has; time stepping is no business of these.
@@ -21,6 +35,8 @@ void Stepper::take(double t, double size) {
     t0 = t;
     h = size;
     has_interpolant_ = false;
+    collocates_ = system_.w.state.seeks_directions;
+    if (collocates_) return collocation_.advance();
     with_scheme(scheme_, [&](auto& scheme) { scheme.advance(system_); });
 }
 
@@ -38,35 +54,47 @@ void Stepper::follow(double t, double size, OutsideStep::Interpolant interpolant
     if (system_.ne > 0) outside.look_inside(system_);
 }
 
-double Stepper::error(ErrorNorm& norm) {
+double Stepper::error() {
     if (!method.adaptive()) return 0.0;
-    norm.set_tolerances(y0, y1, h);
-    return std::get<RungeKutta>(scheme_).error(norm);
+    if (collocates_) return collocation_.error();
+    norm_.set_tolerances(y0, y1, h);
+    return std::get<RungeKutta>(scheme_).error(norm_);
+}
+
+double Stepper::stiffness() const {
+    if (collocates_) return collocation_.stiffness();
+    const double apart = system_.velocity(y1 - last_stage()).norm();
+    return apart > 0.0 ? h * system_.velocity(rates[stages] - rates[stages - 1]).norm() / apart : 0.0;
 }
 
 void Stepper::learn() {
+    if (collocates_) return;
     if (const auto* euler = std::get_if<SemiImplicitEuler>(&scheme_)) euler->learn(system_);
 }
 
 void Stepper::make_interpolant() {
     if (has_interpolant_) return;
     has_interpolant_ = true;
+    if (collocates_) return;
     with_scheme(scheme_, [&](auto& scheme) { scheme.make_interpolant(system_); });
 }
 
 void Stepper::interpolate(double part, VecX& y) const {
-    with_scheme(scheme_, [&](const auto& scheme) { scheme.interpolate(part, y); });
+    if (collocates_) collocation_.interpolate(part, y);
+    else with_scheme(scheme_, [&](const auto& scheme) { scheme.interpolate(part, y); });
     system_.normalize(y);
 }
 
 double Stepper::interpolated(double part, int index) const {
     double value = 0.0;
+    if (collocates_) return collocation_.interpolated(part, index);
     with_scheme(scheme_, [&](const auto& scheme) { value = scheme.interpolated(part, index).first; });
     return value;
 }
 
 double Stepper::interpolated_rate(double part, int index) const {
     double rate = 0.0;
+    if (collocates_) return collocation_.interpolated_rate(part, index);
     with_scheme(scheme_, [&](const auto& scheme) { rate = scheme.interpolated(part, index).second / h; });
     return rate;
 }

@@ -87,7 +87,7 @@ StiffnessGuard::FastestMode StiffnessGuard::fastest_mode() {
 
 void StiffnessGuard::look() {
     const double border = stepper_.method.stability, size = stepper_.h, at = stepper_.t0 + size;
-    if (!(t_end_ - at > most_steps_ * size) || border == 0.0) return;
+    if (!(t_end_ - at > most_steps_ * size) || border == 0.0 || stepper_.collocates()) return;
     if (size * stage_rate() < near_border * border) {
         if (++progress_.quiet_steps == quiet_steps) progress_.stiff_steps = 0;
         return;

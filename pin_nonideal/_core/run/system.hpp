@@ -19,6 +19,7 @@ struct System {
     // Near a singular position the motion off the constraints differs wildly from the motion on them, so stages are
     // projected first: y' = f(P(y)) has the same solutions and no such cliff.
     bool on_constraints = false;
+    bool seeks_directions = true;  // the steps can find directions of slip that is too slow to tell them
     double smallest_pivot = 1.0;  // of the rows' factor, over the evaluations since it was set
     double moved_energy = 0.0;    // by the last projection of a step's end, where the ledger is kept
     const int nq, nv, nz, nw, ne, ns, ny;  // sizes of q, v, z, work, elements, y without watch, y

@@ -1,0 +1,191 @@
+"""Slip that begins at rest without a drop of the limit, by equations of motion of its own and a stiff solver.
+
+A plate on feet slides in its plane, a ball on a pivot turns: with the slip velocities u_e and the limits s_e
+the friction is -s_e u_e / |u_e|.  SciPy's implicit Runge-Kutta method follows the direction of slip from a
+speed far below what the tolerance sees.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, minimize
+from scipy.spatial.transform import Rotation
+
+GRAVITY = 9.81
+FIRST_SPEED = 1e-9  # of slip, along the direction in which it begins
+DISTANCE = 1e-11  # of the search for forces within the limits
+SETTINGS = {"method": "Radau", "rtol": 1e-9, "atol": 1e-13}
+
+
+class Plate:
+    """A body that three feet or more hold to a level plane, under a wrench that moves with it.
+
+    Feet stand below the center of mass, loaded by least norm over those that share the load.
+
+    Attributes:
+        feet: places of the feet (n, 3) in the body [m], all of the same height.
+        mu: coefficient of friction of all feet.
+        wrench: function of time: force and couple in world axes [N, N m].
+        at: where the force acts [m].
+        mass: of the body [kg].
+        inertia: about each axis [kg m^2].
+    """
+
+    def __init__(self, feet, mu, wrench, at, mass=10.0, inertia=0.3):
+        self.feet, self.at = np.asarray(feet, dtype=float), np.asarray(at, dtype=float)
+        self.mu, self.wrench, self.mass, self.inertia = mu, wrench, mass, inertia
+
+    def given(self, t, angle):
+        """Feet in the axes of the plane; force and moment about the center of mass."""
+        turn = Rotation.from_rotvec([0.0, 0.0, angle])
+        force, couple = np.reshape(self.wrench(t), (2, 3))
+        moment = couple + np.cross(turn.apply(self.at), force)
+        return turn.apply(self.feet), force - [0.0, 0.0, self.mass * GRAVITY], moment
+
+    def loads(self, feet, force, moment, friction):
+        """Normal forces of least norm that balance what turns the plate over, for friction forces (n, 2)."""
+        tilts = np.vstack([np.ones(len(feet)), feet[:, 1], -feet[:, 0]])
+        h = feet[:, 2]
+        by_friction = np.array([0.0, -(h * friction[:, 1]).sum(), (h * friction[:, 0]).sum()])
+        return np.linalg.pinv(tilts) @ -(np.array([force[2], moment[0], moment[1]]) + by_friction)
+
+    def acceleration(self, t, angle, directions):
+        """Of x, y and the angle where the feet slip in these directions (n, 2); and the loads."""
+        feet, force, moment = self.given(t, angle)
+        none = self.loads(feet, force, moment, np.zeros((len(feet), 2)))
+        unit = np.eye(len(feet))
+        answer = np.array(
+            [self.loads(feet, force, moment, -self.mu * directions * e[:, None]) - none for e in unit]
+        ).T
+        loads = np.linalg.solve(unit - answer, none)
+        friction = -self.mu * loads[:, None] * directions
+        turning = moment[2] + (feet[:, 0] * friction[:, 1] - feet[:, 1] * friction[:, 0]).sum()
+        return np.array([*(force[:2] + friction.sum(axis=0)) / self.mass, turning / self.inertia]), loads
+
+    def slip(self, angle, v):
+        feet = Rotation.from_rotvec([0.0, 0.0, angle]).apply(self.feet)
+        return np.column_stack([v[0] - v[2] * feet[:, 1], v[1] + v[2] * feet[:, 0]])
+
+    def excess(self, t):
+        """Least part of the limits by which some foot must pass its own while all rest, and those friction forces."""
+        feet, force, moment = self.given(t, 0.0)
+        n = len(feet)
+        balance = np.zeros((3, 2 * n))
+        balance[0, ::2] = balance[1, 1::2] = 1.0
+        balance[2, ::2], balance[2, 1::2] = -feet[:, 1], feet[:, 0]
+        given = np.array([*force[:2], moment[2]])
+        size = self.mu * self.mass * GRAVITY
+
+        def margins(x):
+            f = size * x[:-1].reshape(n, 2)
+            limits = self.mu * self.loads(feet, force, moment, f)
+            return ((limits * (1.0 + x[-1])) ** 2 - (f**2).sum(axis=1)) / size**2
+
+        start = np.append(-np.linalg.pinv(balance) @ given / size, 1.0)
+        found = minimize(
+            lambda x: x[-1],
+            start,
+            jac=lambda x: np.eye(len(x))[-1],
+            constraints=[
+                {"type": "eq", "fun": lambda x: (balance @ x[:-1]) * 1.0 + given / size},
+                {"type": "ineq", "fun": margins},
+            ],
+            method="SLSQP",
+            options={"ftol": DISTANCE, "maxiter": 500},
+        )
+        return found.x[-1], size * found.x[:-1].reshape(n, 2)
+
+    def give_way(self, latest):
+        """The instant at which no forces within the limits hold the plate any more."""
+        return brentq(lambda t: self.excess(t)[0], 0.0, latest, xtol=1e-12)
+
+    def run(self, start, duration, **settings):
+        """State (x, y, angle and their rates) a time after it gave way."""
+        directions = -self.excess(start)[1]
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        rows = np.array([self.slip(0.0, e).ravel() for e in np.eye(3)]).T
+        across = np.column_stack([-directions[:, 1], directions[:, 0]])
+        by_foot = np.einsum("ek,ekj->ej", across, rows.reshape(-1, 2, 3))
+        way = np.linalg.svd(by_foot)[2][-1]
+        along = np.einsum("ek,ekj,j->e", directions, rows.reshape(-1, 2, 3), way)
+        way *= np.sign(along.sum()) / np.abs(along).max()
+
+        def rate(t, y):
+            u = self.slip(y[2], y[3:])
+            n = u / np.linalg.norm(u, axis=1)[:, None]
+            return np.concatenate([y[3:], self.acceleration(t, y[2], n)[0]])
+
+        first = np.concatenate([np.zeros(3), FIRST_SPEED * way])
+        return solve_ivp(rate, (start, start + duration), first, **{**SETTINGS, **settings}).y[:, -1]
+
+
+class Ball:
+    """A body on a ball joint at the origin, rubbed by mu radius times the force in the joint, under a moment.
+
+    Attributes:
+        mass: [kg].
+        center: of mass, in the body [m].
+        inertia: (3, 3) about the center of mass [kg m^2].
+        lever: mu radius [m].
+        wrench: function of time: force at `end` and couple in world axes [N, N m].
+        end: where the force acts, in the body [m].
+    """
+
+    def __init__(self, mass, center, inertia, lever, wrench, end):
+        self.mass, self.lever, self.wrench = mass, lever, wrench
+        self.center, self.end = np.asarray(center, dtype=float), np.asarray(end, dtype=float)
+        self.inertia = inertia + mass * (
+            self.center @ self.center * np.eye(3) - np.outer(self.center, self.center)
+        )
+
+    def acceleration(self, t, turn, omega, friction):
+        """Of the angle (body axes) under a friction moment, and the size of the force in the joint."""
+        force, couple = np.reshape(self.wrench(t), (2, 3))
+        force, couple = turn.inv().apply(force), turn.inv().apply(couple)
+        weight = turn.inv().apply([0.0, 0.0, -self.mass * GRAVITY])
+        moment = couple + np.cross(self.end, force) + np.cross(self.center, weight) + friction
+        alpha = np.linalg.solve(self.inertia, moment - np.cross(omega, self.inertia @ omega))
+        place = np.cross(alpha, self.center) + np.cross(omega, np.cross(omega, self.center))
+        return alpha, np.linalg.norm(self.mass * place - weight - force)
+
+    def slipping(self, t, turn, omega, direction):
+        """Acceleration where the joint slips in a direction: the limit is a fixed point."""
+        limit = 0.0
+        for _ in range(100):
+            alpha, load = self.acceleration(t, turn, omega, -limit * direction)
+            if abs(self.lever * load - limit) <= 1e-15 * limit:
+                break
+            limit = self.lever * load
+        return alpha
+
+    def holding(self, t, turn):
+        """The friction moment that holds the body at rest, and its limit."""
+        none, _ = self.acceleration(t, turn, np.zeros(3), np.zeros(3))
+        moment = -self.inertia @ none
+        return moment, self.lever * self.acceleration(t, turn, np.zeros(3), moment)[1]
+
+    def give_way(self, turn, first, last):
+        def margin(t):
+            moment, limit = self.holding(t, turn)
+            return limit - np.linalg.norm(moment)
+
+        return brentq(margin, first, last, xtol=1e-14)
+
+    def run(self, turn, start, duration, **settings):
+        """Rotation and angular velocity (body axes) a time after the body gave way."""
+
+        def rate(t, y):
+            here = Rotation.from_quat(y[:4])
+            omega = y[4:]
+            x, y_, z, w = y[:4]
+            a, b, c = omega
+            spin = 0.5 * np.array(
+                [w * a + y_ * c - z * b, w * b + z * a - x * c, w * c + x * b - y_ * a, 0.0]
+            )
+            spin[3] = -0.5 * (x * a + y_ * b + z * c)
+            return np.concatenate([spin, self.slipping(t, here, omega, omega / np.linalg.norm(omega))])
+
+        moment, _ = self.holding(start, turn)
+        first = np.concatenate([turn.as_quat(), -FIRST_SPEED * moment / np.linalg.norm(moment)])
+        return solve_ivp(rate, (start, start + duration), first, **{**SETTINGS, **settings}).y[:, -1]

@@ -1,0 +1,62 @@
+"""Random stances to the instant at which they give way and beyond; chains of ball joints."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+import pin_nonideal as pn
+
+from ..standing import balls, plate
+from .measure import at_most, ledger
+
+long = pytest.mark.stress
+
+LATEST = 20.0  # loads grow until then [s]
+GIVES_WAY = 1e-6  # [s]: the optimum is found by a program of its own, to 1e-9 of the limits
+STEPS = {"stance": 2000, "balls": 3000}
+BALANCE = 1e-6
+
+
+def stance(seed):
+    """A plate on three to six feet around its center of mass, under a load that grows."""
+    chosen = np.random.default_rng(seed)
+    count, inside = int(chosen.integers(3, 7)), False
+    while not inside:
+        places = 0.3 * chosen.normal(size=(count, 2))
+        inside = (ConvexHull(places).equations[:, 2] < -0.03).all()
+    feet, mu = np.column_stack([places, np.full(count, -0.3)]), chosen.uniform(0.2, 0.8)
+    first, growth, turning = chosen.normal(size=2), 15.0 * chosen.normal(size=2), 3.0 * chosen.normal()
+    at = [*0.2 * chosen.normal(size=2), -0.3 + chosen.uniform(-0.05, 0.05)]
+    return plate(feet, mu, lambda t: np.array([*first + growth * t, 0.0, 0.0, 0.0, turning * t]), at)
+
+
+@pytest.mark.parametrize("seeds", [range(10), pytest.param(range(10, 1010), marks=long)])
+def test_stances_give_way_in_time_and_in_few_steps(seeds):
+    late, steps, evaluations = [], [], []
+    for seed in seeds:
+        scene, oracle = stance(seed)
+        instant = oracle.give_way(LATEST)
+        run = pn.simulate(scene, instant + 1.0)
+        first = next(event.time for event in run.events if event.kind == "slip")
+        late.append(abs(first - instant))
+        steps.append(run.stats.steps)
+        evaluations.append(run.stats.evaluations)
+    print(f"evaluations: {np.median(evaluations):.0f} in the middle, {max(evaluations)} at most")
+    at_most("the instant of giving way [s]", max(late), GIVES_WAY)
+    at_most("steps", max(steps), STEPS["stance"])
+
+
+@pytest.mark.parametrize("links", [2, 6, pytest.param(20, marks=long)])
+def test_chains_of_ball_joints(links):
+    start = time.perf_counter()
+    run = pn.simulate(balls(links)[0], 5.0, record="energy", output_dt=0.1)
+    taken = time.perf_counter() - start
+    print(
+        f"{links} ball joints: {run.stats.evaluations} evaluations, {len(run.events)} events, {taken:.1f} s"
+    )
+    at_most("steps", run.stats.steps, STEPS["balls"])
+    at_most("energy balance", ledger(run), BALANCE)
