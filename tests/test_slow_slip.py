@@ -12,8 +12,8 @@ import pin_nonideal as pn
 
 from .standing import ball, balls, planar_state, plate, star
 
-# What the package's default tolerance allows over some tenths of a second, and the oracle's own error: it starts
-# with a speed of its own and integrates at 1e-9.
+# What the default tolerance allows over some tenths of a second, and the oracle's own error: it starts with a
+# speed of its own and integrates at 1e-9.
 REACHED = 3e-8
 # An onset from rest to where an explicit method serves again.
 ONSET = 100
