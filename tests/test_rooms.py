@@ -33,7 +33,7 @@ replay plotting pin_nonideal cli
 
 # Headers and sources of the core in the same way, a header together with its source.
 CORE_ORDER = """
-math: lanes unrolled spatial angles timefunction roots
+math: lanes unrolled spatial angles timefunction roots radau
 tree: mechanism model_extraction liegroup body_terms pinocchio_pass own_pass terms factor
 constraints: geometry coordinates kinds kind block row_layout row_system orthogonal row_factor rank redundancy
 forces: given_forces laws mode friction

@@ -1,7 +1,6 @@
 #include "run/collocation.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <Eigen/LU>
@@ -9,23 +8,21 @@
 
 #include "dynamics/evaluation.hpp"
 #include "dynamics/slip.hpp"
+#include "math/radau.hpp"
 #include "run/step_control.hpp"
 #include "tree/liegroup.hpp"
 
 namespace pn {
 
+using radau::points;
+using radau::table;
+using radau::with_weights;
+
 namespace {
 
-constexpr int n_stages = Collocation::stages;
-
-// Roots of P_7(2x - 1) - P_6(2x - 1), Legendre's polynomials.
-constexpr double points[n_stages] = {
-    0.02931642715978489197, 0.14807859966848429185, 0.33698469028115429910, 0.55867151877155013208,
-    0.76923386203005450092, 0.92694567131974111485, 1.0,
-};
 // The error estimate: the defect of the polynomial's rate at the start, in this part of the step. Of a smooth motion
 // that is the interpolant's error, a few times over.
-constexpr double defect_part = 1.0 / (2 * n_stages + 1);
+constexpr double defect_part = 1.0 / (2 * Collocation::stages + 1);
 
 constexpr int most_iterations = 14;
 constexpr double farthest_turn = 1.5;     // of a direction in the first iteration: a step that is not too long
@@ -35,50 +32,6 @@ constexpr double diverging = 0.9, diverging_first = 3.0;  // ratio of two change
 constexpr double rounding_part = 0.5;     // of the tolerance: changes below it that no longer shrink are rounding
 constexpr double perturbation = 1e-6;     // of a direction, for its response: root of the rounding, with a margin
 constexpr double rank_threshold = 1e-5;   // of the turns that slip without speed leaves open
-
-// What follows from the points: integrals of Lagrange's polynomials through them, a_ij = int_0^c_i l_j, and the values
-// of those at 0; barycentric weights of the points together with 0.
-struct Coefficients {
-    double a[n_stages][n_stages], at_start[n_stages], barycentric[n_stages + 1];
-
-    Coefficients() {
-        for (int j = 0; j < n_stages; ++j) {
-            std::array<long double, n_stages> l{1.0L};  // by powers
-            int degree = 0;
-            for (int k = 0; k < n_stages; ++k) {
-                if (k == j) continue;
-                const long double scale = 1.0L / (static_cast<long double>(points[j]) - points[k]);
-                ++degree;
-                for (int p = degree; p >= 0; --p) l[p] = ((p > 0 ? l[p - 1] : 0.0L) - points[k] * l[p]) * scale;
-            }
-            at_start[j] = static_cast<double>(l[0]);
-            for (int i = 0; i < n_stages; ++i) {
-                long double sum = 0.0L;
-                for (int p = n_stages - 1; p >= 0; --p) sum = (sum + l[p] / (p + 1)) * points[i];
-                a[i][j] = static_cast<double>(sum);
-            }
-        }
-        for (int j = 0; j <= n_stages; ++j) {
-            long double product = 1.0L;
-            for (int k = 0; k <= n_stages; ++k)
-                if (k != j) product *= node(j) - node(k);
-            barycentric[j] = static_cast<double>(1.0L / product);
-        }
-    }
-    static double node(int k) { return k == 0 ? 0.0 : points[k - 1]; }
-};
-const Coefficients table;
-
-// Calls use(k, weight) with the weight of each node, 0 at the step's start, in the polynomial through all of them.
-template <class Use>
-void with_weights(double x, const Use& use) {
-    double sum = 0.0, weight[n_stages + 1];
-    for (int k = 0; k <= n_stages; ++k) {
-        if (x == table.node(k)) return use(k, 1.0);
-        sum += weight[k] = table.barycentric[k] / (x - table.node(k));
-    }
-    for (int k = 0; k <= n_stages; ++k) use(k, weight[k] / sum);
-}
 
 }  // namespace
 
