@@ -68,8 +68,7 @@ class Plate:
         return np.column_stack([v[0] - v[2] * feet[:, 1], v[1] + v[2] * feet[:, 0]])
 
     def excess(self, t):
-        by_foot = [self.loads(feet, force, moment, -self.mu * directions * e[:, None]) for e in unit]
-        answer = np.array(by_foot).T - none[:, None]
+        """Least part of the limits by which some foot passes its own while all rest, and the forces."""
         feet, force, moment = self.given(t, 0.0)
         n = len(feet)
         balance = np.zeros((3, 2 * n))
