@@ -86,17 +86,6 @@ MISFITS = {
         {"constraints": [pn.PrescribedMotion("j2", pn.constant(0.0))]},
         'PrescribedMotion(j2): joint "j2" must have 1 degree of freedom; it has 3',
     ),
-    "friction of a floating base": (
-        {"laws": [pn.JointFriction("j4", coulomb=1.0)]},
-        'JointFriction(j4): joint "j4" must have 1 or 3 degrees of freedom; it has 6',
-    ),
-    "friction of a point anchor": (
-        {
-            "constraints": [pn.PointAnchor("j0 tip", name="ball")],
-            "laws": [pn.JointFriction("ball", coulomb=1.0)],
-        },
-        'JointFriction(ball): "ball" is a PointAnchor, which has no axis to rub about; use a HingeAnchor',
-    ),
     "constraint": (
         {"constraints": ["loop"]},
         "a constraint must be one of this package's or of Pinocchio's RigidConstraintModel, "

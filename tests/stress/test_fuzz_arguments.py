@@ -231,7 +231,7 @@ def test_the_public_names_are_all_drawn():
     """A new public function is fuzzed, or is one of these."""
     drawn_by_lot = {x.__name__ for x in (*DESCRIPTIONS, *TIMES)}
     drawn_by_lot |= {"simulate", "rollout", "solve", "Scene", "load", "resume", "replay", "plot", "sweep"}
-    plain = {"Event", "Stats", "Trajectory", "Solution", "robots"}
+    plain = {"Event", "LawRecord", "Stats", "Trajectory", "Solution", "robots"}
     errors = {
         n
         for n in pn.__all__

@@ -61,7 +61,12 @@ struct Search {
     // that makes it the only one: no limit depends on the load. The workspace ends evaluated there.
     bool keeps_suggestion() {
         if (p.needs_reactions || !question.breaking.empty()) return false;
-        apply(question.modes, false);
+        try {
+            apply(question.modes, false);
+        } catch (const Failure& failure) {  // what is driven does not stick
+            if (failure.kind != Failure::Kind::inconsistent) throw;
+            return false;
+        }
         const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
         return std::all_of(list.begin(), list.end(), [&](int e) {
             if (w.state.mode[e] == sticking)
@@ -288,12 +293,14 @@ struct Search {
         RestEquation& equation = problem.equation;
         if (trusted && (contraction(equation) < 1.0 || !is_searched(equation))) return false;
         VecX x = VecX::Zero(equation.n);
-        bool solved = find(problem, x);
-        if (!solved && release(problem, equation, std::vector<Mode>(p.frictions.size(), slip_plus)))
+        bool solved = find(problem, x), one_limit = true;
+        if (!solved && release(problem, equation, std::vector<Mode>(p.frictions.size(), slip_plus))) {
+            one_limit = false;  // some stick by one limit and slip by another: the search had not all of these motions
             solved = find(problem, x);
+        }
         while (solved && release(problem, equation, modes_of(equation, x))) solved = find(problem, x);
-        if (trusted && !proven) return false;
-        if (!solved && proven)
+        if (trusted && !(proven && solved)) return false;
+        if (!solved && proven && one_limit && !found)
             paradox(problem, std::min(0.0, equation.determinant_far_away()), {});
         if (solved) settle(equation, x, modes_of(equation, x));
         return solved;

@@ -250,7 +250,8 @@ struct Search {
         const double before = box.widest();
         for (int k = 0, at = 0; k <= n; ++k) {
             if (k == box.face) continue;
-            const double low = std::max(-radius[k], shift[at] - reach[at]), high = std::min(radius[k], shift[at] + reach[at]);
+            const double low = std::max(-radius[k], shift[at] - reach[at]);
+            const double high = std::min(radius[k], shift[at] + reach[at]);
             ++at;
             box.middle[k] += 0.5 * (low + high);
             box.radius[k] = std::min(box.radius[k], 0.5 * (high - low));

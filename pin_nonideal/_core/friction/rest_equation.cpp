@@ -207,7 +207,8 @@ double RestEquation::determinant_far_away() const {
         MatX slope = MatX::Zero(count, count);
         for (int i = 0; i < count; ++i)
             for (int j = 0; j < count; ++j)
-                slope(i, j) = dlimits.row(i).segment(elements[j].row, elements[j].dim).dot(part(x, elements[j]).normalized());
+                slope(i, j) =
+                    dlimits.row(i).segment(elements[j].row, elements[j].dim).dot(part(x, elements[j]).normalized());
         least = std::min(least, (MatX::Identity(count, count) - slope).determinant());
     }
     return least;
