@@ -75,7 +75,8 @@ RUNS = {
     ),
     "record": (
         {"record": "energi"},
-        "simulate: record must be one of 'a', 'forces', 'energy', 'power', 'laws', 'reactions'; got 'energi'; nearest: \"energy\"",
+        "simulate: record must be one of 'a', 'forces', 'energy', 'power', 'laws', 'reactions'; "
+        "got 'energi'; nearest: \"energy\"",
     ),
     "record list": ({"record": 3}, "simulate: record must be a list; got 3"),
     "progress": ({"progress": "bar"}, "simulate: progress must be one of True, False, None; got 'bar'"),

@@ -40,7 +40,11 @@ def test_stances_give_way_in_time_and_in_few_steps(seeds):
     for seed in seeds:
         scene, oracle = stance(seed)
         instant = oracle.give_way(LATEST)
-        run = pn.simulate(scene, instant + 1.0)
+        try:
+            run = pn.simulate(scene, instant + 1.0)
+        except pn.FrictionParadoxError as stopped:  # a foot that is kept though it pulls may leave no motion
+            run = stopped.trajectory
+            assert any(event.kind == "pull" and event.time > instant for event in run.events)
         first = next(event.time for event in run.events if event.kind == "slip")
         late.append(abs(first - instant))
         steps.append(run.stats.steps)
