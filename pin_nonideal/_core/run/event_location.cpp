@@ -91,7 +91,7 @@ void EventLocator::step_onto(const Crossing& crossing) {
     double size = stepper_.h, here = margin_at_end(watch);
     for (int it = 0; it < correction_passes; ++it) {
         if (known_rate) rate = slip_rate_along_mode(p, w, watch.index);
-        if (!(std::abs(rate) > 0.0)) return;
+        if (!(rate < 0.0)) return;  // it hardly dipped: from here on it moves away again, and no root lies ahead
         const double next = std::clamp(size - here / rate, 0.0, full), change = next - size, before = here;
         if (std::abs(change) <= resolution || (it > 0 && std::abs(change) < corrected_width * full)) return;
         correct_end_to(next, full);
