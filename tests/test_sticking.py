@@ -356,8 +356,8 @@ def test_a_joint_that_sticks_while_others_move(law):
 
 CONSTANT = {"coulomb": 0.05, "viscous": 0.01}
 LOADED = {"mu": 0.01, "radius": 0.02, "preload": 0.01}
-# Four joints reverse at one instant, while others that share a load chatter: to the end of that step they go on by
-# the force of the old direction (docs/limits.md).
+# Four joints reverse at one instant, while others that share a load chatter: to the end of that step
+# they go on by the force of the old direction (docs/limits.md).
 LATE = pytest.mark.xfail(reason="joints that reverse together amid chatter are turned late", strict=True)
 
 
