@@ -59,8 +59,10 @@ EPILOG = """parts:
   evaluation   seconds of one constrained acceleration, against Pinocchio's C++ and MuJoCo
   scaling      the same against the number of loops, N four-bars
   accuracy     run time against error, problem by problem
+  growth       the same and whole runs against links, mechanisms, feet, runs; errors beside long double
   features     what a loop, a law, sticking, recording add to an evaluation and a step
   batches      steps a second of many states in one and two threads
+  contacts     bouncing, sliding, standing: time against error, a step, an impact, open contacts
   long         ten simulated seconds: cost, closure gap, energy change
   footprint    time and memory of an import
 actions:
@@ -169,6 +171,12 @@ def scaling(options: argparse.Namespace) -> Any:
     return scaling.measure(options.quick, say)
 
 
+def growth(options: argparse.Namespace) -> Any:
+    from . import growth
+
+    return growth.measure(options.quick, options.only, say)
+
+
 def features(options: argparse.Namespace) -> Any:
     from . import features
 
@@ -185,6 +193,13 @@ def long(options: argparse.Namespace) -> Any:
     from . import long
 
     return long.measure(chosen_tools(options), options.quick, options.only, say)
+
+
+def contacts(options: argparse.Namespace) -> Any:
+    from . import contacts
+
+    rivals = any(tool.name == "mujoco" for tool in chosen_tools(options))
+    return contacts.measure(rivals, options.quick, options.only, say)
 
 
 def footprint(options: argparse.Namespace) -> Any:
@@ -234,7 +249,8 @@ def report(options: argparse.Namespace) -> int:
 
 
 PARTS: dict[str, Callable[[argparse.Namespace], Any]] = {
-    part.__name__: part for part in (evaluation, scaling, accuracy, features, batches, long, footprint)
+    part.__name__: part
+    for part in (evaluation, scaling, growth, accuracy, features, batches, contacts, long, footprint)
 }
 ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "build-peers": build_peers,

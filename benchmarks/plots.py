@@ -13,6 +13,19 @@ from .goals import Records
 
 COLORS = {"pin_nonideal": "C0", "pin+scipy": "C2", "mujoco": "C1", "exudyn": "C4", "drake": "C3"}
 COLUMNS = 3
+MARKERS, DASHES = "osD^vP*X", ("-", (0, (5, 2)), (0, (1, 1.5)), "-.")
+
+
+def look(number: int, count: int) -> dict[str, Any]:
+    """Marker and line of a series: where several coincide the first is the widest and the last is on top."""
+    rest = (count - number) / max(count, 1)
+    return {
+        "marker": MARKERS[number % len(MARKERS)],
+        "markersize": 3.0 + 4.0 * rest,
+        "markerfacecolor": "none",
+        "linestyle": DASHES[number % len(DASHES)],
+        "linewidth": 0.8 + 1.6 * rest,
+    }
 
 
 def lower_front(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -30,7 +43,7 @@ def accuracy(results: list[dict[str, Any]]) -> Figure:
     figure = Figure(figsize=(4.0 * COLUMNS, 3.0 * rows), layout="constrained")
     panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
     for panel, result in zip(panels, results, strict=False):
-        for tool, color in COLORS.items():
+        for number, (tool, color) in enumerate(COLORS.items()):
             points = [
                 (row["seconds"] * 1e3, max(row["error"], result["reference"]["uncertainty"]))
                 for row in result["runs"]
@@ -38,7 +51,7 @@ def accuracy(results: list[dict[str, Any]]) -> Figure:
             ]
             if points:
                 curve = zip(*lower_front(points), strict=True)
-                panel.loglog(*curve, "o-", color=color, markersize=3, label=tool)
+                panel.loglog(*curve, color=color, label=tool, **look(number, len(COLORS)))
         label(panel, result["title"], "time of the run [ms]", "error [rad or m]")
     for panel in panels[len(results) :]:
         panel.remove()
@@ -55,13 +68,33 @@ def scaling(results: dict[str, Any]) -> Figure:
     figure = Figure(figsize=(5.0, 3.6), layout="constrained")
     panel = figure.subplots()
     names = dict.fromkeys(name for row in results["sizes"] for name in row.get("seconds", ()))
-    for name in names:
+    for number, name in enumerate(names):
         points = [
             (r["N"], r["seconds"][name] * 1e6) for r in results["sizes"] if name in r.get("seconds", ())
         ]
-        panel.loglog(*zip(*points, strict=True), "o-", markersize=3, label=name)
+        panel.loglog(*zip(*points, strict=True), label=name, **look(number, len(names)))
     label(panel, "N four-bars", "N", "one evaluation [us]")
     panel.legend(fontsize="small")
+    return figure
+
+
+def growth(results: list[dict[str, Any]]) -> Figure:
+    """A panel for each case of several sizes: time over size, of everybody in every group."""
+    shown = [result for result in results if result["exponents"]]
+    rows = max(1, -(-len(shown) // COLUMNS))
+    figure = Figure(figsize=(4.0 * COLUMNS, 3.0 * rows), layout="constrained")
+    panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
+    for panel, result in zip(panels, shown, strict=False):
+        series: dict[str, list[tuple[int, float]]] = {}
+        for row in result["rows"]:
+            for name, seconds in row["seconds"].items():
+                series.setdefault(f"{row['group']}: {name}", []).append((row["size"], 1e3 * seconds))
+        for number, (name, points) in enumerate(series.items()):
+            panel.loglog(*zip(*points, strict=True), label=name, **look(number, len(series)))
+        label(panel, result["case"], "size", "time [ms]")
+        panel.legend(fontsize="x-small")
+    for panel in panels[len(shown) :]:
+        panel.remove()
     return figure
 
 
@@ -74,7 +107,7 @@ def label(panel: Axes, title: str, x: str, y: str) -> None:
     panel.minorticks_off()
 
 
-FIGURES = {"accuracy": accuracy, "scaling": scaling}
+FIGURES = {"accuracy": accuracy, "scaling": scaling, "growth": growth}
 
 
 def draw(records: Records, folder: Path) -> None:

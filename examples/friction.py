@@ -9,19 +9,13 @@ with NAME among loaded_joint, rough_four_bar, panda_settling, belt_oscillator, w
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
-
 import numpy as np
+from printed import run_examples, show
 
 import pin_nonideal as pn
 
 G = 9.81
 TIGHT = {"rtol": 1e-10, "atol": 1e-11}
-
-
-def show(what, computed, expected):
-    print(f"  {what:46s} {computed:18.12f} {expected:18.12f} {abs(computed - expected):9.1e}")
 
 
 def first(run, kind):
@@ -87,19 +81,7 @@ EXAMPLES = {
 
 
 def main(arguments=None):
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("names", nargs="*", help=f"any of {', '.join(EXAMPLES)}; all when left out")
-    parser.add_argument("--html", metavar="FOLDER", type=Path, help="folder for the replays")
-    options = parser.parse_args(arguments)
-    unknown = sorted(set(options.names) - set(EXAMPLES))
-    if unknown:
-        parser.error(f"no example {', '.join(unknown)}; known: {', '.join(EXAMPLES)}")
-    for name in options.names or EXAMPLES:
-        print(f"{name:48s} {'computed':>18s} {'expected':>18s}")
-        run = EXAMPLES[name]()
-        if options.html is not None:
-            options.html.mkdir(parents=True, exist_ok=True)
-            print(f"  wrote {pn.replay(run, options.html / f'{name}.html')}")
+    run_examples(__doc__, EXAMPLES, arguments)
 
 
 if __name__ == "__main__":

@@ -219,4 +219,5 @@ def _anchor_rows(model, data, kind, one, two, numbers, objtype):
         mujoco.mj_jac(model, data, jp, jr, point, body)
         jacobians.append((jp, jr))
     place = jacobians[0][0] - jacobians[1][0]
-    return place if kind == CONNECT else np.vstack([place, jacobians[0][1] - jacobians[1][1]])
+    turns = kind == WELD and numbers[10] != 0.0  # the scale of its torques
+    return place if not turns else np.vstack([place, jacobians[0][1] - jacobians[1][1]])

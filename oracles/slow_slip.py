@@ -7,6 +7,8 @@ speed far below what the tolerance sees.
 
 from __future__ import annotations
 
+from itertools import combinations, product
+
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize
@@ -15,13 +17,43 @@ from scipy.spatial.transform import Rotation
 GRAVITY = 9.81
 FIRST_SPEED = 1e-9  # of slip, along the direction in which it begins
 DISTANCE = 1e-11  # of the search for forces within the limits
+NOISE = 1e-10  # part of the loads that a dense solution leaves
 SETTINGS = {"method": "Radau", "rtol": 1e-9, "atol": 1e-13}
+
+
+def shortest_pushes(tilts, needed, least):
+    """The shortest x >= 0 with tilts x = needed, by trying which are zero; `least` where there is none."""
+    n = len(least)
+    size = np.abs(least).max()
+    for count in range(1, n):
+        for zero in combinations(range(n), count):
+            kept = [k for k in range(n) if k not in zero]
+            dual = np.linalg.lstsq(tilts[:, kept] @ tilts[:, kept].T, needed, rcond=1e-12)[0]
+            x = tilts.T @ dual
+            x[list(zero)] = 0.0
+            met = np.abs(tilts @ x - needed).max() <= NOISE * size
+            if met and x.min() >= -NOISE * size and (tilts[:, list(zero)].T @ dual <= NOISE * size).all():
+                return x
+    return least
+
+
+def solved(lack, x):
+    """Zero of a function that is piecewise linear, by Newton's method from x."""
+    for _ in range(50):
+        now = lack(x)
+        step = 1e-6 * np.abs(x).max()
+        J = np.array([(lack(x + step * e) - lack(x - step * e)) / (2.0 * step) for e in np.eye(len(x))]).T
+        x = x - np.linalg.solve(J, now)
+        if np.abs(now).max() <= 1e-13 * np.abs(x).max():
+            break
+    return x
 
 
 class Plate:
     """A body that three feet or more hold to a level plane, under a wrench that moves with it.
 
-    Feet stand below the center of mass, loaded by least norm over those that share the load.
+    Feet stand below the center of mass, loaded by least norm over those that share the load: of all loads, or
+    of those that do not pull.
 
     Attributes:
         feet: places of the feet (n, 3) in the body [m], all of the same height.
@@ -30,10 +62,12 @@ class Plate:
         at: where the force acts [m].
         mass: of the body [kg].
         inertia: about each axis [kg m^2].
+        pulls: whether feet are kept where they would have to pull.
     """
 
-    def __init__(self, feet, mu, wrench, at, mass=10.0, inertia=0.3):
+    def __init__(self, feet, mu, wrench, at, mass=10.0, inertia=0.3, pulls=True):
         self.feet, self.at = np.asarray(feet, dtype=float), np.asarray(at, dtype=float)
+        self.pulls = pulls
         self.mu, self.wrench, self.mass, self.inertia = mu, wrench, mass, inertia
 
     def given(self, t, angle):
@@ -48,20 +82,37 @@ class Plate:
         tilts = np.vstack([np.ones(len(feet)), feet[:, 1], -feet[:, 0]])
         h = feet[:, 2]
         by_friction = np.array([0.0, -(h * friction[:, 1]).sum(), (h * friction[:, 0]).sum()])
-        return np.linalg.pinv(tilts) @ -(np.array([force[2], moment[0], moment[1]]) + by_friction)
+        needed = -(np.array([force[2], moment[0], moment[1]]) + by_friction)
+        least = np.linalg.pinv(tilts) @ needed
+        return least if self.pulls or least.min() >= 0.0 else shortest_pushes(tilts, needed, least)
 
     def acceleration(self, t, angle, directions):
         """Of x, y and the angle where the feet slip in these directions (n, 2); and the loads."""
         feet, force, moment = self.given(t, angle)
-        none = self.loads(feet, force, moment, np.zeros((len(feet), 2)))
-        unit = np.eye(len(feet))
-        answer = np.array(
-            [self.loads(feet, force, moment, -self.mu * directions * e[:, None]) - none for e in unit]
-        ).T
-        loads = np.linalg.solve(unit - answer, none)
+
+        def lack(loads):
+            return loads - self.loads(feet, force, moment, -self.mu * loads[:, None] * directions)
+
+        start = self.loads(feet, force, moment, np.zeros((len(feet), 2)))
+        loads = solved(lack, start)
         friction = -self.mu * loads[:, None] * directions
         turning = moment[2] + (feet[:, 0] * friction[:, 1] - feet[:, 1] * friction[:, 0]).sum()
         return np.array([*(force[:2] + friction.sum(axis=0)) / self.mass, turning / self.inertia]), loads
+
+    def sharings(self, t, angle, directions, mu):
+        """All loads of kept feet that slip in these directions, and rub where they pull as well."""
+        feet, force, moment = self.given(t, angle)
+        unit = np.eye(len(feet))
+        none = self.loads(feet, force, moment, 0.0 * directions)
+        answer = np.array(
+            [self.loads(feet, force, moment, -mu * directions * e[:, None]) - none for e in unit]
+        ).T
+        found = []
+        for signs in product((1.0, -1.0), repeat=len(feet)):
+            sizes = np.linalg.solve(np.diag(signs) - answer, none)
+            if sizes.min() >= 0.0:
+                found.append(sizes * signs)
+        return found
 
     def slip(self, angle, v):
         feet = Rotation.from_rotvec([0.0, 0.0, angle]).apply(self.feet)

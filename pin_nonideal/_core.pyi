@@ -32,6 +32,9 @@ class FailureKind(enum.Enum):
 
     not_finite = 2
 
+    impact_energy = 11
+    """elements: blocks of the contacts; value: energy gained"""
+
     paradox = 3
     """elements: frictional elements; value: determinant"""
 
@@ -50,7 +53,10 @@ class FailureKind(enum.Enum):
     steps = 8
     """value: number of steps, which is all that the run may take"""
 
-    interrupted = 9
+    wall = 9
+    """value: wall time, which is all that the run may take"""
+
+    interrupted = 10
 
 class CoreFailure(Exception):
     kind: FailureKind
@@ -102,6 +108,11 @@ class Mode(enum.IntEnum):
 
     slip_plus = 1
 
+    unloaded = 2
+    """
+    carries no friction: its contact is open, or what asks does so without it
+    """
+
 class Shown(enum.Enum):
     """What a replay shows of a constraint."""
 
@@ -121,6 +132,15 @@ class Shown(enum.Enum):
 
     gear = 7
 
+class ImpactLaw(enum.Enum):
+    """What restitution means in an impact."""
+
+    newton = 0
+    """rate at which a gap opens over that at which it closed"""
+
+    poisson = 1
+    """impulse of expansion over that of compression"""
+
 class Reaction(enum.Enum):
     """Of which motion a law reads the reactions."""
 
@@ -134,6 +154,14 @@ class Builder:
     def __init__(self, model: object, terms: Provider = Provider.core) -> None: ...
 
     def keep_rows(self, block: int, rows: Sequence[int]) -> None: ...
+
+    def add_copy(self, row: int, first: int, factor: float) -> None: ...
+
+    def let_open(self, restitution: float) -> None: ...
+
+    def set_impact(self, law: ImpactLaw) -> None: ...
+
+    def order_contacts(self, blocks: Sequence[int]) -> None: ...
 
     def finish(self) -> Program: ...
 
@@ -180,6 +208,10 @@ class Builder:
 
     def add_contact(self, name: str, frame: tuple[int, Sequence[float], Sequence[float]], plane: tuple[int, Sequence[float], Sequence[float]], normal: Sequence[float], radius: float) -> int: ...
 
+    def add_capsules(self, name: str, frame1: tuple[int, Sequence[float], Sequence[float]], frame2: tuple[int, Sequence[float], Sequence[float]], half1: float, half2: float, radius: float) -> int: ...
+
+    def add_box(self, name: str, frame1: tuple[int, Sequence[float], Sequence[float]], frame2: tuple[int, Sequence[float], Sequence[float]], half: Sequence[float], radius: float) -> int: ...
+
     def add_frame(self, name: str, frame1: tuple[int, Sequence[float], Sequence[float]], frame2: tuple[int, Sequence[float], Sequence[float]]) -> int: ...
 
     def add_hinge(self, name: str, frame1: tuple[int, Sequence[float], Sequence[float]], frame2: tuple[int, Sequence[float], Sequence[float]], axis: Sequence[float], normal1: Sequence[float], normal2: Sequence[float]) -> int: ...
@@ -194,7 +226,11 @@ class Builder:
 
     def add_motion(self, name: str, joint: int, function: object, period: float) -> int: ...
 
+    def add_limit(self, name: str, joint: int, bound: float, sign: float) -> int: ...
+
     def add_user(self, name: str, size: int, rows: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]], tuple[Annotated[NDArray[numpy.float64], dict(shape=(None, None))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]] | None, residual: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))]], Annotated[NDArray[numpy.float64], dict(shape=(None,))]] | None, rate: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]], Annotated[NDArray[numpy.float64], dict(shape=(None,))]] | None) -> int: ...
+
+    def add_user_gap(self, name: str, rows: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]], tuple[Annotated[NDArray[numpy.float64], dict(shape=(None, None))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]] | None, gap: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))]], Annotated[NDArray[numpy.float64], dict(shape=(None,))]] | None, rate: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]], Annotated[NDArray[numpy.float64], dict(shape=(None,))]] | None) -> int: ...
 
     def add_dof_slip(self, name: str, dof: int, count: int) -> int: ...
 
@@ -204,9 +240,13 @@ class Builder:
 
     def add_contact_slip(self, name: str, frame: tuple[int, Sequence[float], Sequence[float]], plane: tuple[int, Sequence[float], Sequence[float]], radius: float, tangent1: Sequence[float], tangent2: Sequence[float], normal: Sequence[float]) -> int: ...
 
+    def add_capsules_slip(self, name: str, frame1: tuple[int, Sequence[float], Sequence[float]], frame2: tuple[int, Sequence[float], Sequence[float]], half1: float, half2: float, radius1: float) -> int: ...
+
+    def add_box_slip(self, name: str, frame1: tuple[int, Sequence[float], Sequence[float]], frame2: tuple[int, Sequence[float], Sequence[float]], half: Sequence[float], radius1: float) -> int: ...
+
     def add_coupling_slip(self, name: str, joint1: int, joint2: int, weight1: float, weight2: float) -> int: ...
 
-    def add_user_slip(self, name: str, direction: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))]], Annotated[NDArray[numpy.float64], dict(shape=(None,))]] | None) -> int: ...
+    def add_user_slip(self, name: str, size: int, directions: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))]], Annotated[NDArray[numpy.float64], dict(shape=(None,))]] | None) -> int: ...
 
 class ConstraintRows:
     @property
@@ -256,6 +296,9 @@ class Instant:
     def modes(self) -> list[Mode]: ...
 
     @property
+    def closed(self) -> list[int]: ...
+
+    @property
     def friction(self) -> list[Annotated[NDArray[numpy.float64], dict(shape=(None,))]]: ...
 
     @property
@@ -271,7 +314,11 @@ class Runner:
 
     def rows(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], t: float) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]: ...
 
+    def slip_rows(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], t: float) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
     def terms(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]: ...
+
+    def energies(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> tuple[float, float]: ...
 
     def project(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], t: float, far: float) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], float, float, float]: ...
 
@@ -289,7 +336,7 @@ class Runner:
     @property
     def factorization(self) -> tuple[float, bool, bool, bool]: ...
 
-    def simulate(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], options: pin_nonideal.runs.options.RunOptions, tick: Callable[[float], None] | None = None, save: Callable[[bytes], None] | None = None, save_interval: float = 0.0) -> Outcome: ...
+    def simulate(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], options: pin_nonideal.runs.options.RunOptions, tick: Callable[[float], None] | None = None, save: Callable[[bytes], None] | None = None, save_interval: float = 0.0, events: Sequence[tuple[Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]], float], int, int]] = [], callback: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]], object] | None = None, hint: Callable[[float, int, float, bool], None] | None = None) -> Outcome: ...
 
     def resume(self, state: bytes, options: pin_nonideal.runs.options.RunOptions, tick: Callable[[float], None] | None = None, save: Callable[[bytes], None] | None = None, save_interval: float = 0.0) -> Outcome: ...
 
@@ -329,6 +376,18 @@ class EventKind(enum.Enum):
     several = 5
     """from here on the laws allow other motions too"""
 
+    user = 6
+    """a function of the user crosses zero"""
+
+    impact = 7
+    """a contact strikes, with an impulse"""
+
+    touch_down = 8
+    """a contact closes without an impulse, or its bouncing ends"""
+
+    lift_off = 9
+    """a contact opens"""
+
 class Event:
     @property
     def time(self) -> float: ...
@@ -338,6 +397,21 @@ class Event:
 
     @property
     def element(self) -> int: ...
+
+    @property
+    def energy_change(self) -> float: ...
+
+    @property
+    def impulse(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def v_minus(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def v_plus(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def of_contact(self) -> bool: ...
 
 class Outcome:
     @property
@@ -360,6 +434,9 @@ class Outcome:
 
     @property
     def a(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def tau(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
 
     @property
     def F_ideal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
@@ -392,7 +469,31 @@ class Outcome:
     def reactions(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
 
     @property
+    def contact_forces(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
     def modes(self) -> Annotated[NDArray[numpy.int8], dict(shape=(None,))]: ...
+
+    @property
+    def dense_times(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def dense_states(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def dense_modes(self) -> Annotated[NDArray[numpy.int8], dict(shape=(None,))]: ...
+
+    @property
+    def dense_directions(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def dense_torque(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def dense_moved(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def closed(self) -> Annotated[NDArray[numpy.int8], dict(shape=(None,))]: ...
 
     @property
     def events(self) -> list[Event]: ...
@@ -402,6 +503,12 @@ class Outcome:
 
     @property
     def rejected(self) -> int: ...
+
+    @property
+    def limited(self) -> int: ...
+
+    @property
+    def rounding(self) -> float: ...
 
     @property
     def evaluations(self) -> int: ...
@@ -416,14 +523,25 @@ class Outcome:
     def iterations(self) -> int: ...
 
     @property
+    def contact_misses(self) -> tuple[float, float, float]: ...
+
+    @property
     def stopped(self) -> BaseException | None: ...
 
-def nearest_states(program: Program, q: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], t: float, far: float, threads: int) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]: ...
+def nearest_states(program: Program, q: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], t: float, far: float, threads: int, names: Sequence[tuple[str, int, str]], values: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]: ...
 
-def rollout(program: Program, q: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], options: pin_nonideal.runs.options.RunOptions, threads: int) -> list[Outcome | None]: ...
+def dense_points(method: str) -> int: ...
+
+def sample_inside(program: Program, options: pin_nonideal.runs.options.RunOptions, t: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], y: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], modes: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], directions: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], torque: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], moved: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> Outcome: ...
+
+def rollout(program: Program, q: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], options: pin_nonideal.runs.options.RunOptions, threads: int, names: Sequence[tuple[str, int, str]], values: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> list[Outcome | None]: ...
+
+def with_numbers(program: Program, names: Sequence[tuple[str, int, str]], values: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> Program: ...
+
+def rollout_arrays(program: Program, q: NDArray[numpy.float64], v: NDArray[numpy.float64], options: pin_nonideal.runs.options.RunOptions, threads: int, names: Sequence[tuple[str, int, str]], values: NDArray[numpy.float64]) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], list[tuple[int, BaseException]]]: ...
 
 class FollowedRun:
-    def __init__(self, program: Program, options: pin_nonideal.runs.options.RunOptions, tick: Callable[[float], None] | None = None) -> None: ...
+    def __init__(self, program: Program, options: pin_nonideal.runs.options.RunOptions, tick: Callable[[float], None] | None = None, events: Sequence[tuple[Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]], float], int, int]] = []) -> None: ...
 
     def start(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None: ...
 
@@ -437,12 +555,37 @@ class FollowedRun:
     def t(self) -> float: ...
 
     @property
+    def done(self) -> bool: ...
+
+    @property
     def y(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
 
     @property
     def rate(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
 
     def outcome(self) -> Outcome: ...
+
+class SteppedRun:
+    def __init__(self, program: Program, method: str, period: float, dt: float, rtol: float, atol: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None: ...
+
+    def begin(self, q: object, v: object, t: float, tau: object | None) -> None: ...
+
+    def advance(self, tau: object | None) -> None: ...
+
+    def step(self, q: object, v: object, t: float, tau: object | None) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]: ...
+
+    def state(self) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]: ...
+
+    @property
+    def begun(self) -> bool: ...
+
+    @property
+    def t(self) -> float: ...
+
+    @property
+    def modes(self) -> list[Mode]: ...
+
+    def take_events(self) -> list[Event]: ...
 
 class Program:
     @property
@@ -453,6 +596,15 @@ class Program:
 
     @property
     def states(self) -> int: ...
+
+    @property
+    def framed_contacts(self) -> list[int]: ...
+
+    @property
+    def contacts(self) -> list[int]: ...
+
+    @property
+    def first_gap(self) -> int: ...
 
     @property
     def law_names(self) -> list[str]: ...
@@ -470,8 +622,44 @@ class Program:
     def element_laws(self) -> list[int]: ...
 
     @property
+    def element_sizes(self) -> list[int]: ...
+
+    @property
     def element_names(self) -> list[str]: ...
 
     def runner(self) -> Runner: ...
+
+class ConeStatus(enum.Enum):
+    """What came of a problem of contacts and friction."""
+
+    solved = 0
+
+    infeasible = 1
+
+    jammed = 2
+
+    failed = 3
+
+class ConeSolver:
+    def __init__(self) -> None: ...
+
+    def solve(self, W: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], w0: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], dims: Sequence[int], bounds: Sequence[float], contacts: int, start: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None) -> ConeStatus: ...
+
+    def again(self, count: int, warm: bool) -> None: ...
+
+    @property
+    def f(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def residuals(self) -> tuple[float, float, float]: ...
+
+    @property
+    def certificate(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def unique_shares(self) -> bool: ...
+
+    @property
+    def steps(self) -> tuple[int, int]: ...
 
 def friction_program(W: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], alpha0: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], dims: Sequence[int], limits: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...

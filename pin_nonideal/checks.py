@@ -74,6 +74,29 @@ def positive(what: str, value: object) -> float:
     return result
 
 
+def fraction(what: str, value: object) -> float:
+    """A number from 0 to 1.
+
+    Raises:
+        InputError: it is none.
+    """
+    result = nonnegative(what, value)
+    if result > 1.0:
+        raise InputError(f"{what} must be at most 1; got {result:g}")
+    return result
+
+
+def flag(what: str, value: object) -> bool:
+    """True or False.
+
+    Raises:
+        InputError: it is neither.
+    """
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{what} must be True or False; got {value!r}")
+    return bool(value)
+
+
 def count(what: str, value: object, *, least: int = 0, most: int = 1_000_000_000) -> int:
     """An integer from `least` to `most`.
 
@@ -117,7 +140,10 @@ def choice(what: str, value: object, allowed: Sequence[Any]) -> Any:
     Raises:
         InputError: it is another value; the message lists the allowed ones.
     """
-    if not any(value is a or (isinstance(value, type(a)) and value == a) for a in allowed):
+    for a in allowed:
+        if value is a:
+            return value
+    if not any(isinstance(value, type(a)) and value == a for a in allowed):
         names = [a for a in allowed if isinstance(a, str)]
         hint = nearest(value, names) if isinstance(value, str) else ""
         if not hint.startswith("; nearest"):  # the message lists them already
@@ -163,8 +189,11 @@ def array(what: str, value: object, shape: Sequence[int | None]) -> NDArray[np.f
     Raises:
         InputError: wrong shape, not numbers, or not finite.
     """
-    wanted = str(tuple("n" if s is None else s for s in shape)).replace("'", "")
     result, where = floats(value)
+    if result is not None and where is None and result.shape == shape:
+        result.setflags(write=False)
+        return result
+    wanted = str(tuple("n" if s is None else s for s in shape)).replace("'", "")
     if result is None:
         raise InputError(f"{what} must be an array of numbers of shape {wanted}; got {value!r}")
     if result.ndim != len(shape) or any(s not in (None, n) for s, n in zip(shape, result.shape, strict=True)):

@@ -1,4 +1,4 @@
-"""The command `pin-nonideal`: run a robot, list the robots, describe one, run the benchmarks.
+"""The command `pin-nonideal`: run robots, resume, replay and sweep, describe them, find where they rest.
 
 Exit codes: 0 done; 2 an error of the package, told in one line on standard error; 130 interrupted by Ctrl-C.
 What a run had computed when it failed or was interrupted is written to the files asked for all the same.
@@ -11,23 +11,38 @@ import os
 import runpy
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pin_nonideal as pn
 
+from .commands import (
+    completion,
+    describe_robot,
+    events_told,
+    named_values,
+    plain_value,
+    replay_file,
+    rest_robot,
+    sweep_file,
+)
 from .errors import InputError, OutputError, PinNonidealError, RunError, RunInterrupted
+from .files import mode_of
 from .loading import robots
 from .plotting import picture_format
+from .rendering import render
 from .scene import SEVERAL
 from .trajectory import Trajectory
 from .types import Table
+
+Writer = tuple[Path, Callable[[Trajectory, Path], Path]]
 
 EXIT_ERROR = 2
 EXIT_UNREAD = 141  # 128 and the number of SIGPIPE, as shells show it
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 
-# Samples per second of simulated time when pictures are asked for: a replay page shows no more.
-PICTURE_RATE = 60.0
+# Samples when pictures are asked for: so many a second of simulated time, within these bounds over a run.
+PICTURE_RATE, PICTURE_SAMPLES = 60.0, (1200, 20_000)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -45,7 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options.rest = rest
     try:
         code = int(options.command(options))
-        sys.stdout.flush()
+        if sys.stdout is not None:  # which a shell may have closed
+            sys.stdout.flush()
         return code
     except RunInterrupted as error:
         print(f"pin-nonideal: interrupted: {error}", file=sys.stderr)
@@ -54,11 +70,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("pin-nonideal: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:  # the reader of the output, such as `head`, has had enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _print_no_more()
         return EXIT_UNREAD
     except PinNonidealError as error:
         print(f"pin-nonideal: error: {error}", file=sys.stderr)
         return EXIT_ERROR
+    except OSError as error:  # a disk that is full, or a terminal that went away
+        print(f"pin-nonideal: error: cannot print: {error.strerror or error}", file=sys.stderr)
+        _print_no_more()
+        return EXIT_ERROR
+
+
+def _print_no_more() -> None:
+    """Leaves what could not be printed to nobody, so that the interpreter does not try again at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -82,7 +107,7 @@ def _parser() -> argparse.ArgumentParser:
         "--output-dt",
         type=float,
         metavar="S",
-        help=f"time between samples [s] (default: every step; 1/{PICTURE_RATE:.0f} with --html or --plot)",
+        help="time between samples [s] (default: every step; with --html or --plot at least 1200 samples)",
     )
     run.add_argument(
         "--record",
@@ -95,19 +120,58 @@ def _parser() -> argparse.ArgumentParser:
         choices=SEVERAL,
         help="where friction allows several motions: stop (default), or go on with the nearest",
     )
-    run.add_argument(
-        "--html", type=Path, metavar="FILE", help="write the replay, one page that needs no network"
-    )
-    run.add_argument("--plot", type=Path, metavar="FILE", help="write a figure (.png, .pdf, .svg)")
-    run.add_argument("--save", type=Path, metavar="FILE", help="write the arrays (.npz)")
+    run.add_argument("--checkpoint", type=Path, metavar="FILE", help="keep the run in a file, for `resume`")
+    _add_start(run)
+    run.add_argument("--v0", **_start("velocity"))
+    _add_writers(run)
     run.set_defaults(command=_run)
+
+    resume = commands.add_parser("resume", help="go on with a run from its checkpoint")
+    resume.add_argument("file", type=Path, metavar="CHECKPOINT", help="file of `run --checkpoint`")
+    _add_writers(resume)
+    resume.set_defaults(command=_resume)
+
+    replay = commands.add_parser("replay", help="write the page of a saved run")
+    replay.add_argument("run", type=Path, metavar="RUN.npz", help="file of `run --save`")
+    replay.add_argument("page", type=Path, nargs="?", metavar="PAGE.html", help="default: the run's name")
+    replay.add_argument("--robot", metavar="NAME_OR_PATH", help="of a run that does not know it")
+    replay.set_defaults(command=replay_file)
+
+    sweep = commands.add_parser("sweep", help="run a robot with many parameters, into a folder")
+    sweep.add_argument("file", type=Path, metavar="SWEEP.yaml", help="robot, duration, grid or samples, ...")
+    sweep.add_argument("--jobs", type=int, metavar="N", help="parallel jobs; -1 for all processors")
+    sweep.set_defaults(command=sweep_file)
+
+    equilibrium = commands.add_parser("equilibrium", help="find where a robot rests")
+    _add_robot(equilibrium)
+    _add_start(equilibrium)
+    equilibrium.add_argument("--json", action="store_true", help="for programs")
+    equilibrium.set_defaults(command=_equilibrium)
 
     listing = commands.add_parser("list", help="robots of the package, by name")
     listing.set_defaults(command=_list)
 
     info = commands.add_parser("info", help="joints, loops, rows, rank, mobility and what is skipped")
     _add_robot(info)
+    info.add_argument("--json", action="store_true", help="all tables, for programs")
     info.set_defaults(command=_info)
+
+    picture = commands.add_parser("render", help="picture or video of a run: .png, .gif, .webm, .mp4")
+    picture.add_argument("run", metavar="RUN", help="file that `run --save` wrote (.npz)")
+    picture.add_argument("out", type=Path, metavar="OUT", help="file to write")
+    picture.add_argument(
+        "--robot", metavar="NAME_OR_PATH", help="robot of the run (default: the name that the run bears)"
+    )
+    picture.add_argument("--size", default="960x540", metavar="WxH", help="pixels (default: 960x540)")
+    picture.add_argument("--seconds", type=float, default=6.0, help="length of a video [s] (default: 6)")
+    picture.add_argument("--fps", type=float, default=25.0, help="pictures a second (default: 25)")
+    picture.add_argument("--time", type=float, metavar="S", help="of a single picture [s]")
+    picture.add_argument("--set", action="append", default=[], dest="settings", metavar="KEY=VALUE")
+    picture.set_defaults(command=_render)
+
+    complete = commands.add_parser("completion", help="print a script that completes words in a shell")
+    complete.add_argument("shell", choices=("bash", "zsh", "fish"))
+    complete.set_defaults(command=_complete)
 
     bench = commands.add_parser(
         "bench", help="run the benchmarks of a checkout; further words go to them", add_help=False
@@ -130,29 +194,86 @@ def _add_robot(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _start(what: str) -> Table:
+    """An option that gives a state by joint name."""
+    return {
+        "action": "append",
+        "default": [],
+        "metavar": "JOINT=NUMBER",
+        "help": f"{what} of a joint at the start, e.g. elbow=0.5 or base.xyz=0,0,1; may be repeated",
+    }
+
+
+def _add_start(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--q0", **_start("configuration"))
+
+
+def _add_writers(parser: argparse.ArgumentParser) -> None:
+    page = "write the replay, one page that needs no network"
+    parser.add_argument("--html", type=Path, metavar="FILE", help=page)
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="write a figure (.png, .pdf, .svg)")
+    parser.add_argument("--save", type=Path, metavar="FILE", help="write the arrays (.npz)")
+    parser.add_argument("--events", action="store_true", help="print the events, a line each")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but what was asked for")
+
+
 def _run(options: argparse.Namespace) -> int:
     writers = _writers(options)
+    q, v = named_values(options.q0, "--q0"), named_values(options.v0, "--v0")
     scene = pn.load(options.robot, **_parameters(options.settings))
     settings = _simulation_settings(options)
+    return _finished(lambda: pn.simulate(scene, options.duration, q=q, v=v, **settings), options, writers)
+
+
+def _resume(options: argparse.Namespace) -> int:
+    writers = _writers(options)
+    return _finished(lambda: pn.resume(options.file), options, writers)
+
+
+def _finished(run: Callable[[], Trajectory], options: argparse.Namespace, writers: list[Writer]) -> int:
+    """Runs, prints and writes; what a run had computed when it stopped is written all the same."""
     try:
-        run = pn.simulate(scene, options.duration, **settings)
+        done = run()
     except RunError as error:
         if error.trajectory is not None:
-            print(error.trajectory)
-            _write(error.trajectory, writers)
+            _told(error.trajectory, options, writers)
         raise
-    print(run)
-    _write(run, writers)
+    _told(done, options, writers)
+    return 0
+
+
+def _told(run: Trajectory, options: argparse.Namespace, writers: list[Writer]) -> None:
+    if not options.quiet:
+        print(run)
+    if options.events:
+        print(events_told(run))
+    for path, writer in writers:
+        written = writer(run, path)
+        if not options.quiet:
+            print(f"wrote {written}")
+
+
+def _equilibrium(options: argparse.Namespace) -> int:
+    scene = pn.load(options.robot, **_parameters(options.settings))
+    return rest_robot(scene, named_values(options.q0, "--q0"), options.json)
+
+
+def _complete(options: argparse.Namespace) -> int:
+    print(completion(_parser(), options.shell, [name for name, _ in robots()]))
     return 0
 
 
 def _simulation_settings(options: argparse.Namespace) -> Table:
     """Keyword arguments of `simulate`: what was given on the command line, and the defaults of pictures."""
-    given = {key: getattr(options, key) for key in ("method", "rtol", "atol", "dt", "output_dt", "several")}
+    keys = ("method", "rtol", "atol", "dt", "output_dt", "several", "checkpoint")
+    given = {key: getattr(options, key) for key in keys}
     settings = {key: value for key, value in given.items() if value is not None}
     pictures = options.html is not None or options.plot is not None
     if pictures and options.output_dt is None:
-        settings["output_dt"] = 1.0 / PICTURE_RATE
+        low, high = PICTURE_SAMPLES
+        count = min(max(PICTURE_RATE * abs(options.duration), low), high)
+        if options.duration > 0.0:
+            settings["output_dt"] = options.duration / count
     if options.record is not None:
         settings["record"] = tuple(name.strip() for name in options.record.split(",") if name.strip())
     elif pictures:
@@ -160,7 +281,7 @@ def _simulation_settings(options: argparse.Namespace) -> Table:
     return settings
 
 
-def _writers(options: argparse.Namespace) -> list[tuple[Path, Callable[[Trajectory, Path], Path]]]:
+def _writers(options: argparse.Namespace) -> list[Writer]:
     """Files to write and what writes them; they are checked now, because a run may take long."""
     if options.plot is not None:
         picture_format(options.plot)
@@ -176,14 +297,10 @@ def _writers(options: argparse.Namespace) -> list[tuple[Path, Callable[[Trajecto
             raise OutputError(f'cannot write "{path}": there is no folder "{folder}"; create it first')
         if path.is_dir():
             raise OutputError(f'cannot write "{path}": it is a folder; give the name of a file')
+        mode_of(path, "the output")
         if not os.access(path if path.exists() else folder, os.W_OK):
             raise OutputError(f'cannot write "{path}": no permission; choose another place')
     return writers
-
-
-def _write(run: Trajectory, writers: list[tuple[Path, Callable[[Trajectory, Path], Path]]]) -> None:
-    for path, writer in writers:
-        print(f"wrote {writer(run, path)}")
 
 
 def _write_replay(run: Trajectory, path: Path) -> Path:
@@ -203,18 +320,8 @@ def _parameters(settings: Sequence[str]) -> Table:
         key, separator, text = word.partition("=")
         if not separator or not key.isidentifier():
             raise InputError(f'--set needs KEY=VALUE, for example --set N=40; got "{word}"')
-        parameters[key] = _value(text)
+        parameters[key] = plain_value(text)
     return parameters
-
-
-def _value(text: str) -> int | float | bool | str:
-    """A whole number, a number, true or false; anything else is text."""
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return {"true": True, "false": False}.get(text, text)
 
 
 def _list(options: argparse.Namespace) -> int:
@@ -227,7 +334,20 @@ def _list(options: argparse.Namespace) -> int:
 
 
 def _info(options: argparse.Namespace) -> int:
-    print(pn.load(options.robot, **_parameters(options.settings)).report())
+    return describe_robot(pn.load(options.robot, **_parameters(options.settings)), options.json)
+
+
+def _render(options: argparse.Namespace) -> int:
+    run = Trajectory.load(options.run)
+    if run.scene is None:
+        scene = pn.load(options.robot or run.name, **_parameters(options.settings))
+        run = replace(run, scene=scene)
+    try:
+        width, height = (int(x) for x in options.size.split("x"))
+    except ValueError:
+        raise InputError(f'--size needs WxH, for example 960x540; got "{options.size}"') from None
+    settings = {"width": width, "height": height, "seconds": options.seconds, "fps": options.fps}
+    print(f"wrote {render(run, options.out, **settings, time=options.time)}")
     return 0
 
 

@@ -15,7 +15,7 @@ import pinocchio
 
 __all__ = ["core", "load_core"]
 
-_AGAIN = 'run "pip install ." in the checkout, which builds the core for the Pinocchio that it needs'
+_AGAIN = "pip install '{}' brings the Pinocchio that it needs"
 
 
 def load_core() -> ModuleType:
@@ -35,7 +35,7 @@ def load_core() -> ModuleType:
         raise ImportError(_missing()) from None
     except ImportError as error:
         raise ImportError(
-            f"the compiled core of pin_nonideal does not load beside Pinocchio {found} ({error}); {_AGAIN}"
+            f"the compiled core of pin_nonideal does not load beside Pinocchio {found} ({error}); {_again()}"
         ) from error
     # A source folder named _core imports as an empty namespace package when nothing is compiled.
     if getattr(core, "__file__", None) is None:
@@ -44,9 +44,19 @@ def load_core() -> ModuleType:
     if built.split(".")[:2] != found.split(".")[:2]:
         raise ImportError(
             f"the compiled core of pin_nonideal was built for Pinocchio {built}, and "
-            f"Pinocchio {found} is installed; {_AGAIN}"
+            f"Pinocchio {found} is installed; {_again()}"
         )
     return core
+
+
+def _again() -> str:
+    from importlib import metadata
+
+    try:
+        needed = [each for each in metadata.requires("pin-nonideal") or [] if each.startswith("pin=")]
+    except metadata.PackageNotFoundError:  # found on a path, not installed
+        needed = []
+    return _AGAIN.format(*needed, "pin")
 
 
 def _missing() -> str:

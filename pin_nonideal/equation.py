@@ -57,7 +57,10 @@ class Solution:
         F_nonideal: nonideal part of the force of constraint, (n,), Eq. (39).
         lam: multipliers of the rows of A, (m,).
         rank: number of independent rows of A, the paper's k.
-        modes: mode of each frictional element of a scene, +1 or -1 for slip, 0 for stick; empty without any.
+        modes: mode of each frictional element of a scene, +1 or -1 for slip, 0 for stick, 2 where the
+            contact is open; empty without any.
+        closed: whether each contact of a scene is closed, in the order of its `contact_names`; empty without
+            any.
         unique: whether this is the only motion that constraints and laws allow: True where it is shown, False
             where another one is known, None where neither is (functions of the user's read the reactions,
             or many elements load each other strongly).
@@ -70,6 +73,7 @@ class Solution:
     rank: int
     modes: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
     unique: bool | None = True
+    closed: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
 def solve(
@@ -102,21 +106,22 @@ def solve(
 
     Source: Eqs. (3)-(7), (39), (40).
     """
-    M, F, A, b, C = _checked(M, F, A, b, C)
+    M, R, F, A, b, C = _checked(M, F, A, b, C)
     mass_scale = np.sqrt(np.diag(M))  # makes the coordinates' units alike: metres, radians
-    R = np.linalg.cholesky(M)  # M = R R^T
     with np.errstate(over="ignore", invalid="ignore"):
         row_scale, chosen, E = _independent_rows(A / mass_scale)
         A_k, b_k, rank = A[chosen], b[chosen], len(chosen)  # A = E A_k: redundant rows left out
-        B = _solve_lower(R, A_k.T).T  # Eq. (7)
+        R_inverse = _solve_lower(R, np.eye(len(R)))
+        B = A_k @ R_inverse.T  # Eq. (7)
         Q, T = np.linalg.qr(B.T)  # B^T = Q T: the Gram-Schmidt of Eqs. (12)-(14), so B^+ = Q T^-T
+        T_inverse = np.linalg.solve(T, np.eye(rank))
 
         def respond(f: Array, r: Array) -> tuple[Array, Array]:
             """The a and lam of M a = f + A_k^T lam, A_k a = r, for several columns f and r at once."""
-            a_s = _solve_lower(R, f)  # Eq. (5)
-            c = _solve_lower(T.T, r - B @ a_s)
-            a = np.linalg.solve(R.T, a_s + Q @ c)  # Eq. (40), scaled: a_s + B^+ (r - B a_s)
-            return a, np.linalg.solve(T, c)
+            a_s = R_inverse @ f  # Eq. (5)
+            c = T_inverse.T @ (r - B @ a_s)
+            a = R_inverse.T @ (a_s + Q @ c)  # Eq. (40), scaled: a_s + B^+ (r - B a_s)
+            return a, T_inverse @ c
 
         # Eq. (40) is linear in (F, b) and C: the first column is the ideal motion, the second what C adds.
         f, r = np.column_stack([F, C]), np.column_stack([b_k, np.zeros(rank)])
@@ -130,12 +135,12 @@ def solve(
         F_ideal = A_k.T @ lam_k[:, 0]  # Eq. (39)
         F_nonideal = C + A_k.T @ lam_k[:, 1]  # Eq. (39)
         total = a[:, 0] + a[:, 1]
-        lam = _spread(E, lam_k[:, 0] + lam_k[:, 1])
+        lam = _spread(E, chosen, lam_k[:, 0] + lam_k[:, 1])
 
     if not (np.isfinite(total).all() and np.isfinite(lam).all()):
         raise NonFiniteError("acceleration must be finite, got an overflow; change the units of M, F or A")
     if rank < len(A):
-        free = np.linalg.solve(R.T, _solve_lower(R, F + C))  # Eq. (1), with C
+        free = R_inverse.T @ (R_inverse @ (F + C))  # Eq. (1), with C
         in_play = np.linalg.norm(mass_scale * total) + np.linalg.norm(mass_scale * free)
         _check_consistent(A, b, total, E, chosen, row_scale, float(in_play))
     return Solution(total, F_ideal, F_nonideal, lam, rank)
@@ -174,12 +179,20 @@ def _independent_rows(A: Array) -> tuple[Array, list[int], Array]:
         remainder[pivot] = 0.0  # exactly, so that L[chosen] is lower triangular
         chosen.append(pivot)
     L = L[:, : len(chosen)]
+    if len(chosen) == m:  # none is redundant
+        E = np.zeros((m, m))
+        E[chosen, range(m)] = 1.0
+        return length, chosen, E
     E = np.linalg.solve(L[chosen].T, L.T).T * (length[:, None] / length[chosen])
     return length, chosen, E
 
 
-def _spread(E: Array, lam_k: Array) -> Array:
+def _spread(E: Array, chosen: list[int], lam_k: Array) -> Array:
     """The shortest lam with E^T lam = lam_k, so that A^T lam = A_k^T lam_k: redundant rows share the load."""
+    if len(chosen) == len(E):
+        lam = np.zeros(len(E))
+        lam[chosen] = lam_k
+        return lam
     Q, T = np.linalg.qr(E)
     lam = Q @ _solve_lower(T.T, lam_k)
     lam += Q @ _solve_lower(T.T, lam_k - E.T @ lam)  # rows of very different scale lose digits in the first
@@ -224,8 +237,8 @@ def _check_consistent(
 
 def _checked(
     M: ArrayLike, F: ArrayLike, A: ArrayLike | None, b: ArrayLike | None, C: ArrayLike | None
-) -> tuple[Array, Array, Array, Array, Array]:
-    """The arguments of `solve` as arrays of fitting shapes, absent ones filled in."""
+) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """The arguments of `solve` as arrays of fitting shapes, absent ones filled in, with the factor R of M."""
     M = _numbers("M", M)
     if M.ndim != 2 or M.shape[0] != M.shape[1] or M.shape[0] == 0:
         raise InputError(f"M must have shape (n, n) with n >= 1, got {M.shape}; pass the mass matrix")
@@ -245,8 +258,9 @@ def _checked(
         raise InputError(f"b must have shape ({len(A)},) to fit A, got {b.shape}; one value a row of A")
     if C.shape != (n,):
         raise InputError(f"C must have shape ({n},) to fit M, got {C.shape}; one force a coordinate")
-    _check_mass(M)
-    return M + (M.T - M) / 2.0, F, A, b, C
+    _check_symmetry(M)
+    symmetric: Array = M + (M.T - M) / 2.0
+    return symmetric, _factor(symmetric), F, A, b, C
 
 
 def _numbers(name: str, value: ArrayLike) -> Array:
@@ -260,26 +274,32 @@ def _numbers(name: str, value: ArrayLike) -> Array:
     return array
 
 
-def _check_mass(M: Array) -> None:
-    """Raise unless M is symmetric and positive definite beyond rounding."""
-    n = len(M)
+def _check_symmetry(M: Array) -> None:
+    """Raise unless M is symmetric beyond rounding."""
     diagonal = np.sqrt(np.abs(np.diag(M)))
     gap = np.abs(M - M.T) - SYMMETRY_TOLERANCE * np.outer(diagonal, diagonal)
+    if (gap <= 0.0).all():
+        return
     i, j = (int(k) for k in np.unravel_index(np.argmax(gap), gap.shape))
-    if gap[i, j] > 0.0:
-        i, j = min(i, j), max(i, j)
-        raise InputError(
-            f"M must be symmetric, got M[{i}, {j}] = {M[i, j]:.6g} but M[{j}, {i}] = {M[j, i]:.6g};"
-            " mirror the triangle that was computed"
-        )
+    i, j = min(i, j), max(i, j)
+    raise InputError(
+        f"M must be symmetric, got M[{i}, {j}] = {M[i, j]:.6g} but M[{j}, {i}] = {M[j, i]:.6g};"
+        " mirror the triangle that was computed"
+    )
+
+
+def _factor(M: Array) -> Array:
+    """R of M = R R^T; raises unless M is positive definite beyond rounding."""
     try:
-        left = np.diag(np.linalg.cholesky(M)) ** 2 / np.diag(M)  # of each diagonal entry, after elimination
-        definite = bool((left > n * np.finfo(float).eps).all())
+        R: Array = np.linalg.cholesky(M)
+        left = np.diag(R) ** 2 / np.diag(M)  # of each diagonal entry, after elimination
+        definite = bool((left > len(M) * np.finfo(float).eps).all())
     except np.linalg.LinAlgError:
         definite = False
-    if not definite:
-        eigenvalues = np.linalg.eigvalsh(M)
-        raise SingularMassError(
-            f"M must be positive definite, got smallest eigenvalue {eigenvalues[0]:.3e}"
-            f" (largest {eigenvalues[-1]:.3e}); give every link a positive mass and inertia"
-        )
+    if definite:
+        return R
+    eigenvalues = np.linalg.eigvalsh(M)
+    raise SingularMassError(
+        f"M must be positive definite, got smallest eigenvalue {eigenvalues[0]:.3e}"
+        f" (largest {eigenvalues[-1]:.3e}); give every link a positive mass and inertia"
+    )

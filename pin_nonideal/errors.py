@@ -7,7 +7,6 @@ do.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from typing import Any
 
@@ -15,9 +14,23 @@ from typing import Any
 class PinNonidealError(Exception):
     """Root of all errors raised by this package."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Not by its constructor, which takes other arguments than the message.
+        return _made_again, (type(self), self.args, dict(self.__dict__))
+
     def __str__(self) -> str:
         # KeyError would print the repr of its message; every class here prints the message itself.
         return str(self.args[0]) if self.args else ""
+
+
+def _made_again(
+    kind: type[PinNonidealError], args: tuple[Any, ...], state: dict[str, Any]
+) -> PinNonidealError:
+    """An error from another process."""
+    error = kind.__new__(kind, *args)
+    error.args = args
+    error.__dict__.update(state)
+    return error
 
 
 class InputError(PinNonidealError, ValueError):
@@ -36,6 +49,10 @@ class OutputError(PinNonidealError, OSError):
     """A file cannot be written or read back."""
 
 
+class JointOrderWarning(UserWarning):
+    """A list of joints' values was taken in the order of the model, and the robot's file has another one."""
+
+
 class RunError(PinNonidealError, RuntimeError):
     """A run stopped early.
 
@@ -43,6 +60,7 @@ class RunError(PinNonidealError, RuntimeError):
         trajectory: what was computed up to the failure (`pin_nonideal.Trajectory`), or None outside of a run.
         time: time of the failure [s], or None.
         index: which state of a rollout it was, or None.
+        results: of all runs of the rollout, a Trajectory or the error of each; None outside of one.
     """
 
     def __init__(self, message: str, *, time: float | None = None) -> None:
@@ -50,6 +68,7 @@ class RunError(PinNonidealError, RuntimeError):
         self.time = time
         self.trajectory: Any = None
         self.index: int | None = None
+        self.results: list[Any] | None = None
 
 
 class SingularMassError(RunError, ValueError):
@@ -118,8 +137,30 @@ class FrictionConvergenceError(RunError):
         self.element = element
 
 
+class ImpactEnergyError(RunError):
+    """An impact gained energy, as Newton's law of restitution with friction may.
+
+    Attributes:
+        element: name of the contact, or names joined by commas.
+        gain: energy gained [J].
+    """
+
+    def __init__(self, message: str, *, element: str, gain: float, time: float | None = None) -> None:
+        super().__init__(message, time=time)
+        self.element = element
+        self.gain = gain
+
+
 class StepSizeError(RunError):
     """Steps as short as the asked tolerance needs lead nowhere, or the run may take no more of them."""
+
+
+class EquilibriumError(RunError):
+    """No state of rest was found."""
+
+
+class WallTimeError(RunError):
+    """The run may take no more wall time."""
 
 
 class StiffnessError(StepSizeError):
@@ -154,6 +195,8 @@ def nearest(name: str, names: Iterable[str]) -> str:
     Returns:
         `; nearest: "..."` or, when nothing is close, `; known: ...` with up to eight names.
     """
+    import difflib
+
     known = list(names)
     close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
     if close:

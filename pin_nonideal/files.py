@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import platform
 import re
 import stat
-import tempfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -47,9 +48,11 @@ def whole_file(path: Path, what: str) -> Iterator[IO[bytes]]:
     Raises:
         OutputError: the folder does not exist or cannot be written, or `path` is a folder, device or pipe.
     """
+    import tempfile
+
     target = Path(os.path.realpath(path))
     try:
-        mode = _mode_of(target, path, what)
+        mode = mode_of(path, what)
         _remove_left_over(target)
         handle, temporary = tempfile.mkstemp(
             dir=target.parent, prefix=_part(target, os.getpid()), suffix=PART
@@ -72,12 +75,21 @@ def whole_file(path: Path, what: str) -> Iterator[IO[bytes]]:
         raise
 
 
-def _mode_of(target: Path, path: Path, what: str) -> int:
+def mode_of(path: Path, what: str) -> int:
     """Permissions of the file that is there, or of a new one.
 
+    Args:
+        path: the file, or a symbolic link to it.
+        what: words for the message.
+
     Raises:
-        OutputError: a device, a pipe or a socket is there.
+        OutputError: a device, a pipe or a socket is there, or links that lead in a circle.
     """
+    target = Path(os.path.realpath(path))
+    if target.is_symlink():
+        raise OutputError(
+            f'cannot write {what} to "{path}": its symbolic links lead in a circle; name a file'
+        )
     if not target.exists():
         return 0o666 & ~_umask()
     mode = target.stat().st_mode
@@ -87,13 +99,15 @@ def _mode_of(target: Path, path: Path, what: str) -> int:
 
 
 def _part(target: Path, process: int) -> str:
-    """Beginning of the name of a file that a process is still writing."""
-    return f".{target.name[:40]}.{process}."
+    """Beginning of the name of a file that a process of this machine is still writing."""
+    whose = zlib.crc32(f"{platform.node()}/{target.name}".encode())
+    return f".{target.name[:40]}.{whose:08x}.{process}."
 
 
 def _remove_left_over(target: Path) -> None:
-    """Takes away half-written files of processes that are gone."""
-    pattern = re.compile(re.escape(f".{target.name[:40]}.") + r"(\d+)\..*" + re.escape(PART))
+    """Takes away half-written files of processes of this machine that are gone."""
+    beginning = _part(target, 0).removesuffix("0.")
+    pattern = re.compile(re.escape(beginning) + r"(\d+)\..*" + re.escape(PART))
     for entry in list(os.scandir(target.parent)):
         found = pattern.fullmatch(entry.name)
         if found is not None and not _is_running(int(found[1])):

@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from .checks import choice, positive, sequence
+from .checks import choice, flag, positive, sequence
+from .compilation.contacts import has_stops
+from .contacts import JointLimit
 from .errors import InputError, LoadingError, nearest
 from .formats.assembly import scene_arguments
 from .formats.example_robots import example_names, example_robot
@@ -19,14 +22,13 @@ from .formats.robot_yaml import MODEL_KEYS, check_keys, optional_string, read_ya
 from .formats.rounding import relaxed
 from .formats.starts import Start
 from .formats.urdf import RobotFile, read_urdf
-from .mjcf.reader import read_mjcf
-from .mjcf.told import ALLOWED
 from .scene import Scene, loaded
 from .types import Table
 
 FILE_PARAMETERS = ("free_flyer", "package_dirs", "merge_ball_joints", "density")
 ASSEMBLY = 1e-6  # to which exports of CAD give the frames of loops [m or rad], with some room
 MJCF_PARAMETERS = ("allow", "ctrl")
+URDF, MJCF = (".urdf", ".xacro"), (".xml", ".mjcf")  # endings, in any case
 
 
 def load(
@@ -34,7 +36,9 @@ def load(
     *,
     terms: str = "core",
     q0: Start = None,
+    v0: Start = None,
     assembly_tolerance: float = ASSEMBLY,
+    limits: bool = False,
     **parameters: Any,
 ) -> Scene:
     """Loads a robot as a scene.
@@ -52,12 +56,15 @@ def load(
 
     Args:
         name: see above.
-        terms: who computes M(q) and the bias forces, as exports of CAD
-            round them: rows that depend on others to this tolerance are left out, which `notes` tell.
+        terms: who computes M(q) and the bias forces, "core" or "pinocchio", see `Scene`.
         q0: initial configuration in place of the file's: numbers (nq,), a table by joint name that changes
-            some of them, or the name of a reference configuration (of a keyframe of an MJCF file, whose
-            velocities and controls come along).
-        assembly_tolerance: to which the frames of the file's loops are given [m or rad], see `Scene`.
+            some of them (see `Scene`), or the name of a reference configuration (of a keyframe of an MJCF
+            file, whose velocities and controls come along).
+        v0: initial velocity in place of the file's: numbers (nv,), or a table by joint name.
+        assembly_tolerance: to which the frames of the file's loops are given [m or rad], as exports of CAD
+            round them: rows that depend on others to this tolerance are left out, which `notes` tell.
+        limits: whether the limits of positions in the file are stops of the joints, each a `JointLimit`
+            without restitution; `notes` tell of those that are not used.
         **parameters: of a generated robot, such as N for "n_four_bar"; of URDF files and folders:
             `free_flyer` (bool, a floating base), `package_dirs` (folders for package:// paths),
             `merge_ball_joints` (bool, True), `density` (of links that state no inertia [kg/m^3], which is
@@ -69,7 +76,7 @@ def load(
         The scene; `simulate` takes it.
 
     Raises:
-        UnknownNameError: no robot of that name.
+        UnknownNameError: no robot of that name, or no joint.
         LoadingError: a file is missing, truncated, malformed, or states something that cannot be honored.
         SingularMassError: the mass matrix at the initial configuration is not positive definite.
         InputError: an unknown parameter, or a bad value of one.
@@ -78,21 +85,76 @@ def load(
     if not isinstance(text, str) or not text or "\0" in text:
         raise InputError(f"name must be the name of a robot or a path; got {name!r}")
     found = _find(name, text, parameters)
-    arguments = scene_arguments(found.robot, found.table, found.name, merge=found.merge, start=q0)
+    arguments = scene_arguments(found.robot, found.table, found.name, merge=found.merge, start=q0, speed=v0)
     given = dict(parameters)
     if terms != "core":
         given["terms"] = terms
-    if q0 is not None:
-        given["q0"] = q0 if isinstance(q0, (str, Mapping)) else np.asarray(q0).tolist()
+    for key, state in (("q0", q0), ("v0", v0)):
+        if state is not None:
+            given[key] = state if isinstance(state, (str, Mapping)) else np.asarray(state).tolist()
     if assembly_tolerance != ASSEMBLY:
         given["assembly_tolerance"] = assembly_tolerance
+    if flag("load: limits", limits):
+        given["limits"] = True
+    _use_limits(arguments, limits)
     arguments["terms"] = terms
     scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
     parts = relaxed(scene, assembly_tolerance)
     if parts is not None:
         arguments.update(constraints=parts.constraints, q0=parts.q, notes=(*scene.notes, parts.note))
         scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
-    return loaded(scene, _origin(text, given), found.robot.contact_friction)
+    return _with_origin(scene, _origin(text, given), found)
+
+
+def _use_limits(arguments: Table, used: bool) -> None:
+    """Stops of the joints whose positions the model bounds, or a note that there are some."""
+    model = arguments["model"]
+    bounded = [
+        str(model.names[i])
+        for i, joint in enumerate(model.joints)
+        if i and joint.nq == joint.nv == 1 and has_stops(model, joint.idx_q)
+    ]
+    if used:
+        stops = [JointLimit(name) for name in bounded]
+        arguments["contacts"] = (*arguments.get("contacts", ()), *stops)
+    elif bounded:
+        note = f"bounds of the positions of {len(bounded)} joints are not used; limits=True makes them stops"
+        arguments["notes"] = (*arguments.get("notes", ()), note)
+
+
+def load_again(origin: Table) -> Scene:
+    """The scene of an origin, as `load` made it.
+
+    Args:
+        origin: name and parameters.
+    """
+    return load(origin["name"], **origin["parameters"])
+
+
+@dataclass(frozen=True)
+class ShapesOf:
+    """Reads the shapes of a loaded robot again, in a process that does not have them.
+
+    Attributes:
+        origin: name and parameters.
+        kind: "visual_model" or "collision_model".
+    """
+
+    origin: Table
+    kind: str
+
+    def __call__(self) -> Any:
+        """The shapes."""
+        return getattr(load_again(self.origin), self.kind)
+
+
+def _with_origin(scene: Scene, origin: Table | None, found: Found) -> Scene:
+    """The scene that knows what it was loaded from."""
+    if origin is not None:
+        kinds = {"visual_model": found.robot.visual, "collision_model": found.robot.collision}
+        sources = [ShapesOf(origin, kind) if shapes is not None else None for kind, shapes in kinds.items()]
+        scene._shape_sources = (sources[0], sources[1])
+    return loaded(scene, origin, found.robot.contact_friction)
 
 
 class Found(NamedTuple):
@@ -134,12 +196,7 @@ def _find(name: str | os.PathLike[str], text: str, parameters: Table) -> Found:
         return _noting_folder(_load_folder(folders[text], parameters), path)
     if path.is_dir() and (text not in example_names() or os.sep in text or isinstance(name, Path)):
         return _load_folder(path, parameters)
-    if (
-        path.is_file()
-        or path.suffix in (".urdf", ".xacro", ".xml", ".mjcf")
-        or isinstance(name, Path)
-        or os.sep in text
-    ):
+    if path.is_file() or path.suffix.lower() in (*URDF, *MJCF) or isinstance(name, Path) or os.sep in text:
         return _load_file(path, parameters)
     check_parameters(parameters, (), text)
     return _noting_folder(Found(example_robot(text, list(folders)), {}, text), path)
@@ -199,22 +256,27 @@ def _file_options(parameters: Table, name: str) -> tuple[Table, bool]:
     return options, parameters.get("merge_ball_joints", True)
 
 
-def _mjcf_options(parameters: Table, name: str) -> Table:
-    check_parameters(parameters, MJCF_PARAMETERS, name)
+def _load_mjcf(path: Path, parameters: Table) -> Found:
+    # Imported where such a file is loaded: not every program has one.
+    from .mjcf.reader import read_mjcf
+    from .mjcf.told import ALLOWED
+
+    check_parameters(parameters, MJCF_PARAMETERS, path.name)
     allow = parameters.get("allow", ())
-    for key in sequence("allow", [allow] if isinstance(allow, str) else allow):
+    allow = (allow,) if isinstance(allow, str) else tuple(sequence("allow", allow))
+    for key in allow:
         choice("allow", key, ALLOWED)
-    return {**parameters, "allow": (allow,) if isinstance(allow, str) else tuple(allow)}
+    return Found(read_mjcf(path, **{**parameters, "allow": allow}), {}, path.stem)
 
 
 def _load_file(path: Path, parameters: Table) -> Found:
     if not path.is_file():
         raise LoadingError(f'no file or folder "{path}"; give a path that exists, or the name of a robot')
-    if path.suffix in (".urdf", ".xacro"):
+    if path.suffix.lower() in URDF:
         options, merge = _file_options(parameters, path.name)
         return Found(read_urdf(path, **options), {}, path.stem, merge)
-    if path.suffix in (".xml", ".mjcf"):
-        return Found(read_mjcf(path, **_mjcf_options(parameters, path.name)), {}, path.stem)
+    if path.suffix.lower() in MJCF:
+        return _load_mjcf(path, parameters)
     raise LoadingError(
         f'"{path}" must be a folder, a .urdf file or a .xml file (MJCF); got "{path.suffix or path.name}"'
     )
@@ -231,6 +293,7 @@ def _load_folder(folder: Path, parameters: Table) -> Found:
             f'"{yaml_path}": model must be a table with keys out of {", ".join(MODEL_KEYS)}; got {entry!r}'
         )
     check_keys(entry, MODEL_KEYS, f'"{yaml_path}": model')
+    entry = {key: value for key, value in entry.items() if value is not None}
     kinds = [k for k in ("urdf", "example_robot_data", "generator") if k in entry]
     if len(kinds) > 1:
         raise LoadingError(
@@ -253,7 +316,8 @@ def _from_urdf(folder: Path, entry: Table, table: Table, parameters: Table, name
     if not urdf.resolve().is_relative_to(folder.resolve()):
         raise LoadingError(f'model: urdf must lie in the folder "{folder}"; got "{entry["urdf"]}"')
     if not urdf.is_file():
-        others = ", ".join(f'"{p}"' for p in sorted(folder.glob("*.urdf"))[:3])
+        files = sorted(p for p in folder.iterdir() if p.suffix.lower() in (*URDF, *MJCF))
+        others = ", ".join(f'"{p}"' for p in files[:3])
         hint = f"; load {others} by its path" if others else ""
         raise LoadingError(f'"{folder}" must hold a {urdf.name}; there is none{hint}')
     options, merge = _file_options(parameters, name)

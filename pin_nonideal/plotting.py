@@ -1,4 +1,4 @@
-"""Figures of a run: positions, velocities, energy, constraint violation, events and modes over time."""
+"""Figures of runs: quantities over time or over each other, events and modes, for a screen or in print."""
 
 from __future__ import annotations
 
@@ -13,7 +13,11 @@ from numpy.typing import NDArray
 
 from .errors import InputError, OutputError
 from .files import file_path, whole_file
-from .page.signals import MODES, Plot, check_scene, mode_bands, plots_of, wanted
+from .page.bands import bands_of, opens
+from .page.figure_styles import Style
+from .page.looks import MODES, UNKNOWN_MODE
+from .page.relations import Relation, friction_joints, is_relation, relations_of
+from .page.signals import Plot, plots_of, several, wanted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,129 +25,250 @@ if TYPE_CHECKING:
 
     from .trajectory import Trajectory
 
-WIDTH, HEIGHT = 8.5, 2.3  # size of a figure and of one of its plots [inch]
-COLORS = ("#ea580c", "#2563eb", "#1e293b", "#059669", "#db2777", "#7c3aed", "#0891b2", "#ca8a04")
-MODE_COLORS = {1: "#fb923c", -1: "#60a5fa", 0: "#475569"}
 EVENT_STYLES = ((0, ()), (0, (4, 2)), (0, (1, 2)), (0, (4, 2, 1, 2)))
-# More events than this are drawn so thin that the curves stay visible.
-CROWD = 40
+# More events than this are drawn so thin that the curves stay visible; beyond the next, as their density.
+CROWD, CLOUD = 40, 400
+HATCHES = {1: "////", -1: "\\\\\\\\", 0: "", 2: "....", 3: "xxxx"}  # of modes in print
 
 
 def plot(
-    run: Trajectory,
+    run: Trajectory | Sequence[Trajectory],
     path: str | os.PathLike[str] | None = None,
     what: str | Sequence[str | tuple[str, Mapping[str, NDArray[np.float64]]]] | None = None,
+    *,
+    ax: Axes | None = None,
+    columns: int | None = None,
+    title: str | None = None,
+    style: str | Mapping[str, Any] | None = None,
+    names: Sequence[str] | None = None,
 ) -> Figure:
-    """Draws a run over time, one plot below the other, with the events marked.
+    """Draws a run, or several in the same axes, one plot below the other, with the events marked.
 
     Args:
-        run: what `simulate` returned.
+        run: what `simulate` returned, or a list of several.
         path: file to write, in the format that its ending names (.png, .pdf, .svg); None writes none.
-        what: "q", "v", "a", "energy", "work", "violation", "reactions", "modes", names of joints, or pairs of
-            a title "what [unit]" and curves by label, (nt,) each. None: q, v, energy, violation and modes, as
-            far as the run has them.
+        what: over time "q", "v", "a", "tau", "energy", "work", "power", "violation", "reactions", "contacts",
+            "gaps" (of contacts that open), "modes", names of joints, or pairs of a title "what [unit]" and
+            curves by label, (nt,) each; of one over another "phase", "phase JOINT" (velocity over position),
+            "friction", "friction LAW" (over slip velocity, with its limit) and "load", "load LAW" (friction
+            over what the bearing carries).  None: what suits the scene, as far as the run has it.
+        ax: matplotlib axes to draw one plot into, in place of a figure of its own.
+        columns: 1 or 2 columns of a printed page, 85 or 176 mm wide; None for a screen.
+        title: heading; None for the scene's name on a screen and none in print, "" for none.
+        style: "screen", "paper" (dashes and markers that survive gray, text that stays text in .svg and .pdf)
+            or matplotlib settings by name; None: "paper" with `columns`, else "screen".
+        names: names of several runs; their numbers when None.
 
     Returns:
         The matplotlib figure, to be changed, shown or saved.
 
     Raises:
-        InputError: something asked for was not recorded, or `what` is empty or no list of plots.
+        InputError: something asked for was not recorded, `what` is empty or no list of plots, `ax` is given
+            for several plots, or `columns`, `style`, `title` or `names` are none of the above.
         UnknownNameError: a name in `what` is none of the above.
         OutputError: the file cannot be written, or matplotlib has no such format.
     """
-    from matplotlib.figure import Figure  # no pyplot: a program that draws to files needs no window system
+    import matplotlib as mpl
 
-    check_scene(run, "a figure")
-    if what is None:
-        what = ["q", "v", *(["energy"] if run.energy else [])]
-        what += [
-            *(["violation"] if run.scene.constraint_slices else []),
-            *(["modes"] if run.modes is not None else []),
-        ]
-    items = wanted("plot: what", what)
-    if not items:
-        raise InputError("plot: what must name at least one plot; got none")
-    if "modes" in items and run.modes is None:
-        raise InputError('plot "modes" needs an element that sticks or slips, and this scene has none')
-    plots: list[Plot | None] = []
-    for item in items:
-        plots += [None] if item == "modes" else plots_of(run, [item])
-
-    heights = [0.4 + 0.22 * len(run.element_names) if item is None else HEIGHT for item in plots]
-    figure = Figure(figsize=(WIDTH, sum(heights) + 0.7), layout="constrained")
-    grid: Any = figure.subplots(len(plots), 1, sharex=True, squeeze=False, height_ratios=heights)
-    for axes, drawn in zip(grid[:, 0], plots, strict=True):
-        if drawn is None:
-            _draw_modes(axes, run)
-        else:
-            _draw_plot(axes, drawn)
-            _mark_events(axes, run)
-    grid[-1, 0].set_xlabel("time [s]")
-    grid[-1, 0].set_xlim(*_limits(run))
-    figure.align_ylabels()
-    figure.suptitle(run.name, fontsize=12, fontweight="bold", x=0.01, ha="left")
-    if path is not None:
-        _save(figure, file_path("plot: path", path))
+    runs, labels = several(run, names, "a figure")
+    look = Style(columns, style)
+    if title is not None and not isinstance(title, str):
+        raise InputError(f"plot: title must be a string or None; got {title!r}")
+    drawn = _asked(runs, usual(runs) if what is None else what)
+    if ax is not None and len(drawn) != 1:
+        raise InputError(f"plot: ax takes one plot; what asks for {len(drawn)}")
+    settings: Any = look.settings
+    with mpl.rc_context(settings):
+        figure = _figure(runs, labels, drawn, look, ax)
+        heading = title if title is not None else ("" if look.print or ax is not None else runs[0].name)
+        if heading and ax is not None:
+            ax.set_title(heading)
+        elif heading:
+            figure.suptitle(heading, fontsize=12, fontweight="bold", x=0.01, ha="left")
+        if path is not None:
+            _save(figure, file_path("plot: path", path))
     return figure
 
 
-def _limits(run: Trajectory) -> tuple[float, float]:
+def usual(runs: Sequence[Trajectory]) -> list[str]:
+    """What suits a scene, as far as its runs have it.
+
+    Args:
+        runs: of one scene.
+    """
+    first = runs[0]
+    found = ["q", "v", *(["energy"] if first.energy else [])]
+    if first.scene.contacts and first.lam is not None:
+        found.append("contacts")
+    if opens(first):
+        found.append("gaps")
+    if first.scene.constraint_slices:
+        found.append("violation")
+    if getattr(first, "law_forces", None) and friction_joints(first):
+        found.append("friction")
+    return found + (["modes"] if bands_of(first) else [])
+
+
+Drawn = tuple[str, list[Any]]
+
+
+def _asked(runs: Sequence[Trajectory], what: Any) -> list[Drawn]:
+    """Each plot as its kind and what each run gives to it."""
+    items = wanted("plot: what", what)
+    if not items:
+        raise InputError("plot: what must name at least one plot; got none")
+    found: list[Drawn] = []
+    for item in items:
+        if item == "modes":
+            if not bands_of(runs[0]):
+                raise InputError(
+                    'plot "modes" needs an element that sticks or slips, and this scene has none'
+                )
+            found += [("modes", [run]) for run in runs]
+            continue
+        over = is_relation(item) and item not in [str(name) for name in runs[0].scene.model.names]
+        each = [relations_of(run, item) if over else plots_of(run, [item]) for run in runs]
+        kind = "relation" if over else "time"
+        found += [(kind, list(parts)) for parts in zip(*each, strict=False)]
+    return found
+
+
+def _figure(
+    runs: Sequence[Trajectory], labels: Sequence[str], drawn: list[Drawn], look: Style, ax: Axes | None
+) -> Figure:
+    """All plots, those over time with one axis of time."""
+    from matplotlib.figure import Figure  # no pyplot: a program that draws to files needs no window system
+
+    if ax is not None:
+        figure, axes = ax.figure, [ax]
+    else:
+        heights = [_height(kind, parts, look) for kind, parts in drawn]
+        figure = Figure(figsize=(look.width, sum(heights) + 0.7), layout="constrained")
+        axes = list(figure.subplots(len(drawn), 1, squeeze=False, height_ratios=heights)[:, 0])
+    timed = [place for place, (kind, _) in zip(axes, drawn, strict=True) if kind != "relation"]
+    for place in timed[1:]:
+        place.sharex(timed[0])
+    for place, (kind, parts) in zip(axes, drawn, strict=True):
+        if kind == "modes":
+            _draw_modes(place, parts[0], look)
+        elif kind == "relation":
+            _draw_relation(place, parts, labels, look)
+        else:
+            _draw_plot(place, parts, labels, look)
+            if len(runs) == 1:
+                _mark_events(place, runs[0], look, place is timed[0])
+    if timed:
+        for place in timed[:-1]:
+            place.tick_params(labelbottom=False)
+        timed[-1].set_xlabel("time [s]")
+        timed[-1].set_xlim(*_limits(runs))
+    if ax is None:
+        figure.align_ylabels()
+    return figure  # type: ignore[return-value]
+
+
+def _height(kind: str, parts: list[Any], look: Style) -> float:
+    """Height of a plot [inch]."""
+    if kind == "modes":
+        return 0.4 + 0.22 * len(bands_of(parts[0]))
+    return look.height if kind == "time" else min(1.4 * look.height, 0.75 * look.width)
+
+
+def _limits(runs: Sequence[Trajectory]) -> tuple[float, float]:
     """First and last time [s], apart also for a run of one sample."""
-    first, last = float(run.t[0]), float(run.t[-1])
+    first, last = min(float(run.t[0]) for run in runs), max(float(run.t[-1]) for run in runs)
     return (first, last) if last > first else (first - 0.5, first + 0.5)
 
 
-def _draw_plot(axes: Axes, item: Plot) -> None:
-    marker = "o" if len(item.t) == 1 else ""
-    for number, (label, values) in enumerate(item.curves.items()):
-        shown = np.where(values > 0.0, values, np.nan) if item.log else values
-        axes.plot(item.t, shown, color=COLORS[number % len(COLORS)], lw=1.3, marker=marker, label=label)
+def _draw_plot(axes: Axes, parts: Sequence[Plot], labels: Sequence[str], look: Style) -> None:
+    """Curves over time, of all runs."""
+    for number, item in enumerate(parts):
+        for index, (label, values) in enumerate(item.curves.items()):
+            shown = np.where(values > 0.0, values, np.nan) if item.log else values
+            name = label if len(parts) == 1 else f"{label}, {labels[number]}"
+            axes.plot(item.t, shown, label=name, **look.line(index, len(item.t), number, len(parts)))
+    item = parts[0]
     if item.log and any(np.any(values > 0.0) for values in item.curves.values()):
         axes.set_yscale("log")
-    axes.set_ylabel(f"{item.title}\n[{item.unit}]")
-    axes.grid(color="#e2e8f0", lw=0.7)
+    axes.set_ylabel(f"{item.title}\n[{item.unit}]" + (f"\n{item.note}" if item.note else ""))
+    _finish(axes, look)
+
+
+def _draw_relation(axes: Axes, parts: Sequence[Relation], labels: Sequence[str], look: Style) -> None:
+    """One quantity over another, of all runs, and what the law allows as points."""
+    for number, item in enumerate(parts):
+        for index, (label, (x, y)) in enumerate(item.curves.items()):
+            name = label if len(parts) == 1 else f"{label}, {labels[number]}"
+            line = look.line(index, len(x), number, len(parts))
+            axes.plot(x, y, label=name, **line)
+            if label in item.bounds:
+                at, most = item.bounds[label]
+                both = [most] if item.x.startswith("load") else [most, -most]
+                for bound in both:
+                    axes.plot(at, bound, ls="", marker=".", ms=2.0, color=line["color"], alpha=0.35)
+    if any(item.bounds for item in parts):
+        axes.plot([], [], ls="", marker=".", ms=3.0, color="#64748b", label="limit of the law")
+    axes.set_xlabel(parts[0].x)
+    axes.set_ylabel(parts[0].y + (f"\n{parts[0].note}" if parts[0].note else ""))
+    _finish(axes, look)
+
+
+def _finish(axes: Axes, look: Style) -> None:
+    axes.grid(color="#e2e8f0", lw=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
-    if item.curves:
-        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.02), frameon=False, fontsize=8)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(**look.legend())
 
 
-def _mark_events(axes: Axes, run: Trajectory) -> None:
-    """A vertical line at each event, its style by the kind of event."""
+def _mark_events(axes: Axes, run: Trajectory, look: Style, legend: bool) -> None:
+    """A vertical line at each event, its style by the kind of event; of a cloud of them the density."""
     kinds = list(dict.fromkeys(str(event.kind) for event in run.events))
+    if len(run.events) > CLOUD:
+        counts, edges = np.histogram([float(event.time) for event in run.events], bins=200)
+        shade = counts / counts.max()
+        colors = [(0.58, 0.64, 0.72, 0.6 * s) for s in shade]
+        low = axes.get_xaxis_transform()  # at the foot of the plot
+        axes.vlines((edges[1:] + edges[:-1]) / 2.0, 0.0, 0.06, colors, transform=low, lw=1.5)
+        if legend:
+            axes.plot([], [], color="#94a3b8", lw=3.0, label=f"{len(run.events)} events, by density")
+            axes.legend(**look.legend())
+        return
     width = 0.8 if len(run.events) <= CROWD else 0.3
     for event in run.events:
         style = EVENT_STYLES[kinds.index(str(event.kind)) % len(EVENT_STYLES)]
         axes.axvline(float(event.time), color="#cbd5e1", lw=width, ls=style, zorder=0.5)
-    if kinds and axes.get_subplotspec().rowspan.start == 0:  # type: ignore[union-attr]
+    if kinds and legend:
+        handles, names = axes.get_legend_handles_labels()
         styles = [EVENT_STYLES[number % len(EVENT_STYLES)] for number in range(len(kinds))]
-        lines = [axes.plot([], [], color="#cbd5e1", lw=1.2, ls=style)[0] for style in styles]
-        handles, labels = axes.get_legend_handles_labels()
-        axes.legend(
-            [*handles, *lines],
-            [*labels, *kinds],
-            loc="upper left",
-            bbox_to_anchor=(1.0, 1.02),
-            frameon=False,
-            fontsize=8,
-        )
+        lines = [axes.plot([], [], color="#94a3b8", lw=1.2, ls=style)[0] for style in styles]
+        axes.legend([*handles, *lines], [*names, *kinds], **look.legend())
 
 
-def _draw_modes(axes: Axes, run: Trajectory) -> None:
+def _draw_modes(axes: Axes, run: Trajectory, look: Style) -> None:
     """A band for each element, colored by its mode."""
-    bands = [] if run.modes is None else mode_bands(run.t, run.modes)
+    names, bands = [list(column) for column in zip(*bands_of(run), strict=True)]
+    present = [mode for mode in MODES if any(piece[2] == mode for pieces in bands for piece in pieces)]
     for row, pieces in enumerate(bands):
-        spans = [(start, end - start) for start, end, _ in pieces]
-        colors = [MODE_COLORS.get(mode, "#f1f5f9") for _, _, mode in pieces]
-        axes.broken_barh(spans, (row - 0.35, 0.7), facecolors=colors)
-    axes.set_yticks(range(len(bands)), run.element_names)
+        if not look.print:
+            spans = [(start, end - start) for start, end, _ in pieces]
+            colors = [MODES.get(mode, UNKNOWN_MODE)[0] for _, _, mode in pieces]
+            axes.broken_barh(spans, (row - 0.35, 0.7), facecolors=colors)
+            continue
+        for mode in present:
+            spans = [(start, end - start) for start, end, which in pieces if which == mode]
+            axes.broken_barh(spans, (row - 0.35, 0.7), **_print_mode(mode))
+    axes.set_yticks(range(len(bands)), names)
     axes.set_ylim(len(bands) - 0.5, -0.5)
     axes.spines[["top", "right", "left"]].set_visible(False)
     axes.tick_params(axis="y", length=0)
-    swatches = [axes.barh(0, 0, color=MODE_COLORS[mode])[0] for mode in MODES]
-    axes.legend(
-        swatches, MODES.values(), loc="upper left", bbox_to_anchor=(1.0, 1.02), frameon=False, fontsize=8
-    )
+    looks = [_print_mode(mode) if look.print else {"facecolor": MODES[mode][0]} for mode in present]
+    swatches = [axes.barh(0, 0, **one)[0] for one in looks]
+    axes.legend(swatches, [MODES[mode][1] for mode in present], **look.legend())
+
+
+def _print_mode(mode: int) -> dict[str, Any]:
+    return {"facecolor": MODES[mode][0], "hatch": HATCHES[mode], "edgecolor": "white", "linewidth": 0.0}
 
 
 def picture_format(path: Path) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, Literal, ParamSpec, TypeVar, overload
 
 import numpy as np
 import pinocchio as pin
@@ -20,10 +20,17 @@ from .core import core
 from .equation import Solution
 from .errors import InputError
 from .forces import Force
+from .geometry_contacts import GeometryContact, with_geometry
 from .laws import Law
+from .scene_copy import copied, packed, parts_of, rebuilt
+from .scene_geometry import Geometry
+from .scene_steps import Steps
+from .scene_tables import Tables
 from .states.closure import CLOSURE_TOLERANCE
-from .states.configurations import configuration, require_resolved, unit_parts
-from .types import Array, GeometryModel, Model, Table
+from .states.configurations import require_resolved, unit_parts
+from .states.named import named_configuration, named_velocity
+from .states.projection import ProjectionReport
+from .types import Array, GeometryModel, Model, State, Table
 
 Rest = ParamSpec("Rest")
 Result = TypeVar("Result")
@@ -31,9 +38,12 @@ Result = TypeVar("Result")
 # What to do where laws and dynamics allow several motions.
 SEVERAL = ("error", "continue")
 TERMS = tuple(provider.name for provider in core.Provider)
+IMPACTS = tuple(law.name for law in core.ImpactLaw)
+# What the core has taken when a scene was made.
+TAKEN = ("model", "constraints", "laws", "contacts", "forces", "actuation", "terms", "impact", "q0", "v0")
 
 
-class Scene:
+class Scene(Geometry, Tables, Steps):
     """A Pinocchio model with constraints, laws, contacts, forces and actuation.
 
     Everything is checked when the scene is made; rows that can never act are found then and left out.
@@ -47,9 +57,12 @@ class Scene:
         forces: descriptions of `pin_nonideal.forces`.
         actuation: None, a constant torque (nv,), a function (t, q, v) -> tau, or a description of
             `pin_nonideal.actuation`.
-        q0: initial configuration, (nq,); the neutral one when None.  Frames held to the world are held where
-            they are here.
-        v0: initial velocity, (nv,); zero when None.
+        q0: initial configuration; the neutral one when None.  Frames held to the world are held where they
+            are here.  Here and wherever a configuration is taken it is an array (nq,), a table by joint name,
+            {"crank": 1.0, "base": {"xyz": [0, 0, 1], "rpy": [0, 0, 1.57]}}, which leaves the others as they
+            are (in `solve`, `project` and `simulate` as in the scene's initial state), or the name of a
+            reference configuration.
+        v0: initial velocity, an array (nv,) or a table by joint name; zero when None.
         visual_model: pinocchio.GeometryModel for the replay, or a function that makes it when asked for.
         collision_model: pinocchio.GeometryModel, or such a function.
         name: shown in messages and pages; the model's own when None.
@@ -58,6 +71,9 @@ class Scene:
         licence: its licence.
         terms: who computes M(q), the bias forces and the kinematics: "core", its own pass over the tree, or
             "pinocchio", Pinocchio's crba, nonLinearEffects and computeJointJacobians.
+        impact: what restitution e means: "newton", that a gap opens with e times the rate at which it closed,
+            or "poisson", that after the impulse which stops the approach a contact gives e times that impulse
+            again.  Without friction both say the same where all gaps that touch close with one e.
         assembly_tolerance: to which the frames of loops are given [m or rad]: a gap up to it, in a direction
             in which no joint moves, is no error.
 
@@ -68,6 +84,7 @@ class Scene:
     Attributes:
         constraint_slices: rows of `lam` of each constraint and contact, by name.
         anchor_frames: (name, frame id, frame id or None) of what joins two frames.
+        contact_names: names of the contacts, in the order of `closed`; the stops of a JointLimit one by one.
         element_names: names of the frictional elements, in the order of `modes`.
         law_names: names of the laws, in the order of the ledger's columns.
         dropped: (name, row, reason) of rows that can never act.
@@ -81,11 +98,11 @@ class Scene:
         *,
         constraints: Sequence[Any] = (),
         laws: Sequence[Law] = (),
-        contacts: Sequence[Contact] = (),
+        contacts: Sequence[Contact | GeometryContact] = (),
         forces: Sequence[Force] = (),
         actuation: Actuation | None = None,
-        q0: ArrayLike | None = None,
-        v0: ArrayLike | None = None,
+        q0: State | None = None,
+        v0: State | None = None,
         visual_model: GeometryModel | Callable[[], GeometryModel] | None = None,
         collision_model: GeometryModel | Callable[[], GeometryModel] | None = None,
         name: str | None = None,
@@ -93,6 +110,7 @@ class Scene:
         source: str | None = None,
         licence: str | None = None,
         terms: str = "core",
+        impact: str = "newton",
         assembly_tolerance: float = CLOSURE_TOLERANCE,
     ) -> None:
         if not isinstance(model, pin.Model):
@@ -105,8 +123,10 @@ class Scene:
         self.model = model
         self.name = optional_text("Scene: name", name) or model.name or "scene"
         self.constraints, self.laws = sequence("constraints", constraints), sequence("laws", laws)
-        self.contacts, self.forces = sequence("contacts", contacts), sequence("forces", forces)
+        self.contacts = with_geometry(sequence("contacts", contacts), model, collision_model)
+        self.forces = sequence("forces", forces)
         self.actuation, self.terms = actuation, choice("Scene: terms", terms, TERMS)
+        self.impact = choice("Scene: impact", impact, IMPACTS)
         self._visual, self._collision = visual_model, collision_model
         self.contact_friction: dict[str, tuple[float, float, float]] = {}
         self.notes = list(sequence("notes", notes))
@@ -117,14 +137,21 @@ class Scene:
         check_model(model)
         self._as_made = model.copy()
         self._unit_parts = tuple(unit_parts(model))
-        self._q0: Array = pin.neutral(model) if q0 is None else self._configuration(q0, "q0")
-        self._v0 = np.zeros(model.nv) if v0 is None else self._velocity(v0, "v0")
+        self._q0: Array = pin.neutral(model)
+        self._v0: Array = np.zeros(model.nv)
+        if q0 is not None:
+            self._q0 = self._configuration(q0, "q0")
+        if v0 is not None:
+            self._v0 = self._velocity(v0, "v0")
         for state in (self._q0, self._v0):
             state.setflags(write=False)
-        said = Descriptions(self.constraints, self.contacts, self.laws, self.forces, actuation, terms)
+        said = Descriptions(
+            self.constraints, self.contacts, self.laws, self.forces, actuation, terms, self.impact
+        )
         tolerance = nonnegative("Scene: assembly_tolerance", assembly_tolerance)
         self._compiled = CompiledScene(model, self.q0, self.v0, said, tolerance)
         self.constraint_slices, self.anchor_frames = self._compiled.slices, self._compiled.anchors
+        self.contact_names = self._compiled.contact_names
         self.element_names = self._compiled.program.element_names
         self.law_names = self._compiled.program.law_names
         self.dropped = self._compiled.dropped
@@ -135,8 +162,25 @@ class Scene:
             )
         self._runner = self._compiled.program.runner()
         self._nv = int(model.nv)
-        self._closed: tuple[Array, Array] | None = None
+        self._closed: tuple[Array, Array, ProjectionReport] | None = None
+        self._told: list[str] | None = None
         self._origin: Table | None = None  # what `load` made the scene from
+        self._shape_sources: tuple[Any, Any] | None = None  # what reads its shapes again
+        self._assembly_tolerance = tolerance
+
+    def __setattr__(self, key: str, value: Any) -> None:
+        if key in TAKEN and "_compiled" in self.__dict__:
+            raise InputError(
+                f'{key} of scene "{self.name}" is what the scene was made of and cannot be exchanged; make a '
+                f"new Scene with another {key}"
+            )
+        super().__setattr__(key, value)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return rebuilt, (type(self), packed(parts_of(self), self.name))
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Scene:
+        return copied(self, memo)  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
         return (
@@ -154,36 +198,11 @@ class Scene:
         """Initial velocity, (nv,), read-only."""
         return self._v0
 
-    @property
-    def visual_model(self) -> GeometryModel | None:
-        """pinocchio.GeometryModel for the replay, or None; meshes of a file are read when first asked for."""
-        self._visual = self._read(self._visual)
-        return self._visual
-
-    @property
-    def collision_model(self) -> GeometryModel | None:
-        """pinocchio.GeometryModel for collisions, or None; meshes are read when first asked for."""
-        self._collision = self._read(self._collision)
-        return self._collision
-
-    def _read(self, shapes: GeometryModel | Callable[[], GeometryModel] | None) -> GeometryModel | None:
-        """The geometry itself, made now where only the means to make it were given."""
-        if not callable(shapes):
-            return shapes
-        geometry = shapes()
-        if not isinstance(geometry, pin.GeometryModel):
-            raise InputError(
-                "Scene: what makes a geometry must return a pinocchio.GeometryModel; "
-                f"got {type(geometry).__name__}"
-            )
-        self.notes += [note for note in getattr(shapes, "notes", ()) if note not in self.notes]
-        return geometry
-
     # --- states ---------------------------------------------------------------------------------------------
 
-    def _configuration(self, q: ArrayLike, what: str) -> Array:
+    def _configuration(self, q: State, what: str) -> Array:
         self._require_unchanged()
-        return configuration(self.model, q, what, self._unit_parts)
+        return named_configuration(self.model, q, self._q0, what, self._unit_parts)
 
     def _require_unchanged(self) -> None:
         """The core has taken the model's numbers when the scene was made.
@@ -197,8 +216,8 @@ class Scene:
                 "numbers; make a new Scene of the changed model"
             )
 
-    def _velocity(self, v: ArrayLike, what: str) -> Array:
-        return np.array(array(what, v, (self.model.nv,)))
+    def _velocity(self, v: State, what: str) -> Array:
+        return named_velocity(self.model, v, self._v0, what)
 
     def initial_state(self) -> tuple[Array, Array]:
         """The scene's initial state with its loops closed.
@@ -211,55 +230,85 @@ class Scene:
             InputError: a coordinate is too large to move.
         """
         self._require_unchanged()
+        q, v, _ = self._initial()
+        return q, v
+
+    def _initial(self) -> tuple[Array, Array, ProjectionReport]:
         if self._closed is None:
             self._closed = self._project(self.q0, self.v0, 0.0)
-        return self._closed[0].copy(), self._closed[1].copy()
+        q, v, moved = self._closed
+        return q.copy(), v.copy(), moved
 
+    @overload
     def project(
-        self, q: ArrayLike | None = None, v: ArrayLike | None = None, t: float = 0.0
-    ) -> tuple[Array, Array]:
+        self,
+        q: State | None = None,
+        v: State | None = None,
+        t: float = 0.0,
+        *,
+        report: Literal[False] = False,
+    ) -> tuple[Array, Array]: ...
+    @overload
+    def project(
+        self, q: State | None = None, v: State | None = None, t: float = 0.0, *, report: Literal[True]
+    ) -> tuple[Array, Array, ProjectionReport]: ...
+    def project(
+        self, q: State | None = None, v: State | None = None, t: float = 0.0, *, report: bool = False
+    ) -> tuple[Array, Array] | tuple[Array, Array, ProjectionReport]:
         """Nearest consistent state: phi(q, t) = 0 and A v + phi_t = 0.
 
-        Near the constraints this is Newton's method in the metric of M; from far away damped steps lead
-        there, from several starts when needed.
+        Of all configurations that satisfy the constraints it is that with the least d^T M(q) d, where d is
+        the move from q in tangent coordinates and M(q) the mass matrix there; of all velocities, that with
+        the least d^T M d.  Units, scales of rows and copies of constraints change nothing.  Where the move is
+        long the nearest of the closures found from several starts is taken; the report tells whether it is
+        known to be the nearest.  Closures in gimbal lock (M nearly singular) are taken only where no other is
+        found.
 
         Args:
-            q: configuration, (nq,); the scene's initial one when None.
-            v: velocity, (nv,); the scene's initial one when None.
+            q: configuration, (nq,) or by joint name; the scene's initial one when None.
+            v: velocity, (nv,) or by joint name; the scene's initial one when None.
             t: time [s].
+            report: also returns how far q moved, a `ProjectionReport`.
 
         Returns:
-            q (nq,), v (nv,).
+            q (nq,), v (nv,), and with `report` the report.
 
         Raises:
             LoopClosureError: the constraints cannot be met from here; `gaps` names each gap.
             InputError: wrong shapes or numbers, or a coordinate where floating-point numbers are more than
                 a millimeter or milliradian apart.
         """
-        time = number("t", t)
+        time, wanted = number("t", t), choice("report", report, (True, False))
         if q is None and v is None and time == 0.0:
-            return self.initial_state()
-        q_in = self.q0 if q is None else self._configuration(q, "q")
-        v_in = self.v0 if v is None else self._velocity(v, "v")
-        return self._project(q_in, v_in, time)
+            found = self._initial()
+        else:
+            q_in = self.q0 if q is None else self._configuration(q, "q")
+            v_in = self.v0 if v is None else self._velocity(v, "v")
+            found = self._project(q_in, v_in, time)
+        return found if wanted else found[:2]
 
-    def _project(self, q: Array, v: Array, t: float) -> tuple[Array, Array]:
+    def _project(self, q: Array, v: Array, t: float) -> tuple[Array, Array, ProjectionReport]:
         require_resolved(self.model, q)
         return self._compiled.project(q, v, t)
 
-    def _project_all(self, q: Array, v: Array, t: float, threads: int) -> tuple[Array, Array]:
-        """What `project` gives for each of many states, (n, nq) and (n, nv), on several threads."""
-        if self._unit_parts:
-            q = np.array([self._configuration(one, "q") for one in q]).reshape(q.shape)
-        require_resolved(self.model, q)
-        return self._compiled.project_all(q, v, t, threads)
+    def _moved(self, q: State, on: Array) -> list[str]:
+        """What to tell of a configuration that was moved onto the constraints, see `Projection.notes`."""
+        if isinstance(q, np.ndarray) and np.array_equal(q, on):
+            return []
+        return self._compiled.projection.notes(self._configuration(q, "q"), on)
+
+    def _start_notes(self) -> list[str]:
+        """What to tell of the scene's own initial state, once it is closed."""
+        if self._told is None:
+            self._told = self._moved(self.q0, self.initial_state()[0])
+        return self._told
 
     # --- one instant ----------------------------------------------------------------------------------------
 
     def solve(
         self,
-        q: ArrayLike,
-        v: ArrayLike,
+        q: State,
+        v: State,
         t: float = 0.0,
         *,
         tau: ArrayLike | None = None,
@@ -269,16 +318,18 @@ class Scene:
         """Eq. (40) at one state: acceleration, both parts of the force of constraint, multipliers, modes.
 
         Args:
-            q: configuration, (nq,).
-            v: velocity, (nv,).
+            q: configuration, (nq,) or by joint name.
+            v: velocity, (nv,) or by joint name.
             t: time [s].
             tau: joint torques instead of the scene's actuation, (nv,).
-            modes: mode of each frictional element, +1, -1 or 0; by velocity and complementarity when None.
+            modes: mode of each frictional element, +1, -1 or 0, and 2 without friction, as of a contact that
+                is open; by velocity and complementarity when None.
             several: what to do where the laws allow several motions: "error", or "continue" with the one of
                 least friction.  What may stick or slip at rest sticks either way.
 
         Returns:
-            The Solution; `lam` holds all rows in the order of `constraint_slices`, zero for dropped ones.
+            The Solution; `lam` holds all rows in the order of `constraint_slices`, zero for those that
+            never act.
 
         Raises:
             InputError: wrong shapes or numbers.
@@ -288,20 +339,23 @@ class Scene:
         given = None
         if modes is not None:
             asked = np.asarray(modes, dtype=object)
-            known = [int(mode) for mode in core.Mode]
+            opens = any(getattr(contact, "unilateral", True) for contact in self.contacts)
+            known = [int(mode) for mode in core.Mode if opens or mode is not core.Mode.unloaded]
             if asked.shape != (len(self.element_names),) or not np.isin(asked, known).all():
                 raise InputError(
-                    f"modes must hold {len(self.element_names)} numbers out of -1, 0, 1; got {modes}"
+                    f"modes must hold {len(self.element_names)} numbers out of "
+                    f"{', '.join(map(str, known))}; got {modes}"
                 )
             given = [core.Mode(int(m)) for m in asked]
         now = self._call(self._runner.solve, q, v, t, tau, given)
         used = np.array(now.modes, dtype=np.int8)
-        return Solution(now.a, now.F_ideal, now.F_nonideal, now.lam, now.rank, used, now.unique)
+        closed = np.array(now.closed, dtype=bool)
+        return Solution(now.a, now.F_ideal, now.F_nonideal, now.lam, now.rank, used, now.unique, closed)
 
     def acceleration(
         self,
-        q: ArrayLike,
-        v: ArrayLike,
+        q: State,
+        v: State,
         tau: ArrayLike | None = None,
         t: float = 0.0,
         *,
@@ -310,8 +364,8 @@ class Scene:
         """Just the acceleration, for loops of one's own.
 
         Args:
-            q: configuration, (nq,).
-            v: velocity, (nv,).
+            q: configuration, (nq,) or by joint name.
+            v: velocity, (nv,) or by joint name.
             tau: joint torques instead of the scene's actuation, (nv,).
             t: time [s].
             several: "error" or "continue" where the laws allow several motions, as in `solve`.
@@ -323,6 +377,7 @@ class Scene:
             InputError: wrong shapes or numbers.
             InconsistentConstraintsError, FrictionParadoxError, SingularMassError: there is no solution.
         """
+        self._require_unchanged()
         a = np.empty(self._nv)
         self._runner.continues = choice("acceleration: several", several, SEVERAL) == "continue"
         try:  # arrays of the right shape go straight to the core, which checks sizes, lengths and finiteness
@@ -334,8 +389,8 @@ class Scene:
     def _call(
         self,
         function: Callable[Concatenate[Array, Array, float, Array | None, Rest], Result],
-        q: ArrayLike,
-        v: ArrayLike,
+        q: State,
+        v: State,
         t: float,
         tau: ArrayLike | None,
         *rest: Rest.args,
@@ -352,7 +407,7 @@ class Scene:
         """What the scene is made of: joints, constraints, rows, rank, mobility, and what was left out."""
         q, v = self.initial_state()
         self._runner.solve(q, v, 0.0, modes=[core.Mode.slip_plus] * len(self.element_names))
-        notes = [f"note: {n}" for n in self.notes]
+        notes = [f"note: {n}" for n in (*self.notes, *self._moved(self.q0, q))]
         credits = {"source": self.source, "licence": self.licence}
         notes += [f"{key}: {value}" for key, value in credits.items() if value]
         return report(self._compiled, self.name, self._runner.rank, notes)

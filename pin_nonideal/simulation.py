@@ -1,29 +1,33 @@
-"""simulate and rollout: a scene and a length of time in, a Trajectory out."""
+"""simulate: a scene and a length of time in, a Trajectory out."""
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from numpy.typing import ArrayLike
 
-from .checks import array, choice, count
-from .core import core
-from .errors import InputError, RunError, RunInterrupted
-from .runs.checkpoint import Saver
-from .runs.options import SCIPY, run_options
+from .checks import choice
+from .compilation.failures import stiff_hint
+from .errors import InputError
+from .runs.asked import Asked, asked_callback, asked_events
+from .runs.components import run_apart, run_together, stepped_apart
+from .runs.options import SCIPY, kept_options
 from .runs.progress import progress_bar
 from .runs.results import finish
 from .scene import Scene
 from .trajectory import Trajectory
+from .types import State
 
 
 def simulate(
     scene: Scene,
     duration: float,
-    q: ArrayLike | None = None,
-    v: ArrayLike | None = None,
+    q: State | None = None,
+    v: State | None = None,
     *,
     t0: float = 0.0,
     method: str = "dop853",
@@ -32,8 +36,12 @@ def simulate(
     dt: float | None = None,
     output_dt: float | None = None,
     max_steps: float | None = None,
+    max_wall: float | None = None,
     record: str | Sequence[str] = (),
+    events: str | Callable[..., Any] | Sequence[Any] | None = None,
+    callback: Callable[..., Any] | None = None,
     several: str = "error",
+    strict: bool = False,
     progress: bool | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     checkpoint_interval: float = 60.0,
@@ -47,8 +55,10 @@ def simulate(
     Args:
         scene: what to simulate.
         duration: length of time [s].
-        q: initial configuration, (nq,); the scene's when None.  It is projected onto the constraints first.
-        v: initial velocity, (nv,); the scene's when None.
+        q: initial configuration, (nq,) or by joint name (see `Scene`); the scene's when None.  It is
+            projected onto the constraints first (`Scene.project`); `Trajectory.notes` tells of one that moved
+            more than a little, and where it was given here a RuntimeWarning does.
+        v: initial velocity, (nv,) or by joint name; the scene's when None.
         t0: initial time [s].
         method: "dop853" (order 8) or "dopri5" (order 5), adaptive; "rk4", "semi_implicit_euler" or "moreau"
             (time stepping at velocity level), fixed dt; "Radau", "BDF" or "LSODA" by SciPy, for stiff scenes.
@@ -56,15 +66,26 @@ def simulate(
         atol: absolute tolerance, a number or an array (2 nv,) for positions and velocities, 1e-10 when None;
             states of laws take the number, or the smallest of the array.
         dt: step of the fixed-step methods [s].
-        output_dt: time between samples [s]; every accepted step when None.  Events are samples as well.
+        output_dt: time between samples [s]; every accepted step when None.  Events are samples as well;
+            `run.grid` tells which samples lie on the grid t0 + k output_dt, both ends among them.
         max_steps: most steps that the run may take; when None as many as it takes, but a stiff scene stops as
             soon as an explicit method would take 100,000 more.
-        record: any of "a", "forces" (which include "laws"), "laws", "reactions", "energy", "power", or names
-            of fields that they fill.
+        max_wall: most wall time that the run may take [s]; as much as it takes when None.
+        record: any of "a", "tau", "forces" (which include "laws" and "tau"), "laws", "reactions", "energy",
+            "power", "dense" (interpolants of the steps, for `run.at`), or names of fields that they fill.
+        events: functions (t, q, v) -> number whose zeros are events, as in SciPy's solve_ivp: `terminal`
+            (True, or how many of them end the run) and `direction` (its sign: only where the value rises, or
+            falls) are attributes of the function.  A step ends at each, found as accurately as the step; a
+            value that is zero at the start is no event there.  `run.user_events` holds them.  "separate",
+            alone or in the list, keeps all events out of the samples, which then lie on the grid exactly.
+        callback: called as callback(t, q, v) before every step; True ends the run there, torques (nv,) are
+            those of the actuation from there on, None changes nothing.  Of the core's methods only.
         several: what to do where the laws allow several motions: "error" stops with a FrictionParadoxError
             that shows two; "continue" goes on with the one nearest to the motion before (at the start, that
             of least friction), and an event of kind "several" says from when on.  What rests and might slip
             as well goes on resting either way, with such an event.
+        strict: whether an impact that gains energy, as Newton's law of restitution with friction may, is an
+            ImpactEnergyError; an event of kind "impact" with a positive energy_change tells it otherwise.
         progress: progress bar on standard error; None shows it on a terminal only.
         checkpoint: file that the run is kept in, so that `resume` goes on with it should it be killed; None
             for none.  It is replaced whole, at the start, at the end, on Ctrl-C between two steps, and every
@@ -79,110 +100,81 @@ def simulate(
         OutputError: the checkpoint cannot be written.
         LoopClosureError: the initial state cannot be put on the constraints, or the run was pulled off them.
         StiffnessError: the scene is stiff, and the method explicit; `joint` and `rate` say where and how.
+        WallTimeError: `max_wall` is over.
         RunError: the run stopped early; its `trajectory` holds the samples up to there.
+        ImpactEnergyError: an impact gained energy, and `strict` was asked for.
         RunInterrupted: Ctrl-C; the same.
     """
     if not isinstance(scene, Scene):
         raise InputError(f"simulate: scene must be a Scene; got {type(scene).__name__}")
-    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, max_steps, record, several)
+    asked = asked_events(events)
+    steps = (method, rtol, atol, dt, output_dt, max_steps)
+    kept = (max_wall, asked.names, asked.separate)
+    options = kept_options(scene, duration, t0, *steps, record, several, *kept, strict)
     q0, v0 = (
         scene.project(q, v, options.t0) if (q is not None or v is not None or t0) else scene.initial_state()
     )
+    own = q is None and v is None and not t0
+    notes = scene._start_notes() if own else scene._moved(scene.q0 if q is None else q, q0)
+    if notes and q is not None:
+        warnings.warn(f"simulate: {notes[0]}", RuntimeWarning, stacklevel=2)
     choice("simulate: progress", progress, (True, False, None))
+    between = asked_callback(callback, scene.model.nv)
+    _check_together(method, asked, callback, checkpoint)
     saver = None
     if checkpoint is not None:
-        if method in SCIPY:
-            raise InputError(
-                f'simulate: checkpoint needs one of the core\'s methods; "{method}" runs in SciPy, which '
-                "does not give its state away"
-            )
+        from .runs.checkpoint import Saver
+
         saver = Saver(checkpoint, scene, options, checkpoint_interval)
+    hints: list[str] = []
+
+    def hint(at: float, dof: int, rate: float, decays: bool) -> None:
+        hints.append(f"from t = {at:.4g} s on {stiff_hint(scene.model, dof, rate, decays)}")
+        warnings.warn(f"simulate: {hints[0]}", RuntimeWarning, stacklevel=4)
+
     begin = time.perf_counter()
     with progress_bar(progress, options) as tick:
         if method in SCIPY:
             from .runs.scipy_methods import simulate_stiff
 
-            outcome, stopped = simulate_stiff(scene, q0, v0, options, tick)
+            outcome, stopped = simulate_stiff(scene, q0, v0, options, tick, asked.watched)
         else:
-            interval = saver.interval if saver else 0.0
-            runner = scene._compiled.program.runner()
-            outcome = runner.simulate(q0, v0, options, tick=tick, save=saver, save_interval=interval)
+            parts = [] if saver or between else stepped_apart(scene, options)
+            apart = run_apart(scene, parts, q0, v0, options, tick) if parts else None
+            # Where all step together, what fails is told.
+            outcome = apart or run_together(
+                scene,
+                q0,
+                v0,
+                options,
+                tick=tick,
+                save=saver,
+                save_interval=saver.interval if saver else 0.0,
+                events=asked.watched,
+                callback=between,
+                hint=hint,
+            )
             stopped = outcome.stopped
-    return finish(scene, outcome, stopped, options, time.perf_counter() - begin)
+    return finish(scene, outcome, stopped, options, time.perf_counter() - begin, [*notes, *hints])
 
 
-def rollout(
-    scene: Scene,
-    q: ArrayLike | tuple[ArrayLike, ArrayLike],
-    v: ArrayLike | None = None,
-    duration: float | None = None,
-    *,
-    t0: float = 0.0,
-    method: str = "dop853",
-    rtol: float | None = None,
-    atol: ArrayLike | None = None,
-    dt: float | None = None,
-    output_dt: float | None = None,
-    max_steps: float | None = None,
-    record: str | Sequence[str] = (),
-    several: str = "error",
-    threads: int = 1,
-) -> list[Trajectory]:
-    """Runs many initial states in native threads; each result is bitwise that of its own `simulate`.
-
-    Called as rollout(scene, q, v, duration), or with a pair of states as rollout(scene, (q, v), duration).
-
-    Args:
-        scene: what to simulate.
-        q: initial configurations, (n, nq).
-        v: initial velocities, (n, nv).
-        duration: length of time [s].
-        t0: initial time [s].
-        method: one of the core's methods (not SciPy's).
-        rtol: relative tolerance.
-        atol: absolute tolerance, a number or an array (2 nv,).
-        dt: step of the fixed-step methods [s].
-        output_dt: time between samples [s]; every accepted step when None.
-        max_steps: as in `simulate`.
-        record: as in `simulate`.
-        several: "error" or "continue", as in `simulate`.
-        threads: number of native threads.
-
-    Returns:
-        One Trajectory a state.
+def _check_together(method: str, asked: Asked, callback: object, checkpoint: object) -> None:
+    """Refuses what does not go together.
 
     Raises:
-        InputError: an argument does not fit.
-        RunError: a run stopped early; `trajectory` of the first one that did, and `index` tells which.
-        RunInterrupted: Ctrl-C, which ends all runs; the same, of one that it met.  Others are lost.
+        InputError: see above.
     """
-    if not isinstance(scene, Scene):
-        raise InputError(f"rollout: scene must be a Scene; got {type(scene).__name__}")
-    threads = count("rollout: threads", threads, least=1)
-    if isinstance(q, tuple) and len(q) == 2 and (v is None or duration is None):
-        (q, v), duration = q, v if duration is None else duration  # type: ignore[assignment]
-    if v is None or duration is None:
-        raise InputError("rollout needs q, v and a duration: rollout(scene, q, v, duration)")
-    starts_q = array("rollout: q", q, (None, scene.model.nq))
-    starts_v = array("rollout: v", v, (None, scene.model.nv))
-    if len(starts_q) != len(starts_v):
-        raise InputError(f"rollout: q and v must have as many rows; got {len(starts_q)} and {len(starts_v)}")
-    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, max_steps, record, several)
-    if method in SCIPY:
-        raise InputError(f'rollout: method must be one of the core\'s; "{method}" runs in SciPy')
-    begin = time.perf_counter()
-    q0, v0 = scene._project_all(starts_q, starts_v, options.t0, threads)
-    outcomes = core.rollout(scene._compiled.program, q0, v0, options, threads)
-    wall = time.perf_counter() - begin
-    results: list[Trajectory] = []
-    failed: list[RunError] = []
-    for i, outcome in enumerate(outcomes):
-        try:
-            if outcome is not None:
-                results.append(finish(scene, outcome, outcome.stopped, options, wall))
-        except RunError as error:
-            error.index = i
-            failed.append(error)
-    if failed:  # an interrupt before the runs that it ended in other threads
-        raise min(failed, key=lambda error: not isinstance(error, RunInterrupted))
-    return results
+    if method in SCIPY and checkpoint is not None:
+        raise InputError(
+            f'simulate: checkpoint needs one of the core\'s methods; "{method}" runs in SciPy, which '
+            "does not give its state away"
+        )
+    if method in SCIPY and callback is not None:
+        raise InputError(
+            f'simulate: callback needs one of the core\'s methods; "{method}" runs in SciPy, whose steps '
+            "go on from earlier ones"
+        )
+    if checkpoint is not None and (asked.watched or callback is not None):
+        raise InputError(
+            "simulate: checkpoint cannot hold functions; leave out events and callback, or the checkpoint"
+        )

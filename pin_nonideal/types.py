@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 Table: TypeAlias = dict[str, Any]  # names to values of files and options
+State: TypeAlias = ArrayLike | Mapping[str, Any]  # a configuration or velocity, as numbers or by name
 
 Model: TypeAlias = Any  # pinocchio.Model
 JointModel: TypeAlias = Any  # pinocchio.JointModel

@@ -1,11 +1,15 @@
-"""The oracles of the checkout, importable by name; and Ctrl-C as in a terminal."""
+"""The oracles of the checkout, importable by name; Ctrl-C as in a terminal; the files that runs write."""
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
+import io
 import signal
 import sys
 from pathlib import Path
+
+import pytest
 
 # Shells let what they start in the background, and its children, ignore Ctrl-C.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -23,3 +27,21 @@ def _import_oracles() -> None:
 
 
 _import_oracles()
+
+
+@pytest.fixture
+def kept(monkeypatch):
+    """Every file that a run writes, in order."""
+    from pin_nonideal.runs import checkpoint
+
+    written = []
+
+    @contextlib.contextmanager
+    def keep(path, what):
+        content = io.BytesIO()
+        yield content
+        written.append(content.getvalue())
+        path.write_bytes(written[-1])
+
+    monkeypatch.setattr(checkpoint, "whole_file", keep)
+    return written

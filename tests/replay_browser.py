@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pin_nonideal.replay import replay
+from pin_nonideal.replaying import replay
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 FLAGS = [

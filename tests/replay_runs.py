@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from pin_nonideal.compilation.constraints import lower_constraint, lower_contact
+from pin_nonideal.compilation.constraints import lower_constraint
+from pin_nonideal.compilation.contacts import lower_contacts
 from pin_nonideal.compilation.names import Resolution
 from pin_nonideal.constraints import PointAnchor
 from pin_nonideal.core import core
@@ -47,11 +48,14 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
         "violation_rate": np.zeros(len(t)),
         "modes": None,
         "element_names": [],
+        "element_laws": [],
+        "law_names": [],
         "name": scene.name,
         "events": [],
         "stats": Stats(steps=10, wall_s=0.001),
         "scene": scene,
     }
+    values |= dict.fromkeys(("tau", "limits", "law_forces", "reactions"))
     values |= dict.fromkeys(("a", "F_ideal", "F_nonideal", "lam", "lam_ideal", "energy", "power", "z"))
     return SimpleNamespace(**values | fields)
 
@@ -61,8 +65,7 @@ def _program(scene: Any) -> Any:
     builder, where = core.Builder(scene.model), Resolution(scene.model, scene.q0)
     for name, c in zip("abcdef", scene.constraints, strict=False):
         lower_constraint(c, name, builder, where)
-    for name, c in zip("uvwxyz", scene.contacts, strict=False):
-        lower_contact(c, name, builder, where)
+    list(lower_contacts(list(zip("uvwxyz", scene.contacts, strict=False)), builder, where))
     return builder
 
 

@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pinocchio as pin
 
 import pin_nonideal as pn
 from pin_nonideal.contacts import PointContact
 
+from .mechanisms import again
 from .random_trees import AXIS, add, attach, place_of, three_trees
 
 ROBOTS = [name for name, _ in pn.robots()]
+
+
+def kept(scene):
+    """The scene with contacts that may open kept instead, without friction: their rows act in any state.
+
+    Friction of feet that are kept though they pull may leave no solution.
+    """
+
+    def closed(c):
+        unkept = isinstance(c, PointContact) and c.unilateral
+        return dataclasses.replace(c, unilateral=False, mu=0.0) if unkept else c
+
+    contacts = [closed(c) for c in scene.contacts]
+    return scene if contacts == list(scene.contacts) else again(scene, contacts=contacts)
 
 
 def _meeting(rng, one, other):
@@ -58,7 +75,7 @@ def _disk(axis):
 
 
 def _contact(radius):
-    return lambda frame, plane: PointContact(frame, plane=plane, radius=radius)
+    return lambda frame, plane: PointContact(frame, plane=plane, radius=radius, unilateral=False)
 
 
 def _on_plane(make, body, plane, height):

@@ -21,7 +21,7 @@ def star(feet, height=0.3):
     return np.column_stack([0.3 * np.cos(angle), 0.3 * np.sin(angle), np.full(feet, -height)])
 
 
-def plate(feet, mu, wrench, at, ratio=1.0, **more):
+def plate(feet, mu, wrench, at, ratio=1.0, unilateral=True, **more):
     """A body on feet, and its oracle."""
     model = empty()
     joint = body(model, 0, pin.JointModelFreeFlyer(), "plate", MASS, inertia=INERTIA * np.eye(3))
@@ -30,9 +30,9 @@ def plate(feet, mu, wrench, at, ratio=1.0, **more):
         frame(model, name, joint, pin.SE3(np.eye(3), np.array(place, dtype=float)))
     q0 = pin.neutral(model)
     q0[2] = -feet[0][2]
-    contacts = [pn.PointContact(name, mu=mu, static_ratio=ratio) for name in names]
+    contacts = [pn.PointContact(name, mu=mu, static_ratio=ratio, unilateral=unilateral) for name in names]
     scene = pn.Scene(model, contacts=contacts, forces=[pn.Wrench("pulled", wrench)], q0=q0, **more)
-    return scene, Plate(feet, mu, wrench, at, MASS, INERTIA)
+    return scene, Plate(feet, mu, wrench, at, MASS, INERTIA, pulls=not unilateral)
 
 
 def planar_state(run):

@@ -75,7 +75,8 @@ RUNS = {
     ),
     "record": (
         {"record": "energi"},
-        "simulate: record must be one of 'a', 'forces', 'energy', 'power', 'laws', 'reactions'; "
+        "simulate: record must be one of 'a', 'forces', 'energy', 'power', 'laws', 'reactions', "
+        "'tau', 'dense'; "
         "got 'energi'; nearest: \"energy\"",
     ),
     "record list": ({"record": 3}, "simulate: record must be a list; got 3"),
@@ -112,12 +113,16 @@ def test_a_run_needs_a_scene():
     with refuses("simulate: scene must be a Scene; got Model", InputError):
         pn.simulate(MODEL, 1.0)
     with refuses("rollout: scene must be a Scene; got Model", InputError):
-        pn.rollout(MODEL, (Q[None], V[None]), 1.0)
+        pn.rollout(MODEL, Q[None], V[None], 1.0)
 
 
 ROLLOUTS = {
-    "no velocities": ({"v": None}, "rollout needs q, v and a duration: rollout(scene, q, v, duration)"),
-    "no duration": ({"duration": None}, "rollout needs q, v and a duration: rollout(scene, q, v, duration)"),
+    "no runs": (
+        {"q": None, "v": None},
+        "rollout needs states or parameters of its runs: rollout(scene, q, v, duration)",
+    ),
+    "no duration": ({"duration": None}, "simulate: duration must be a number; got None"),
+    "failures": ({"failures": "drop"}, "rollout: failures must be one of 'raise', 'keep'; got 'drop'"),
     "one state": ({"q": Q, "v": V}, "rollout: q must have shape (n, 15); got shape (15,)"),
     "rows": (
         {"q": np.tile(Q, (2, 1))},

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.errors import InputError
+from pin_nonideal.errors import InputError, UnknownNameError
 
 from .every_joint import INF, MODEL, NAN, Q, V, scaled, with_entry
 from .refusals import refuses
@@ -64,7 +64,26 @@ def test_configurations_close_to_unit_length_are_normalized():
 STATES = {
     "q shape": ({"q": Q[:3]}, "q must have shape (15,); got shape (3,)"),
     "q matrix": ({"q": Q[None]}, "q must have shape (15,); got shape (1, 15)"),
-    "q word": ({"q": "home"}, "q must be an array of numbers of shape (15,); got 'home'"),
+    "q word": ({"q": "home"}, 'q: no reference configuration "home"; there is none'),
+    "v word": ({"v": "fast"}, "v must be an array of numbers of shape (12,); got 'fast'"),
+    "q joint": ({"q": {"j00": 1.0}}, 'q: no joint "j00"; nearest: "j0"'),
+    "v joint": ({"v": {3: 1.0}}, 'v: no joint "3"'),
+    "q of a joint": ({"q": {"j0": [1.0, 2.0]}}, 'q of "j0" must have shape (1,); got shape (2,)'),
+    "q of a joint nan": ({"q": {"j2": [0, 0, 0, NAN]}}, 'q of "j2" must be finite; entry [3] is nan'),
+    "q piece": (
+        {"q": {"j4": {"rpi": [0, 0, 0]}}},
+        'q of "j4": no "rpi" in a FreeFlyer joint; nearest: "rpy"',
+    ),
+    "v piece": ({"v": {"j0": {"linear": 1}}}, 'v of "j0": no "linear" in a RX joint; there is none'),
+    "q piece shape": ({"q": {"j4": {"xyz": 1.0}}}, 'q of "j4": xyz must have shape (3,); got shape ()'),
+    "q turned twice": (
+        {"q": {"j2": {"rpy": [0, 0, 1], "quaternion": [0, 0, 0, 1]}}},
+        'q of "j2": give "rpy" or "quaternion", not both',
+    ),
+    "q short quaternion": (
+        {"q": {"j2": {"quaternion": [0, 0, 0, 2]}}},
+        'q: quaternion [x, y, z, w] of joint "j2" must have length 1; got 2',
+    ),
     "q nan": ({"q": with_entry(Q, 0, NAN)}, "q must be finite; entry [0] is nan"),
     "v shape": ({"v": V[:3]}, "v must have shape (12,); got shape (3,)"),
     "v inf": ({"v": with_entry(V, 5, -INF)}, "v must be finite; entry [5] is -inf"),
@@ -81,7 +100,7 @@ def test_states_that_do_not_fit(road, case):
     given, message = STATES[case]
     if road == "project" and "tau" in given:
         return
-    with refuses(message, InputError):
+    with refuses(message, (InputError, UnknownNameError)):
         getattr(pn.Scene(MODEL), road)(**{"q": Q, "v": V, **given})
 
 

@@ -68,6 +68,19 @@ def test_scaling(command: ModuleType, tmp_path: Path, monkeypatch: pytest.Monkey
     assert (tmp_path / "benchmarks" / "scaling.svg").is_file()
 
 
+@pytest.mark.parametrize("case", ["chains", "motions", "rings", "forests", "slipping", "short"])
+def test_growth(command: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, case: str) -> None:
+    from benchmarks import growth
+
+    monkeypatch.setattr(growth, "LONG_RUN", 1e-3)
+    (found,) = results(command, tmp_path, "growth", "--only", case)
+    assert found["case"] == case
+    for row in found["rows"]:
+        assert all(seconds > 0.0 for seconds in row["seconds"].values())
+        assert all(error < REACHED for error in row["errors"].values())
+    assert (tmp_path / "benchmarks" / "growth.svg").is_file()
+
+
 def test_a_size_that_fails_is_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
     from benchmarks import scaling
 
@@ -97,6 +110,25 @@ def test_features(command: ModuleType, tmp_path: Path) -> None:
     found = results(command, tmp_path, "features")
     assert [row["feature"] for row in found["added"]][:2] == ["open chains, nothing else", "+ loop (2 rows)"]
     assert len(found["absent"]) >= 3
+
+
+def test_contacts(command: ModuleType, tmp_path: Path) -> None:
+    found = results(command, tmp_path, "contacts", "--only", "bouncing")
+    (bouncing,) = found["curves"]
+    errors = {row["setting"]: row["error"] for row in bouncing["runs"] if row["tool"] == "pin_nonideal"}
+    assert errors["dop853 rtol 1e-08"] < GAP
+    assert errors["moreau h 1e-03"] < errors["moreau h 1e-02"]
+    assert {row["contacts"] for row in found["impacts"]} == {1, 2, 4, 8}
+    assert {row["method"] for row in found["open"]} == {"dop853", "moreau"}
+
+
+@pytest.mark.parametrize("name", ["sliding", "standing"])
+def test_closed_forms_of_contacts(name: str) -> None:
+    from benchmarks import contacts
+
+    case = contacts.CASES[name]()
+    run = contacts.ours(case, ())[2]
+    np.testing.assert_allclose(run.run(), case.end, atol=GAP)
 
 
 def test_batches(command: ModuleType, tmp_path: Path) -> None:
@@ -277,3 +309,23 @@ def test_the_report_keeps_full_runs_only(
     assert text.startswith("before\n")
     assert text.endswith("after\n")
     assert "old" not in text
+
+
+def test_series_that_coincide_are_told_apart_in_the_pictures() -> None:
+    """Two equal series over N: the color of each is seen along the line, and no two looks are alike."""
+    import io
+
+    from PIL import Image
+
+    from benchmarks import plots
+
+    sizes = [{"N": n, "seconds": {"first": 1e-6 * n, "second": 1e-6 * n}} for n in (1, 4, 16, 64)]
+    figure = plots.scaling({"sizes": sizes})
+    figure.axes[0].get_legend().remove()
+    stream = io.BytesIO()
+    figure.savefig(stream, dpi=150)
+    picture = np.asarray(Image.open(stream).convert("RGB")).astype(int)
+    for color in ((31, 119, 180), (255, 127, 14)):
+        assert np.count_nonzero(np.abs(picture - color).max(axis=2) < 40) > 300
+    looks = [plots.look(k, 8) for k in range(8)]
+    assert len({(one["marker"], one["markersize"], one["linewidth"]) for one in looks}) == 8

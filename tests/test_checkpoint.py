@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import io
 import json
 import signal
 import subprocess
@@ -79,22 +78,6 @@ RUNS = {
     "rolling": (lambda: pn.load("rolling_disk"), 0.5, {"output_dt": 0.1}),
     "slow slip": (lambda: balls(2)[0], 1.0, {"output_dt": 0.02, "record": ALL}),
 }
-
-
-@pytest.fixture
-def kept(monkeypatch):
-    """Every file that a run writes, in order."""
-    written = []
-
-    @contextlib.contextmanager
-    def keep(path, what):
-        content = io.BytesIO()
-        yield content
-        written.append(content.getvalue())
-        path.write_bytes(written[-1])
-
-    monkeypatch.setattr(checkpoint, "whole_file", keep)
-    return written
 
 
 @pytest.mark.parametrize("case", RUNS)

@@ -137,7 +137,11 @@ def test_contact_friction_slides_against_the_slip():
         (contact,) = bare.contacts
         rough = pn.Scene(
             bare.model,
-            contacts=[type(contact)(contact.frame, mu=0.5, plane=contact.plane, radius=contact.radius)],
+            contacts=[
+                type(contact)(
+                    contact.frame, mu=0.5, plane=contact.plane, radius=contact.radius, unilateral=False
+                )
+            ],
             q0=bare.q0,
         )
         q, v = consistent(rough, rng, 0.0)

@@ -1,31 +1,37 @@
-"""The friction examples print what they compute beside closed forms; both must agree."""
+"""The examples of friction and of contacts print what they compute beside closed forms; both must agree."""
 
 from __future__ import annotations
 
+import base64
+import gzip
 import importlib.util
 import re
+import sys
 from pathlib import Path
 
 import pytest
 
-SCRIPT = Path(__file__).parent.parent / "examples" / "friction.py"
+FOLDER = Path(__file__).parent.parent / "examples"
 # Runs at rtol 1e-10: events to 1e-9, as tests/test_references_friction.py has them.
 PRINTED = 1e-9
 
 
-def script():
-    spec = importlib.util.spec_from_file_location("examples_friction", SCRIPT)
+def script(name):
+    spec = importlib.util.spec_from_file_location(f"examples_{name}", FOLDER / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
-FRICTION = script()
+sys.path.insert(0, str(FOLDER))  # as a script has it
+FRICTION, CONTACTS = script("friction"), script("contacts")
 
 
-@pytest.mark.parametrize("name", FRICTION.EXAMPLES)
-def test_computed_and_expected_agree(name, capsys):
-    FRICTION.main([name])
+@pytest.mark.parametrize(
+    ("examples", "name"), [(part, name) for part in (FRICTION, CONTACTS) for name in part.EXAMPLES]
+)
+def test_computed_and_expected_agree(examples, name, capsys):
+    examples.main([name])
     lines = re.findall(r"^  (.{46}) +(\S+) +(\S+) +(\S+)$", capsys.readouterr().out, re.M)
     assert len(lines) >= 2
     for what, computed, expected, _ in lines:
@@ -38,7 +44,8 @@ def test_replays_are_written_where_asked(tmp_path, capsys):
     FRICTION.main(["belt_oscillator", "--html", str(tmp_path / "pages")])
     page = tmp_path / "pages" / "belt_oscillator.html"
     assert f"wrote {page}" in capsys.readouterr().out
-    assert "slip" in page.read_text(encoding="utf-8")
+    packed = re.search(r'id="payload">([^<]+)<', page.read_text(encoding="utf-8")).group(1)
+    assert b'"slip"' in gzip.decompress(base64.b64decode(packed))
 
 
 def test_unknown_names_are_told(capsys):

@@ -13,11 +13,15 @@ import numpy as np
 import pytest
 
 import pin_nonideal as pn
+from pin_nonideal.cli import main
 from pin_nonideal.errors import InputError, LoadingError, OutputError, UserFunctionError
 from pin_nonideal.files import whole_file
+from pin_nonideal.scene import TAKEN
 
 from .refusals import refuses
 from .small_robots import folder, joint, link, robot
+
+LIST = f"{sys.executable} -c 'from pin_nonideal.cli import main; raise SystemExit(main([\"list\"]))'"
 
 
 def write(path, content=b"new"):
@@ -55,6 +59,37 @@ def test_devices_and_pipes_are_left_alone(tmp_path):
     assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
 
 
+def test_links_that_lead_in_a_circle_are_left_alone(tmp_path):
+    loop = tmp_path / "run.npz"
+    loop.symlink_to(loop)
+    with refuses("its symbolic links lead in a circle; name a file", OutputError):
+        write(loop)
+    assert loop.is_symlink()
+
+
+def test_a_device_is_no_beginning_of_a_name():
+    run = pn.simulate(pn.load("four_bar"), 0.01)
+    with refuses('cannot write the trajectory to "/dev/null": it is a device or a pipe', OutputError):
+        run.save("/dev/null")
+    assert not os.path.exists("/dev/null.npz")
+
+
+def test_a_device_is_found_before_the_run(capsys, monkeypatch):
+    monkeypatch.setattr(pn, "simulate", None)
+    assert main(["run", "four_bar", "--duration", "0.1", "--html", "/dev/null"]) == 2
+    assert 'cannot write the output to "/dev/null": it is a device or a pipe' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("where", "code", "said"), [("> /dev/full", 2, "cannot print: No space left"), (">&-", 0, "")]
+)
+def test_output_that_cannot_be_printed_is_said_in_one_line(where, code, said):
+    done = subprocess.run(f"{LIST} {where}", shell=True, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == code
+    assert said in done.stderr
+    assert done.stderr.count("\n") <= 1
+
+
 def test_parts_of_killed_processes_are_taken_away(tmp_path):
     code = (
         "import os, sys\nfrom pathlib import Path\nfrom pin_nonideal.files import whole_file\n"
@@ -64,16 +99,21 @@ def test_parts_of_killed_processes_are_taken_away(tmp_path):
     path = tmp_path / "run.npz"
     subprocess.run([sys.executable, "-c", code, str(path)], check=False)
     assert len(list(tmp_path.iterdir())) == 1
-    other = tmp_path / f".run.npz.{os.getpid()}.abc.part"  # of a process that goes on
-    other.write_bytes(b"")
+    (half,) = tmp_path.iterdir()
+    beginning, owner, process, *ends = half.name.rsplit(".", 4)
+    live = half.with_name(".".join((beginning, owner, str(os.getpid()), *ends)))  # of a process that goes on
+    far = half.with_name(".".join((beginning, "00000000", process, *ends)))  # of another machine, or file
+    for other in (live, far):
+        other.write_bytes(b"")
     write(path)
-    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([path.name, other.name])
+    assert {p.name for p in tmp_path.iterdir()} == {path.name, live.name, far.name}
 
 
-def test_a_list_that_is_not_read_to_its_end_ends_quietly():
-    command = f"{sys.executable} -m pin_nonideal.cli list | head -1"
-    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+@pytest.mark.parametrize(("reader", "read"), [("head -1", 1), ("true", 0)])
+def test_a_list_that_is_not_read_to_its_end_ends_quietly(reader, read):
+    done = subprocess.run(f"{LIST} | {reader}", shell=True, capture_output=True, text=True, check=False)
     assert done.stderr == ""
+    assert done.stdout.count("\n") == read
 
 
 def test_times_of_a_saved_run_are_checked(tmp_path):
@@ -110,12 +150,39 @@ def test_a_model_that_is_changed_after_the_scene_was_made_is_refused(tmp_path):
     for act in (
         lambda: pn.simulate(scene, 0.1),
         lambda: scene.solve(scene.q0, scene.v0),
+        lambda: scene.acceleration(scene.q0, scene.v0),
+        lambda: scene.step(scene.q0, scene.v0, None, 0.1),
         scene.initial_state,
     ):
         with refuses("was changed after the scene was made", InputError):
             act()
     with pytest.raises(ValueError, match="read-only"):
         scene.q0[0] = 1.0
+
+
+@pytest.mark.parametrize("key", TAKEN)
+def test_what_a_scene_was_made_of_cannot_be_exchanged(tmp_path, key):
+    scene = pn.load(folder(tmp_path))
+    with refuses(f'{key} of scene "{scene.name}" is what the scene was made of', InputError):
+        setattr(scene, key, getattr(scene, key))
+    scene.name = "another"
+
+
+def test_configurations_of_a_saved_run_are_checked(tmp_path):
+    pn.simulate(pn.load("four_bar"), 0.01).save(tmp_path / "run.npz")
+    with np.load(tmp_path / "run.npz") as file:
+        arrays = dict(file)
+    arrays["v"][1, 0] = np.inf
+    np.savez(tmp_path / "bad.npz", **arrays)
+    with refuses("v must be finite; it holds inf", LoadingError):
+        pn.Trajectory.load(tmp_path / "bad.npz")
+
+
+@pytest.mark.parametrize("text", ["duration: 1:30", "duration: 010", "parameters: {N: 012}"])
+def test_numbers_that_mean_something_else_are_refused_in_sweeps_too(tmp_path, capsys, text):
+    (tmp_path / "sweep.yaml").write_text(f"robot: four_bar\ngrid: {{}}\n{text}\n")
+    assert main(["sweep", str(tmp_path / "sweep.yaml")]) == 2
+    assert "is octal or sexagesimal in YAML" in capsys.readouterr().err
 
 
 YAML = {

@@ -12,7 +12,7 @@ from pin_nonideal.states.rows import holonomic_rows
 
 from .mechanisms import again
 from .random_trees import state, tree
-from .row_cases import ROBOTS
+from .row_cases import ROBOTS, kept
 
 # Sums of a few dozen products of forces and displacements.
 ROUNDING = 1e-11
@@ -26,9 +26,11 @@ KEPT = 1e-8
 )
 def robot(request):
     name, terms = request.param
-    scene = pn.load(name, terms=terms)
+    scene = kept(pn.load(name, terms=terms))
     rng = np.random.default_rng(1)
-    states = [scene.initial_state()] + [consistent(scene, rng, 0.0, speed) for speed in (0.3, 3.0)]
+    states = [scene.project(*scene.initial_state())] + [
+        consistent(scene, rng, 0.0, speed) for speed in (0.3, 3.0)
+    ]
     return scene, states
 
 

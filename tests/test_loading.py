@@ -41,7 +41,7 @@ def test_start_by_joint_name_by_numbers_and_by_reference(tmp_path):
     file = folder(tmp_path)
     np.testing.assert_array_equal(pn.load(file, q0={"elbow": 0.5}).q0, [0, 0.5])
     np.testing.assert_array_equal(pn.load(file, q0=[0.1, 0.2]).q0, [0.1, 0.2])
-    with refuses('load: q0: q: no joint "elbw"; nearest: "elbow"', InputError):
+    with refuses('load: q0: no joint "elbw"; nearest: "elbow"', UnknownNameError):
         pn.load(file, q0={"elbw": 0.5})
 
 

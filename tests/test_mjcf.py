@@ -58,6 +58,20 @@ def test_bodies_and_joints_without_names_arrive(tmp_path):
     assert list(model.names)[1:] == ["joint_0", "joint_1"]
 
 
+def test_a_joint_that_has_the_name_of_the_ground_gets_another(tmp_path):
+    bodies = '<body name="universe"><joint name="universe"/><geom size="0.1"/></body>'
+    scene = pn.load(write(tmp_path, bodies=bodies))
+    assert list(scene.model.names) == ["universe", "universe_0"]
+    assert 'joint "universe" is called "universe_0" here, for the ground has its name' in scene.notes
+
+
+def test_a_fragment_whose_tendon_goes_around_nothing_is_refused(tmp_path):
+    path = '<site site="rod_tip"/><geom geom="lost"/><site site="rocker_tip"/>'
+    tail = f"<tendon><spatial>{path}</spatial></tendon>"
+    with refuses("cannot be compiled by MuJoCo"):
+        pn.load(write(tmp_path, tail=tail))
+
+
 def test_several_joints_of_one_body_stay_single(tmp_path):
     bodies = """<body name="base"><geom size="0.1"/><body name="table" pos="0 0 1" euler="0 0 0.5">
         <joint name="x" type="slide" axis="1 0 0"/><joint name="turn" axis="0 0 1"/>
@@ -241,7 +255,7 @@ def test_keyframes_are_named_starts(tmp_path):
     np.testing.assert_array_equal(pn.load(file).q0, [0.25, 0, 0])
     np.testing.assert_array_equal(pn.load(file, q0="home", ctrl={"drive": 0.2}).actuation.ctrl, [0.2])
     np.testing.assert_array_equal(pn.load(file, q0={"rod_joint": 0.4}).q0, [0.25, 0.4, 0])
-    with refuses('load: q0: no reference configuration "hoem"; nearest: "home"', pn.InputError):
+    with refuses('load: q0: no reference configuration "hoem"; nearest: "home"', pn.UnknownNameError):
         pn.load(file, q0="hoem")
     with refuses('ctrl: no actuator "driv"; nearest: "drive"', pn.UnknownNameError):
         pn.load(file, ctrl={"driv": 1.0})
@@ -332,6 +346,29 @@ def test_meshes_are_read_when_a_replay_asks_for_them(tmp_path):
     )  # meshes are floats of 24 bits
     assert [(p.first, p.second) for p in scene.collision_model.collisionPairs] == [(0, 1), (0, 2)]
     assert scene.contact_friction["floor"] == (1.0, 0.005, 0.0001)
+
+
+@pytest.mark.parametrize("through", ["", "include"])
+def test_meshes_of_attached_models_are_found_in_their_own_folders(tmp_path, through):
+    (tmp_path / "hand" / "shapes").mkdir(parents=True)
+    (tmp_path / "hand" / "shapes" / "t.obj").write_text(TETRAHEDRON)
+    body = '<body name="palm"><joint axis="1 0 0"/><geom type="mesh" mesh="t"/></body>'
+    head = '<compiler meshdir="shapes"/><asset><mesh name="t" file="t.obj"/></asset>'
+    text = f"<mujoco>{head}<worldbody>{body}</worldbody></mujoco>"
+    (tmp_path / "hand" / "hand.xml").write_text(text)
+    asset = '<asset><model name="hand" file="hand/hand.xml"/></asset>'
+    (tmp_path / "parts.xml").write_text(f"<mujoco>{asset}</mujoco>")
+    attached = '<frame pos="1 0 0"><attach model="hand" body="palm" prefix="left_"/></frame>'
+    head = '<include file="parts.xml"/>' if through else asset
+    scene = pn.load(write(tmp_path, bodies=CRANK + attached, head=head))
+    assert [scene.model.inertias[3].mass] == pytest.approx([1000.0 / 6.0])
+    assert scene.visual_model.ngeoms == 3
+    assert not any("not found" in note for note in scene.notes)
+
+
+def test_what_makes_a_body_float_is_said_in_the_words_of_the_file(tmp_path):
+    scene = pn.load(write(tmp_path, bodies='<body><geom size="0.1"/></body>'))
+    assert "nothing moves: give a body a <freejoint/>" in scene.notes
 
 
 def test_mass_of_meshes_is_mujocos(tmp_path):

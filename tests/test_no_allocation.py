@@ -38,7 +38,11 @@ int posix_memalign(void **out, size_t align, size_t n) {
 SCRIPT = """
 import ctypes, json, sys
 
+import numpy as np
+import pinocchio as pin
+
 import pin_nonideal as pn
+from pin_nonideal._core import ConeSolver
 
 allocations = ctypes.c_long.in_dll(ctypes.CDLL(sys.argv[1]), "allocations")
 
@@ -49,22 +53,56 @@ def taken(runner, q, v, count):
     return allocations.value - before
 
 
+def deep_ring(terms, n=50):
+    model, parent, link = pin.Model(), 0, np.array([0.0, 0.0, 0.1])
+    for i in range(n):
+        place = pin.SE3(pin.rpy.rpyToMatrix(0.0, 6.28 / n, 0.0), link)
+        parent = model.addJoint(parent, pin.JointModelRY(), place, f"j{i}")
+        model.appendBodyToJoint(parent, pin.Inertia.Random(), pin.SE3.Identity())
+    model.addFrame(pin.Frame("tip", parent, 0, pin.SE3(np.eye(3), link), pin.FrameType.OP_FRAME))
+    wrench, drag = pn.Wrench("tip", [1.0] * 6), pn.Drag("tip", 0.1, 1.0)
+    anchor = pn.PointAnchor("tip", None)
+    return pn.Scene(model, constraints=[anchor], forces=[wrench], laws=[drag], terms=terms)
+
+
 found = {}
 for case in sys.argv[2:]:
     name, terms = case.split(":")
-    scene = pn.load(name, terms=terms)
+    scene = deep_ring(terms) if name == "deep_ring" else pn.load(name, terms=terms)
     runner = scene._compiled.program.runner()
     q, v = scene.initial_state()
     if name == "panda_friction":  # one joint at rest sticks
         v[0] = 0.0
     taken(runner, q, v, 10)
     found[case] = [taken(runner, q, v, count) for count in (10, 1010)]
+rng = np.random.default_rng(0)
+solver = ConeSolver()
+
+
+def solved(count, warm):
+    before = allocations.value
+    solver.again(count, warm)
+    return allocations.value - before
+
+
+for k in range(6):  # a box on its corners: contacts that open, stick and slide, and share a load
+    axes = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    corners = [np.array([x, y, -0.1]) for x in (0.2, -0.2) for y in (0.1, -0.1)]
+    H = np.vstack([np.hstack([axes, np.cross(corner, axes)]) for corner in corners])
+    push = rng.standard_normal(6) * 4.0 - np.array([0.0, 0.0, 9.81, 0.0, 0.0, 0.0])
+    solver.solve(H @ H.T, H @ push, [3] * 4, [0.5] * 4, 4, None)
+    solved(1, False)
+    solved(1, True)
+    for warm in (False, True):
+        found[f"cones {k} {warm}"] = [solved(10, warm), solved(1010, warm)]
 found["the counter itself"] = [0, allocations.value]
 print(json.dumps(found))
 """
 
 ROBOTS = ["four_bar", "delta", "solo12_standing", "panda_friction", "n_four_bar", "rolling_disk", "five_bar"]
+ROBOTS.append("deep_ring")
 NAMES = [f"{name}:{terms}" for terms in ("core", "pinocchio") for name in ROBOTS]
+CONES = [f"cones {k} {warm}" for k in range(6) for warm in (False, True)]
 
 
 @pytest.fixture(scope="module")
@@ -98,3 +136,9 @@ def test_the_counter_counts(counts):
 def test_an_evaluation_allocates_nothing(counts, name):
     few, many = counts[name]
     assert many - few == 0, f"{(many - few) / 1000} allocations an evaluation"
+
+
+@pytest.mark.parametrize("name", CONES)
+def test_a_contact_problem_allocates_nothing(counts, name):
+    few, many = counts[name]
+    assert many - few == 0, f"{(many - few) / 1000} allocations a solve"

@@ -64,9 +64,10 @@ class Rod:
         frame(model, "ground", 0)
         return model
 
-    def contact(self, mu):
-        """The ground as a contact with friction."""
-        return pn.Scene(self.model(), contacts=[pn.PointContact("tip", mu=mu, name="ground")])
+    def contact(self, mu, unilateral=False):
+        """The ground as a contact with friction, kept as in a groove unless it may open."""
+        tip = pn.PointContact("tip", mu=mu, unilateral=unilateral, name="ground")
+        return pn.Scene(self.model(), contacts=[tip])
 
     def user_law(self, mu):
         """The same friction, known to the package only as a function of the reactions."""
@@ -124,6 +125,18 @@ class TestRod:
             assert caught.value.time == 0.0
             assert caught.value.element == element
             assert caught.value.determinant == pytest.approx(1.0 - share, abs=DETERMINANT)
+
+    @pytest.mark.parametrize("angle", ANGLES)
+    def test_a_tip_that_may_open_does_not_pull(self, angle):
+        """The second motion away from the lean would pull: there is one; against it none, as kept."""
+        rod = Rod(angle)
+        for share in (0.1, 0.9, 1.0, 1.0 + NEAR, 1.1, 3.0):
+            s = rod.contact(share / rod.k, unilateral=True).solve(*rod.state(1))
+            assert s.lam[0] == pytest.approx(rod.normal(share / rod.k, 1), rel=SOLVED)
+            assert s.unique
+            if share > 1.0:
+                with raises("ground", "no solution"):
+                    rod.contact(share / rod.k, unilateral=True).solve(*rod.state(-1))
 
     @pytest.mark.parametrize("angle", ANGLES)
     @pytest.mark.parametrize(("way", "element"), WAYS)

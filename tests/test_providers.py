@@ -85,7 +85,8 @@ def assert_same_motion(one, two):
 def test_every_robot_along_a_run(name):
     scene = pn.load(name)
     duration = 0.01 if name == "andrews_squeezer" else 0.1
-    options = {"output_dt": duration / 5, "record": EVERYTHING}
+    # A hold in free fall stands still to rounding, which then decides on steps; the tolerance bounds the gap.
+    options = {"output_dt": duration / 5, "record": EVERYTHING, "rtol": 1e-10, "atol": 1e-12}
     assert_same_motion(
         *(pn.simulate(s, duration, **options) for s in (scene, again(scene, terms="pinocchio")))
     )
@@ -97,7 +98,7 @@ def test_every_robot_along_a_run(name):
 def test_random_mechanisms_with_friction_along_a_run(seed, method):
     m = mechanism(seed)
     options = {"output_dt": 0.02, "record": EVERYTHING, "method": method}
-    options |= {"rtol": 1e-11, "atol": 1e-12} if method == "dop853" else {"dt": 1e-3}
+    options |= {"rtol": 1e-12, "atol": 1e-13} if method == "dop853" else {"dt": 1e-3}
     assert_same_motion(
         *(pn.simulate(s, 0.1, q=m.q, v=m.v, **options) for s in (m.scene, again(m.scene, terms="pinocchio")))
     )

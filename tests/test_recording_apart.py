@@ -20,7 +20,11 @@ def rod_on_a_point():
     turn = body(model, z, pin.JointModelRY(), "turn", 1.0, inertia=0.1 * np.eye(3))
     frame(model, "tip", turn, pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.0])))
     return pn.Scene(
-        model, contacts=[pn.PointContact("tip")], q0=[0.0, 0.45, 1.2], v0=[0.3, 0.0, -0.5], name="rod"
+        model,
+        contacts=[pn.PointContact("tip", unilateral=False)],
+        q0=[0.0, 0.45, 1.2],
+        v0=[0.3, 0.0, -0.5],
+        name="rod",
     )
 
 
@@ -72,7 +76,7 @@ def rubbing_cart():
     return pn.Scene(
         model,
         laws=[pn.UserLaw(drag, name="drag")],
-        contacts=[pn.PointContact("foot", mu=0.3)],
+        contacts=[pn.PointContact("foot", mu=0.3, unilateral=False)],
         actuation=lambda t, q, v: np.array([6.0 * np.sin(3.0 * t), 0.0]),
         v0=[1.0, 0.0],
     )

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from .replay_browser import MOVED, Watched, changed, headless_browser, opened_replay
@@ -74,12 +75,12 @@ def test_a_click_on_the_time_line_or_a_plot_seeks(loop: Any, where: str) -> None
 
 def test_keys_play_step_and_jump(loop: Any) -> None:
     watched, keyboard = loop.watched, loop.page.keyboard
-    watched.run("() => replay.seek(0.5)")
-    frame = 1.0 / 60.0
+    times = watched.run("() => replay.times")
+    watched.run("t => replay.seek(t)", times[300])
     for key, expected in (
-        ("ArrowRight", 0.5 + frame),
-        ("ArrowLeft", 0.5),
-        ("Shift+ArrowRight", 0.5 + 10 * frame),
+        ("ArrowRight", times[301]),
+        ("ArrowLeft", times[300]),
+        ("Shift+ArrowRight", times[310]),
         ("Home", 0.0),
         ("End", 1.0),
     ):
@@ -128,10 +129,77 @@ def test_the_camera_turns_and_returns(arm: Any) -> None:
     turned = arm.watched.picture(0.0)
     assert changed(before, turned) > MOVED
     arm.page.keyboard.press("r")
-    assert changed(before, arm.watched.picture(0.0)) == 0
+    inside = (slice(4, -4), slice(4, -4))  # the ring around what has the focus left out
+    assert changed(before[inside], arm.watched.picture(0.0)[inside]) == 0
 
 
 def test_it_plays_by_itself_unless_told_not_to(browser: Any, loop: Any) -> None:
     watched = Watched(browser, loop.path, fragment="")
     watched.page.wait_for_function("() => replay.playing && replay.time > 0")
     watched.context.close()
+
+
+def test_keys_go_from_event_to_event(arm: Any) -> None:
+    watched, keyboard = arm.watched, arm.page.keyboard
+    watched.run("() => replay.seek(0)")
+    keyboard.press("n")
+    assert watched.run("() => replay.time") == pytest.approx(0.2)
+    keyboard.press("n")  # there is no other
+    assert watched.run("() => replay.time") == pytest.approx(0.2)
+    keyboard.press("End")
+    keyboard.press("b")
+    assert watched.run("() => replay.time") == pytest.approx(0.2)
+
+
+def test_time_axes_zoom_together_and_come_back(loop: Any) -> None:
+    watched, page = loop.watched, loop.page
+    box = page.locator("#plots canvas >> nth=0").bounding_box()
+    page.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 40)
+    page.mouse.wheel(0, -400)
+    start, end = watched.run("() => replay.span")
+    assert end - start == pytest.approx(np.exp(-0.7), rel=0.02)
+    around = (0.7 * box["width"] - 52) / (
+        box["width"] - 60
+    )  # the axis begins at 52 pixels, ends 8 before the edge
+    assert start < around < end
+    line = page.locator("#timeline").bounding_box()
+    page.mouse.click(line["x"] + line["width"] - 8, line["y"] + 10)
+    assert watched.run("() => replay.time") == pytest.approx(end, abs=0.01)
+    page.keyboard.press("0")
+    assert watched.run("() => replay.span") == [0.0, 1.0]
+    page.keyboard.press("Home")
+
+
+def test_a_part_of_the_run_is_repeated(loop: Any) -> None:
+    watched, keyboard = loop.watched, loop.page.keyboard
+    for time, key in ((0.4, "["), (0.45, "]")):
+        watched.run("t => replay.seek(t)", time)
+        keyboard.press(key)
+    watched.run("() => { replay.seek(0.44); replay.play(); }")
+    watched.page.wait_for_function("() => replay.time < 0.44")
+    assert watched.run("() => replay.time") >= 0.4
+    watched.run("() => replay.pause()")
+    keyboard.press("\\")
+
+
+def test_space_presses_the_button_that_has_the_focus(loop: Any) -> None:
+    watched, page = loop.watched, loop.page
+    watched.run("() => { replay.seek(0.5); document.getElementById('plots-toggle').focus(); }")
+    page.keyboard.press("Space")
+    assert watched.run("() => replay.playing") is False
+    assert not page.locator("#plots").is_visible()
+    page.keyboard.press("Space")
+    assert page.locator("#plots").is_visible()
+    watched.run("() => document.activeElement.blur()")
+
+
+def test_the_time_line_is_a_slider_for_the_keyboard_and_for_readers(loop: Any) -> None:
+    page = loop.page
+    page.locator("#timeline").focus()
+    page.keyboard.press("End")
+    slider = page.locator("#timeline")
+    assert slider.get_attribute("role") == "slider"
+    assert [float(slider.get_attribute(f"aria-value{x}")) for x in ("min", "now", "max")] == [0.0, 1.0, 1.0]
+    page.keyboard.press("PageUp")
+    assert float(slider.get_attribute("aria-valuenow")) == pytest.approx(0.9)
+    assert slider.get_attribute("aria-valuetext").endswith(" s")

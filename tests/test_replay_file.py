@@ -18,8 +18,8 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, OutputError
-from pin_nonideal.page.payload import packed_run
-from pin_nonideal.replay import replay
+from pin_nonideal.page.payload import packed_runs
+from pin_nonideal.replaying import replay
 
 from .replay_runs import four_bar, jointed, run_of
 
@@ -40,7 +40,7 @@ def test_the_file_is_the_page_and_overwrites_an_older_one(tmp_path: Path) -> Non
 def test_every_robot_of_the_package_can_be_replayed(name: str) -> None:
     scene = pn.load(name)
     run = pn.simulate(scene, 1e-3, record=("forces", "energy"))
-    content = packed_run(run, 1000.0, "title", None, True)
+    content = packed_runs([run], ["run"], 1000.0, "title", None, True)
     header = json.loads(content[4 : 4 + int.from_bytes(content[:4], "little")])
     assert header["visuals"]
     assert len(header["joints"]) == scene.model.njoints
@@ -115,7 +115,9 @@ def test_switches_are_true_or_false(switch: str) -> None:
 
 def test_equal_shapes_are_stored_once() -> None:
     model = jointed(*[pin.JointModelRZ()] * 4)  # four equal bars, drawn in place of geometry
-    content = packed_run(run_of(model, [0.0, 1.0], lambda t: np.full(4, t)), 60.0, "title", None, True)
+    content = packed_runs(
+        [run_of(model, [0.0, 1.0], lambda t: np.full(4, t))], ["run"], 60.0, "title", None, True
+    )
     header = json.loads(content[4 : 4 + int.from_bytes(content[:4], "little")])
     assert len(header["visuals"]) == 8
     assert len(header["shapes"]) == 2
@@ -148,7 +150,7 @@ def test_writing_a_replay_imports_neither_meshcat_nor_its_server() -> None:
     script = (
         "import sys\n"
         "from tests.replay_runs import four_bar\n"
-        "from pin_nonideal.replay import replay\n"
+        "from pin_nonideal.replaying import replay\n"
         "replay(four_bar())\n"
         "print(sorted({'meshcat', 'zmq', 'tornado', 'umsgpack', 'matplotlib', 'scipy'} & set(sys.modules)))\n"
     )

@@ -6,8 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import pin_nonideal as pn
 from pin_nonideal.constraints import (
     Distance,
+    FrameAnchor,
     HingeAnchor,
     JointCoupling,
     KnifeEdge,
@@ -166,7 +168,7 @@ def single(item: object, lam: list[float], joint: object = None, **fields: objec
     ids=["point", "hinge", "distance", "disk", "sphere", "contact", "edge", "drive"],
 )
 def test_force_and_place_of_each_kind(item: object, lam: list, force: list, origin: list) -> None:
-    (arrow,) = single(item, lam)
+    (arrow,) = [found for found in single(item, lam) if found.unit == "N"]
     np.testing.assert_allclose(arrow.values[0], force, atol=ROUNDING)
     np.testing.assert_allclose(arrow.origin[0], origin, atol=ROUNDING)
     assert (arrow.name, arrow.unit, arrow.kind) == ("c", "N", "total")
@@ -229,3 +231,81 @@ def test_rods_springs_and_contacts_are_marked() -> None:
         ("foot", "contact"),
         ("spring", "spring"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("item", "lam", "moment"),
+    [
+        (HingeAnchor("tip", "base", name="c"), [1.0, 2.0, 3.0, 8.0, 9.0], [-9.0, 8.0, 0.0]),
+        (HingeAnchor("tip", "base", axis="x", name="c"), [1.0, 2.0, 3.0, 8.0, 9.0], [-8.0, 0.0, 9.0]),
+        (FrameAnchor("tip", "base", name="c"), [1.0, 2.0, 3.0, 7.0, 8.0, 9.0], [-8.0, 7.0, 9.0]),
+    ],
+    ids=["hinge z", "hinge x", "frame"],
+)
+def test_moments_of_anchors_are_drawn_at_the_frame(item: object, lam: list, moment: list) -> None:
+    """`base` is turned by a right angle about z: its x is the world's y; t1 and t2 of "x" are y and z."""
+    (arrow,) = [found for found in single(item, lam) if found.unit == "N m"]
+    np.testing.assert_allclose(arrow.values[0], moment, atol=ROUNDING)
+    np.testing.assert_allclose(arrow.origin[0], [0.4, 0.0, 0.0], atol=ROUNDING)
+
+
+def test_a_moment_that_is_rounding_of_the_forces_has_no_arc() -> None:
+    item = FrameAnchor("tip", "base", name="c")
+    assert [a.unit for a in single(item, [10.0, 0.0, 0.0, 1e-15, 0.0, 0.0])] == ["N"]
+    assert [a.unit for a in single(item, [10.0, 0.0, 0.0, 1e-3, 0.0, 0.0])] == ["N", "N m"]
+
+
+def test_joints_of_several_dofs_show_the_force_and_the_moment_on_their_body() -> None:
+    """A free body turned by a right angle about z: its own x is the world's y."""
+    model = jointed(pin.JointModelFreeFlyer())
+    q = pin.SE3ToXYZQUAT(pin.SE3(pin.utils.rotate("z", np.pi / 2.0), np.array([1.0, 2.0, 3.0])))
+    force = np.tile([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], (2, 1))
+    straight, moment = arrows(run_of(model, [0.0, 1.0], lambda t: q, F_nonideal=force))
+    np.testing.assert_allclose(straight.values[0], [-2.0, 1.0, 3.0], atol=ROUNDING)
+    np.testing.assert_allclose(moment.values[0], [-5.0, 4.0, 6.0], atol=ROUNDING)
+    assert (straight.unit, moment.unit, straight.kind) == ("N", "N m", "nonideal")
+    model = jointed(pin.JointModelTranslation())
+    (arrow,) = arrows(
+        run_of(model, [0.0, 1.0], lambda t: np.zeros(3), F_ideal=np.tile([1.0, 2.0, 3.0], (2, 1)))
+    )
+    np.testing.assert_allclose(arrow.values[0], [1.0, 2.0, 3.0], atol=ROUNDING)
+
+
+def test_the_force_on_a_universal_joint_is_the_least_that_has_its_components() -> None:
+    model = jointed(pin.JointModelSphericalZYX())
+    q, tau = np.array([0.3, -0.8, 0.5]), np.array([1.0, -2.0, 0.7])
+    (moment,) = arrows(run_of(model, [0.0, 1.0], lambda t: q, F_nonideal=np.tile(tau, (2, 1))))
+    data = model.createData()
+    pin.computeJointJacobians(model, data, q)
+    turning = pin.getJointJacobian(model, data, 1, pin.LOCAL_WORLD_ALIGNED)[3:]
+    np.testing.assert_allclose(turning.T @ moment.values[0], tau, atol=ROUNDING)
+
+
+def test_slides_without_a_mass_between_them_are_one_particle() -> None:
+    model = pin.Model()
+    x = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "x")
+    y = model.addJoint(x, pin.JointModelPY(), pin.SE3.Identity(), "y")
+    model.appendBodyToJoint(y, pin.Inertia(1.0, np.zeros(3), np.zeros((3, 3))), pin.SE3.Identity())
+    (arrow,) = arrows(
+        run_of(model, [0.0, 1.0], lambda t: np.array([t, 0.0]), F_ideal=np.tile([3.0, 4.0], (2, 1)))
+    )
+    np.testing.assert_allclose(arrow.values[0], [3.0, 4.0, 0.0], atol=ROUNDING)
+    assert arrow.name == "x, y"
+
+
+def test_torques_of_the_actuation_are_drawn_at_their_joints() -> None:
+    model = jointed(pin.JointModelRZ(), pin.JointModelRX())
+    tau = np.array([[0.0, 2.5], [0.0, 2.5]])
+    (arrow,) = arrows(run_of(model, [0.0, 1.0], lambda t: np.array([t, 0.0]), tau=tau))
+    assert (arrow.name, arrow.kind, arrow.unit) == ("j1", "drive", "N m")
+    np.testing.assert_allclose(arrow.values, 2.5)
+
+
+def test_stops_of_joints_and_bounces_are_drawn() -> None:
+    """A pendulum against its stops: the force of the upper one turns back; each stop has rows of its own."""
+    model = jointed(pin.JointModelRY())
+    stop = pn.JointLimit("j0", lower=-0.5, upper=0.5, name="stop")
+    run = pn.simulate(pn.Scene(model, contacts=[stop]), 2.0, record="forces")
+    (arrow,) = [arrow for arrow in arrows(run) if arrow.name == "stop upper"]
+    assert arrow.values[-1] < 0.0
+    assert len(pn.replay(run).text) > 100_000

@@ -10,11 +10,11 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, UnknownNameError
+from pin_nonideal.page.bands import mode_bands
 from pin_nonideal.page.signals import (
     INTERVALS,
     MAX_CURVES,
     Plot,
-    mode_bands,
     plots_of,
     positions,
     velocities,

@@ -84,7 +84,10 @@ def block_on_feet(points, wrench, at, mu, static_ratio=1.0):
     frame(model, "pull", joint, pin.SE3(np.eye(3), np.array(at)))
     q = pin.neutral(model)
     q[2] = -points[0][2]
-    contacts = [pn.PointContact(f"foot{k}", mu=mu, static_ratio=static_ratio) for k in range(len(points))]
+    contacts = [
+        pn.PointContact(f"foot{k}", mu=mu, static_ratio=static_ratio, unilateral=False)
+        for k in range(len(points))
+    ]
     return pn.Scene(model, contacts=contacts, forces=[pn.Wrench("pull", wrench)], q0=q)
 
 

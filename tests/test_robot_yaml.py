@@ -337,3 +337,24 @@ def test_a_folder_is_only_read(tmp_path):
     before = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*")}
     pn.load(tmp_path)
     assert {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*")} == before
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("gravity: [yes, 0, 0]", "gravity must hold numbers; got [True, 0, 0]"),
+        (
+            "forces: [{Wrench: {frame: hand, force: [0, on, 1]}}]",
+            "forces: 0: Wrench: force must hold numbers; got [0, True, 1]",
+        ),
+        ("description: 3", "description must be a text; got an int"),
+    ],
+)
+def test_words_that_are_no_numbers_are_refused(tmp_path, text, message):
+    with refuses(message):
+        pn.load(folder(tmp_path, text))
+
+
+def test_keys_of_the_model_that_are_left_empty_are_absent(tmp_path):
+    text = "model: {urdf: , example_robot_data: , free_flyer: , locked: , base: }"
+    assert pn.load(folder(tmp_path, text)).model.nv == 2

@@ -45,6 +45,7 @@ def test_the_robots_are_there():
         "rolling_disk",
         "rough_four_bar",
         "slider_crank",
+        "solo12_dropped",
         "solo12_standing",
         "worm_drive",
     ]
@@ -63,7 +64,7 @@ def test_each_loads_with_source_licence_and_shapes(name):
     assert scene.source
     assert "BSD-3-Clause" in scene.licence
     assert len(scene.visual_model.geometryObjects) >= 3
-    assert scene.constraints or scene.laws
+    assert scene.constraints or scene.laws or scene.contacts
 
 
 def place(scene, data, name):

@@ -16,35 +16,45 @@ PACKAGE = ROOT / "pin_nonideal"
 # All modules from the top down, a line a room. CONTRIBUTING shows the same order.
 ORDER = """
 version errors types checks files equation
-timefunctions constraints laws contacts forces actuation
-_core core
-states: placements configurations closure rows projection
-compilation: failures callbacks names constraints friction laws forces lowering analysis scene report
-scene records trajectory
-formats: xml shapes model_edit inertia urdf_checks tidy density urdf generators example_robots robot_yaml \
-starts assembly rounding
+timefunctions constraints laws round_contacts contacts geometry_contacts forces actuation
+_core core cones
+states: placements configurations orders named rows closure projection
+compilation: failures callbacks names constraints contacts friction laws forces lowering analysis scene \
+run_numbers description report
+scene_geometry scene_tables scene_steps scene_copy scene
+formats: xml shapes model_edit inertia urdf_checks urdf_words tidy density meshes expansion urdf generators \
+example_robots robot_yaml starts assembly rounding
 mjcf: compile motion tree tendons forces transmissions actuators equality fields told shapes reader
 loading
-runs: options progress results checkpoint scipy_methods resume
-simulation sweep
-page: geometry motion forces signals payload
-replay plotting pin_nonideal cli
+records outcome dense trajectory_file trajectory_columns trajectory
+runs: options asked progress results checkpoint components scipy_methods resume
+simulation run_arrays batches sweep_points sweep_store sweeping
+statics: forces equilibrium rest inverse_dynamics
+page: looks figure_styles geometry bare packing tracks motion between touched view guides forces given bands \
+signals relations elements choices payload window
+replaying plotting rendering commands pin_nonideal cli
 """
 
 # Headers and sources of the core in the same way, a header together with its source.
 CORE_ORDER = """
-math: lanes unrolled spatial angles timefunction roots radau
-tree: mechanism model_extraction liegroup body_terms pinocchio_pass own_pass terms factor
-constraints: geometry coordinates kinds kind block row_layout row_system orthogonal row_factor rank redundancy
+math: lanes unrolled spatial angles timefunction roots radau nonnegative
+tree: mechanism model_extraction liegroup body_terms articulated pinocchio_pass own_pass terms factor
+constraints: geometry coordinates kinds kind block row_layout row_system orthogonal row_factor rank \
+redundancy pulls
 forces: given_forces laws mode friction
-dynamics: failure program reaction_equation reaction_roots workspace given_forces law_forces solution \
+dynamics: failure program numbers reaction_equation reaction_roots workspace \
+given_forces law_forces solution \
 reactions split slip unknowns uniqueness implicit power evaluation projection step_start
-friction: box_program cone_program rest_equation rest_solver rest_branches problem rest_problem modes \
-continuation
+friction: box_program lorentz cone_program dense_solver cone_problem cone_newton cone_path cone_shares \
+cone_certificate cone_complementarity rest_equation rest_solver rest_branches problem rest_problem \
+beginning modes continuation
+contact: gaps reach separation contact_rows impact resting closing
 run: archive method step outside_step step_control runge_kutta system semi_implicit_euler error_norm \
-collocation stepper moreau recorder checkpoint stiffness event_search event_location events simulation \
-followed_run
-python: arrays failures callbacks builder constraints runner options runs followed program module
+collocation stepper gap_search moreau moreau_contacts dense_output recorder inside_samples checkpoint \
+options output stiffness rounding event_search event_location events bouncing notices user_events simulation \
+followed_run stepped_run
+python: arrays buffers failures callbacks builder constraints cleared runner options run_programs share_out \
+runs batch followed stepped program cones module
 """
 
 

@@ -143,7 +143,7 @@ def test_a_pull_is_reported_when_it_begins(method, options, late, mu):
     """A lift that grows as 30 N/s takes the weight of 1 kg at g / 30."""
     scene = pn.Scene(
         point_mass(),
-        contacts=[pn.PointContact("mass", mu=mu)],
+        contacts=[pn.PointContact("mass", mu=mu, unilateral=False)],
         actuation=lambda t, q, v: [0.0, 0.0, 30.0 * t],
     )
     run = pn.simulate(scene, 1.0, method=method, **options)
@@ -156,7 +156,7 @@ def test_time_stepping_keeps_the_books_of_a_slip_that_turns():
     """A force across the slip turns it by more than a half circle; friction only ever takes energy."""
     scene = pn.Scene(
         point_mass(),
-        contacts=[pn.PointContact("mass", mu=0.05, name="rub")],
+        contacts=[pn.PointContact("mass", mu=0.05, unilateral=False, name="rub")],
         actuation=lambda t, q, v: [-3.0 * v[1], 3.0 * v[0], 0.0],
     )
     options = {"v": [2.0, 0.0, 0.0], "record": "energy"}
@@ -240,7 +240,7 @@ def test_a_body_that_rocks_on_two_contacts():
 def test_a_contact_that_nothing_presses(mu, options):
     """On a plane along which the point moves, whatever it does: no row, no load, no friction, no pull."""
     model = point_mass("XZ")
-    wall = pn.PointContact("mass", mu=mu, normal="y", name="wall")
+    wall = pn.PointContact("mass", mu=mu, normal="y", unilateral=False, name="wall")
     scene = pn.Scene(model, contacts=[wall], v0=[1.0, 2.0])
     assert scene.dropped == [("wall", 0, "vanishes")]
     run = pn.simulate(scene, 0.5, record="forces", **options)

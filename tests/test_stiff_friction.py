@@ -88,7 +88,7 @@ def sledge():
         model.addFrame(frame)
     q0 = pin.neutral(model)
     q0[2] = 0.1
-    contacts = [pn.PointContact(f"f{k}", mu=0.3, static_ratio=1.1) for k in range(3)]
+    contacts = [pn.PointContact(f"f{k}", mu=0.3, static_ratio=1.1, unilateral=False) for k in range(3)]
     brake = pn.Drag("f0", 50.0, 1.0)
     return pn.Scene(model, contacts=contacts, q0=q0, v0=[1.0, 0.3, 0.0, 0.0, 0.0, 2.0], laws=[brake])
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.errors import InputError, StepSizeError, StiffnessError
+from pin_nonideal.errors import InputError, StepSizeError, StiffnessError, WallTimeError
 
 from .mechanisms import body, empty
 from .refusals import refuses
@@ -167,6 +167,56 @@ def test_a_stiff_run_that_may_take_its_steps():
 def test_a_wrong_number_of_steps(wrong):
     with refuses("simulate: max_steps must be", InputError):
         pn.simulate(pulled(1.0), 1.0, max_steps=wrong)
+
+
+# --- What takes long for a fast motion ---------------------------------------------------------------------
+
+
+def beam(links: int = 30, damping: float = 0.0) -> pn.Scene:
+    """A cantilever of 1 m in links with springs: its fastest mode swings a thousand times its first."""
+    model, joint, length = empty(), 0, 1.0 / links
+    about = length**3 / 12.0
+    for k in range(links):
+        place = pin.SE3(np.eye(3), np.array([length if k else 0.0, 0.0, 0.0]))
+        inertia, lever = np.diag([1e-6, about, about]), np.array([0.5 * length, 0.0, 0.0])
+        joint = body(
+            model, joint, pin.JointModelRY(), f"j{k}", length, place=place, inertia=inertia, lever=lever
+        )
+    stiffness = 100.0 / length
+    return pn.Scene(
+        model, forces=[pn.JointSpring(f"j{k}", stiffness, damping=damping * stiffness) for k in range(links)]
+    )
+
+
+def test_a_stiff_beam_says_within_a_second_what_it_follows():
+    with (
+        pytest.warns(RuntimeWarning, match=r'simulate: from t = .* s on joint "j\d+" swings at') as told,
+        pytest.raises(WallTimeError) as caught,
+    ):
+        pn.simulate(beam(), 10.0, max_wall=1.0)
+    assert len(told) == 1
+    assert 'damp them and use method="Radau"' in str(told[0].message)
+    assert told[0].filename == __file__
+    assert str(told[0].message).removeprefix("simulate: ") in caught.value.trajectory.notes
+    rate = float(re.search(r"at ([-+.0-9e]+) rad/s", str(told[0].message))[1])
+    scene = beam()
+    M = pin.crba(scene.model, scene.model.createData(), scene.q0)
+    fastest = np.sqrt(np.linalg.eigvals(np.linalg.solve(M, 3000.0 * np.eye(30))).real.max())
+    assert 0.3 * fastest < rate < 1.1 * fastest
+
+
+def test_a_damped_beam_goes_through_by_the_method_that_is_named():
+    scene = beam(damping=1e-3)
+    with pytest.raises(StiffnessError, match='use method="Radau"'):
+        pn.simulate(scene, 1.0)
+    run = pn.simulate(scene, 1.0, method="Radau", rtol=1e-4, atol=1e-6)
+    assert run.stats.steps < 1000
+
+
+def test_what_is_allowed_by_max_steps_is_not_told(recwarn):
+    with pytest.raises(StepSizeError):
+        pn.simulate(beam(), 10.0, max_steps=3000)
+    assert not [w for w in recwarn if "swings" in str(w.message)]
 
 
 # --- No false alarm -----------------------------------------------------------------------------------------

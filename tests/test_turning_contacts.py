@@ -205,10 +205,10 @@ def test_refused(make, key):
         make(**{key: -1.0})
 
 
-@pytest.mark.parametrize(("method", "order"), [("rk4", 4), ("semi_implicit_euler", 1)])
+@pytest.mark.parametrize(("method", "order"), [("rk4", 4), ("semi_implicit_euler", 1), ("moreau", 1)])
 def test_fixed_steps(method, order):
     """They come to the same rest, schemes of first order with an error in proportion to the step."""
-    scene = again(ball(rolling_along(0.3, 0.6), contact={"mu": 0.8, "rolling": 0.004}))
+    scene = again(ball(rolling_along(0.3, 0.6), contact={"mu": 0.8, "rolling": 0.004, "unilateral": False}))
     rest = pn.simulate(scene, 3.0, **TIGHT).q[-1, :2]
     missed = []
     for dt in (1e-3, 2.5e-4):
@@ -217,3 +217,32 @@ def test_fixed_steps(method, order):
         assert_close(run.v[-1], 0.0, 1e-9)
     assert missed[0] < (1e-9 if order > 1 else 0.01)
     assert order > 1 or missed[1] < missed[0] / 3.5
+
+
+@pytest.mark.parametrize("tie", ["contact", "anchor"])
+def test_loads_of_time_stepping(tie):
+    """What velocities add to a load is added in full: a ball that spins as it slides, a stone that whirls."""
+    if tie == "contact":
+        scene = ball([1.0, 0.5, 0.0, 20.0, -5.0, 30.0], contact={"mu": 0.2, "unilateral": False})
+    else:
+        model = empty((0.0, 0.0, 0.0))
+        index = body(
+            model, 0, pin.JointModelFreeFlyer(), "stone", 1.0, lever=(0.5, 0, 0), inertia=0.02 * np.eye(3)
+        )
+        frame(model, "end", index)
+        law = pn.JointFriction("string", mu=0.2, radius=0.05)
+        scene = pn.Scene(
+            model, constraints=[pn.PointAnchor("end", name="string")], laws=[law], v0=[0, 0, 0, 0, 1.0, 6.0]
+        )
+    exact = pn.simulate(scene, 0.2, record="energy", **TIGHT)
+    law = scene.law_names[0]
+    missed = [
+        abs(
+            pn.simulate(scene, 0.2, method="moreau", dt=dt, record="energy").energy[law][-1]
+            / exact.energy[law][-1]
+            - 1.0
+        )
+        for dt in (1e-3, 2.5e-4)
+    ]
+    assert missed[0] < 0.05
+    assert missed[1] < missed[0] / 3.0

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sys
-import types
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
@@ -77,6 +77,14 @@ URDF_REFUSED = {
         robot(*ARM, link("x", mass="nan"), joint("j", "base", "x")),
         'value must be finite; got "nan"',
     ),
+    "mass with an underscore": (
+        robot(*ARM, link("x", mass="1_3"), joint("j", "base", "x")),
+        'value must hold numbers; got "1_3"',
+    ),
+    "mass in other digits": (
+        robot(*ARM, link("x", mass="\u0661"), joint("j", "base", "x")),
+        'value must hold numbers; got "\u0661"',
+    ),
     "mass a word": (
         robot(*ARM, link("x", mass="heavy"), joint("j", "base", "x")),
         'value must hold numbers; got "heavy"',
@@ -121,6 +129,10 @@ URDF_REFUSED = {
         robot(*ARM, link("x"), joint("j", "base", "x", inside='<mimic joint="j"/>')),
         "must mimic another joint; it mimics itself",
     ),
+    "joint of the ground": (
+        robot(*ARM, link("x"), joint("universe", "base", "x")),
+        'no joint may be called "universe", which is the name of the joint of the ground',
+    ),
     "another root element": ("<sdf/>", "must have the root element <robot>; got <sdf>"),
     "entities": (
         '<!DOCTYPE r [<!ENTITY a "b">]>' + robot(*ARM),
@@ -134,6 +146,13 @@ URDF_REFUSED = {
 def test_malformed_urdf_is_refused(tmp_path, text, message):
     with refuses(message):
         pn.load(folder(tmp_path, urdf=text))
+
+
+def test_a_joint_must_not_have_the_name_of_the_floating_base(tmp_path):
+    path = folder(tmp_path, urdf=robot(*ARM, link("x"), joint("root_joint", "base", "x")))
+    assert "root_joint" in pn.load(path).model.names
+    with refuses('no joint may be called "root_joint"'):
+        pn.load(path, free_flyer=True)
 
 
 def test_truncated_urdf_never_loads(tmp_path):
@@ -285,6 +304,32 @@ def test_meshes_are_found_in_package_folders(tmp_path):
     assert len(scene.visual_model.geometryObjects) == 1
 
 
+def test_the_next_robot_of_the_same_files_is_read_no_more(tmp_path, monkeypatch):
+    """Its model and shapes are its own all the same, and other content is read anew."""
+    (tmp_path / "t.stl").write_text(TRIANGLE)
+    inside = '<visual><geometry><mesh filename="t.stl"/></geometry></visual>'
+    text = robot(*ARM, link("x", inside=inside), joint("j", "base", "x"))
+    first = pn.load(folder(tmp_path, urdf=text))
+    places = [g.placement.copy() for g in first.visual_model.geometryObjects]
+    first.model.inertias[1].mass = 77.0
+    first.visual_model.geometryObjects[0].placement = pin.SE3.Random()
+    reads = []
+    read_shapes, read_model = pin.buildGeomFromUrdfString, pin.buildModelFromXML
+    monkeypatch.setattr(pin, "buildGeomFromUrdfString", lambda *a: reads.append("mesh") or read_shapes(*a))
+    monkeypatch.setattr(pin, "buildModelFromXML", lambda *a: reads.append("model") or read_model(*a))
+    again = pn.load(tmp_path)
+    assert again.model.inertias[1].mass != 77.0
+    assert again.visual_model.geometryObjects[0].placement == places[0]
+    assert reads == []
+    (tmp_path / "t.stl").write_text(TRIANGLE.replace("1 0 0", "2 0 0"))
+    wider = pn.load(tmp_path).visual_model.geometryObjects[0].geometry
+    assert wider.vertices().max() == 2.0
+    assert reads == ["mesh"]
+    (tmp_path / "robot.urdf").write_text(text.replace('name="j"', 'name="k"'))
+    assert "k" in list(pn.load(tmp_path).model.names)
+    assert reads == ["mesh", "model"]
+
+
 def shape(kind, attributes, inside=""):
     return f"<visual><geometry><{kind} {attributes}/></geometry>{inside}</visual>"
 
@@ -334,6 +379,7 @@ LIMITS = {
     "without effort": ('effort="1"', ""),
     "negative effort": ('effort="1"', 'effort="-1"'),
     "turned around": ('lower="-3" upper="3"', 'lower="3" upper="-3"'),
+    "infinite": ('effort="1"', 'effort="inf"'),
 }
 
 
@@ -341,7 +387,7 @@ LIMITS = {
 def test_limits_are_mended(tmp_path, old, new):
     text = robot(*ARM, link("x"), joint("j", "base", "x").replace(old, new))
     scene = pn.load(folder(tmp_path, urdf=text))
-    assert 'limits that are missing, negative or turned around are mended, of joints "j"' in scene.notes
+    assert 'limits that are none, missing, negative or turned around are mended, of joints "j"' in scene.notes
 
 
 BARE = (
@@ -368,6 +414,20 @@ def test_links_without_inertia_take_that_of_their_shapes_when_a_density_is_given
     assert 'inertias of links "x" are those of their shapes at 500 kg/m^3' in scene.notes
     with refuses("density must be positive; got -1", pn.InputError):
         pn.load(tmp_path, density=-1.0)
+
+
+def test_infinite_bounds_are_none(tmp_path):
+    endless = joint("j", "base", "x", limits='lower="-inf" upper="Infinity"')
+    scene = pn.load(folder(tmp_path, urdf=robot(*ARM, link("x"), endless)), limits=True)
+    assert {c.joint for c in scene.contacts} == {"shoulder", "elbow"}
+
+
+def test_inertias_that_no_body_has_are_told(tmp_path):
+    text = link("x").replace('izz="0.1"', 'izz="0.3"')
+    scene = pn.load(folder(tmp_path, urdf=robot(*ARM, text, joint("j", "base", "x"))))
+    (note,) = (note for note in scene.notes if "inertias" in note)
+    assert note.startswith('inertias that no body has are taken as they are, of links "x": their largest')
+    assert scene.model.inertias[scene.model.getJointId("j")].inertia[2, 2] == 0.3
 
 
 def test_joints_that_move_nothing_are_fixed(tmp_path):
@@ -407,13 +467,61 @@ def test_packages_are_found_as_ros_finds_them(tmp_path, monkeypatch):
     assert pn.load(home / "urdf" / "arm.urdf").visual_model.ngeoms == 1
 
 
-def test_xacro_is_expanded_or_says_what_to_install(tmp_path, monkeypatch):
+XACRO = """<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:property name="length" value="0.4"/>
+  <xacro:macro name="bar" params="name mass">
+    <link name="${name}">
+      <inertial>
+        <origin xyz="${length/2} 0 0"/><mass value="${mass}"/>
+        <inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/>
+      </inertial>
+    </link>
+  </xacro:macro>
+  <link name="ground"/>
+  <xacro:bar name="upper" mass="${2*0.5}"/>
+  <xacro:bar name="lower" mass="0.5"/>
+  <joint name="shoulder" type="continuous">
+    <parent link="ground"/><child link="upper"/><axis xyz="0 1 0"/>
+  </joint>
+  <joint name="elbow" type="continuous">
+    <parent link="upper"/><child link="lower"/><axis xyz="0 1 0"/><origin xyz="${length} 0 0"/>
+  </joint>
+</robot>"""
+
+
+def test_xacro_is_expanded(tmp_path):
+    (tmp_path / "arm.urdf.xacro").write_text(XACRO)
+    model = pn.load(tmp_path / "arm.urdf.xacro").model
+    assert [inertia.mass for inertia in model.inertias][1:] == [1.0, 0.5]
+    assert model.jointPlacements[2].translation[0] == 0.4
+    (tmp_path / "wrong.urdf.xacro").write_text(XACRO.replace("2*0.5", "2*weight"))
+    with refuses("cannot be expanded by xacro: name 'weight' is not defined"):
+        pn.load(tmp_path / "wrong.urdf.xacro")
+
+
+@pytest.mark.parametrize("place", ["arm_parts", "arm", "x/arm_parts"])
+def test_xacro_finds_packages_without_ros(tmp_path, place):
+    """Beside the robot's package, around the robot's file, or in `package_dirs`; includes within includes."""
+    home, parts = tmp_path / "arm" / "urdf", tmp_path / place
+    head, tail = XACRO.split('  <link name="ground"/>')
+    home.mkdir(parents=True)
+    (parts / "macros").mkdir(parents=True)
+    if place == "arm":
+        (parts / "package.xml").write_text("<package><name>arm_parts</name></package>")
+    opening = head.split(">")[0] + ">"
+    include = f'{opening}<xacro:include filename="$(find arm_parts)/macros/{{}}.xacro"/>'
+    (parts / "macros" / "all.xacro").write_text(f"{include.format('bar')}</robot>")
+    (parts / "macros" / "bar.xacro").write_text(f"{head}</robot>")
+    (home / "arm.urdf.xacro").write_text(f'{include.format("all")}<link name="ground"/>{tail}')
+    (home / "lost.urdf.xacro").write_text(f"{include.format('all').replace('arm_parts', 'lost')}</robot>")
+    model = pn.load(home / "arm.urdf.xacro", package_dirs=[tmp_path / "x"]).model
+    assert model.jointPlacements[2].translation[0] == 0.4
+    with refuses("cannot be expanded by xacro"):
+        pn.load(home / "lost.urdf.xacro")
+
+
+def test_xacro_says_what_to_install(tmp_path, monkeypatch):
     (tmp_path / "arm.urdf.xacro").write_text(robot(*ARM))
     monkeypatch.setitem(sys.modules, "xacro", None)
     with refuses("must be expanded by xacro, which cannot be imported; pip install xacro"):
         pn.load(tmp_path / "arm.urdf.xacro")
-    expander = types.SimpleNamespace(
-        process_file=lambda path: types.SimpleNamespace(toxml=lambda: Path(path).read_text())
-    )
-    monkeypatch.setitem(sys.modules, "xacro", expander)
-    assert pn.load(tmp_path / "arm.urdf.xacro").model.nv == 2

@@ -1,4 +1,6 @@
-// Pinocchio's own forward dynamics, called many times from C++ at one state: seconds per evaluation.
+// Pinocchio's own forward dynamics, called many times from C++ at one state: seconds per evaluation; and motions of trees
+// by Boost.odeint on top of it.
+#include <algorithm>
 #include <chrono>
 #include <stdexcept>
 #include <vector>
@@ -6,6 +8,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
+#include <boost/numeric/odeint.hpp>
 #include <boost/python.hpp>
 #include <pinocchio/algorithm/aba.hpp>
 #include <pinocchio/algorithm/constrained-dynamics.hpp>
@@ -74,7 +77,32 @@ public:
         Eigen::Map<VectorX>(out.data(), model_.nv) = data_.ddq;
     }
 
+    // The motion of a tree whose coordinates are plain numbers, by the method of order 8 of Fehlberg; its steps.
+    int integrate(Array q, Array v, double duration, double rtol, double atol) {
+        namespace odeint = boost::numeric::odeint;
+        using State = std::vector<double>;
+        const int n = model_.nv;
+        if (model_.nq != n || !models_.empty()) throw std::invalid_argument("expected a tree of plain coordinates");
+        State y(2 * n);
+        std::copy(q.data(), q.data() + n, y.begin());
+        std::copy(v.data(), v.data() + n, y.begin() + n);
+        const ConstView tau_view(tau_);
+        const auto rate = [&](const State& at, State& to, double) {
+            const ConstView q_view(Eigen::Map<const VectorX>(at.data(), n));
+            const ConstView v_view(Eigen::Map<const VectorX>(at.data() + n, n));
+            pinocchio::aba(model_, data_, q_view, v_view, tau_view, pinocchio::Convention::LOCAL);
+            std::copy(at.begin() + n, at.end(), to.begin());
+            Eigen::Map<VectorX>(to.data() + n, n) = data_.ddq;
+        };
+        auto stepper = odeint::make_controlled<odeint::runge_kutta_fehlberg78<State>>(atol, rtol);
+        const size_t steps = odeint::integrate_adaptive(stepper, rate, y, 0.0, duration, first_step);
+        std::copy(y.begin(), y.begin() + n, q.data());
+        std::copy(y.begin() + n, y.end(), v.data());
+        return static_cast<int>(steps);
+    }
+
 private:
+    static constexpr double first_step = 1e-3;  // [s]
     const pinocchio::Model model_;
     pinocchio::Data data_;
     VectorX tau_;
@@ -90,5 +118,6 @@ NB_MODULE(PEER_NAME, m) {
         .def(nb::init<nb::handle, nb::list, double, int>(), "model"_a, "constraints"_a, "mu"_a, "iterations"_a)
         .def("time_aba", &Peer::time_aba, "q"_a, "v"_a, "count"_a, "world"_a)
         .def("time_constraint_dynamics", &Peer::time_constraint_dynamics, "q"_a, "v"_a, "count"_a)
-        .def("acceleration", &Peer::acceleration, "q"_a, "v"_a, "out"_a);
+        .def("acceleration", &Peer::acceleration, "q"_a, "v"_a, "out"_a)
+        .def("integrate", &Peer::integrate, "q"_a, "v"_a, "duration"_a, "rtol"_a, "atol"_a);
 }

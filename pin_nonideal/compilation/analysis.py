@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 import numpy as np
 import pinocchio as pin
@@ -10,18 +10,19 @@ from numpy.typing import NDArray
 
 from pin_nonideal.checks import array
 from pin_nonideal.constraints import UserConstraint
+from pin_nonideal.contacts import UserContact
 from pin_nonideal.core import core
 from pin_nonideal.errors import InconsistentConstraintsError, InputError, LoopClosureError
 from pin_nonideal.states.closure import CLOSURE_TOLERANCE
-from pin_nonideal.states.rows import row_slices, rows_at
+from pin_nonideal.states.rows import copies, row_slices, rows_at
 from pin_nonideal.types import Array, Model
 
 Rows = NDArray[np.bool_]
 
-# Rows below this part of the largest entry of A at random states vanish structurally, and rows whose
-# directions differ by less are copies: rounding of the kinematics.
+# Rows below this part of the largest entry of A at random states vanish structurally: rounding of the
+# kinematics.
 STRUCTURAL = 1e-11
-# What such a row asks for beside the largest, and how far projections of copies may differ: long sums.
+# What such a row asks for beside the largest: rounding of long sums.
 SUM_ROUNDING = 1e-9
 # Stands for the length of rows that are all zero.
 LEAST_LENGTH = 1e-300
@@ -66,7 +67,7 @@ def check_model(model: Model) -> None:
 
 def idle_rows(
     model: Model, q0: Array, program: core.Program, tolerance: float = CLOSURE_TOLERANCE
-) -> list[tuple[str, int, str]]:
+) -> tuple[list[tuple[str, int, str]], list[tuple[int, int, float]]]:
     """Rows that can never act: they vanish at every state, or are copies of others.
 
     Args:
@@ -76,17 +77,21 @@ def idle_rows(
         tolerance: gap that a row that vanishes may have [m or rad].
 
     Returns:
-        (name, row, reason) of each.
+        (name, row, reason) of each, and (row, the row it is a copy of, its multiple of it) of each copy,
+        numbered as in `lam`.
 
     Raises:
         InconsistentConstraintsError: a row that vanishes asks for an acceleration.
         LoopClosureError: a row that vanishes has a gap.
     """
-    owners = [(c.name, row) for c in program.constraints for row in range(c.count)]
-    # Rows that may look special at a few states and times only.
-    fixed = np.array([c.moves_in_time for c in program.constraints for _ in range(c.count)], dtype=bool)
+    blocks = sorted(program.constraints, key=lambda c: c.first)
+    opening = {c.name for c in program.constraints[program.first_gap :]}
+    owners = [(c.name, row) for c in blocks for row in range(c.count)]
+    # Rows that may look special at a few states and times only; gaps of contacts are no copies of each other.
+    fixed = np.array([c.moves_in_time for c in blocks for _ in range(c.count)], dtype=bool)
+    opens = np.array([c.name in opening for c in blocks for _ in range(c.count)], dtype=bool)
     if fixed.all():
-        return []
+        return [], []
     runner, generator, samples = program.runner(), np.random.default_rng(1), []
     for _ in range(3):
         q = pin.integrate(model, q0, generator.standard_normal(model.nv))
@@ -98,14 +103,13 @@ def idle_rows(
     vanishing = (length <= STRUCTURAL * max(float(length.max()), LEAST_LENGTH)) & ~fixed
     dropped = []
     for row in map(int, np.flatnonzero(vanishing)):
-        _check_vanishing(*owners[row], np.abs(right[row]).max(), np.abs(right).max(), gaps[row], tolerance)
+        gap = 0.0 if opens[row] else gaps[row]
+        _check_vanishing(*owners[row], np.abs(right[row]).max(), np.abs(right).max(), gap, tolerance)
         dropped.append((*owners[row], "vanishes"))
-    keep = ~vanishing
-    for first, second in _copies(wide, right, length, keep & ~fixed):
-        keep[second] = False
-        dropped.append((*owners[second], f'copy of a row of "{owners[first][0]}"'))
+    pairs = copies(np.hstack([wide, right]), ~vanishing & ~fixed & ~opens, wide.shape[1])
+    dropped += [(*owners[row], f'copy of a row of "{owners[first][0]}"') for row, first, _ in pairs]
     rows = {owner: row for row, owner in enumerate(owners)}
-    return sorted(dropped, key=lambda entry: rows[entry[:2]])
+    return sorted(dropped, key=lambda entry: rows[entry[:2]]), pairs
 
 
 def _check_vanishing(
@@ -125,55 +129,29 @@ def _check_vanishing(
         )
 
 
-def _copies(wide: Array, right: Array, length: Array, candidates: Rows) -> list[tuple[int, int]]:
-    """Pairs (row, copy of it) among the candidates, in the order in which they are found.
-
-    Args:
-        wide: rows of A at several states, side by side, (m, n).
-        right: their right-hand sides, (m, k).
-        length: of the rows, (m,).
-        candidates: rows to look at, (m,).
-    """
-    rows = np.flatnonzero(candidates & (length > 0.0))
-    unit = np.hstack([wide[rows], right[rows]]) / length[rows, None]
-    probe = unit @ np.random.default_rng(2).standard_normal(unit.shape[1])
-    unit *= np.sign(probe)[:, None]  # a copy may be turned around
-    order = np.argsort(np.abs(probe), kind="stable")
-    copy = np.zeros(len(rows), dtype=bool)
-    pairs = []
-    for place, i in enumerate(order):
-        if copy[i]:
-            continue
-        for j in order[place + 1 :]:
-            if abs(abs(probe[j]) - abs(probe[i])) > SUM_ROUNDING * (1.0 + abs(probe[i])):
-                break
-            close = STRUCTURAL * (1.0 + np.abs(unit[i]).max())
-            if not copy[j] and np.abs(unit[i] - unit[j]).max() <= close:
-                first, second = sorted((i, j))
-                copy[second] = True
-                pairs.append((int(rows[first]), int(rows[second])))
-    return pairs
-
-
-def check_user_constraints(
-    model: Model, q0: Array, v0: Array, constraints: Sequence[object], program: core.Program
+def check_user_functions(
+    model: Model, q0: Array, v0: Array, described: Mapping[str, object], program: core.Program
 ) -> None:
     """Compares once, by central differences: d residual/dt = rate and d rate/dt = A a - b.
+
+    The residual of a contact is its gap.
 
     Args:
         model: pinocchio.Model.
         q0: configuration near which they are compared, (nq,).
         v0: velocity, (nv,).
-        constraints: descriptions of all constraints.
+        described: constraints and contacts by their names.
         program: the scene as the core knows it.
 
     Raises:
         InputError: they differ.
     """
+    slices = row_slices(program)
     mine = [
-        (rows, name, c)
-        for (name, rows), c in zip(row_slices(program).items(), constraints, strict=False)
-        if isinstance(c, UserConstraint) and (c.residual is not None or c.rate is not None)
+        (slices[name], f'{type(c).__name__} "{name}"', c)
+        for name, c in described.items()
+        if isinstance(c, UserContact)
+        or (isinstance(c, UserConstraint) and (c.residual is not None or c.rate is not None))
     ]
     if not mine:
         return
@@ -190,9 +168,16 @@ def check_user_constraints(
             ends.append(rows_at(runner, ahead, v + s * a, t + s))
         size = float(np.abs(A).max()) * (1.0 + float(np.abs(v).max())) ** 2
         scale = 1.0 + size + float(np.abs(b).max())
-        if c.residual is not None:
+        if isinstance(c, UserContact) or c.residual is not None:
             difference = (ends[0][2] - ends[1][2])[rows] / (2.0 * h)
-            _compare(name, "d residual/dt", difference, "rate", rate, scale)
+            _compare(
+                name,
+                "d gap/dt" if isinstance(c, UserContact) else "d residual/dt",
+                difference,
+                "rate",
+                rate,
+                scale,
+            )
         difference = (ends[0][3] - ends[1][3])[rows] / (2.0 * h)
         _compare(name, "d rate/dt", difference, "A a - b", A @ a - b, scale)
 
@@ -202,6 +187,6 @@ def _compare(name: str, left: str, x: Array, right: str, y: Array, scale: float)
     if float(miss.max(initial=0.0)) > DERIVATIVE_TOLERANCE * scale:
         k = int(np.argmax(miss))
         raise InputError(
-            f'UserConstraint "{name}": {left} must equal {right}; row {k}: {x[k]:.6g} by differences against '
-            f"{y[k]:.6g}; mend the function, the residual or the rate"
+            f"{name}: {left} must equal {right}; row {k}: {x[k]:.6g} by differences against {y[k]:.6g}; "
+            "mend the function, the residual or gap, or the rate"
         )

@@ -20,6 +20,7 @@ from pin_nonideal.types import Array
 # corners there, and at several, since one may fall on a corner all the same.
 PROBES = (0.01371, 0.21317, 0.71753)
 PROBE_STEP = 1e-6
+FLOATS = np.dtype(float)
 COARSE = 0.1  # what is interpolated in tables of its own for each derivative stays below
 ROUNDING = 1e-7  # of a difference over two steps, and more
 
@@ -32,22 +33,41 @@ def checked(function: Callable[..., Any], who: str, *shapes: tuple[int, ...]) ->
         who: words for messages.
         shapes: shape of its result, or of each part of a tuple of results.
     """
+    ask = named(function, who)
 
     def call(*arguments: Any) -> Any:
-        try:
-            value = function(*arguments)
-        except RunError:
-            raise
-        except Exception as error:
-            raise _failed(f"{who} raised {type(error).__name__}: {error}", arguments) from error
+        value = ask(*arguments)
+        if type(value) is np.ndarray and value.dtype == FLOATS and (value.shape,) == shapes:
+            row = value.reshape(-1)
+            if value.flags.c_contiguous and math.isfinite(row.dot(row)):
+                return value
         parts = (value,) if len(shapes) == 1 else value
         if not isinstance(parts, (tuple, list)) or len(parts) != len(shapes):
             raise _failed(f"{who} must return {len(shapes)} values; got {type(value).__name__}", arguments)
         try:
-            results = [_numbers(part, shape, who) for part, shape in zip(parts, shapes, strict=True)]
+            results = [numbers_of(part, shape, who) for part, shape in zip(parts, shapes, strict=True)]
         except UserFunctionError as error:
             raise _failed(str(error), arguments) from None
         return results[0] if len(shapes) == 1 else tuple(results)
+
+    return call
+
+
+def named(function: Callable[..., Any], who: str) -> Callable[..., Any]:
+    """The user's function with errors that name it.
+
+    Args:
+        function: what the user passed.
+        who: words for messages.
+    """
+
+    def call(*arguments: Any) -> Any:
+        try:
+            return function(*arguments)
+        except RunError:
+            raise
+        except Exception as error:
+            raise _failed(f"{who} raised {type(error).__name__}: {error}", arguments) from error
 
     return call
 
@@ -58,7 +78,17 @@ def _failed(message: str, arguments: Sequence[Any]) -> UserFunctionError:
     return UserFunctionError(message if time is None else f"{message} (at t = {time:.6g} s)")
 
 
-def _numbers(part: Any, shape: tuple[int, ...], who: str) -> Array:
+def numbers_of(part: Any, shape: tuple[int, ...], who: str) -> Array:
+    """What a user's function has returned, as finite numbers of a shape.
+
+    Args:
+        part: what came.
+        shape: which it must have.
+        who: words for messages.
+
+    Raises:
+        UserFunctionError: it is something else.
+    """
     result, where = floats(part, "fiubOUS")  # whatever float() takes
     if result is None:
         raise UserFunctionError(f"{who} must return numbers of shape {shape}; got {part!r}")

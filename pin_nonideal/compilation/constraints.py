@@ -1,12 +1,11 @@
-"""Constraints and contacts as blocks of rows in the core's program."""
+"""Constraints as blocks of rows in the core's program."""
 
 from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from fractions import Fraction
 from functools import singledispatch
 from typing import Any
 
@@ -25,7 +24,6 @@ from pin_nonideal.constraints import (
     Rolling,
     UserConstraint,
 )
-from pin_nonideal.contacts import PointContact
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, UnknownNameError
 from pin_nonideal.timefunctions import Constant
@@ -128,6 +126,8 @@ def _(c: JointCoupling, name: str, out: core.Builder, where: Resolution) -> None
     period, position = 0.0, True
     turn = 2.0 * math.pi
     if endless[0] and endless[1]:
+        from fractions import Fraction
+
         gear = Fraction(c.ratio).limit_denominator(LARGEST_GEAR)
         position = abs(float(gear) - c.ratio) < GEAR_ROUNDING
         period = turn / gear.denominator
@@ -176,8 +176,26 @@ def _(c: Rolling, name: str, out: core.Builder, where: Resolution) -> None:
 
 @lower_constraint.register
 def _(c: UserConstraint, name: str, out: core.Builder, where: Resolution) -> None:
-    model, size, who = where.model, c.size, words(c, name)
+    who = words(c, name)
+    rows = user_rows(c, c.size, who, where)
+    residual = None if c.residual is None else checked(c.residual, f"{who}: residual", (c.size,))
+    rate = user_rate(c, c.size, who, rows, residual)
+    out.add_user(name, c.size, rows=rows, residual=residual, rate=rate)
+
+
+def user_rows(c: Any, size: int, who: str, where: Resolution) -> Callable[..., Any]:
+    """The user's rows as a function of (t, q, v), with Pinocchio's data made for it.
+
+    Args:
+        c: the description.
+        size: number of rows.
+        who: words for messages.
+        where: the model.
+    """
+    model = where.model
     function = checked(c.function, f"{who}: function", (size, model.nv), (size,))
+    if getattr(c.function, "needs_data", True) is False:  # of this package's own, which follow from q and v
+        return lambda t, q, v: function(t, q, v, None)
     local = threading.local()
 
     def rows(t: float, q: Array, v: Array) -> Any:
@@ -189,36 +207,33 @@ def _(c: UserConstraint, name: str, out: core.Builder, where: Resolution) -> Non
         pin.updateFramePlacements(model, data)
         return function(t, q, v, data)
 
-    residual = None if c.residual is None else checked(c.residual, f"{who}: residual", (size,))
-    rate = None if c.rate is None else checked(c.rate, f"{who}: rate", (size,))
-    if residual is not None and rate is None:
-        held = residual
-
-        def rate(t: float, q: Array, v: Array) -> Array:
-            step = TIME_DIFFERENCE * max(1.0, abs(t))
-            moving = (held(t + step, q) - held(t - step, q)) / (2.0 * step)
-            result: Array = rows(t, q, v)[0] @ v + moving
-            return result
-
-    out.add_user(name, size, rows=rows, residual=residual, rate=rate)
+    return rows
 
 
-def lower_contact(c: Any, name: str, out: core.Builder, where: Resolution) -> None:
-    """Adds the normal row of a contact; its friction follows all rows (`lower_contact_friction`).
+def user_rate(
+    c: Any, size: int, who: str, rows: Callable[..., Any], residual: Callable[..., Array] | None
+) -> Callable[..., Array] | None:
+    """The user's rate; from a residual without one, A v and a difference in time.
 
     Args:
         c: the description.
-        name: its unique name.
-        out: the program under construction.
-        where: frames and joints by name.
-
-    Raises:
-        InputError, UnknownNameError: what it refers to does not exist or does not fit.
+        size: number of rows.
+        who: words for messages.
+        rows: of `user_rows`.
+        residual: of (t, q), checked.
     """
-    if not isinstance(c, PointContact):
-        raise InputError(f"a contact must be a PointContact; got {c!r}")
-    f1, f2, (_, _, normal) = where.contact(c, words(c, name))
-    out.add_contact(name, f1, f2, normal=normal, radius=c.radius)
+    if c.rate is not None:
+        return checked(c.rate, f"{who}: rate", (size,))
+    if residual is None:
+        return None
+
+    def rate(t: float, q: Array, v: Array) -> Array:
+        step = TIME_DIFFERENCE * max(1.0, abs(t))
+        moving = (residual(t + step, q) - residual(t - step, q)) / (2.0 * step)
+        result: Array = rows(t, q, v)[0] @ v + moving
+        return result
+
+    return rate
 
 
 def anchor_frames(

@@ -10,6 +10,7 @@ from pin_nonideal.core import core
 from pin_nonideal.errors import (
     FrictionConvergenceError,
     FrictionParadoxError,
+    ImpactEnergyError,
     InconsistentConstraintsError,
     LoopClosureError,
     NonFiniteError,
@@ -18,6 +19,7 @@ from pin_nonideal.errors import (
     SingularMassError,
     StepSizeError,
     StiffnessError,
+    WallTimeError,
 )
 from pin_nonideal.types import Model
 
@@ -59,12 +61,15 @@ def named_failure(failure: core.CoreFailure, model: Model, program: core.Program
         elements = ", ".join(program.element_names[i] for i in failure.elements)
         return _paradox(elements or ", ".join(program.law_names), failure)
     if kind is kinds.not_converged:
-        return _unresolved(", ".join(program.element_names[i] for i in failure.elements), t)
+        names = [program.element_names[i] for i in failure.elements]
+        return _unresolved(", ".join(names or [program.constraints[i].name for i in program.contacts]), t)
     if kind is kinds.closure:
         name = program.constraints[failure.elements[0]].name
         return opened(name, {name: value}, t)
     if kind is kinds.interrupted:
         return RunInterrupted(f"the run was interrupted at t = {t:.4g} s", time=t)
+    if kind is kinds.impact_energy:
+        return _gained(", ".join(program.constraints[i].name for i in failure.elements), value, t)
     if kind is kinds.stiff:
         return _stiff(model, failure.elements[0], value, t)
     if kind is kinds.steps:
@@ -73,7 +78,23 @@ def named_failure(failure: core.CoreFailure, model: Model, program: core.Program
             "loosen rtol and atol, or simulate a shorter duration",
             time=t,
         )
+    if kind is kinds.wall:
+        return WallTimeError(
+            f"the run has taken its max_wall = {value:g} s of wall time by t = {t:.4g} s; allow more, loosen "
+            "rtol and atol, or simulate a shorter duration",
+            time=t,
+        )
     return _stuck(value, t)
+
+
+def _gained(element: str, gain: float, t: float) -> RunError:
+    return ImpactEnergyError(
+        f'the impact of "{element}" at t = {t:.6g} s gains {gain:.3g} J, as Newton\'s law of restitution '
+        "with friction may; use a smaller restitution, or strict=False",
+        element=element,
+        gain=gain,
+        time=t,
+    )
 
 
 def _stiff(model: Model, dof: int, rate: float, t: float) -> RunError:
@@ -85,6 +106,27 @@ def _stiff(model: Model, dof: int, rate: float, t: float) -> RunError:
         joint=joint,
         rate=rate,
         time=t,
+    )
+
+
+def stiff_hint(model: Model, dof: int, rate: float, decays: bool) -> str:
+    """What to know of a run that takes long because its steps follow a fast motion.
+
+    Args:
+        model: pinocchio.Model.
+        dof: the one whose force does most to the fastest motion.
+        rate: of that motion [1/s].
+        decays: whether it decays; else it swings.
+    """
+    joint = str(model.names[_joint_of(model, dof)])
+    if decays:
+        return (
+            f'joint "{joint}" is stiff: its motion relaxes at {rate:.2g} 1/s, and an explicit method takes '
+            'steps that short; use method="Radau", or look at its damping, stiffness and inertia'
+        )
+    return (
+        f'joint "{joint}" swings at {rate:.2g} rad/s, and the steps follow it; where these vibrations do not '
+        'matter, damp them and use method="Radau", or loosen rtol and atol'
     )
 
 
@@ -136,6 +178,12 @@ def _stuck(steps: float, t: float) -> RunError:
 
 def _inconsistent(names: Sequence[str], items: list[int], residual: float, t: float) -> RunError:
     quoted = " and ".join(f'"{names[i]}"' for i in items)
+    if residual == 0.0:  # of an impact, which leaves none
+        return InconsistentConstraintsError(
+            f"no impulses part the bodies at {quoted} as their restitution asks at t = {t:.2f} s: with what"
+            ' else holds them they cannot move apart; lower restitution, or use Scene(..., impact="poisson")',
+            time=t,
+        )
     blame = (
         f"constraints {quoted} contradict each other"
         if len(items) > 1

@@ -88,7 +88,7 @@ def lower_actuation(u: Any, out: core.Builder, where: Resolution) -> None:
     elif callable(u):
         out.set_torque_function(checked(u, "actuation", (nv,)))
     else:
-        out.set_constant_torque(np.ascontiguousarray(array("actuation", u, (nv,))))
+        out.set_constant_torque(tau=np.ascontiguousarray(array("actuation", u, (nv,))))
 
 
 def _gains(u: HoldPosition, key: str, model: Model) -> Array:

@@ -8,12 +8,13 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.constraints import HingeAnchor, JointCoupling, PointAnchor, Rolling
-from pin_nonideal.contacts import PointContact
+from pin_nonideal.contacts import PointContact, UserContact
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.laws import JointFriction
+from pin_nonideal.round_contacts import BoxContact, CapsuleContact, SphereContact
 
-from .callbacks import ReactionNames
+from .callbacks import ReactionNames, checked, named
 from .constraints import frames_of
 from .names import Frame, Resolution, words
 
@@ -233,9 +234,9 @@ def _viscous(law: JointFriction, out: core.Builder, index: int, place: Place) ->
         return
     coefficient = law.viscous * place.lever**2
     if place.block >= 0:
-        out.add_viscous(index, coefficient, block=place.block, anchor=place.anchor)
+        out.add_viscous(index, coefficient=coefficient, block=place.block, anchor=place.anchor)
     else:
-        out.add_viscous(index, coefficient, dof=place.dof, count=place.dofs)
+        out.add_viscous(index, coefficient=coefficient, dof=place.dof, count=place.dofs)
 
 
 def _dry(law: JointFriction, name: str, out: core.Builder, index: int, place: Place) -> None:
@@ -267,7 +268,10 @@ def _dry(law: JointFriction, name: str, out: core.Builder, index: int, place: Pl
 
 
 def lower_contact_friction(
-    c: PointContact | Rolling, name: str, out: core.Builder, around: Surroundings
+    c: PointContact | Rolling | SphereContact | CapsuleContact | BoxContact | UserContact,
+    name: str,
+    out: core.Builder,
+    around: Surroundings,
 ) -> None:
     """Adds what rubs where a contact presses: sliding, spinning about the normal, and rolling.
 
@@ -277,21 +281,11 @@ def lower_contact_friction(
         out: the program under construction.
         around: what it may refer to.
     """
-    where, who = around.where, words(c, name)
-    f1, f2, (t1, t2, n) = where.contact(c, who)
-    sliding = getattr(c, "mu", 0.0)
-    if not (sliding or c.torsional or c.rolling):
+    if not any(getattr(c, key, 0.0) for key in ("mu", "torsional", "rolling")):
         return
     law = out.add_law(name)
-    level = _turned(f2, np.column_stack([t1, t2, n]))
-    rubs = []
-    if sliding:
-        block = out.add_contact_slip(name, f1, f2, radius=c.radius, tangent1=t1, tangent2=t2, normal=n)
-        rubs.append((name, block, sliding))
-    for part, coefficient, axes in (("torsional", c.torsional, [2]), ("rolling", c.rolling, [0, 1])):
-        if coefficient:
-            block = out.add_turn_slip(f"{name} {part}", f1, level, axes=axes)
-            rubs.append((f"{name} {part}", block, coefficient))
+    slip = _user_slip if isinstance(c, UserContact) else _flat_slip if hasattr(c, "plane") else _round_slip
+    rubs = slip(c, name, out, around.where)
     for element, block, coefficient in rubs:
         out.add_friction(
             law,
@@ -304,6 +298,43 @@ def lower_contact_friction(
             mu=coefficient,
             static_ratio=getattr(c, "static_ratio", 1.0),
         )
+
+
+def _round_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[tuple[str, int, float]]:
+    """Name, directions and coefficient of what rubs between spheres, capsules and boxes."""
+    who = words(c, name)
+    if isinstance(c, BoxContact):
+        f1, f2, half = where.box(c, who)
+        return [(name, out.add_box_slip(name, f1, f2, half=half, radius1=c.radius1), c.mu)]
+    f1, f2, half1, half2 = where.capsules(c, who)
+    block = out.add_capsules_slip(name, f1, f2, half1=half1, half2=half2, radius1=c.radius1)
+    return [(name, block, c.mu)]
+
+
+def _user_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[tuple[str, int, float]]:
+    """The same in directions of the user's."""
+    who, nv = f"{words(c, name)}: directions", where.model.nv
+    shape = np.shape(named(c.directions, who)(0.0, where.q0))
+    if shape not in ((1, nv), (2, nv)):
+        raise InputError(f"{who} must return one or two rows of {nv} numbers each; got shape {shape}")
+    function = checked(c.directions, who, shape)
+    block = out.add_user_slip(name, shape[0], lambda t, q: function(t, q).ravel())
+    return [(name, block, c.mu)]
+
+
+def _flat_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[tuple[str, int, float]]:
+    """The same on a plane."""
+    f1, f2, (t1, t2, n) = where.contact(c, words(c, name))
+    level, sliding = _turned(f2, np.column_stack([t1, t2, n])), getattr(c, "mu", 0.0)
+    rubs = []
+    if sliding:
+        block = out.add_contact_slip(name, f1, f2, radius=c.radius, tangent1=t1, tangent2=t2, normal=n)
+        rubs.append((name, block, sliding))
+    for part, coefficient, axes in (("torsional", c.torsional, [2]), ("rolling", c.rolling, [0, 1])):
+        if coefficient:
+            block = out.add_turn_slip(f"{name} {part}", f1, level, axes=axes)
+            rubs.append((f"{name} {part}", block, coefficient))
+    return rubs
 
 
 def _turned(frame: Frame, axes: Any) -> Frame:

@@ -92,7 +92,7 @@ def _(law: UserFriction, name: str, out: core.Builder, around: Surroundings) -> 
             raise UserFunctionError(f"{who}: limit must not be negative; got {value:g}")
         return value
 
-    block = out.add_user_slip(name, direction)
+    block = out.add_user_slip(name, 1, direction)
     out.add_friction(
         out.add_law(name),
         block,

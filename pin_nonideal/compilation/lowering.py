@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, NamedTuple
 
 from pin_nonideal.constraints import Rolling
+from pin_nonideal.contacts import JointLimit
 from pin_nonideal.core import core
 from pin_nonideal.states.rows import row_slices
 
 from .callbacks import ReactionNames
-from .constraints import lower_constraint, lower_contact
+from .constraints import lower_constraint
+from .contacts import lower_contacts, lower_gaps
 from .forces import lower_actuation, lower_force
 from .friction import Surroundings, lower_contact_friction
 from .laws import lower_law
@@ -26,6 +30,7 @@ class Descriptions(NamedTuple):
         forces: descriptions.
         actuation: None, an array (nv,), a function, or a description.
         terms: who computes M and the bias forces, "core" or "pinocchio".
+        impact: the law of restitution, "newton" or "poisson".
     """
 
     constraints: tuple[Any, ...]
@@ -34,9 +39,26 @@ class Descriptions(NamedTuple):
     forces: tuple[Any, ...]
     actuation: Any
     terms: str
+    impact: str
 
 
-def lower(said: Descriptions, builder: core.Builder, where: Resolution) -> None:
+class Written(NamedTuple):
+    """A description that is in the builder now.
+
+    Attributes:
+        kind: "constraint", "contact", "law", "force" or "actuation".
+        name: unique among its kind.
+        description: itself.
+        again: (description, builder) writes another one in its place.
+    """
+
+    kind: str
+    name: str
+    description: Any
+    again: Callable[[Any, Any], object]
+
+
+def lower(said: Descriptions, builder: core.Builder, where: Resolution) -> dict[str, Any]:
     """Writes one scene into the core's builder.
 
     Args:
@@ -44,8 +66,23 @@ def lower(said: Descriptions, builder: core.Builder, where: Resolution) -> None:
         builder: the core's program under construction, empty so far.
         where: frames and joints by name.
 
+    Returns:
+        Constraints and contacts by their unique names.
+
     Raises:
         InputError, UnknownNameError: what a description refers to does not exist or does not fit.
+    """
+    written = lowered(said, builder, where)
+    return {each.name: each.description for each in written if each.kind in ("constraint", "contact")}
+
+
+def lowered(said: Descriptions, builder: core.Builder, where: Resolution) -> Iterator[Written]:
+    """The same, telling of each description when it is in; a contact has two parts.
+
+    Args:
+        said: what the scene is made of.
+        builder: the core's program under construction, empty so far.
+        where: frames and joints by name.
     """
     taken: set[str] = set()
     constraint_names = unique_names(said.constraints, taken)
@@ -53,21 +90,32 @@ def lower(said: Descriptions, builder: core.Builder, where: Resolution) -> None:
     law_names = unique_names(said.laws, set())
     for c, name in zip(said.constraints, constraint_names, strict=True):
         lower_constraint(c, name, builder, where)
-    for c, name in zip(said.contacts, contact_names, strict=True):
-        lower_contact(c, name, builder, where)
+        yield Written("constraint", name, c, partial(_again, lower_constraint, name, where))
+    for name, c in lower_contacts(list(zip(contact_names, said.contacts, strict=True)), builder, where):
+        yield Written("contact", name, c, partial(_again, lower_gaps, name, where))
     joints = {name: i for i, name in enumerate(where.model.names) if i}
     blocks = {c.name: block for block, c in enumerate(builder.constraints)}
     names = ReactionNames(row_slices(builder), blocks, joints)
     around = Surroundings(where, dict(zip(constraint_names, said.constraints, strict=True)), names)
     for law, name in zip(said.laws, law_names, strict=True):
         lower_law(law, name, builder, around)
+        yield Written("law", name, law, partial(_again, lower_law, name, around))
     rolling = [
         (c, name)
         for c, name in zip(said.constraints, constraint_names, strict=True)
         if isinstance(c, Rolling)
     ]
-    for c, name in [*rolling, *zip(said.contacts, contact_names, strict=True)]:
+    contacts = zip(said.contacts, contact_names, strict=True)
+    for c, name in [*rolling, *(pair for pair in contacts if not isinstance(pair[0], JointLimit))]:
         lower_contact_friction(c, name, builder, around)
-    for f in said.forces:
+        yield Written("contact", name, c, partial(_again, lower_contact_friction, name, around))
+    for name, f in zip(unique_names(said.forces, set()), said.forces, strict=True):
         lower_force(f, builder, where)
+        yield Written("force", name, f, lambda f, out: lower_force(f, out, where))
     lower_actuation(said.actuation, builder, where)
+    yield Written("actuation", "actuation", said.actuation, lambda u, out: lower_actuation(u, out, where))
+    builder.set_impact(core.ImpactLaw[said.impact])  # no description's: after the last of them
+
+
+def _again(write: Callable[..., object], name: str, around: Any, description: Any, out: Any) -> None:
+    write(description, name, out, around)

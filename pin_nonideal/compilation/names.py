@@ -13,6 +13,7 @@ from pin_nonideal.constraints import HingeAnchor, Rolling
 from pin_nonideal.contacts import PointContact
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.round_contacts import BoxContact, CapsuleContact, SphereContact, segments
 from pin_nonideal.states.placements import frame_index, frame_on_joint, joint_placements
 from pin_nonideal.types import Array, Model, Placement
 
@@ -107,8 +108,39 @@ class Resolution:
         self, c: PointContact | Rolling, who: str
     ) -> tuple[Frame, Frame, tuple[Vector3, Vector3, Vector3]]:
         """Frame, plane, and right-handed directions (along, along, normal) in the axes of the plane."""
-        plane = self.plane(c.plane, who)
-        return self.frame(c.frame, who), plane, axis_triad(unit_axis(who, c.normal))
+        plane, axes = self.plane(c.plane, who), axis_triad(unit_axis(who, c.normal))
+        level = np.array(axes[2]) * getattr(c, "height", 0.0)
+        frame = self.frame(c.frame, who)
+        if frame[0] == plane[0]:
+            raise InputError(f"{who}: frame and plane are on the same body, which cannot touch itself")
+        return moved(frame, getattr(c, "offset", (0.0, 0.0, 0.0))), moved(plane, level), axes
+
+    def capsules(self, c: SphereContact | CapsuleContact, who: str) -> tuple[Frame, Frame, float, float]:
+        """Both frames in the middle of their segments, along z, and half the lengths of these [m]."""
+        ends = self._two_bodies(c, who)
+        halves = []
+        for k, (first, last) in enumerate(segments(c)):
+            half = 0.5 * float(np.linalg.norm(last - first))
+            joint, R, p = moved(ends[k], 0.5 * (first + last))
+            if half > 0.0:
+                along, across, axis = axis_triad(unit_axis(who, last - first))
+                R = (np.reshape(R, (3, 3)) @ np.column_stack([along, across, axis])).ravel().tolist()
+            ends[k] = (joint, R, p)
+            halves.append(half)
+        return ends[0], ends[1], halves[0], halves[1]
+
+    def box(self, c: BoxContact, who: str) -> tuple[Frame, Frame, list[float]]:
+        """Frames in the middle of the sphere and of the box, and half the box without its rounding [m]."""
+        first, (joint, R, p) = self._two_bodies(c, who)
+        turned = np.reshape(R, (3, 3)) @ pin.rpy.rpyToMatrix(*c.rpy)
+        second = (joint, turned.ravel().tolist(), moved((joint, R, p), c.xyz)[2])
+        return moved(first, c.offset), second, [0.5 * edge - c.radius2 for edge in c.size]
+
+    def _two_bodies(self, c: Any, who: str) -> list[Frame]:
+        ends = [self.frame(c.frame1, who), self.frame(c.frame2, who)]
+        if ends[0][0] == ends[1][0]:
+            raise InputError(f"{who}: frame1 and frame2 are on the same body, which cannot touch itself")
+        return ends
 
     def bearing(self, joint: int) -> tuple[core.Load, list[float]]:
         """What loads a joint that rubs, and its axis in the joint's frame, (3,).
@@ -132,6 +164,17 @@ class Resolution:
         if np.linalg.norm(ang) > 0.5:
             return core.Load.revolute, (ang / np.linalg.norm(ang)).tolist()
         return core.Load.prismatic, (lin / np.linalg.norm(lin)).tolist()
+
+
+def moved(frame: Frame, by: Any) -> Frame:
+    """A frame at another place of its body.
+
+    Args:
+        frame: the frame.
+        by: the way there in its axes [m], (3,).
+    """
+    joint, R, p = frame
+    return (joint, R, (np.array(p) + np.reshape(R, (3, 3)) @ np.array(by)).tolist()) if np.any(by) else frame
 
 
 def unique_names(descriptions: Sequence[object], taken: set[str]) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pin_nonideal.contacts import JointLimit
 from pin_nonideal.laws import JointFriction
 from pin_nonideal.types import Model
 
@@ -21,25 +22,29 @@ def report(scene: CompiledScene, name: str, rank: int, notes: Sequence[str]) -> 
         rank: of its rows in the initial state.
         notes: remarks that follow.
     """
-    model, rows = scene.model, scene.program.rows
+    model, opening = scene.model, set(scene.opening_names)
+    rows = scene.program.rows - len(opening)
     lines = [f"{name}: {model.njoints - 1} joints, nq {model.nq}, nv {model.nv}"]
     for i in range(1, model.njoints):
         kind = model.joints[i].shortname().removeprefix("JointModel")
         lines.append(f"  joint {model.names[i]}: {kind}, on {model.names[model.parents[i]]}")
-    for name, s in scene.slices.items():
-        lines.append(f"  constraint {name}: {s.stop - s.start} rows")
+    for name, (first, end, is_contact) in scene.rows.items():
+        what = "contact" if is_contact else "constraint"
+        lines.append(f"  {what} {name}: {end - first} rows{', may open' if name in opening else ''}")
     for name in scene.program.law_names:
         lines.append(f"  law {name}")
     lines += [f"  force {_label(force)}" for force in scene.said.forces]
     if scene.said.actuation is not None:
         lines.append(f"  actuation {_label(scene.said.actuation)}")
-    limited = [str(model.names[i]) for i in range(1, model.njoints) if _limited(model, i)]
+    limited = [str(model.names[i]) for i in _passed(scene)]
     if limited:
         lines.append(f"  limits, which the motion may pass: {', '.join(limited)}")
     lines.append(f"rows {rows}, rank {rank}, mobility {model.nv - rank}")
+    if opening:
+        lines.append(f"  contacts that may open: {len(opening)}, a row and its friction each while closed")
     for name, row, reason in scene.dropped:
         lines.append(f"  left out: row {row} of {name}: {reason}")
-    redundant = rows - len(scene.dropped) - rank
+    redundant = rows - sum(name not in opening for name, _, _ in scene.dropped) - rank
     if redundant > 0:
         lines.append(f"  redundant: {redundant} further rows, decided at every step")
     lines.append("skipped: " + (", ".join(_skipped(scene)) or "nothing"))
@@ -65,13 +70,20 @@ def _skipped(scene: CompiledScene) -> list[str]:
     said = scene.said
     depends = any(isinstance(law, JointFriction) and law.mu for law in said.laws)
     depends |= any(getattr(law, "reaction", None) for law in said.laws if not isinstance(law, JointFriction))
-    if not depends and not any(c.mu for c in said.contacts):
+    if not depends and not any(getattr(c, "mu", 0.0) for c in said.contacts):
         skipped.append("reactions (no law reads them)")
     if not said.forces and said.actuation is None:
         skipped.append("given forces (none)")
-    if any(_limited(scene.model, joint) for joint in range(1, scene.model.njoints)):
+    if _passed(scene):
         skipped.append("limits of joints (the motion may pass them)")
     return skipped
+
+
+def _passed(scene: CompiledScene) -> list[int]:
+    """Joints with limits of position that are no stops of the scene."""
+    stops = {c.joint for c in scene.said.contacts if isinstance(c, JointLimit)}
+    model = scene.model
+    return [i for i in range(1, model.njoints) if _limited(model, i) and str(model.names[i]) not in stops]
 
 
 def _limited(model: Model, joint: int) -> bool:

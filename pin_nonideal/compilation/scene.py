@@ -5,11 +5,12 @@ from __future__ import annotations
 from pin_nonideal.constraints import UserConstraint
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, RunError
-from pin_nonideal.states.projection import nearest_state, nearest_states
+from pin_nonideal.states.configurations import joint_places
+from pin_nonideal.states.projection import Projection, ProjectionReport
 from pin_nonideal.states.rows import row_slices
 from pin_nonideal.types import Array, Model
 
-from .analysis import check_user_constraints, idle_rows
+from .analysis import check_user_functions, idle_rows
 from .constraints import anchor_frames
 from .failures import named_failure
 from .lowering import Descriptions, lower
@@ -36,8 +37,13 @@ class CompiledScene:
         said: see above.
         program: the core's, without the rows that can never act.
         slices: rows of `lam` of each constraint and contact, by name.
+        rows: the same as (first, end, whether it is a contact).
+        joints: where the values of each joint stand.
+        contact_names: names of the contacts in the order of their descriptions, stops of joints one by one.
+        opening_names: names of those that may open.
         anchors: (name, frame id, frame id or None for the world) of what joins two frames.
         dropped: (name, row, reason) of rows that can never act.
+        projection: onto the constraints.
         unprojected: names of user constraints without residual and rate.
     """
 
@@ -48,9 +54,16 @@ class CompiledScene:
         except ValueError as error:
             raise InputError(str(error)) from None
         where = Resolution(model, q0)
-        lower(said, builder, where)
+        described = lower(said, builder, where)
         self.program = builder.finish()
         self.slices = row_slices(self.program)
+        constraints = len(said.constraints)  # contacts follow
+        self.rows = {
+            name: (s.start, s.stop, k >= constraints) for k, (name, s) in enumerate(self.slices.items())
+        }
+        self.joints = joint_places(model)
+        self.contact_names = [self.program.constraints[block].name for block in self.program.contacts]
+        self.opening_names = [c.name for c in self.program.constraints[self.program.first_gap :]]
         named = list(zip(self.slices, said.constraints, strict=False))  # contacts follow
         self.anchors = anchor_frames(named, where)
         self.unprojected = [
@@ -58,26 +71,22 @@ class CompiledScene:
             for name, c in named
             if isinstance(c, UserConstraint) and c.residual is None and c.rate is None
         ]
-        check_user_constraints(model, q0, v0, said.constraints, self.program)
-        self.dropped = idle_rows(model, q0, self.program, tolerance)
+        check_user_functions(model, q0, v0, described, self.program)
+        self.dropped, copies = idle_rows(model, q0, self.program, tolerance)
         if self.dropped:
             idle = {(name, row) for name, row, _ in self.dropped}
             for block, c in enumerate(self.program.constraints):
                 kept = [row for row in range(c.count) if (c.name, row) not in idle]
                 builder.keep_rows(block, kept)
+            for row, first, factor in copies:
+                builder.add_copy(row, first, factor)
             self.program = builder.finish()
+        self.projection = Projection(model, self.program, q0)
 
-    def project(self, q: Array, v: Array, t: float) -> tuple[Array, Array]:
-        """Nearest state on the constraints, see `states.projection.nearest_state`."""
+    def project(self, q: Array, v: Array, t: float) -> tuple[Array, Array, ProjectionReport]:
+        """Nearest state on the constraints, see `Projection.nearest`."""
         try:
-            return nearest_state(self.model, self.program, q, v, t)
-        except core.CoreFailure as failure:
-            raise self.named(failure) from None
-
-    def project_all(self, q: Array, v: Array, t: float, threads: int) -> tuple[Array, Array]:
-        """That of each of many states, see `states.projection.nearest_states`."""
-        try:
-            return nearest_states(self.model, self.program, q, v, t, threads)
+            return self.projection.nearest(q, v, t)
         except core.CoreFailure as failure:
             raise self.named(failure) from None
 

@@ -17,6 +17,7 @@ from pin_nonideal.checks import nonnegative, number
 from pin_nonideal.constraints import JointCoupling, PrescribedMotion
 from pin_nonideal.errors import InputError, LoadingError, SingularMassError, nearest
 from pin_nonideal.laws import JointFriction
+from pin_nonideal.states.orders import remember_order
 from pin_nonideal.types import GeometryModel, Model, Table
 
 from .inertia import require_positive_mass
@@ -48,7 +49,13 @@ FARTHEST = 1e9
 
 
 def scene_arguments(
-    robot: RobotFile, table: Table, name: str, *, merge: bool = True, start: Start = None
+    robot: RobotFile,
+    table: Table,
+    name: str,
+    *,
+    merge: bool = True,
+    start: Start = None,
+    speed: Start = None,
 ) -> Table:
     """Keyword arguments of Scene.
 
@@ -59,6 +66,7 @@ def scene_arguments(
         merge: merge three revolutes with massless links between into ball joints.
         start: initial configuration in place of the file's: (nq,), by joint name, or the name of a reference
             configuration.
+        speed: initial velocity in place of the file's: (nv,), or by joint name.
 
     Raises:
         LoadingError: a name in the table does not exist, or a value is refused.
@@ -67,18 +75,21 @@ def scene_arguments(
     """
     where = f'robot.yaml of "{name}"'
     notes = [*robot.notes, *strings(table, "notes", where)]
+    optional_string(table, "description", where)
     _change_joints(robot, table, where, notes, merge)
     _place_base(robot, table, where)
-    _propose_floating(robot.model, notes)
+    if robot.model.nv == 0:  # what stands on nothing and has no joint was meant to float
+        notes.append(f"nothing moves: {robot.to_float}" if robot.to_float else "nothing moves")
     if "gravity" in table:
         robot.model.gravity = pin.Motion(
             np.array(vector(table["gravity"], 3, f"{where}: gravity")), np.zeros(3)
         )
-    q0, v0 = initial_state(robot, table.get("initial"), where)
+    remember_order(robot.model, robot.joint_order)
+    q0, v0 = initial_state(robot, table.get("initial"), where, notes)
     q0, v0 = _lock(robot, table, q0, v0, where)
     q0, v0 = _fix_idle(robot, names_in(table), q0, v0, notes)
-    if start is not None:
-        q0, v0 = asked_start(robot, q0, v0, start)
+    remember_order(robot.model, robot.joint_order)  # of the model that is left
+    q0, v0 = asked_start(robot, q0, v0, start, speed)
     robot.constraints = [c for c in robot.constraints if _still_moves(robot.model, c, where)]
     motors = strings(table, "name_mot", where) or [m for m in robot.motors if robot.model.existJointName(m)]
     for motor in motors:
@@ -111,6 +122,7 @@ def scene_arguments(
         "notes": tuple(notes),
         "source": optional_string(table, "source", where),
         "licence": optional_string(table, "licence", where),
+        **({"impact": table["impact"]} if "impact" in table else {}),
     }
 
 
@@ -257,12 +269,6 @@ def _lock(
         return q0, v0
     indices = [joint_index(robot.model, n, f"{where}: model: locked") for n in locked]
     return _reduced(robot, indices, q0, v0)
-
-
-def _propose_floating(model: Model, notes: list[str]) -> None:
-    """A robot that stands on nothing and has no joint was meant to float."""
-    if model.nv == 0:
-        notes.append("nothing moves: load(..., free_flyer=True) gives the root link a floating base")
 
 
 def _fix_idle(

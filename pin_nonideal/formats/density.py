@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
+from .urdf_checks import pose
 from .xml import listed, numbers
 
 # A mesh whose volume is below this part of its bounding box is not closed; its box is taken instead.
@@ -56,9 +57,8 @@ def add_inertias(root: ElementTree.Element, density: float, notes: list[str]) ->
 
 def _inertia(shape: ElementTree.Element, density: float, link: str, boxes: list[str]) -> Any:
     """Inertia of one shape in the link's frame, a pinocchio.Inertia."""
-    origin, where = shape.find("origin"), f'link "{link}"'
-    xyz, rpy = (numbers(origin, key, 3, (0, 0, 0), where) for key in ("xyz", "rpy"))
-    place = pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz)
+    where = f'link "{link}"'
+    place = pose(shape.find("origin"), where)
     volume, center, moments = _solid(shape.find("geometry")[0], where, boxes, link)  # type: ignore[index]
     if not volume > 0.0:
         return pin.Inertia.Zero()

@@ -14,7 +14,7 @@ import pinocchio as pin
 from pin_nonideal.errors import LoadingError, UnknownNameError, nearest
 from pin_nonideal.types import Model
 
-from .shapes import Shapes
+from .shapes import Shapes, kept_models, kept_shapes, stamps
 from .urdf import RobotFile, read_mimics
 
 
@@ -72,15 +72,18 @@ def _drawn_later(robots_loader: Any, name: str) -> tuple[RobotFile, Path]:
     inside = os.path.join(kind.path, kind.urdf_subpath, kind.urdf_filename)
     base = kind.model_path or robots_loader.getModelPath(inside, False)
     file, root = os.path.join(base, inside), pin.JointModelFreeFlyer() if kind.free_flyer else None
-    model = pin.buildModelFromUrdf(file, root) if root else pin.buildModelFromUrdf(file)
+    content = (*stamps([file]), kind.free_flyer)
+    read = partial(pin.buildModelFromUrdf, file, *([root] if root else []))
+    model = kept_models(content, read).copy()
     q0, srdf = pin.neutral(model), None
     if kind.srdf_filename:
         srdf = os.path.join(base, kind.path, kind.srdf_subpath, kind.srdf_filename)
         q0 = robots_loader.readParamsFromSrdf(model, srdf, False, kind.has_rotor_parameters, kind.ref_posture)
     if kind.free_flyer:
         model.upperPositionLimit[:7], model.lowerPositionLimit[:7] = 1.0, -1.0
-    shapes = cache(partial(_example_shapes, model.copy(), file, os.path.join(base, "../.."), srdf))
-    visual, collision = Shapes(lambda: shapes()[0]), Shapes(lambda: shapes()[1])
+    read = partial(_example_shapes, model.copy(), file, os.path.join(base, "../.."), srdf)
+    shapes = partial(kept_shapes, (*content, *stamps([srdf] if srdf else [])), read)
+    visual, collision = (Shapes(cache(lambda k=k: shapes()[k].copy())) for k in range(2))
     return RobotFile(model, visual, collision, q0=np.array(q0)), Path(file)
 
 

@@ -15,6 +15,7 @@ from typing import Any, get_args
 from pin_nonideal import actuation, constraints, contacts, forces, laws, timefunctions
 from pin_nonideal.checks import number
 from pin_nonideal.errors import InputError, LoadingError, nearest
+from pin_nonideal.geometry_contacts import GeometryContact
 from pin_nonideal.types import Table
 
 from .xml import read_text
@@ -28,6 +29,7 @@ OWN_KEYS = (
     "constraints",
     "laws",
     "contacts",
+    "impact",
     "forces",
     "actuation",
     "initial",
@@ -47,7 +49,9 @@ MODEL_KEYS = (
 
 CONSTRAINTS = {c.__name__: c for c in get_args(constraints.Constraint) if not c.__name__.startswith("User")}
 LAWS = {c.__name__: c for c in get_args(laws.Law) if not c.__name__.startswith("User")}
-CONTACTS = {"PointContact": contacts.PointContact}
+CONTACTS = {
+    c.__name__: c for c in (*get_args(contacts.Contact), GeometryContact) if not c.__name__.startswith("User")
+}
 FORCES = {c.__name__: c for c in (forces.SpringDamper, forces.JointSpring, forces.Wrench)}
 ACTUATION = {c.__name__: c for c in (actuation.HoldPosition, actuation.Table)}
 FUNCTIONS: dict[str, Callable[..., Any]] = {
@@ -65,20 +69,44 @@ def read_yaml(path: Path) -> Table:
         LoadingError: the file is truncated or malformed, holds tags that name code, anchors, a key twice, or
             a key that is not known.
     """
-    import yaml
-
-    try:
-        table = yaml.load(read_text(path), Loader=_loader())  # a SafeLoader: plain values only
-    except yaml.YAMLError as error:
-        raise LoadingError(f'"{path}" cannot be read as plain YAML: {_one_line(error)}') from None
-    except RecursionError:
-        raise LoadingError(f'"{path}" is nested too deeply; a robot.yaml is a flat table') from None
+    table = plain_yaml(path)
     if table is None:  # an empty file: a robot without extras
         table = {}
     if not isinstance(table, dict):
         raise LoadingError(f'"{path}" must be a table of keys; got {_kind(table)}')
     check_keys(table, (*COMMUNITY_KEYS, *OWN_KEYS), f'"{path}"')
+    _check_numbers(table, f'"{path}"')
     return table
+
+
+def _check_numbers(value: Any, where: str) -> None:
+    """Raises where true or false, which YAML also writes yes and no, stands among numbers."""
+    parts = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, part in parts:
+        _check_numbers(part, f"{where}: {key}")
+    kinds = {type(x) for x in value} if isinstance(value, list) else set()
+    if bool in kinds and kinds & {int, float}:
+        raise LoadingError(f"{where} must hold numbers; got {value!r}")
+
+
+def plain_yaml(path: Path) -> Any:
+    """What a YAML file holds: tables, lists, texts and numbers that are what they look like.
+
+    Args:
+        path: the file.
+
+    Raises:
+        LoadingError: it is truncated or malformed, or holds tags that name code, anchors, a key twice, or
+            octal or sexagesimal numbers.
+    """
+    import yaml
+
+    try:
+        return yaml.load(read_text(path), Loader=_loader())  # a SafeLoader: plain values only
+    except yaml.YAMLError as error:
+        raise LoadingError(f'"{path}" cannot be read as plain YAML: {_one_line(error)}') from None
+    except RecursionError:
+        raise LoadingError(f'"{path}" is nested too deeply; it must be a flat table') from None
 
 
 def _loader() -> Any:

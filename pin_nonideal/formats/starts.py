@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,16 +9,14 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pin_nonideal.checks import array, number
-from pin_nonideal.errors import InputError, LoadingError, nearest
-from pin_nonideal.states.configurations import CIRCLES, unit_parts
+from pin_nonideal.checks import array
+from pin_nonideal.errors import InputError, LoadingError, UnknownNameError, nearest
+from pin_nonideal.states.named import named_configuration, named_velocity, with_unit_lengths
+from pin_nonideal.states.orders import order_words, tell_order
 from pin_nonideal.types import Model
 
 from .robot_yaml import check_keys
 from .urdf import RobotFile
-
-# A quaternion this close to unit length is normalized; one farther away is a mistake.
-UNIT_TOLERANCE = 1e-3
 
 Start = Sequence[float] | NDArray[np.float64] | Mapping[str, Any] | str | None
 
@@ -59,7 +55,7 @@ def vector(value: Any, size: int, where: str) -> list[float]:
 
 
 def initial_state(
-    robot: RobotFile, initial: Any, where: str
+    robot: RobotFile, initial: Any, where: str, notes: list[str]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Initial q and v: the file's own, changed joint by joint by the table.
 
@@ -67,6 +63,7 @@ def initial_state(
         robot: what the robot's file holds.
         initial: the entry of robot.yaml, or None.
         where: words for messages.
+        notes: receives one where a list is not in the order of the URDF.
 
     Raises:
         LoadingError: a joint does not exist, or a value is refused.
@@ -80,81 +77,59 @@ def initial_state(
     if not isinstance(initial, dict):
         raise LoadingError(f"{where} must be a table with the keys q, v, reference; got {initial!r}")
     check_keys(initial, ("q", "v", "reference"), where)
-    if "reference" in initial:
-        known = [entry.key() for entry in model.referenceConfigurations]
-        if initial["reference"] not in known:
-            asked = str(initial["reference"])
-            raise LoadingError(f'{where}: no reference configuration "{asked}"{nearest(asked, known)}')
-        q0 = np.array(model.referenceConfigurations[initial["reference"]])
-    for key, state, first, size in (("q", q0, model.idx_qs, model.nqs), ("v", v0, model.idx_vs, model.nvs)):
-        given = initial.get(key) or {}
-        if isinstance(given, list):
-            state[:] = vector(given, state.size, f"{where}: {key}")
-            given = {}
-        if not isinstance(given, dict):
-            raise LoadingError(f"{where}: {key} must be a table by joint name or a full list; got {given!r}")
-        for name, value in given.items():
-            j = joint_index(model, name, f"{where}: {key}")
-            state[first[j] : first[j] + size[j]] = _joint_value(
-                model, j, key, value, f'{where}: {key} of "{name}"'
+    for key in ("q", "v"):
+        if not isinstance(initial.get(key) or {}, (list, dict)):
+            raise LoadingError(
+                f"{where}: {key} must be a table by joint name or a full list; got {initial[key]!r}"
             )
-    return _with_unit_quaternions(model, q0, where), v0
+        words = order_words(model) if isinstance(initial.get(key), list) else None
+        if words is not None:
+            notes.append(f"{where}: {key}: {words}")
+    try:
+        if "reference" in initial:
+            q0 = named_configuration(model, str(initial["reference"]), q0, where)
+        q0 = _written(model, initial.get("q"), q0, f"{where}: q", named_configuration)
+        return q0, _written(model, initial.get("v"), v0, f"{where}: v", named_velocity)
+    except (InputError, UnknownNameError) as error:
+        raise LoadingError(str(error)) from None
+
+
+def _written(model: Model, given: Any, base: NDArray[np.float64], where: str, parse: Any) -> Any:
+    """A state of a file: a table by name, a list, or nothing."""
+    if isinstance(given, list) and parse is named_configuration:
+        return with_unit_lengths(model, np.array(array(where, given, (model.nq,))), where)
+    return parse(model, np.asarray(given) if isinstance(given, list) else given or {}, base, where)
 
 
 def asked_start(
-    robot: RobotFile, q0: NDArray[np.float64], v0: NDArray[np.float64], start: Start
+    robot: RobotFile, q0: NDArray[np.float64], v0: NDArray[np.float64], start: Start, speed: Start
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The configuration that the caller of `load` asks for, with the velocity of a keyframe.
+    """The state that the caller of `load` asks for, with the velocity of a keyframe.
 
     Args:
         robot: what the robot's file holds.
         q0: configuration so far, (nq,).
         v0: velocity so far, (nv,).
-        start: what is asked for.
+        start: configuration that is asked for, or None.
+        speed: velocity that is asked for, or None.
 
     Raises:
-        InputError: it does not fit the model.
+        InputError, UnknownNameError: it does not fit the model.
     """
     if isinstance(start, str) and start in robot.keyframes:
         keyframe = robot.keyframes[start]
         keyframe.apply()
-        return np.array(keyframe.q), np.array(keyframe.v)
-    key, value = ("reference", start) if isinstance(start, str) else ("q", start)
-    if not isinstance(value, (str, Mapping)):
-        value = np.asarray(value).tolist()
-    kept = dataclasses.replace(robot, q0=q0, v0=v0)
-    try:
-        return initial_state(kept, {key: dict(value) if isinstance(value, Mapping) else value}, "load: q0")[
-            0
-        ], v0
-    except LoadingError as error:
-        raise InputError(str(error).replace("load: q0: initial", "load: q0")) from None
+        q0, v0 = np.array(keyframe.q), np.array(keyframe.v)
+    elif start is not None:
+        q0 = _asked(robot.model, start, q0)
+    if speed is not None:
+        v0 = named_velocity(robot.model, speed, v0, "load: v0")
+    return q0, v0
 
 
-def _joint_value(model: Model, j: int, key: str, value: Any, where: str) -> list[float]:
-    """Values of one joint; an angle may stand for its cosine and sine."""
-    size = model.nqs[j] if key == "q" else model.nvs[j]
-    values = list(value) if isinstance(value, (list, tuple)) else [value]
-    turns = key == "q" and model.joints[j].shortname().startswith(CIRCLES)
-    if turns and len(values) == model.nvs[j]:
-        try:
-            angle = number(where, values[-1])
-        except InputError as error:
-            raise LoadingError(str(error)) from None
-        values = [*values[:-1], float(np.cos(angle)), float(np.sin(angle))]
-    return vector(values, size, where)
-
-
-def _with_unit_quaternions(model: Model, q: NDArray[np.float64], where: str) -> NDArray[np.float64]:
-    """Quaternions (and cosine-sine pairs) of unit length.
-
-    Raises:
-        LoadingError: one is far from unit length.
-    """
-    for joint, part in unit_parts(model):
-        length = math.hypot(*q[part])
-        if abs(length - 1.0) > UNIT_TOLERANCE:
-            what = "quaternion [x, y, z, w]" if part.stop - part.start == 4 else "cosine and sine"
-            raise LoadingError(f'{where}: {what} of joint "{joint}" must have length 1; got {length:g}')
-        q[part] /= length
-    return q
+def _asked(model: Model, start: Any, q0: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A configuration by name, or in numbers as they were written."""
+    if isinstance(start, (str, Mapping)):
+        return named_configuration(model, start, q0, "load: q0")
+    tell_order(model, start, "load: q0", model.nqs)
+    return with_unit_lengths(model, np.array(array("load: q0", start, (model.nq,))), "load: q0")

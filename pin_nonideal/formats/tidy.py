@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import math
+import sys
 from xml.etree import ElementTree
 
 import numpy as np
 
 from .urdf_checks import SHAPES
+from .urdf_words import tell_unread
 from .xml import listed
 
 # Tags of URDF that the robot's own elements may hold; what other tools add is left out.
 ROBOT = ("link", "joint", "material", "transmission")
+VERSION = "1.1"  # of URDF; Pinocchio's parser forgets capsules and quaternions where a file states none
+WORLD = "world"  # link that many files attach to and do not declare
+INFINITE = ("inf", "-inf", "+inf", "infinity", "-infinity", "+infinity")  # bounds that are none
 LEFT_OUT = "{"  # tags of a namespace begin so
 # Principal moments below this part of the mass times (1 m)^2 are rounding.
 LEAST_INERTIA = 1e-12
+UNBALANCED = 1e-2  # part by which a principal moment may exceed the sum of the others: files round them
 
 
 def tidy(root: ElementTree.Element) -> list[str]:
@@ -25,7 +32,8 @@ def tidy(root: ElementTree.Element) -> list[str]:
     Returns:
         Notes on what was done.
     """
-    notes = _foreign(root)
+    notes = [*_foreign(root), *_stray_shapes(root), *tell_unread(root), *_world(root)]
+    root.set("version", VERSION)
     for number, material in enumerate(root.iter("material")):
         if not material.get("name"):
             material.set("name", f"material {number}")
@@ -60,6 +68,29 @@ def _foreign(root: ElementTree.Element) -> list[str]:
     return (
         [f"elements of other tools are not read: {', '.join(f'<{tag}>' for tag in found)}"] if found else []
     )
+
+
+def _stray_shapes(root: ElementTree.Element) -> list[str]:
+    """Leaves out of a `<geometry>` what stands beside its shape."""
+    lost: dict[str, None] = {}
+    for link in root.findall("link"):
+        for geometry in (g for kind in ("visual", "collision") for g in link.findall(f"{kind}/geometry")):
+            stray = [e for e in geometry if e.tag not in SHAPES]
+            if len(geometry) - len(stray) == 1:
+                for element in stray:
+                    geometry.remove(element)
+                    lost[f'<{element.tag}> in link "{link.get("name")}"'] = None
+    return [f"elements beside the shape of a <geometry> are not read: {', '.join(lost)}"] if lost else []
+
+
+def _world(root: ElementTree.Element) -> list[str]:
+    """Declares the link "world" where joints hang on it and the file forgot it."""
+    declared = {link.get("name") for link in root.findall("link")}
+    named = {e.get("link") for joint in root.findall("joint") for e in joint.findall("parent")}
+    if WORLD in declared or WORLD not in named or not declared:
+        return []
+    root.append(ElementTree.Element("link", {"name": WORLD}))
+    return [f'link "{WORLD}", on which joints hang, is not declared; it is added without inertia']
 
 
 def _colors(root: ElementTree.Element) -> list[str]:
@@ -115,8 +146,8 @@ def _uniform_scale(shape: ElementTree.Element) -> None:
 
 
 def _inertias(root: ElementTree.Element) -> list[str]:
-    """Principal moments that miss zero by rounding are zero."""
-    keys, rounded = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), []
+    """Principal moments that miss zero by rounding are zero; those that no body has are told."""
+    keys, rounded, unbalanced = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), [], []
     for link in root.findall("link"):
         element, mass = link.find("inertial/inertia"), link.find("inertial/mass")
         if element is None or mass is None:
@@ -135,9 +166,17 @@ def _inertias(root: ElementTree.Element) -> list[str]:
             for key, value in zip(keys, moments[np.triu_indices(3)], strict=True):
                 element.set(key, repr(float(value)))
             rounded.append(str(link.get("name")))
-    return (
-        [f"moments of inertia below zero by rounding are zero, of links {listed(rounded)}"] if rounded else []
-    )
+        elif values[0] >= 0.0 and values[2] > (1.0 + UNBALANCED) * (values[0] + values[1]):
+            unbalanced.append(str(link.get("name")))
+    notes = []
+    if rounded:
+        notes.append(f"moments of inertia below zero by rounding are zero, of links {listed(rounded)}")
+    if unbalanced:
+        notes.append(
+            f"inertias that no body has are taken as they are, of links {listed(unbalanced)}: their largest "
+            "principal moment exceeds the sum of the others"
+        )
+    return notes
 
 
 def _limits(root: ElementTree.Element) -> list[str]:
@@ -150,6 +189,10 @@ def _limits(root: ElementTree.Element) -> list[str]:
             mended.append(str(joint.get("name")))
         if limit is None:
             continue
+        for key in ("effort", "velocity", "lower", "upper"):
+            if (limit.get(key) or "").strip().lower() in INFINITE:
+                limit.set(key, repr(math.copysign(sys.float_info.max, float(limit.get(key, "0")))))
+                mended.append(str(joint.get("name")))
         for key in ("effort", "velocity"):
             if limit.get(key) is None:
                 limit.set(key, "0")
@@ -165,8 +208,8 @@ def _limits(root: ElementTree.Element) -> list[str]:
             limit.set("lower", repr(upper))
             limit.set("upper", repr(lower))
             mended.append(str(joint.get("name")))
-    return (
-        [f"limits that are missing, negative or turned around are mended, of joints {listed(mended)}"]
-        if mended
-        else []
-    )
+    if not mended:
+        return []
+    return [
+        f"limits that are none, missing, negative or turned around are mended, of joints {listed(mended)}"
+    ]

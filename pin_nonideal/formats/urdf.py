@@ -5,7 +5,6 @@ What Pinocchio's reader passes over in silence is an error, a note, a law or a c
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -22,10 +21,12 @@ from pin_nonideal.timefunctions import Constant
 from pin_nonideal.types import Array, GeometryModel, Model
 
 from .density import add_inertias, without_inertia
-from .shapes import Shapes
+from .expansion import urdf_text
+from .meshes import resolve_meshes
+from .shapes import Shapes, kept_models, kept_shapes, stamps
 from .tidy import tidy
 from .urdf_checks import check_urdf
-from .xml import numbers, parse_xml, read_text
+from .xml import listed, numbers, parse_xml, read_text
 
 
 class Keyframe(NamedTuple):
@@ -60,7 +61,9 @@ class RobotFile:
         actuation: what drives the joints, or None.
         keyframes: states that the file names.
         advice: what may help where the mass matrix is singular, "" for nothing.
+        to_float: what makes it float where nothing moves, "" for nothing.
         contact_friction: coefficients of sliding, spinning and rolling by the geometry's name.
+        joint_order: names of the joints in the order of the file.
     """
 
     model: Model
@@ -76,7 +79,9 @@ class RobotFile:
     actuation: Any = None
     keyframes: dict[str, Keyframe] = field(default_factory=dict)
     advice: str = ""
+    to_float: str = ""
     contact_friction: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    joint_order: tuple[str, ...] = ()
 
 
 def read_urdf(
@@ -98,58 +103,56 @@ def read_urdf(
     Raises:
         LoadingError: the file is malformed, holds a loop, or a link or joint that cannot be.
     """
-    root = parse_xml(urdf_text(path), path, "robot")
+    root = parse_xml(urdf_text(path, package_dirs), path, "robot")
     name = root.get("name") or path.parent.name
     root.set("name", name)
     notes = tidy(root)
-    check_urdf(root, path)
-    notes += _resolve_meshes(root, path, package_dirs)
+    check_urdf(root, path, ("universe", "root_joint") if free_flyer else ("universe",))
+    notes += resolve_meshes(root, path, package_dirs)
     bare = without_inertia(root)
     if density is not None:
         add_inertias(root, density, notes)
     xml = ElementTree.tostring(root, encoding="unicode")
     try:
-        model = (
-            pin.buildModelFromXML(xml, pin.JointModelFreeFlyer())
-            if free_flyer
-            else pin.buildModelFromXML(xml)
-        )
+        model = kept_models((xml, free_flyer), lambda: _model(xml, free_flyer)).copy()
     except (ValueError, RuntimeError) as error:
         raise LoadingError(f'"{path}" cannot be read by Pinocchio: {error}') from None
     _keep_dynamics(model, root, path)
-    visual, collision = (_shapes(model.copy(), root, path, kind) for kind in ("visual", "collision"))
+    _turn_planes(model, root, path, notes)
+    notes += _unused(root)
+    visual, collision = (
+        _shapes(model.copy(), root, path, kind, free_flyer) for kind in ("visual", "collision")
+    )
     motors = [j.get("name", "") for j in root.findall("transmission/joint")]
     robot = RobotFile(model, visual, collision, constraints=_mimics(root, path), motors=motors, notes=notes)
+    robot.to_float = "load(..., free_flyer=True) gives the root link a floating base"
+    robot.joint_order = tuple(j.get("name", "") for j in root.findall("joint"))
     if bare and density is None:
         robot.advice = "load(..., density=1000.0) computes the inertia of such links from their shapes"
     return robot
 
 
-def _shapes(model: Model, root: ElementTree.Element, path: Path, kind: str) -> Shapes:
+def _model(xml: str, free_flyer: bool) -> Model:
+    return pin.buildModelFromXML(xml, pin.JointModelFreeFlyer()) if free_flyer else pin.buildModelFromXML(xml)
+
+
+def _shapes(model: Model, root: ElementTree.Element, path: Path, kind: str, free_flyer: bool) -> Shapes:
     """Geometry of one kind, read when something asks for it."""
     notes: list[str] = []
-    return Shapes(cache(lambda: _geometry(model, root, path, kind, notes)), notes)
 
+    def read() -> tuple[GeometryModel, list[str]]:
+        dropped: list[str] = []
+        return _geometry(model, root, path, kind, dropped), dropped
 
-def urdf_text(path: Path) -> str:
-    """The text of a URDF file; a `.xacro` file is expanded by the xacro package.
+    @cache
+    def shapes() -> GeometryModel:
+        meshes = (mesh.get("filename", "") for mesh in root.iter("mesh"))
+        content = (ElementTree.tostring(root), free_flyer, kind, stamps(meshes))
+        geometry, dropped = kept_shapes(content, read)
+        notes.extend(dropped)
+        return geometry.copy()
 
-    Raises:
-        LoadingError: it cannot be read, or cannot be expanded.
-    """
-    if path.suffix != ".xacro":
-        return read_text(path)
-    try:
-        import xacro
-    except ImportError:
-        raise LoadingError(
-            f'"{path}" must be expanded by xacro, which cannot be imported; pip install xacro, or expand the '
-            "file: xacro FILE > robot.urdf"
-        ) from None
-    try:
-        return str(xacro.process_file(str(path)).toxml())
-    except Exception as error:  # xacro raises whatever its macros raise
-        raise LoadingError(f'"{path}" cannot be expanded by xacro: {" ".join(str(error).split())}') from None
+    return Shapes(shapes, notes)
 
 
 def _keep_dynamics(model: Model, root: ElementTree.Element, path: Path) -> None:
@@ -163,6 +166,58 @@ def _keep_dynamics(model: Model, root: ElementTree.Element, path: Path) -> None:
         model.damping[dofs] = numbers(dynamics, "damping", 1, (0,), where)[0]
         friction = numbers(dynamics, "friction", 1, (0,), where)[0]
         model.upperDryFrictionLimit[dofs], model.lowerDryFrictionLimit[dofs] = friction, -friction
+
+
+def _turn_planes(model: Model, root: ElementTree.Element, path: Path, notes: list[str]) -> None:
+    """Planar joints move in the plane normal to their axis; Pinocchio's reader takes x-y for all."""
+    up = np.array([0.0, 0.0, 1.0])
+    for joint in root.findall("joint"):
+        name = joint.get("name", "")
+        axis = numbers(joint.find("axis"), "xyz", 3, (1, 0, 0), f'"{path}": joint "{name}"')
+        normal = axis / np.linalg.norm(axis) if axis.any() else up
+        if joint.get("type") != "planar" or np.array_equal(normal, up):
+            continue
+        j, turn = model.getJointId(name), pin.Quaternion.FromTwoVectors(up, normal).matrix()
+        forth = pin.SE3(turn, np.zeros(3))
+        back = forth.inverse()
+        model.jointPlacements[j] = model.jointPlacements[j] * forth
+        model.inertias[j] = model.inertias[j].se3Action(back)
+        for k in range(1, model.njoints):
+            if model.parents[k] == j:
+                model.jointPlacements[k] = back * model.jointPlacements[k]
+        for frame in model.frames:
+            if frame.parentJoint == j and frame.type != pin.FrameType.JOINT:
+                frame.placement = back * frame.placement
+        x, y = (" ".join(f"{round(c, 9):g}" for c in 0.0 + column) for column in turn.T[:2])
+        whose = "its axis" if joint.find("axis") is not None else "URDF's axis, for the file states none,"
+        notes.append(
+            f'planar joint "{name}" moves in the plane normal to {whose} '
+            f"{' '.join(f'{c:g}' for c in normal)}: its x and y are along {x} and {y} in the joint's frame"
+        )
+
+
+def _unused(root: ElementTree.Element) -> list[str]:
+    """Notes on limits of effort and velocity, and on reductions of transmissions."""
+    notes = []
+    limits = [j.find("limit") for j in root.findall("joint") if j.get("type") != "fixed"]
+    told = []
+    for key in ("effort", "velocity"):
+        bounded = sum(float(numbers(limit, key, 1, (0,), "limit")[0]) > 0.0 for limit in limits)
+        if bounded:
+            told.append(f"the {key} of {bounded} joints (scene.model.upper{key.capitalize()}Limit)")
+    if told:
+        notes.append(f"bounds of {' and '.join(told)} are not enforced")
+    geared = [
+        str(t.get("name"))
+        for t in root.findall("transmission")
+        for e in t.iter("mechanicalReduction")
+        if (e.text or "").strip() not in ("", "1", "1.0")
+    ]
+    if geared:
+        notes.append(
+            f"reductions of transmissions {listed(geared)} are not used: torques are those at the joints"
+        )
+    return notes
 
 
 def read_mimics(path: Path) -> list[Constraint]:
@@ -198,64 +253,6 @@ def _mimics(root: ElementTree.Element, path: Path) -> list[Constraint]:
         else:
             result.append(JointCoupling(name, leader, multiplier, offset, name=f"{name} mimic"))
     return result
-
-
-def _resolve_meshes(root: ElementTree.Element, path: Path, package_dirs: Sequence[str | Path]) -> list[str]:
-    """Writes absolute mesh paths into the tree; a mesh that is nowhere loses its shape and leaves a note."""
-    missing: dict[str, None] = {}
-    for link in root.findall("link"):
-        for kind in ("visual", "collision"):
-            for shape in link.findall(kind):
-                mesh = shape.find("geometry/mesh")
-                if mesh is None:
-                    continue
-                filename = mesh.get("filename", "")
-                found = find_mesh(filename, path.parent, package_dirs)
-                if found is None:
-                    missing[filename] = None
-                    link.remove(shape)
-                else:
-                    mesh.set("filename", str(found))
-    return [f'mesh "{m}" was not found; its shape is left out' for m in missing]
-
-
-def find_mesh(filename: str, folder: Path, package_dirs: Sequence[str | Path] = ()) -> Path | None:
-    """Where a mesh lies, or None.
-
-    Args:
-        filename: a path, `file://...`, or `package://name/...` (`package:///...` is taken inside the folder).
-        folder: folder of the robot's file.
-        package_dirs: more folders that hold packages.
-    """
-    for scheme in ("package://", "model://"):
-        if filename.startswith(scheme):
-            inner = filename[len(scheme) :].lstrip("/")
-            package, _, rest = inner.partition("/")
-            rest = rest or inner
-            parents = folder.resolve().parents
-            candidates = [folder / inner, folder / rest]
-            candidates += [base / inner for base in (*map(Path, package_dirs), *_ros_folders(), *parents)]
-            candidates += [base / rest for base in (*map(Path, package_dirs), *parents[:2])]
-            candidates += [base / rest for base in (folder.resolve(), *parents) if _is_package(base, package)]
-            break
-    else:
-        candidates = [folder / filename.removeprefix("file://")]
-    return next((c.resolve() for c in candidates if c.is_file()), None)
-
-
-def _ros_folders() -> list[Path]:
-    """Folders in which ROS looks for packages: ROS 1's own list, and the shares of ROS 2's prefixes."""
-    first = [Path(p) for p in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if p]
-    second = [Path(p) / "share" for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
-    return [*first, *second]
-
-
-def _is_package(folder: Path, name: str) -> bool:
-    """Whether a folder is the ROS package of that name, whatever it is called itself."""
-    try:
-        return f"<name>{name}</name>" in (folder / "package.xml").read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        return False
 
 
 def _geometry(model: Model, root: ElementTree.Element, path: Path, kind: str, notes: list[str]) -> Any:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
+import pinocchio as pin
 
 from pin_nonideal.errors import LoadingError, nearest
+from pin_nonideal.types import Placement
 
 from .xml import numbers
 
@@ -22,12 +25,13 @@ SHAPES: dict[str, dict[str, int]] = {
 MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
 
 
-def check_urdf(root: ElementTree.Element, path: Path) -> None:
+def check_urdf(root: ElementTree.Element, path: Path, barred: Collection[str] = ()) -> None:
     """Raises on the first thing that Pinocchio's reader would misread.
 
     Args:
         root: the `<robot>` element.
         path: the file, for messages.
+        barred: names that no joint may bear, for Pinocchio gives them to joints of its own.
 
     Raises:
         LoadingError: names the link or joint and says what must hold.
@@ -36,6 +40,11 @@ def check_urdf(root: ElementTree.Element, path: Path) -> None:
     for link in root.findall("link"):
         _check_link(link, path)
     for joint in root.findall("joint"):
+        if joint.get("name") in barred:
+            raise LoadingError(
+                f'"{path}": no joint may be called "{joint.get("name")}", which is the name of the joint of '
+                "the ground or of the floating base in Pinocchio; rename it"
+            )
         _check_joint(joint, path)
 
 
@@ -107,8 +116,7 @@ def _check_link(link: ElementTree.Element, path: Path) -> None:
     """Shapes and inertia in full (urdfdom drops malformed ones, and links lose their mass without a word)."""
     where = f'"{path}": link "{link.get("name")}"'
     for origin in link.iter("origin"):
-        numbers(origin, "xyz", 3, (0, 0, 0), where)
-        numbers(origin, "rpy", 3, (0, 0, 0), where)
+        pose(origin, where)
     for shape in (*link.findall("visual"), *link.findall("collision")):
         _check_shape(shape, where)
     inertial = link.find("inertial")
@@ -128,6 +136,27 @@ def _check_link(link: ElementTree.Element, path: Path) -> None:
         raise LoadingError(
             f"{where}: principal moments of inertia must not be negative; got {principal[0]:g} kg m^2"
         )
+
+
+def pose(origin: ElementTree.Element | None, where: str) -> Placement:
+    """The placement that an `<origin>` states, a pinocchio.SE3.
+
+    Args:
+        origin: the element, or None.
+        where: words for messages.
+
+    Raises:
+        LoadingError: not numbers, a quaternion without length, or two rotations.
+    """
+    xyz, rpy = (numbers(origin, key, 3, (0, 0, 0), where) for key in ("xyz", "rpy"))
+    x, y, z, w = numbers(origin, "quat_xyzw", 4, (0, 0, 0, 1), where)
+    if origin is not None and origin.get("quat_xyzw") is not None:
+        if origin.get("rpy") is not None:
+            raise LoadingError(f"{where}: <origin> must have one of rpy and quat_xyzw; got both")
+        if not (x or y or z or w):
+            raise LoadingError(f"{where}: quat_xyzw must have a length; got 0 0 0 0")
+        return pin.SE3(pin.Quaternion(w, x, y, z).normalized().matrix(), xyz)
+    return pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz)
 
 
 def _check_shape(shape: ElementTree.Element, where: str) -> None:
@@ -154,9 +183,7 @@ def _check_joint(joint: ElementTree.Element, path: Path) -> None:
     if kind not in (*MOVING, "fixed"):
         found = "none" if kind is None else f'"{kind}"'
         raise LoadingError(f"{where}: type must be one of {', '.join(MOVING)}, fixed; got {found}")
-    origin = joint.find("origin")
-    numbers(origin, "xyz", 3, (0, 0, 0), where)
-    numbers(origin, "rpy", 3, (0, 0, 0), where)
+    pose(joint.find("origin"), where)
     axis = numbers(joint.find("axis"), "xyz", 3, (1, 0, 0), where)
     if kind in ("revolute", "continuous", "prismatic", "planar") and not axis.any():
         raise LoadingError(f"{where}: axis must have a direction; got 0 0 0")

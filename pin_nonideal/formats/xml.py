@@ -12,6 +12,8 @@ import numpy as np
 
 from pin_nonideal.errors import LoadingError
 
+# Numbers as all readers of such files take them; Python's float also takes 1_000 and digits of other scripts.
+NUMBER = re.compile(r"[-+]?((\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|inf|infinity|nan)", re.ASCII | re.IGNORECASE)
 FOREIGN = "unbound:"  # namespace that stands for a prefix which a file does not declare
 
 
@@ -88,10 +90,9 @@ def numbers(
             inside = "" if element is None else f" in <{element.tag}>"
             raise LoadingError(f"{where}: {key} is missing{inside}")
         return np.array(default, dtype=float)
-    try:
-        values = np.array([float(x) for x in text.split()])
-    except ValueError:
-        raise LoadingError(f'{where}: {key} must hold numbers; got "{text}"') from None
+    if not all(NUMBER.fullmatch(x) for x in text.split()):
+        raise LoadingError(f'{where}: {key} must hold numbers; got "{text}"')
+    values = np.array([float(x) for x in text.split()])
     if values.size != size:
         raise LoadingError(f'{where}: {key} must hold {size} number{"s" if size > 1 else ""}; got "{text}"')
     if not np.isfinite(values).all():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -116,7 +117,8 @@ def _assets(
     """
     _strip(spec, notes)
     assets = [*spec.meshes, *spec.hfields]
-    found = {_shape(asset): _is_there(spec, asset, path) for asset in assets}
+    homes = [Path(spec.modelfiledir or "."), *_homes(path)]
+    found = {_shape(asset): _is_there(spec, asset, homes) for asset in assets}
     files = {_shape(asset): asset.file for asset in assets}
     absent, unread = [], []
     wrapping = _wrapping(mujoco, spec)
@@ -161,20 +163,40 @@ def _shape(asset: Any) -> str:
     return str(asset.name or Path(asset.file).stem)
 
 
-def _is_there(spec: Any, asset: Any, path: Path) -> bool:
+def _is_there(spec: Any, asset: Any, homes: Sequence[Path]) -> bool:
     """Whether the file of a mesh or a height field exists, where it has one."""
     if not asset.file:
         return True
     name = Path(asset.file).name if spec.strippath else asset.file
-    bases = [Path(spec.modelfiledir or "."), path.resolve().parent]
     folders = [asset.compiler.meshdir or "", spec.meshdir or "", ""]
-    return any((base / folder / name).is_file() for base in bases for folder in folders)
+    return any((home / folder / name).is_file() for home in homes for folder in folders)
+
+
+def _homes(path: Path) -> list[Path]:
+    """Folders from which paths lead: of the file, and of the models that it or its includes attach."""
+    homes: dict[Path, None] = {}
+    left, seen = [(path.resolve(), path.resolve().parent)], set()
+    while left:
+        file, home = left.pop()
+        if file in seen:
+            continue
+        seen.add(file)
+        homes[home] = None
+        try:
+            text = file.read_text(encoding="utf-8", errors="ignore")
+        except OSError:  # which MuJoCo has refused, or does not need
+            continue
+        for tag, name in re.findall(r"<(include|model)\b[^>]*?\bfile\s*=\s*[\"']([^\"']+)[\"']", text):
+            named = (home / name).resolve()
+            left.append((named, home if tag == "include" else named.parent))
+    return list(homes)
 
 
 def _wrapping(mujoco: Any, spec: Any) -> set[str]:
-    """Names of the geoms that tendons go around."""
+    """Names of the geoms that tendons go around; a geom that is not there is for MuJoCo to refuse."""
     around = (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER)
-    return {w.target.name for tendon in spec.tendons for w in tendon.path if w.type in around}
+    wraps = [w for tendon in spec.tendons for w in tendon.path if w.type in around]
+    return {w.target.name for w in wraps if w.target is not None}
 
 
 def _carries_mass(mujoco: Any, geom: Any) -> bool:

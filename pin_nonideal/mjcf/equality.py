@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -100,8 +100,10 @@ class Lengths:
         lengths: Y and X, or Y alone.
         rests: y0 and x0.
         c: the five coefficients.
+        needs_data: whether Pinocchio's kinematics are made for it.
     """
 
+    needs_data: ClassVar[bool] = False
     lengths: list[Any]
     rests: list[float]
     c: Array
@@ -126,8 +128,10 @@ class Lengths:
 
     def _derivatives(self, q: Array) -> tuple[float, float, float]:
         """The polynomial of the second length with its first and second derivative."""
-        x, p = self.lengths[1].length(q) - self.rests[1], np.polynomial.Polynomial(self.c[:5])
-        return float(p(x)), float(p.deriv()(x)), float(p.deriv(2)(x))
+        x = self.lengths[1].length(q) - self.rests[1]
+        a, b, c, d, e = self.c[:5].tolist()
+        value = a + x * (b + x * (c + x * (d + x * e)))
+        return value, b + x * (2.0 * c + x * (3.0 * d + x * 4.0 * e)), 2.0 * c + x * (6.0 * d + x * 12.0 * e)
 
     def _row(self, q: Array) -> Array:
         row = self.lengths[0].jacobian(q)

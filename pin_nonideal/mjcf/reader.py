@@ -95,6 +95,7 @@ def translate(mujoco: Any, compiled: Any, name: str, told: Told) -> tuple[RobotF
         told.note("the file's flags switch its equalities off")
     if compiled.nactuator and not flags & off.mjDSBL_ACTUATION:
         robot.actuation = _actuators(tree, tendons, through_drives, not flags & off.mjDSBL_CLAMPCTRL)
+    robot.to_float = "give a body a <freejoint/>"
     robot.contact_friction = {
         name: (float(a), float(b), float(c))
         for name, (a, b, c) in zip(geom_names(compiled), compiled.geom_friction, strict=True)

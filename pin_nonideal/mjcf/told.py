@@ -17,7 +17,7 @@ from .motion import Tendon
 from .tendons import tendon_name
 from .transmissions import BODY
 from .transmissions import TENDON as BY_TENDON
-from .tree import BALL, Tree, actuator_share
+from .tree import BALL, GROUND, Tree, actuator_share
 
 ALLOWED = ("actuator", "flex", "fluid", "muscle", "plasticity", "plugin", "tendon")
 MUSCLE = 2  # of MuJoCo's mjtGain and mjtBias
@@ -237,6 +237,11 @@ def _tell_world(mujoco: Any, tree: Tree, told: Told) -> None:
     m = tree.compiled
     if m.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
         told.note("bodies do not fall asleep here, whatever the file's sleep flag")
+    renamed = [j for j in range(m.njnt) if m.joint(j).name == GROUND]
+    if renamed:
+        told.note(
+            f'joint "{GROUND}" is called "{tree.joint_name(renamed[0])}" here, for the ground has its name'
+        )
     if m.nsensor:
         told.note(f"sensors ({m.nsensor}) are not read")
     floating = [

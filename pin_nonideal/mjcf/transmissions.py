@@ -30,14 +30,14 @@ class Geared:
 
 
 @dataclass(frozen=True, eq=False)
-class OnBall:
-    """A ball joint: the rotation vector along the gear's axis, in the axes of the joint's body or its parent.
+class _OnTurn:
+    """A joint that turns by a quaternion.
 
     Attributes:
         at: place of the quaternion in q.
         dof: first degree of freedom.
-        gear: (3,).
-        in_parent: whether the gear is given in the parent's axes.
+        gear: (3,) of a ball joint, (6,) of a free one.
+        in_parent: whether what turns is given in the axes of the parent or the world, not of the body.
         size: number of degrees of freedom.
     """
 
@@ -46,6 +46,10 @@ class OnBall:
     gear: Array
     in_parent: bool
     size: int
+
+
+class OnBall(_OnTurn):
+    """A ball joint: its rotation vector along the gear's axis, in the axes of the body or its parent."""
 
     def rows(self, q: Array) -> tuple[float, Array]:
         """Length and moment arms, (nv,)."""
@@ -54,23 +58,8 @@ class OnBall:
         return float(pin.log3(turn) @ axis), row
 
 
-@dataclass(frozen=True, eq=False)
-class OnFree:
-    """A free joint: a force in world axes and a moment in the axes of the body or the world; no length.
-
-    Attributes:
-        at: place of the quaternion in q.
-        dof: first degree of freedom.
-        gear: (6,).
-        in_parent: whether the moment is given in the world's axes.
-        size: number of degrees of freedom.
-    """
-
-    at: int
-    dof: int
-    gear: Array
-    in_parent: bool
-    size: int
+class OnFree(_OnTurn):
+    """A free joint: a force in world axes and a moment in the axes of the body or the world; no length."""
 
     def rows(self, q: Array) -> tuple[float, Array]:
         """Length and moment arms, (nv,)."""

@@ -20,6 +20,7 @@ from pin_nonideal.types import Array, JointModel, Model, Placement
 from .motion import Motion
 
 FREE, BALL, SLIDE, HINGE = range(4)  # of MuJoCo's mjtJoint
+GROUND = "universe"  # Pinocchio's name, which no joint may bear
 
 
 def placement(position: Array, quaternion: Array) -> Placement:
@@ -121,7 +122,7 @@ def build_tree(mujoco: Any, compiled: Any, name: str) -> Tree:
     tree = Tree(m, model)
     tree.body_names = _names(m, m.nbody, m.name_bodyadr, "body")
     tree.site_names = _names(m, m.nsite, m.name_siteadr, "site")
-    joint_names = _names(m, m.njnt, m.name_jntadr, "joint")
+    joint_names = _names(m, m.njnt, m.name_jntadr, "joint", GROUND)
     for body in range(m.nbody):
         tree.bodies.append(_add_body(tree, body, joint_names))
     for site in range(m.nsite):
@@ -136,15 +137,16 @@ def build_tree(mujoco: Any, compiled: Any, name: str) -> Tree:
     return tree
 
 
-def _names(m: Any, count: int, addresses: Array, kind: str) -> list[str]:
-    """Names of all objects of a kind, with a new one for each that has none."""
+def _names(m: Any, count: int, addresses: Array, kind: str, barred: str = "") -> list[str]:
+    """Names of all objects of a kind, with a new one for each that has none or a barred one."""
     given = [m.names[adr : m.names.index(b"\0", adr)].decode() for adr in addresses[:count]]
-    taken = set(given)
-    for i, name in enumerate(given):
-        while not given[i]:
-            name = f"{kind}_{i}" if not name else name + "_"
-            given[i] = "" if name in taken else name
-        taken.add(given[i])
+    taken = {*given, barred}
+    for i, old in enumerate(given):
+        name = "" if old == barred else old
+        while not name or (name != old and name in taken):
+            name = f"{name}_" if name else f"{old or kind}_{i}"
+        given[i] = name
+        taken.add(name)
     return given
 
 

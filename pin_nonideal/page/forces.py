@@ -1,13 +1,15 @@
 """What the replay shows of constraints: marks where bodies meet, and arrows of the forces there.
 
 The arrow at an anchor is the reaction on the body of frame1, from the anchor's rows of `lam`, split by
-`lam_ideal` into its ideal and its nonideal part.  `F_nonideal` is drawn at the joints of one degree of
-freedom; so is `F_ideal` when no constraint has a place of its own (those of a user have none).
+`lam_ideal` into its ideal and its nonideal part, its moment an arc beside it.  `F_nonideal` is drawn at the
+joints, and so are the torques `tau` of the actuation; `F_ideal` is when no constraint has a place of its own
+(those of a user have none).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +29,8 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory import Trajectory
 
 
-# A generalized force below this part of the largest one is rounding and gets no arrow.
+# A force below this part of the largest one is rounding and gets no arrow; moments are measured by the
+# largest moment and by the largest force at the length of a link.
 SMALLEST = 1e-9
 
 
@@ -42,6 +45,7 @@ class Mark:
         point1: the point in that joint's frame [m], (3,).
         joint2: index of the joint that carries the second point.
         point2: the second point [m], (3,).
+        axes: unit vectors in the second joint's frame along which the points must coincide, (k, 3).
     """
 
     name: str
@@ -50,6 +54,7 @@ class Mark:
     point1: Array
     joint2: int
     point2: Array
+    axes: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 @dataclass(frozen=True)
@@ -58,21 +63,26 @@ class Arrow:
 
     Attributes:
         name: name of the constraint or joint.
-        kind: "total", "ideal" or "nonideal".
+        kind: "total", "ideal", "nonideal", "drive", "spring", "drag" or "given".
         unit: "N" or "N m"; a moment is drawn as an arc about its axis.
-        values: force in world axes, (n, 3), or moment about the axis, (n,).
-        origin: where a force acts in the world [m], (n, 3); None for a moment.
-        joint: index of the joint of a moment, which acts at the joint's origin.
-        axis: axis of a moment in the joint's frame, (3,); None for a force.
+        values: force or moment in world axes, (n, 3), or moment about the axis, (n,).
+        joint: index of the joint that carries the place where it acts.
+        origin: that place in the world [m], (n, 3); None for the origin of the joint.
+        axis: axis of a moment in the joint's frame, (3,); None where the values are vectors.
     """
 
     name: str
     kind: str
     unit: str
     values: Array
-    origin: Array | None = None
     joint: int = 0
+    origin: Array | None = None
     axis: Array | None = None
+
+    def largest(self) -> float:
+        """Its largest size over the run [N or N m]."""
+        sizes = self.values if self.values.ndim == 1 else np.linalg.norm(self.values, axis=1)
+        return float(np.abs(sizes).max(initial=0.0))
 
 
 @dataclass(frozen=True)
@@ -95,10 +105,13 @@ class _Side:
 def marks_of(scene: Scene) -> list[Mark]:
     """Marks of all anchors, rods, contacts and springs of a scene."""
     marks = []
-    for name, item, shown in _constraints(scene):
+    for name, item, shown in constraints_of(scene):
+        if not hasattr(item, "frame") and hasattr(item, "lower"):
+            continue
         if shown == core.Shown.contact:
             side = _side(scene.model, item.frame)
-            marks.append(Mark(name, "contact", side.joint, side.point, side.joint, side.point))
+            point = side.point + np.asarray(side.placement.rotation) @ getattr(item, "offset", np.zeros(3))
+            marks.append(Mark(name, "contact", side.joint, point, side.joint, point))
         elif shown in (core.Shown.anchor, core.Shown.rod):
             marks.append(_tie(scene, name, shown.name, item))
     springs = [item for item in scene.forces if isinstance(item, SpringDamper)]
@@ -108,13 +121,25 @@ def marks_of(scene: Scene) -> list[Mark]:
 def _tie(scene: Scene, name: str, kind: str, item: Any) -> Mark:
     """The mark of what ties two frames."""
     first, second = _sides(scene, item)
-    return Mark(name, kind, first.joint, first.point, second.joint, second.point)
+    held = ["xyz".index(axis) for axis in getattr(item, "axes", "xyz")] if kind == "anchor" else []
+    axes = np.asarray(second.placement.rotation).T[held]
+    return Mark(name, kind, first.joint, first.point, second.joint, second.point, axes)
 
 
-def _constraints(scene: Scene) -> list[tuple[str, Any, core.Shown]]:
-    """Constraints and contacts with the names of their rows, and what the core says is shown of them."""
+def constraints_of(scene: Scene) -> list[tuple[str, Any, core.Shown]]:
+    """Constraints and contacts with the names of their rows, and what the core says is shown of them.
+
+    Args:
+        scene: the scene.
+    """
     known = [c.shown for c in scene._compiled.program.constraints]
-    return list(zip(scene.constraint_slices, [*scene.constraints, *scene.contacts], known, strict=True))
+    contacts: list[Any] = []
+    for item in scene.contacts:  # a stop of a joint has rows of its own at each of its ends
+        ends = [end for end in ("lower", "upper") if hasattr(item, end)]
+        own = [name for name in scene.constraint_slices if any(name.endswith(f" {end}") for end in ends)]
+        named = [name for name in own if name.rpartition(" ")[0] == (item.name or item.joint)] if ends else []
+        contacts += [item] * (len(named) or 1)
+    return list(zip(scene.constraint_slices, [*scene.constraints, *contacts], known, strict=False))
 
 
 def _side(model: pin.Model, frame: str) -> _Side:
@@ -136,11 +161,18 @@ def _sides(scene: Scene, item: Any) -> tuple[_Side, _Side]:
     return first, _Side(0, pin.SE3(np.eye(3), here))
 
 
-def arrows_of(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]:
-    """Arrows of the forces that the run recorded; none without record "forces"."""
+def arrows_of(run: Trajectory, motion: Motion, marks: list[Mark], more: Sequence[Arrow] = ()) -> list[Arrow]:
+    """Arrows of the forces that the run recorded, as far as they are more than rounding.
+
+    Args:
+        run: the run; without record "forces" it has none of constraints.
+        motion: its motion.
+        marks: of the scene.
+        more: arrows of other forces.
+    """
     arrows: list[Arrow] = []
     if run.lam is not None:
-        for name, item, shown in _constraints(run.scene):
+        for name, item, shown in constraints_of(run.scene):
             rows = run.scene.constraint_slices[name]
             parts = {"total": motion.of(run.lam[:, rows])}
             if run.lam_ideal is not None:
@@ -148,21 +180,31 @@ def arrows_of(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]
                 rest = parts["total"] - ideal
                 acts = np.abs(rest).max(initial=0.0) > SMALLEST * np.abs(ideal).max(initial=0.0)
                 parts = {"ideal": ideal} | ({"nonideal": rest} if acts else {})
+            touches = shown == core.Shown.contact and hasattr(item, "frame")
+            if touches and run.reactions is not None and name in run.reactions:
+                arrows.append(_touching(run, motion, name, item))
+                continue
             for kind, lam in parts.items():
                 arrows += _reaction(run.scene, motion, name, kind, item, shown, lam)
-    drawn = [("nonideal", run.F_nonideal)]
-    if not arrows:
+    # What rubs in contacts alone is part of the forces drawn there.
+    touching = {arrow.name for arrow in [*arrows, *more] if arrow.kind == "total"}
+    drawn = [] if run.law_names and touching.issuperset(run.law_names) else [("nonideal", run.F_nonideal)]
+    if not arrows and not touching:
         drawn.append(("ideal", run.F_ideal))
+    drawn.append(("drive", run.tau))
     for kind, force in drawn:
-        if force is None:
-            continue
-        joints = motion.of(force)
-        largest = float(np.abs(joints).max(initial=0.0))
-        for joint in range(1, run.scene.model.njoints):
-            values = joints[:, run.scene.model.joints[joint].idx_v]
-            if np.abs(values).max() > SMALLEST * largest:
-                arrows += _at_joint(run.scene.model, motion, None, kind, joint, values)
-    return arrows
+        if force is not None:
+            arrows += _at_joints(run.scene.model, motion, kind, motion.of(force))
+    return _acting([*arrows, *more], run.scene.model, motion.size)
+
+
+def _acting(arrows: list[Arrow], model: pin.Model, size: float) -> list[Arrow]:
+    """The arrows that are more than rounding of the largest ones and of the weight of all bodies."""
+    weight = sum(inertia.mass for inertia in model.inertias) * float(np.linalg.norm(model.gravity.linear))
+    force = max([weight, *(arrow.largest() for arrow in arrows if arrow.unit == "N")])
+    moment = max([weight * size, *(arrow.largest() for arrow in arrows if arrow.unit == "N m")])
+    least = {"N": SMALLEST * max(force, moment / size), "N m": SMALLEST * max(moment, force * size)}
+    return [arrow for arrow in arrows if arrow.largest() > least[arrow.unit]]
 
 
 def _reaction(
@@ -170,33 +212,55 @@ def _reaction(
 ) -> list[Arrow]:
     """Arrows of one constraint: the force on its first body, or the force on its joints."""
     model = scene.model
+    if hasattr(item, "lower"):  # a stop of a joint pushes away from its end
+        way = -1.0 if name.endswith(" upper") else 1.0
+        return along(model, motion, name, kind, model.getJointId(item.joint), way * lam[:, 0])
     if shown in (core.Shown.anchor, core.Shown.rod):
-        return [Arrow(name, kind, "N", *_between(scene, motion, item, shown, lam))]
+        return _between(scene, motion, name, kind, item, shown, lam)
     if shown in (core.Shown.rolling, core.Shown.contact):
-        return [Arrow(name, kind, "N", *_on_plane(model, motion, item, lam))]
+        body = _side(model, item.frame)
+        force, place = _on_plane(model, motion, item, lam)
+        return [Arrow(name, kind, "N", force, body.joint, place)]
     if shown == core.Shown.edge:
         edge = _side(model, item.frame)
         force = edge.turned(motion, lam[:, :1] * np.array(unit_axis("axis", item.axis)))
-        return [Arrow(name, kind, "N", force, motion.point(edge.joint, edge.point))]
+        return [Arrow(name, kind, "N", force, edge.joint, motion.point(edge.joint, edge.point))]
     if shown == core.Shown.drive:
-        return _at_joint(model, motion, name, kind, model.getJointId(item.joint), lam[:, 0])
+        return along(model, motion, name, kind, model.getJointId(item.joint), lam[:, 0])
     if shown == core.Shown.gear:
-        driven = _at_joint(model, motion, name, kind, model.getJointId(item.joint1), lam[:, 0])
-        leading = _at_joint(model, motion, name, kind, model.getJointId(item.joint2), -item.ratio * lam[:, 0])
+        driven = along(model, motion, name, kind, model.getJointId(item.joint1), lam[:, 0])
+        leading = along(model, motion, name, kind, model.getJointId(item.joint2), -item.ratio * lam[:, 0])
         return driven + leading
     return []
 
 
-def _between(scene: Scene, motion: Motion, item: Any, shown: core.Shown, lam: Array) -> tuple[Array, Array]:
-    """Force on the first of two frames that are tied, and the place of that frame, (n, 3) each."""
+def _touching(run: Trajectory, motion: Motion, name: str, item: Any) -> Arrow:
+    """The force in a contact, friction included, from the recorded reactions."""
+    body = _side(run.scene.model, item.frame)
+    _, place = _on_plane(run.scene.model, motion, item, np.zeros((len(motion.times), 1)))
+    return Arrow(name, "total", "N", motion.of(run.reaction(name, axes="world")[:, :3]), body.joint, place)
+
+
+def _between(
+    scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.Shown, lam: Array
+) -> list[Arrow]:
+    """Force on the first of two frames that are tied, and the moment where the tie takes one."""
     first, second = _sides(scene, item)
     origin = motion.point(first.joint, first.point)
     if shown == core.Shown.rod:
-        return lam[:, :1] * _unit(origin - motion.point(second.joint, second.point)), origin
+        force = lam[:, :1] * _unit(origin - motion.point(second.joint, second.point))
+        return [Arrow(name, kind, "N", force, first.joint, origin)]
     axes = ["xyz".index(axis) for axis in getattr(item, "axes", "xyz")]
     local = np.zeros((len(lam), 3))
     local[:, axes] = lam[:, : len(axes)]
-    return second.turned(motion, local), origin
+    arrows = [Arrow(name, kind, "N", second.turned(motion, local), first.joint, origin)]
+    if lam.shape[1] > 3:
+        about = np.eye(3)  # of a hinge: the two directions across its axis
+        if lam.shape[1] == 5:
+            about = np.array(axis_triad(unit_axis("axis", item.axis))[:2])
+        moment = second.turned(motion, lam[:, 3:] @ about)
+        arrows.append(Arrow(name, kind, "N m", moment, first.joint, origin))
+    return arrows
 
 
 def _on_plane(model: pin.Model, motion: Motion, item: Any, lam: Array) -> tuple[Array, Array]:
@@ -211,7 +275,10 @@ def _on_plane(model: pin.Model, motion: Motion, item: Any, lam: Array) -> tuple[
     if getattr(item, "axis", None) is not None:  # a disk: its lowest point
         axis = body.turned(motion, np.tile(unit_axis("axis", item.axis), (len(lam), 1)))
         up = _unit(up - np.sum(up * axis, axis=1, keepdims=True) * axis)
-    return plane.turned(motion, local), motion.point(body.joint, body.point) - item.radius * up
+    middle = motion.point(
+        body.joint, body.point + np.asarray(body.placement.rotation) @ getattr(item, "offset", np.zeros(3))
+    )
+    return plane.turned(motion, local), middle - item.radius * up
 
 
 def _unit(vectors: Array) -> Array:
@@ -220,15 +287,76 @@ def _unit(vectors: Array) -> Array:
     return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0))
 
 
-def _at_joint(
-    model: pin.Model, motion: Motion, name: str | None, kind: str, joint: int, values: Array
-) -> list[Arrow]:
-    """Generalized force on a joint of one degree of freedom, along or about its axis; else nothing."""
+def along(model: pin.Model, motion: Motion, name: str, kind: str, joint: int, values: Array) -> list[Arrow]:
+    """Generalized force on a joint of one degree of freedom, along or about its axis; else nothing.
+
+    Args:
+        model: the model.
+        motion: the motion.
+        name: of the arrow.
+        kind: of the arrow.
+        joint: index of the joint.
+        values: the force or torque at each frame [N or N m], (n,).
+    """
     axis, turning = joint_axis(model, joint)
     if axis is None:
         return []
-    name = name or str(model.names[joint])
     if turning:
-        return [Arrow(name, kind, "N m", values, joint=int(joint), axis=axis)]
-    along = motion.rotation(joint) @ axis
-    return [Arrow(name, kind, "N", along * values[:, None], motion.poses[:, joint, :3])]
+        return [Arrow(name, kind, "N m", values, int(joint), axis=axis)]
+    force = motion.rotation(joint) @ axis * values[:, None]
+    return [Arrow(name, kind, "N", force, int(joint), motion.poses[:, joint, :3])]
+
+
+def _at_joints(model: pin.Model, motion: Motion, kind: str, force: Array) -> list[Arrow]:
+    """A generalized force at all joints, (n, nv): forces and moments along the directions of their motion.
+
+    Joints that only slide, one on the other without a mass between them, move one particle: their forces are
+    one arrow.
+    """
+    arrows: list[Arrow] = []
+    taken: set[int] = set()
+    for joint in reversed(range(1, model.njoints)):
+        if joint in taken:
+            continue
+        chain = _sliding(model, joint)
+        taken.update(chain)
+        name = ", ".join(str(model.names[j]) for j in reversed(chain))
+        if len(chain) > 1:
+            parts = [along(model, motion, name, kind, j, force[:, model.joints[j].idx_v])[0] for j in chain]
+            total = np.sum([part.values for part in parts], axis=0)
+            own = [Arrow(name, kind, "N", total, joint, parts[0].origin)]
+        elif model.joints[joint].nv == 1:
+            own = along(model, motion, name, kind, joint, force[:, model.joints[joint].idx_v])
+        else:
+            own = _wrench(model, motion, kind, joint, force)
+        arrows = own + arrows
+    return arrows
+
+
+def _sliding(model: pin.Model, joint: int) -> list[int]:
+    """A joint and those before it that move the same particle."""
+    chain = [joint]
+    while _slides(model, joint):
+        joint = int(model.parents[joint])
+        if not _slides(model, joint) or model.inertias[joint].mass > 0.0:
+            break
+        chain.append(joint)
+    return chain
+
+
+def _slides(model: pin.Model, joint: int) -> bool:
+    axis, turning = joint_axis(model, joint) if joint else (None, False)
+    return axis is not None and not turning
+
+
+def _wrench(model: pin.Model, motion: Motion, kind: str, joint: int, force: Array) -> list[Arrow]:
+    """The least force and moment S^T w = tau along the motions of a joint of several degrees of freedom."""
+    item, name = model.joints[joint], str(model.names[joint])
+    data, local = item.createData(), np.empty((len(force), 6))
+    for k, row in enumerate(force[:, item.idx_v : item.idx_v + item.nv]):
+        item.calc(data, motion.q[k])
+        local[k] = np.linalg.pinv(np.asarray(data.S)).T @ row
+    turn = motion.rotation(joint)
+    linear, angular = (np.einsum("nij,nj->ni", turn, part) for part in np.hsplit(local, 2))
+    place = motion.poses[:, joint, :3]
+    return [Arrow(name, kind, "N", linear, joint, place), Arrow(name, kind, "N m", angular, joint, place)]

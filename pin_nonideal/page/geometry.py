@@ -227,74 +227,13 @@ def _material_colors(root: ElementTree.Element) -> dict[str, Color]:
     return materials
 
 
-def sticks(model: pin.Model, ends: list[tuple[int, Array]], size: float) -> list[Visual]:
-    """Visuals for a model without geometry: bars from joint to joint, hubs at joints, balls for point masses.
-
-    Args:
-        model: the model.
-        ends: points on bodies that bars lead to as well, as joint index and position in its frame [m], (3,).
-        size: diagonal of the model, which sets the thickness [m].
-    """
-    radius = 0.013 * size
-    points: list[list[Array]] = [[] for _ in range(model.njoints)]
-    for joint in range(1, model.njoints):
-        points[int(model.parents[joint])].append(np.asarray(model.jointPlacements[joint].translation))
-    for joint, point in ends:
-        points[joint].append(np.asarray(point))
-
-    visuals: list[Visual] = []
-    for joint in range(1, model.njoints):
-        color = LINK_COLORS[(joint - 1) % len(LINK_COLORS)]
-        name = str(model.names[joint])
-        lever = np.asarray(model.inertias[joint].lever)
-        reach = points[joint] or [
-            np.asarray(frame.placement.translation) for frame in model.frames if frame.parentJoint == joint
-        ]
-        reach = [point for point in reach if np.linalg.norm(point) > radius]
-        if not reach and np.linalg.norm(lever) > radius:
-            reach = [2.0 * lever]  # a uniform bar ends at twice the distance of its center of mass
-        for number, point in enumerate(reach):
-            visuals.append(Visual(f"{name} bar {number}", joint, *_bar(point, radius), color))
-        if not reach and model.inertias[joint].mass > 0.0:
-            ball = Shape("ellipsoid", (2.2 * radius,) * 3)
-            visuals.append(Visual(f"{name} mass", joint, pin.SE3(np.eye(3), lever), ball, color))
-        else:
-            visuals.append(_hub(model, joint, radius))
-    return visuals
-
-
-def _bar(end: Array, radius: float) -> tuple[pin.SE3, Shape]:
-    """A rounded bar from the origin to a point."""
-    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end).matrix()
-    return pin.SE3(turn, end / 2.0), Shape("capsule", (radius, float(np.linalg.norm(end))))
-
-
-def _hub(model: pin.Model, joint: int, radius: float) -> Visual:
-    """The mark of a joint: a drum along a revolute axis, a block on a prismatic one, else a ball."""
-    name = f"{model.names[joint]} joint"
-    axis, turning = joint_axis(model, joint)
-    if axis is None:
-        ball = Shape("ellipsoid", (1.7 * radius,) * 3)
-        return Visual(name, joint, pin.SE3.Identity(), ball, JOINT_COLOR)
-    turn = pin.SE3(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis).matrix(), np.zeros(3))
-    shape = Shape("cylinder", (1.6 * radius, 3.4 * radius))
-    if not turning:
-        shape = Shape("box", (3.4 * radius, 3.4 * radius, 5.0 * radius))
-    return Visual(name, joint, turn, shape, JOINT_COLOR)
-
-
 def joint_axis(model: pin.Model, joint: int) -> tuple[Array | None, bool]:
     """Axis of a joint of one degree of freedom in its own frame, (3,), and whether it turns; else None."""
     if model.joints[joint].nv != 1:
         return None, False
     data = model.joints[joint].createData()
-    model.joints[joint].calc(data, pin.neutral(model)[_slice(model, joint)])
+    model.joints[joint].calc(data, pin.neutral(model))
     linear, angular = np.split(np.asarray(data.S).ravel(), 2)
     turning = bool(np.linalg.norm(angular) > 0.0)
     axis = angular if turning else linear
     return axis / np.linalg.norm(axis), turning
-
-
-def _slice(model: pin.Model, joint: int) -> slice:
-    start = int(model.joints[joint].idx_q)
-    return slice(start, start + int(model.joints[joint].nq))

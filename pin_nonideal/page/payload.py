@@ -2,100 +2,240 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
 
-from pin_nonideal.states.placements import joint_placements
 from pin_nonideal.types import Array, Table
 
+from .bands import bands_of
+from .bare import sticks
+from .between import between
+from .choices import collisions_of, inertia_box, signals_of
+from .elements import Element, elements_of
 from .forces import Arrow, arrows_of, marks_of
-from .geometry import Shape, Visual, sticks, visuals_of
-from .motion import sample, view
-from .signals import Chosen, mode_bands, plots_of
+from .geometry import Visual, joint_axis, visuals_of
+from .given import given_arrows
+from .guides import Guide, guides_of
+from .looks import table
+from .motion import Motion, sample
+from .packing import Payload, Shapes
+from .signals import Chosen, Plot, plots_of, usual_plots, wanted
+from .touched import touched_of
+from .tracks import Tracks
+from .view import link_length, treads, upward, view
 
 if TYPE_CHECKING:
+    from pin_nonideal.scene import Scene
     from pin_nonideal.trajectory import Trajectory
 
-
-class Payload:
-    """The run as bytes: a JSON header, which refers to the typed arrays that follow it."""
-
-    def __init__(self) -> None:
-        self._chunks: list[bytes] = []
-        self._length = 0
-
-    def add(self, values: Any, kind: str = "f4") -> dict[str, list[Any]]:
-        """Reference to a stored array.
-
-        Args:
-            values: anything NumPy can turn into an array; stored flat.
-            kind: type of the stored numbers, "f4", "f8", "u2" or "u4".
-        """
-        chunk = np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()
-        reference = {"array": [kind, self._length, len(chunk) // int(kind[1])]}
-        self._chunks.append(chunk)
-        self._length += len(chunk)
-        return reference
-
-    def bytes(self, header: Table) -> bytes:
-        """Length of the header as four bytes, header, arrays."""
-        text = json.dumps(header, allow_nan=False, separators=(",", ":")).encode()
-        return b"".join([len(text).to_bytes(4, "little"), text, *self._chunks])
+# Of so many runs curves are plotted; all of them are drawn.
+MOST_PLOTTED = 8
 
 
-def packed_run(run: Trajectory, fps: float, title: str, plots: Chosen | None, forces: bool) -> bytes:
-    """Everything that the page shows of a run.
+def packed_runs(
+    runs: Sequence[Trajectory],
+    names: Sequence[str],
+    fps: float | None,
+    title: str,
+    plots: Chosen | None,
+    forces: bool,
+) -> bytes:
+    """Everything that the page shows of a run, and of others as ghosts beside it.
 
     Args:
-        run: the run.
-        fps: frames a second of simulated time.
+        runs: the run, and those that it is compared with.
+        names: of the runs.
+        fps: frames a second of simulated time; None for frames chosen by the motion.
         title: heading of the page.
-        plots: what is plotted, as `replay_signals.plots_of` takes it.
+        plots: what is plotted, as `signals.plots_of` takes it.
         forces: whether arrows of forces are shown.
     """
-    scene, model, payload = run.scene, run.scene.model, Payload()
-    motion = sample(run, fps)
-    marks = marks_of(scene)
+    run, payload = runs[0], Payload()
+    scene, marks = run.scene, marks_of(run.scene)
+    motions = [sample(one, fps, share=len(runs)) for one in runs]
+    model, known = scene.model, [between(*pair) for pair in zip(runs, motions, strict=True)][:MOST_PLOTTED]
+    finer, motion = known[0]
     ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
-    visuals = visuals_of(scene.visual_model) if scene.visual_model is not None else []
-    if not visuals:
-        visuals = sticks(model, ends, _skeleton_size(model, scene.q0))
-    looking = view(model, motion, visuals, ends)
-    shapes, drawn = _shapes(payload, visuals)
-    arrows = arrows_of(run, motion, marks) if forces else []
+    visuals, bare = _drawn(scene, motion, ends)
+    visuals = visuals + touched_of(finer, motion, visuals, upward(model))
+    guides = guides_of(finer, motion)
+    shapes = Shapes(payload)
+    looking = view(scene, motion, visuals, ends, np.vstack([np.zeros((0, 3)), *(g.points for g in guides)]))
+    drawn = shapes.add(visuals)
+    arrows = arrows_of(finer, motion, marks, given_arrows(finer, motion, marks)) if forces else []
+    for number, spacing in treads(motion, visuals, _sliding_axes(model)).items():
+        drawn[number]["wrap"] = spacing
     header = {
         "title": title,
         "subtitle": _subtitle(run),
-        "facts": _facts(run, fps),
+        "failure": getattr(run, "failure", None),
+        "facts": _facts(run, motion),
+        "looks": table(),
         "times": payload.add(motion.times, "f8"),
-        "joints": [
-            {"name": str(name), "poses": payload.add(_shortest(motion.poses[:, joint]))}
-            for joint, name in enumerate(model.names)
-        ],
-        "shapes": shapes,
+        "held": payload.add(motion.held, "u1") if motion.held.any() else None,
+        "joints": _joints(payload, model, motion),
         "visuals": drawn,
+        "name": names[0],
+        "others": [
+            _other(payload, shapes, *other) for other in zip(runs[1:], motions[1:], names[1:], strict=True)
+        ],
         "marks": [_plain(mark) for mark in marks],
-        "arrows": [_stored_arrow(payload, arrow) for arrow in arrows],
-        "plots": [
-            {
-                "title": plot.title,
-                "unit": plot.unit,
-                "log": plot.log,
-                "t": payload.add(plot.t, "f8"),
-                "curves": [{"label": k, "values": payload.add(v, "f8")} for k, v in plot.curves.items()],
-            }
-            for plot in (item.thinned() for item in plots_of(run, plots))
-        ],
-        "events": [
-            {"time": float(e.time), "kind": str(e.kind), "element": str(e.element)} for e in run.events
-        ],
-        "modes": _modes(run),
+        "guides": [_stored_guide(payload, guide) for guide in guides],
+        "trails": [{"joint": j, "point": point} for j, point in _trails(model, guides, bare)],
+        "arrows": [_stored_arrow(payload, motion, arrow) for arrow in arrows],
+        "plots": _plots(payload, runs, [one for one, _ in known], names, plots),
+        "events": _events(payload, run),
+        "modes": _modes(payload, run),
+        "elements": [_stored_element(payload, element) for element in elements_of(finer, motion, marks)],
         "view": _plain(looking),
+        "collisions": shapes.add(collisions_of(scene)),
+        "signals": [
+            {"label": s.label, "unit": s.unit, "t": payload.add(s.t, "f8"), "values": payload.add(s.values)}
+            for s in signals_of(run, finer)
+        ],
     }
+    header["shapes"] = shapes.stored
     return payload.bytes(header)
+
+
+def _drawn(scene: Scene, motion: Motion, ends: list[tuple[int, Array]]) -> tuple[list[Visual], bool]:
+    """What is drawn of a scene, and whether it has no shapes of its own."""
+    visuals = visuals_of(scene.visual_model) if scene.visual_model is not None else []
+    if visuals:
+        return visuals, False
+    return sticks(scene.model, ends, link_length(scene.model, ends, motion.size)), True
+
+
+def _other(payload: Payload, shapes: Shapes, run: Trajectory, motion: Motion, name: str) -> Table:
+    """A run as a ghost: its motion and its bodies."""
+    marks = marks_of(run.scene)
+    ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
+    visuals, _ = _drawn(run.scene, motion, ends)
+    return {
+        "name": name,
+        "times": payload.add(motion.times, "f8"),
+        "held": payload.add(motion.held, "u1") if motion.held.any() else None,
+        "joints": _joints(payload, run.scene.model, motion),
+        "visuals": shapes.add([visual for visual in visuals if visual.joint]),
+    }
+
+
+def _curves(run: Trajectory, finer: Trajectory, chosen: Chosen | None) -> list[Plot]:
+    """Plots of a run as it is between its samples, but for curves that were given at them."""
+    dense, items = (
+        getattr(run, "dense", None) is not None,
+        wanted("plots", usual_plots(run) if chosen is None else chosen),
+    )
+    smooth = {"q", "v", "energy", "gaps", *run.scene.model.names}  # all else runs straight between samples
+    return [
+        plot
+        for item in items
+        for plot in plots_of(finer if isinstance(item, str) and (dense or item in smooth) else run, [item])
+    ]
+
+
+def _plots(
+    payload: Payload,
+    runs: Sequence[Trajectory],
+    finer: Sequence[Trajectory],
+    names: Sequence[str],
+    chosen: Chosen | None,
+) -> list[Table]:
+    """Plots of the first run, with the curves of the others that have the same."""
+    each = [[plot.thinned() for plot in _curves(*pair, chosen)] for pair in zip(runs, finer, strict=False)]
+    found = []
+    for plot in each[0]:
+        stored = _stored_plot(payload, plot)
+        said = f"{len(each)} of {len(runs)} runs" if len(runs) > len(each) else ""
+        stored["note"] = " · ".join(filter(None, [plot.note, said]))
+        for number, others in enumerate(each[1:], 1):
+            for other in others:
+                if (other.title, other.unit) == (plot.title, plot.unit):
+                    stored["curves"] += _compared(payload, plot, other, number, names[number])
+        found.append(stored)
+    return found
+
+
+def _compared(payload: Payload, plot: Plot, other: Plot, number: int, name: str) -> list[Table]:
+    """Curves of another run that the first has as well."""
+    t, common = payload.add(other.t, "f8"), {k: v for k, v in other.curves.items() if k in plot.curves}
+    return [
+        {"label": f"{k}, {name}", "run": number, "of": k, "t": t, "values": payload.curve(v)}
+        for k, v in common.items()
+    ]
+
+
+def _sliding_axes(model: pin.Model) -> dict[int, Array]:
+    axes = {joint: joint_axis(model, joint) for joint in range(1, model.njoints)}
+    return {joint: axis for joint, (axis, turning) in axes.items() if axis is not None and not turning}
+
+
+def _joints(payload: Payload, model: pin.Model, motion: Motion) -> list[Table]:
+    """How each joint moves, the world first; coordinates that never change once."""
+    found: list[Table] = [{"name": str(model.names[0])}]
+    for number, track in Tracks(model).moving():
+        values = motion.coordinates[:, track.columns]
+        still = np.array_equal(values, np.broadcast_to(values[0], values.shape))
+        exact = float(np.abs(values).max(initial=0.0)) > 16.0  # beyond it 32 bits are too few
+        found.append(
+            {
+                "name": str(model.names[number]),
+                "parent": track.parent,
+                "place": track.place.tolist(),
+                "axis": None if track.axis is None else track.axis.tolist(),
+                "turning": track.turning,
+                "mass": float(model.inertias[number].mass),
+                "inertia": inertia_box(model.inertias[number]),
+                "lever": np.asarray(model.inertias[number].lever).tolist(),
+                "values": payload.add(values[:1] if still else values, "f8" if exact else "f4"),
+            }
+        )
+    return found
+
+
+def _trails(model: pin.Model, guides: list[Guide], bare: bool) -> list[tuple[int, list[float]]]:
+    """Points whose paths are drawn: those on guides, and the ends of a model without shapes."""
+    found = {guide.joint: guide.point.tolist() for guide in guides}
+    for joint in range(1, model.njoints) if bare else ():
+        if not len(model.children[joint]):
+            found.setdefault(joint, np.asarray(model.inertias[joint].lever).tolist())
+    return list(found.items())
+
+
+def _stored_plot(payload: Payload, plot: Plot) -> Table:
+    curves = [{"label": k, "values": payload.curve(v)} for k, v in plot.curves.items()]
+    return {
+        "title": plot.title,
+        "unit": plot.unit,
+        "note": plot.note,
+        "log": plot.log,
+        "t": payload.add(plot.t, "f8"),
+        "curves": curves,
+    }
+
+
+def _events(payload: Payload, run: Trajectory) -> Table:
+    """Times of the events with their kinds and elements by number."""
+    kinds = sorted({str(event.kind) for event in run.events})
+    elements = sorted({str(event.element) for event in run.events})
+    return {
+        "kinds": kinds,
+        "elements": elements,
+        "times": payload.add([float(event.time) for event in run.events], "f8"),
+        "kind": payload.add([kinds.index(str(event.kind)) for event in run.events], "u2"),
+        "element": payload.add([elements.index(str(event.element)) for event in run.events], "u2"),
+        "impulse": payload.add([float(np.linalg.norm(_impulse(event))) for event in run.events]),
+        "taken": payload.add([float(getattr(event, "energy_change", 0.0) or 0.0) for event in run.events]),
+    }
+
+
+def _impulse(event: Any) -> Array:
+    """Impulse of an impact, in the directions of the contact; zero of other events."""
+    given = getattr(event, "impulse", None)
+    return np.zeros(3) if given is None else np.asarray(given, dtype=float)
 
 
 def _plain(item: Any) -> Table:
@@ -103,74 +243,40 @@ def _plain(item: Any) -> Table:
     return {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in vars(item).items()}
 
 
-def _stored_arrow(payload: Payload, arrow: Arrow) -> Table:
+def _stored_arrow(payload: Payload, motion: Motion, arrow: Arrow) -> Table:
+    """An arrow whose place is one that its joint carries, one for all frames where it stays there."""
     stored = _plain(arrow)
     stored["values"] = payload.add(arrow.values)
     if arrow.origin is not None:
-        stored["origin"] = payload.add(arrow.origin)
+        local = motion.local(arrow.joint, arrow.origin)
+        fixed = np.abs(local - local[0]).max() < 1e-9 * motion.size
+        stored["origin"] = payload.add(local[:1] if fixed else local)
     return stored
 
 
-def _shortest(poses: Array) -> Array:
-    """One pose when a joint never moves, else all."""
-    return poses[:1] if np.array_equal(poses, np.broadcast_to(poses[0], poses.shape)) else poses
-
-
-def _skeleton_size(model: pin.Model, q: Array) -> float:
-    """Diagonal of the box around all joints and frames at a configuration [m]."""
-    joints = joint_placements(model, q)
-    points = np.array(
-        [placement.translation for placement in joints]
-        + [joints[frame.parentJoint].act(frame.placement.translation) for frame in model.frames]
-        + [joints[joint].act(model.inertias[joint].lever) for joint in range(1, model.njoints)]
-    )
-    size = float(np.linalg.norm(np.ptp(points, axis=0)))
-    return size if size > 1e-6 else 1.0
-
-
-def _shapes(payload: Payload, visuals: list[Visual]) -> tuple[list[Table], list[Table]]:
-    """Shapes, equal ones once, and the visuals that refer to them by number."""
-    known: dict[bytes, int] = {}
-    shapes: list[Table] = []
-    drawn: list[Table] = []
-    for visual in visuals:
-        key = _fingerprint(visual.shape)
-        if key not in known:
-            known[key] = len(shapes)
-            shapes.append(_stored(payload, visual.shape))
-        drawn.append(
-            {
-                "name": visual.name,
-                "joint": visual.joint,
-                "placement": visual.placement.homogeneous.ravel().tolist(),
-                "shape": known[key],
-                "color": list(visual.color),
-            }
-        )
-    return shapes, drawn
-
-
-def _fingerprint(shape: Shape) -> bytes:
-    """Equal for equal shapes."""
-    words = repr((shape.kind, shape.size, shape.parts)).encode()
-    return b"|".join([words, shape.vertices.tobytes(), shape.triangles.tobytes()])
-
-
-def _stored(payload: Payload, shape: Shape) -> Table:
-    stored: Table = {"kind": shape.kind, "size": list(shape.size)}
-    if shape.kind == "mesh":
-        stored["vertices"] = payload.add(shape.vertices)
-        stored["triangles"] = payload.add(shape.triangles, "u2" if len(shape.vertices) <= 0xFFFF else "u4")
-        stored["parts"] = [[count, None if color is None else list(color)] for count, color in shape.parts]
+def _stored_element(payload: Payload, element: Element) -> Table:
+    stored = _plain(element)
+    for key in ("share", "normal"):
+        if stored[key] is not None:
+            stored[key] = payload.add(getattr(element, key))
     return stored
 
 
-def _modes(run: Trajectory) -> list[Table]:
-    """Bands of the elements that stick or slip, with their names."""
-    if run.modes is None:
-        return []
-    pairs = zip(run.element_names, mode_bands(run.t, run.modes), strict=True)
-    return [{"name": name, "runs": runs} for name, runs in pairs]
+def _stored_guide(payload: Payload, guide: Guide) -> Table:
+    stored = _plain(guide)
+    for key in ("points", "shift", "normals"):
+        if stored[key] is not None:
+            stored[key] = payload.add(getattr(guide, key))
+    return stored
+
+
+def _modes(payload: Payload, run: Trajectory) -> list[Table]:
+    """Bands of the elements that stick or slip: starts and modes of their pieces, and the end of the last."""
+    found = []
+    for name, pieces in bands_of(run):
+        starts, modes = [piece[0] for piece in pieces], [piece[2] for piece in pieces]
+        found.append({"name": name, "starts": payload.add(starts, "f8"), "modes": payload.add(modes)})
+    return found
 
 
 def _subtitle(run: Trajectory) -> str:
@@ -194,13 +300,16 @@ def _above(value: float) -> str:
     return f"{np.ceil(value / power) * power:.1e}"
 
 
-def _facts(run: Trajectory, fps: float) -> list[tuple[str, str]]:
+def _facts(run: Trajectory, motion: Motion) -> list[tuple[str, str]]:
     """What the help dialog tells of a run."""
     model = run.scene.model
+    frames = f"{len(motion.times)} frames"
+    if motion.held.any():
+        frames += f", {int(motion.held.sum())} of them still: the samples do not tell the motion between them"
     facts = [
         ("scene", str(run.scene.name)),
         ("model", f"{model.name}, {model.njoints - 1} joints, nq {model.nq}, nv {model.nv}"),
-        ("time", f"{run.t[0]:g} to {run.t[-1]:g} s, {len(run.t)} samples, {fps:g} frames a second"),
+        ("time", f"{run.t[0]:g} to {run.t[-1]:g} s, {len(run.t)} samples, {frames}"),
     ]
     for key, value in vars(run.stats).items():
         facts.append((str(key), f"{value:g}" if isinstance(value, float) else str(value)))

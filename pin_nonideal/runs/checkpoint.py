@@ -25,7 +25,7 @@ from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, LoadingError, OutputError
 from pin_nonideal.files import file_path, whole_file
 from pin_nonideal.scene import Scene
-from pin_nonideal.trajectory import UNREADABLE
+from pin_nonideal.trajectory_file import UNREADABLE
 from pin_nonideal.types import Table
 from pin_nonideal.version import __version__
 

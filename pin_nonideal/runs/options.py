@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pin_nonideal.actuation import SampledControl
-from pin_nonideal.checks import array, choice, count, label, nonnegative, number, positive, sequence
+from pin_nonideal.checks import array, choice, count, flag, label, nonnegative, number, positive, sequence
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene import SEVERAL, Scene
@@ -20,13 +21,14 @@ METHODS = {method.name: method.adaptive for method in core.methods()}
 # Those of SciPy, and of them those that go on from a state that was put in place.
 SCIPY = tuple(method.name for method in core.methods() if method.outside)
 ONE_STEP = tuple(method.name for method in core.methods() if method.outside and method.one_step)
-RECORDS = ("a", "forces", "energy", "power", "laws", "reactions")
+RECORDS = ("a", "forces", "energy", "power", "laws", "reactions", "tau", "dense")
 FIELDS = {"F_ideal": "forces", "F_nonideal": "forces", "lam": "forces", "lam_ideal": "forces"}
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-8, 1e-10
 # Times are floating-point numbers: a step of fewer of their spacings is off by more than a percent, and one
 # shorter than a spacing leads nowhere.
 LEAST_SPACINGS = 100.0
 NO_LIMIT = 2**62  # of steps
+MOST_KEPT = 32  # options that a scene keeps
 MOST_SAMPLES = 1e8  # some gigabytes for a small robot
 # No step meets a tolerance below rounding; the square of what misses it must not overflow.
 LEAST_RTOL, LEAST_ATOL = 1e-14, 1e-100
@@ -51,7 +53,13 @@ class RunOptions:
         power: whether powers are.
         laws: whether the forces of each law are, and limits of friction.
         reactions: whether the wrenches that joints and anchors carry are.
+        tau: whether torques of the actuation are.
+        dense: whether interpolants of the steps are.
+        max_wall: wall time that the run may take [s], or 0 for as much as it takes.
+        event_names: of the user's functions whose zeros are events.
+        separate: whether samples lie on the asked grid only.
         several: "error" or "continue" where the laws allow several motions.
+        strict: whether an impact that gains energy is an error.
     """
 
     method: str
@@ -68,7 +76,13 @@ class RunOptions:
     power: bool
     laws: bool
     reactions: bool
+    tau: bool
+    dense: bool
+    max_wall: float
+    event_names: tuple[str, ...]
+    separate: bool
     several: str
+    strict: bool
 
 
 def run_options(
@@ -83,6 +97,10 @@ def run_options(
     max_steps: float | None,
     record: str | Sequence[str],
     several: str,
+    max_wall: float | None = None,
+    event_names: tuple[str, ...] = (),
+    separate: bool = False,
+    strict: bool = False,
 ) -> RunOptions:
     """Options of a run, checked.
 
@@ -98,6 +116,10 @@ def run_options(
         max_steps: most accepted steps, infinite too, or None.
         record: names of what to record.
         several: "error" or "continue".
+        max_wall: most wall time [s], infinite too, or None.
+        event_names: of the user's functions whose zeros are events.
+        separate: whether samples lie on the asked grid only.
+        strict: whether an impact that gains energy is an error.
 
     Raises:
         InputError: one is wrong, or they do not go together.
@@ -113,6 +135,8 @@ def run_options(
             )
     elif dt is not None:
         raise InputError(f'simulate: method "{method}" chooses its own steps; leave dt out, or set output_dt')
+    if opening := scene._compiled.opening_names:
+        _check_opening(method, record, opening[0])
     nv = scene.model.nv
     if nv == 0:
         raise InputError(f'simulate: "{scene.name}" has no joint that moves; there is nothing to simulate')
@@ -131,6 +155,10 @@ def run_options(
     begin, length = number("simulate: t0", t0), positive("simulate: duration", duration)
     steps = {"dt": dt, "output_dt": output_dt}
     lengths = {key: positive(f"simulate: {key}", value) for key, value in steps.items() if value is not None}
+    if separate and output_dt is None:
+        raise InputError(
+            'simulate: events="separate" needs an output_dt: without one, every step is a sample'
+        )
     _check_clock(scene, begin, length, lengths)
     wanted = {record} if isinstance(record, str) else set(sequence("simulate: record", record))
     groups = set()
@@ -152,8 +180,53 @@ def run_options(
         power="power" in groups,
         laws="laws" in groups or "forces" in groups,
         reactions="reactions" in groups,
+        tau="tau" in groups or "forces" in groups,
         several=choice("simulate: several", several, SEVERAL),
+        dense="dense" in groups,
+        max_wall=0.0 if max_wall in (None, np.inf) else positive("simulate: max_wall", max_wall),
+        event_names=event_names,
+        separate=separate,
+        strict=flag("simulate: strict", strict),
     )
+
+
+def kept_options(scene: Scene, *asked: Any) -> RunOptions:
+    """The same as `run_options`, checked once: controllers ask for the same run again and again.
+
+    Args:
+        scene: what to simulate, which keeps them.
+        *asked: the other arguments of `run_options`, in order.
+    """
+    kept: dict[Any, RunOptions] = scene.__dict__.setdefault("_kept_options", {})
+    key = tuple((type(each), each) for each in asked)
+    try:
+        if key in kept:
+            return kept[key]
+    except TypeError:  # lists and arrays, which may change
+        return run_options(scene, *asked)
+    if len(kept) >= MOST_KEPT:
+        kept.clear()
+    kept[key] = options = run_options(scene, *asked)
+    return options
+
+
+def _check_opening(method: str, record: str | Sequence[str], name: str) -> None:
+    """Refuses methods and records that know no contacts that open.
+
+    Raises:
+        InputError: it is one.
+    """
+    if "dense" in ((record,) if isinstance(record, str) else record):
+        raise InputError(
+            f'simulate: record "dense" knows no contacts that open, and "{name}" may open; leave it out, or '
+            "keep the contact closed with unilateral=False"
+        )
+    known = [m for m in METHODS if m not in SCIPY]
+    if method not in known:
+        raise InputError(
+            f'simulate: method "{method}" cannot open and close contacts, and "{name}" may open; use one of '
+            f"{', '.join(known)}, or keep it closed with unilateral=False"
+        )
 
 
 def _most_steps(max_steps: float | None) -> int:

@@ -10,7 +10,7 @@ projected.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
@@ -22,6 +22,7 @@ from pin_nonideal.errors import InputError, RunError, StepSizeError
 from pin_nonideal.scene import Scene
 from pin_nonideal.types import Array
 
+from .asked import Watched
 from .options import ONE_STEP, RunOptions
 
 Tick = Callable[[float], None]  # with the time
@@ -35,9 +36,11 @@ FREE = 1e100
 class _Run:
     """One run: what SciPy asks of it, step by step."""
 
-    def __init__(self, scene: Scene, options: RunOptions, tick: Tick | None) -> None:
+    def __init__(
+        self, scene: Scene, options: RunOptions, tick: Tick | None, events: Sequence[Watched]
+    ) -> None:
         self.model, self.options = scene.model, options
-        self.core = core.FollowedRun(scene._compiled.program, options, tick)
+        self.core = core.FollowedRun(scene._compiled.program, options, tick, list(events))
         self.failure: core.CoreFailure | None = None
 
     def rate(self, t: float, y: Array) -> Array:
@@ -103,7 +106,12 @@ def _one_blas_thread() -> AbstractContextManager[Any]:
 
 
 def simulate_stiff(
-    scene: Scene, q0: Array, v0: Array, options: RunOptions, tick: Tick | None
+    scene: Scene,
+    q0: Array,
+    v0: Array,
+    options: RunOptions,
+    tick: Tick | None,
+    events: Sequence[Watched] = (),
 ) -> tuple[core.Outcome, BaseException | None]:
     """Runs one of SciPy's implicit methods.
 
@@ -113,6 +121,7 @@ def simulate_stiff(
         v0: initial velocity on the constraints, (nv,).
         options: as checked by `simulate`.
         tick: called with the time now and then.
+        events: functions of the user whose zeros are events.
 
     Returns:
         What the core recorded of it, and what stopped the run.
@@ -124,13 +133,12 @@ def simulate_stiff(
 
     if isinstance(scene.actuation, SampledControl):
         raise InputError(f'simulate: SampledControl needs one of the core\'s methods; got "{options.method}"')
-    run = _Run(scene, options, tick)
-    t_end = options.t0 + options.duration
+    run = _Run(scene, options, tick, events)
     try:
         with _one_blas_thread():
             run.core.start(q0, v0)
-            while run.core.t < t_end:
-                run.smooth_stretch(getattr(integrate, options.method), t_end)
+            while not run.core.done:
+                run.smooth_stretch(getattr(integrate, options.method), options.t0 + options.duration)
     except (KeyboardInterrupt, RunError, core.CoreFailure) as error:
         return run.core.outcome(), error
     return run.core.outcome(), None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -22,6 +23,39 @@ COARSEST_SPACING = 1e-3
 
 # Joints whose configuration ends in the cosine and sine of an angle, by the beginnings of their names.
 CIRCLES = ("JointModelRUB", "JointModelRevoluteUnbounded", "JointModelPlanar")
+
+
+class JointPlace(NamedTuple):
+    """Where the values of a joint stand.
+
+    Attributes:
+        name: of the joint.
+        kind: Pinocchio's name of its kind.
+        q_first: where they begin in a configuration.
+        nq: how many they are there.
+        v_first: where they begin in a velocity.
+        nv: how many they are there.
+    """
+
+    name: str
+    kind: str
+    q_first: int
+    nq: int
+    v_first: int
+    nv: int
+
+
+def joint_places(model: Model) -> list[JointPlace]:
+    """Where the values of each joint stand, in the order of the model.
+
+    Args:
+        model: pinocchio.Model.
+    """
+    sizes = zip(model.names, model.joints, model.idx_qs, model.nqs, model.idx_vs, model.nvs, strict=True)
+    return [
+        JointPlace(str(name), str(joint.shortname()), int(q), int(nq), int(v), int(nv))
+        for name, joint, q, nq, v, nv in list(sizes)[1:]
+    ]
 
 
 def unit_parts(model: Model) -> Iterator[tuple[str, slice]]:
@@ -83,8 +117,8 @@ def require_resolved(model: Model, q: NDArray[np.float64]) -> None:
     Raises:
         InputError: a coordinate is too large; names its joint.
     """
-    farthest = np.abs(q).max(initial=0.0)
-    spacing = np.spacing(farthest)
+    farthest = float(np.abs(q).max(initial=0.0))
+    spacing = math.ulp(farthest)
     if spacing <= COARSEST_SPACING:
         return
     k = int(np.argmax(np.abs(q))) % model.nq

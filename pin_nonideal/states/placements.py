@@ -5,6 +5,7 @@ Data holds tensors of nv^3 numbers, gigabytes from some five hundred degrees of 
 
 from __future__ import annotations
 
+import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.types import Array, Model, Placement
@@ -57,3 +58,34 @@ def frame_index(model: Model, name: str) -> int:
     kinds = (pin.FrameType.BODY, pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT, pin.FrameType.OP_FRAME)
     found = (int(model.getFrameId(name, kind)) for kind in kinds if model.existFrame(name, kind))
     return next(found, None) or int(model.getFrameId(name))
+
+
+def frame_motion(model: Model, name: str, q: Array, v: Array) -> tuple[Array, Array, Array]:
+    """How a frame moves over many states, by the joints between it and the world.
+
+    v_i = X_i^-1 v_parent + S_i(q) dq_i,  in the axes of each body; the frame's last, turned into world axes.
+
+    Args:
+        model: pinocchio.Model.
+        name: of a frame or a joint of the model.
+        q: configurations, (n, nq).
+        v: velocities, (n, nv).
+
+    Returns:
+        Place of its origin [m], (n, 3); its axes by columns, (n, 3, 3); velocity of its origin and of its
+        rotation in world axes [m/s; rad/s], (n, 6).
+    """
+    carrier, local = frame_on_joint(model, name)
+    chain = [int(i) for i in model.supports[carrier]][1:]
+    datas = {i: model.joints[i].createData() for i in chain}
+    places, axes, rates = np.empty((len(q), 3)), np.empty((len(q), 3, 3)), np.empty((len(q), 6))
+    for k, (q_k, v_k) in enumerate(zip(q, v, strict=True)):
+        placement, velocity = pin.SE3.Identity(), pin.Motion.Zero()
+        for i in chain:
+            model.joints[i].calc(datas[i], q_k, v_k)
+            step = model.jointPlacements[i] * pin.SE3(datas[i].M)
+            placement, velocity = placement * step, step.actInv(velocity) + pin.Motion(datas[i].v)
+        placement, velocity = placement * local, local.actInv(velocity)
+        places[k], axes[k] = placement.translation, placement.rotation
+        rates[k] = np.concatenate([axes[k] @ velocity.linear, axes[k] @ velocity.angular])
+    return places, axes, rates

@@ -1,54 +1,267 @@
-"""States on the constraints: the core's Newton method nearby, damped steps and many starts from far away."""
+"""States on the constraints: the core's Newton method from nearby, the search for the nearest from afar."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
+from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
 
 from pin_nonideal.core import core
-from pin_nonideal.errors import InconsistentConstraintsError, LoopClosureError
+from pin_nonideal.errors import InconsistentConstraintsError, InputError, LoopClosureError, PinNonidealError
 from pin_nonideal.types import Array, Model
 
-from .closure import CLOSURE_TOLERANCE, close_loops
-from .rows import holonomic_rows, row_slices, rows_at
+from .closure import CLOSURE_TOLERANCE, WELL_CONDITIONED, Closure, Rows, Search, conditioning
+from .rows import copies, holonomic_rows, row_slices, rows_at
 
-# A larger gap than this [m or rad] is closed by damped steps before Newton's method has its turn.
-FAR = 1e-3
 # Rows that no velocity meets better than this part of 1 + |v| contradict each other.
 RATE_TOLERANCE = 1e-6
+# Where Newton's method moves nothing by more than this part of its unit, it misses the nearest state by
+# rounding.
+NEARBY = 1e-6
+SURELY = 0.1  # of it, in ambient coordinates: no difference of configurations is ten times as long
+# Residuals up to this part of the length are tried by it at all.
+NEWTON_REACH = 1e-3
+# A move of more than this part of a unit is worth a word.
+LITTLE = 1e-3
+# Part of the length, of one at most, by which a contact may start inside: more is no rounding of a pose.
+DEEP = 1e-2
+# Part of the largest below which a row or an axis is rounding.
+VANISHING = 1e-11
+# The inertia that a coordinate has at least in the distance where M is singular, as a part of the largest.
+LEAST_INERTIA = 1e-9
+# A search in more freedoms takes minutes: Newton's method has the first word, however large the gap.
+MANY_FREEDOMS = 300
 
 
-def nearest_state(model: Model, program: core.Program, q: Array, v: Array, t: float) -> tuple[Array, Array]:
-    """Nearest state with phi(q, t) = 0 and A v + phi_t = 0.
+@dataclass(frozen=True)
+class ProjectionReport:
+    """How far a projection moved a configuration.
+
+    Attributes:
+        distance: sqrt(d^T M(q) d) of the move d = q' - q in tangent coordinates [sqrt(kg) m].
+        coordinate: the one that moved most, by the name of its joint, with a number from 0 on where the joint
+            has several; of lengths and angles the one that moved by more of its unit, a radian or the length
+            of the mechanism.  Empty where nothing moved.
+        moved: how far that one moved [rad or m].
+        gap: largest residual before [m or rad, in the scale of its row].
+        iterations: steps of the search; 0 where Newton's method sufficed.
+        nearest: whether this is the nearest consistent configuration as far as can be told: no nearer one
+            lies around it, nor was one found from other starts, of which two ended here.
+    """
+
+    distance: float = 0.0
+    coordinate: str = ""
+    moved: float = 0.0
+    gap: float = 0.0
+    iterations: int = 0
+    nearest: bool = True
+
+
+class Projection:
+    """The projection onto the constraints of one scene.
 
     Args:
         model: pinocchio.Model.
         program: the scene as the core knows it.
-        q: configuration, (nq,).
-        v: velocity, (nv,).
-        t: time [s].
+        q0: a configuration, (nq,), whose lengths count where the model has none.
 
-    Returns:
-        q (nq,), v (nv,).
-
-    Raises:
-        LoopClosureError: no configuration satisfies the constraints.
-        InconsistentConstraintsError: no velocity does.
+    Attributes:
+        unit: a long move of each coordinate, (nv,): a radian, or the length of the mechanism.
+        length: of the mechanism [m]: the longest chain of joints and frames.
     """
-    if not program.rows:
-        return q, v
-    runner = program.runner()
-    on, v_on, before, after, rate = runner.project(q, v, t, FAR)
-    if not after <= CLOSURE_TOLERANCE:
-        rows, mass = _holonomic_rows(program, runner, model.nv, t), _mass(model, runner)
-        q, _ = close_loops(model, rows, mass, q)
-        on, v_on, before, after, rate = runner.project(q, v, t, np.inf)
-    if not after <= CLOSURE_TOLERANCE:
-        raise _open_loops(rows_at(runner, on if after < before else q, v_on, t)[2], program, t)
-    if not rate <= RATE_TOLERANCE * (1.0 + _largest(v_on)):
-        raise _lost_velocity(rows_at(runner, on, v_on, t)[3], program, t)
-    return on, v_on
+
+    def __init__(self, model: Model, program: core.Program, q0: Array) -> None:
+        self.model, self.program = model, program
+        self._slides = _slides(model)
+        self.length = _chain(model) or self._length_at(q0) or 1.0
+        self.unit = np.where(self._slides, self.length, 1.0)
+        self._closed = CLOSURE_TOLERANCE * min(1.0, self.length)
+
+    def nearest(self, q: Array, v: Array, t: float) -> tuple[Array, Array, ProjectionReport]:
+        """Nearest state with phi(q, t) = 0 and A v + phi_t = 0.
+
+        Args:
+            q: configuration, (nq,).
+            v: velocity, (nv,).
+            t: time [s].
+
+        Returns:
+            q (nq,), v (nv,), and how far q moved.
+
+        Raises:
+            LoopClosureError: no configuration satisfies the constraints.
+            InconsistentConstraintsError: no velocity does.
+        """
+        if not self.program.rows:
+            return q, v, ProjectionReport()
+        runner = self.program.runner()
+        self._refuse_deep_starts(rows_at(runner, q, v, t)[2], t)
+        on, v_on, before, after, rate = runner.project(q, v, t, self._reached())
+        iterations, nearest = 0, True
+        if not (after <= self._closed and self._is_nearby(q, on)):
+            found, nearest = self._search(runner, q, t, on if after <= self._closed else None)
+            iterations = found.iterations
+            on, v_on, _, after, rate = runner.project(found.q, v, t, np.inf)
+            if not (after <= self._closed or found.gap <= CLOSURE_TOLERANCE):
+                raise _open_loops(rows_at(runner, found.q, v_on, t)[2], self.program, t)
+        if not rate <= RATE_TOLERANCE * min(1.0, self.length) * (1.0 + _largest(v_on)):
+            raise _lost_velocity(rows_at(runner, on, v_on, t)[3], self.program, t)
+        return on, v_on, self._report(runner, q, on, before, iterations, nearest)
+
+    def _refuse_deep_starts(self, phi: Array, t: float) -> None:
+        """Raises where a contact that may open starts far inside, if the loops tell that its place is meant.
+
+        Args:
+            phi: residuals of all rows, (m,).
+            t: time [s].
+
+        Raises:
+            InputError: one does.
+        """
+        kinds, slices = self.program.constraints, row_slices(self.program)
+        allowed = DEEP * min(1.0, self.length)
+        loops = [phi[slices[c.name]] for c in kinds[: self.program.first_gap] if all(c.holonomic)]
+        if any(_largest(part) > allowed for part in loops):
+            return
+        depths = {c.name: -float(phi[slices[c.name]].min()) for c in kinds[self.program.first_gap :]}
+        name = max(depths, key=lambda key: depths[key], default="")
+        if name and depths[name] > allowed:
+            raise InputError(
+                f'contact "{name}" starts {depths[name]:.3g} (m or rad) inside at t = {t:.4g} s; it must '
+                f"start open, closed, or at most {allowed:.2g} inside, which is moved out: change the start"
+            )
+
+    def nearest_of_each(
+        self, q: Array, v: Array, t: float, threads: int, numbers: tuple[list[tuple[str, int, str]], Array]
+    ) -> tuple[Array, Array, dict[int, PinNonidealError | core.CoreFailure]]:
+        """What `nearest` gives for each of many, on several threads as long as Newton's method suffices.
+
+        Args:
+            q: configurations, (n, nq).
+            v: velocities, (n, nv).
+            t: time [s].
+            threads: number of native threads.
+            numbers: of the program that differ between them, see `compilation.run_numbers`.
+
+        Returns:
+            q (n, nq), v (n, nv), and what `nearest` raised, by state.
+        """
+        failures: dict[int, PinNonidealError | core.CoreFailure] = {}
+        if not self.program.rows:
+            return q, v, failures
+        names, values = numbers
+        found_q, found_v, after, rate = core.nearest_states(
+            self.program, q, v, t=t, far=self._reached(), threads=threads, names=names, values=values
+        )
+        on, v_on = found_q.reshape(q.shape), found_v.reshape(v.shape)
+        met = rate <= RATE_TOLERANCE * min(1.0, self.length) * (1.0 + np.abs(v_on).max(axis=1, initial=0.0))
+        hardly = np.abs(on - q).max(axis=1, initial=0.0) <= SURELY * NEARBY * self.unit.min(initial=np.inf)
+        for i in map(int, np.flatnonzero(~((after <= self._closed) & met & hardly))):
+            if not (after[i] <= self._closed and met[i] and self._is_nearby(q[i], on[i])):
+                own = copy(self)
+                if names:
+                    own.program = core.with_numbers(self.program, names, values[i : i + 1])
+                try:
+                    on[i], v_on[i], _ = own.nearest(q[i], v[i], t)
+                except (PinNonidealError, core.CoreFailure) as failure:
+                    failures[i] = failure
+        return on, v_on, failures
+
+    def _length_at(self, q: Array) -> float:
+        """The largest slide or residual of a mechanism whose joints and frames all coincide."""
+        away = pin.difference(self.model, pin.neutral(self.model), q)[self._slides]
+        phi = rows_at(self.program.runner(), q, np.zeros(self.model.nv), 0.0)[2]
+        return max(_largest(away), _largest(phi))
+
+    def _reached(self) -> float:
+        """The largest residual from which Newton's method is tried."""
+        return np.inf if self.model.nv > MANY_FREEDOMS else NEWTON_REACH * self.length
+
+    def _is_nearby(self, q: Array, on: Array) -> bool:
+        return bool((np.abs(pin.difference(self.model, q, on)) <= NEARBY * self.unit).all())
+
+    def _search(self, runner: core.Runner, q: Array, t: float, newton: Array | None) -> tuple[Closure, bool]:
+        """The nearest closure, and whether it is known to be; Newton's own where a search takes minutes."""
+        if newton is not None and self.model.nv > MANY_FREEDOMS:
+            return Closure(newton, 0.0, 0.0, False, 0), False
+        mass, unit = _mass(self.model, runner), self._unit_at(runner, q, t)
+        try:
+            rows = self._rows(runner, q, t, unit)
+            search = Search(
+                self.model, rows, mass, self._metric(mass(q)), unit, np.logical_not(self._slides), q
+            )
+            return search.nearest()
+        except np.linalg.LinAlgError:  # numbers that ran away: no closure
+            return Closure(q, np.inf, 0.0, False, 0), False
+
+    def _unit_at(self, runner: core.Runner, q: Array, t: float) -> Array:
+        """The units of a search: slides go as far as the gaps ask for."""
+        A, _, phi, _ = rows_at(runner, q, np.zeros(self.model.nv), t)
+        slope = np.abs(A[:, self._slides]).max(axis=1, initial=0.0)
+        far = np.divide(np.abs(phi), slope, out=np.zeros_like(phi), where=slope > 0.0)
+        return np.where(self._slides, max(self.length, _largest(far)), 1.0)
+
+    def _rows(self, runner: core.Runner, q: Array, t: float, unit: Array) -> Rows:
+        """The holonomic rows over their reach, without copies and rows that move nothing."""
+        zero, generator, samples = np.zeros(self.model.nv), np.random.default_rng(1), []
+        for _ in range(3):
+            away = pin.integrate(self.model, q, unit * generator.standard_normal(self.model.nv))
+            samples.append(rows_at(runner, away, zero, t))
+        weighted = np.hstack([A * unit for A, _, _, _ in samples])
+        reach = np.abs(weighted).max(axis=1, initial=0.0)
+        used = holonomic_rows(self.program) & (reach > VANISHING * reach.max(initial=0.0))
+        wide = np.hstack([weighted, np.column_stack([phi for _, _, phi, _ in samples])])
+        used[[row for row, _, _ in copies(wide, used, weighted.shape[1])]] = False
+        scale = 1.0 / reach[used]
+
+        def rows(q: Array) -> tuple[Array, Array]:
+            A, _, phi, _ = rows_at(runner, q, zero, t)
+            return A[used] * scale[:, None], phi[used] * scale
+
+        return rows
+
+    def _metric(self, M: Array) -> Array:
+        """M, with a little inertia for coordinates that move none where it is singular."""
+        if conditioning(M) > WELL_CONDITIONED:
+            return M
+        return M + np.diag(LEAST_INERTIA * (np.diag(M) * self.unit**2).max() / self.unit**2)
+
+    def _report(
+        self, runner: core.Runner, q: Array, on: Array, gap: float, iterations: int, nearest: bool
+    ) -> ProjectionReport:
+        move = pin.difference(self.model, q, on)
+        if not move.any():
+            return ProjectionReport(gap=gap)
+        dof = self._furthest(move)
+        distance = float(np.sqrt(max(move @ _mass(self.model, runner)(q) @ move, 0.0)))
+        return ProjectionReport(
+            distance, _coordinate(self.model, dof), float(move[dof]), gap, iterations, nearest
+        )
+
+    def _furthest(self, move: Array) -> int:
+        """The coordinate that moves by most of its unit."""
+        return int(np.argmax(np.abs(move) / self.unit))
+
+    def notes(self, q: Array, on: Array) -> list[str]:
+        """A sentence on a configuration that was moved more than a little; none for one that was not.
+
+        Args:
+            q: as it was given, (nq,).
+            on: where the run starts, (nq,).
+        """
+        move = pin.difference(self.model, q, on)
+        if not (np.abs(move) > LITTLE * self.unit).any():
+            return []
+        dof = self._furthest(move)
+        unit = "m" if self._slides[dof] else "rad"
+        return [
+            "the initial configuration did not satisfy the constraints and was moved onto them: "
+            f'"{_coordinate(self.model, dof)}" by {move[dof]:.3g} {unit}, the others by less; '
+            "Scene.project(report=True) says more"
+        ]
 
 
 def nearest_closure(
@@ -67,52 +280,48 @@ def nearest_closure(
         The configuration, (nq,), and its largest gap [m or rad].
     """
     zero = np.zeros(model.nv)
+    projection = Projection(model, program, q)
     try:
-        on, _, before, after, _ = runner.project(q, zero, 0.0, FAR)
+        on, _, before, after, _ = runner.project(q, zero, 0.0, projection._reached())
     except core.CoreFailure:
         before = after = np.inf
     if min(before, after) > enough:
-        on, after = close_loops(
-            model, _holonomic_rows(program, runner, model.nv, 0.0), _mass(model, runner), q
-        )
-        before = np.inf
+        on = projection._search(runner, q, 0.0, None)[0].q
+        before, after = np.inf, _largest(rows_at(runner, on, zero, 0.0)[2])
     return (on, after) if after <= before else (q, before)
 
 
-def nearest_states(
-    model: Model, program: core.Program, q: Array, v: Array, t: float, threads: int
-) -> tuple[Array, Array]:
-    """The `nearest_state` of each of many, taken on several threads as long as Newton's method suffices.
+def _chain(model: Model) -> float:
+    """The longest way from the world to a joint or frame along the tree, slides left out."""
+    way = [0.0] * model.njoints
+    for i in range(1, model.njoints):
+        way[i] = way[model.parents[i]] + float(np.linalg.norm(model.jointPlacements[i].translation))
+    ends = [way[f.parentJoint] + float(np.linalg.norm(f.placement.translation)) for f in model.frames]
+    return float(max([*way, *ends]))
 
-    Args:
-        model: pinocchio.Model.
-        program: the scene as the core knows it.
-        q: configurations, (n, nq).
-        v: velocities, (n, nv).
-        t: time [s].
-        threads: number of native threads.
 
-    Returns:
-        q (n, nq), v (n, nv).
+def _slides(model: Model) -> Array:
+    """Which coordinates are lengths, (nv,)."""
+    q, slides = pin.neutral(model), np.zeros(model.nv, dtype=bool)
+    for joint in list(model.joints)[1:]:
+        data = joint.createData()
+        joint.calc(data, q)
+        turning = np.asarray(data.S).reshape(6, joint.nv)[3:]
+        slides[joint.idx_v : joint.idx_v + joint.nv] = np.abs(turning).max(axis=0) < VANISHING
+    return slides
 
-    Raises:
-        LoopClosureError: no configuration satisfies the constraints.
-        InconsistentConstraintsError: no velocity does.
-    """
-    if not program.rows:
-        return q, v
-    found_q, found_v, after, rate = core.nearest_states(program, q, v, t=t, far=FAR, threads=threads)
-    on, v_on = found_q.reshape(q.shape), found_v.reshape(v.shape)
-    closed = after <= CLOSURE_TOLERANCE
-    met = rate <= RATE_TOLERANCE * (1.0 + np.abs(v_on).max(axis=1, initial=0.0))
-    for i in np.flatnonzero(~(closed & met)):
-        on[i], v_on[i] = nearest_state(model, program, q[i], v[i], t)
-    return on, v_on
+
+def _coordinate(model: Model, dof: int) -> str:
+    """The name of a coordinate."""
+    i = next(i for i, j in enumerate(model.joints) if i and j.idx_v <= dof < j.idx_v + j.nv)
+    joint = model.joints[i]
+    return str(model.names[i]) if joint.nv == 1 else f"{model.names[i]}[{dof - joint.idx_v}]"
 
 
 def _open_loops(phi: Array, program: core.Program, t: float) -> LoopClosureError:
     gaps = {name: _largest(phi[s]) for name, s in row_slices(program).items()}
-    open_loops = {name: gap for name, gap in gaps.items() if not gap <= CLOSURE_TOLERANCE}
+    largest = max(gaps.values())
+    open_loops = {name: gap for name, gap in gaps.items() if not gap <= min(CLOSURE_TOLERANCE, 0.5 * largest)}
     text = "; ".join(f'loop "{name}" does not close: gap {gap:.2g}' for name, gap in open_loops.items())
     return LoopClosureError(
         f"{text} after several starts; check the lengths and frames, or start nearer", gaps=gaps, time=t
@@ -127,20 +336,6 @@ def _lost_velocity(rate: Array, program: core.Program, t: float) -> Inconsistent
         f"{_largest(rate):.1e}",
         time=t,
     )
-
-
-def _holonomic_rows(
-    program: core.Program, runner: core.Runner, nv: int, t: float
-) -> Callable[[Array], tuple[Array, Array]]:
-    """The function q -> (A, phi), with the rows that restrict the velocity only set to zero."""
-    zero, holonomic = np.zeros(nv), holonomic_rows(program)
-
-    def rows(q: Array) -> tuple[Array, Array]:
-        A, _, phi, _ = rows_at(runner, q, zero, t)
-        A[~holonomic] = 0.0
-        return A, phi
-
-    return rows
 
 
 def _mass(model: Model, runner: core.Runner) -> Callable[[Array], Array]:

@@ -15,16 +15,20 @@ def row_slices(program: core.Program | core.Builder) -> dict[str, slice]:
     Args:
         program: the scene as the core knows it, finished or not.
     """
-    return {c.name: slice(c.first, c.first + c.count) for c in program.constraints}
+    blocks = sorted(program.constraints, key=lambda c: c.first)
+    return {c.name: slice(c.first, c.first + c.count) for c in blocks}
 
 
 def holonomic_rows(program: core.Program) -> NDArray[np.bool_]:
-    """Which rows restrict the position; the others leave nothing to project it on, (m,).
+    """Which rows hold a position, (m,); others, and contacts that may open, leave nothing to project it on.
 
     Args:
         program: the scene as the core knows it.
     """
-    return np.array([holds for c in program.constraints for holds in c.holonomic], dtype=bool)
+    out = np.zeros(program.rows, dtype=bool)
+    for c in program.constraints[: program.first_gap]:
+        out[c.first : c.first + c.count] = c.holonomic
+    return out
 
 
 def rows_at(runner: core.Runner, q: Array, v: Array, t: float) -> tuple[Array, Array, Array, Array]:
@@ -37,4 +41,45 @@ def rows_at(runner: core.Runner, q: Array, v: Array, t: float) -> tuple[Array, A
         t: time [s].
     """
     A, b, phi, rate = runner.rows(q, v, t)
-    return A.reshape(-1, len(v)), b, phi, rate
+    return A.reshape(len(phi), len(v)), b, phi, rate
+
+
+# Rows whose directions differ by less than this part are copies: rounding of the kinematics.
+SAME_ROW = 1e-11
+# How far projections of copies may differ: rounding of long sums.
+SUM_ROUNDING = 1e-9
+
+
+def copies(wide: Array, candidates: NDArray[np.bool_], direction: int) -> list[tuple[int, int, float]]:
+    """Rows that are multiples of earlier ones: (row, the first such row, row over it).
+
+    Args:
+        wide: rows at several states side by side, with what belongs to them, (m, n).
+        candidates: rows to look at, (m,).
+        direction: the columns that tell the length of a row stand before this one.
+    """
+    length = np.linalg.norm(wide[:, :direction], axis=1)
+    rows = np.flatnonzero(candidates & (length > 0.0))
+    unit = wide[rows] / length[rows, None]
+    probe = unit @ np.random.default_rng(2).standard_normal(unit.shape[1])
+    side = np.where(probe < 0.0, -1.0, 1.0)  # a copy may be turned around
+    unit, probe = unit * side[:, None], np.abs(probe)
+    order = np.argsort(probe, kind="stable")
+    taken = np.zeros(len(rows), dtype=bool)
+    found = []
+    for place, i in enumerate(order):
+        if taken[i]:
+            continue
+        close, same = SAME_ROW * (1.0 + np.abs(unit[i]).max()), [i]
+        for j in order[place + 1 :]:
+            if probe[j] - probe[i] > SUM_ROUNDING * (1.0 + probe[i]):
+                break
+            if not taken[j] and np.abs(unit[i] - unit[j]).max() <= close:
+                same.append(j)
+        taken[same] = True
+        first = min(same)
+        for j in same:
+            if j != first:
+                factor = side[j] * length[rows[j]] / (side[first] * length[rows[first]])
+                found.append((int(rows[j]), int(rows[first]), float(factor)))
+    return sorted(found)

@@ -166,8 +166,17 @@ int main() {
     check("knife", pn::KnifeRows{f, f, y}, 0, 0);
     check("rolling disk", pn::RollingRows{f, f, 0.2, false, y, x, y, z}, 2, 3);
     check("rolling sphere", pn::RollingRows{f, f, 0.2, true, y, x, y, z}, 2, 3);
-    check("hinge slip", pn::HingeSlipRows{f, f, z}, 0, 0);
-    check("turn slip", pn::TurnSlipRows{f, f, {0, 1, 2}}, 0, 0);
-    check("contact slip", pn::ContactSlipRows{f, f, 0.2, x, y, z}, 0, 0);
+    check("hinge slip", pn::HingeSlipRows{{}, f, f, z}, 0, 0);
+    check("turn slip", pn::TurnSlipRows{{}, f, f, {0, 1, 2}}, 0, 0);
+    check("contact slip", pn::ContactSlipRows{{}, f, f, 0.2, x, y, z}, 0, 0);
+    for (const double half : {0.05, 0.6, 2.0}) {
+        check("box", pn::BoxRow{f, f, {half, 0.4, 0.1}, 0.1}, 0, 1);
+        check("box slip", pn::BoxSlipRows{{}, f, f, {half, 0.4, 0.1}, 0.1}, 0, 0);
+    }
+    for (const double half1 : {0.0, 0.3, 1.5})
+        for (const double half2 : {0.0, 0.4, 2.0}) {
+            check("capsules", pn::CapsulesRow{f, f, half1, half2, 0.1}, 0, 1);
+            check("capsules slip", pn::CapsulesSlipRows{{}, f, f, half1, half2, 0.1}, 0, 0);
+        }
     return wrong != 0;
 }

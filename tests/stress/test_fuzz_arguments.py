@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import inspect
+import io
 
+import coal
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import strategies as st
+from PIL import Image
 
 import pin_nonideal as pn
+from pin_nonideal import rendering
 from pin_nonideal.errors import PinNonidealError
 
 from .fuzzing import few_and_many, for_all, junk, result_or_named_error
 
 DESCRIPTIONS = [
-    pn.Distance, pn.Drag, pn.FrameAnchor, pn.HingeAnchor, pn.HoldPosition, pn.JointCoupling, pn.JointFriction,
-    pn.JointSpring, pn.KnifeEdge, pn.LuGre, pn.PointAnchor, pn.PointContact, pn.PrescribedMotion, pn.Rolling,
-    pn.SampledControl, pn.SigmoidFriction, pn.SpringDamper, pn.Table, pn.UserConstraint, pn.UserForce,
-    pn.UserFriction, pn.UserLaw, pn.Wrench,
+    pn.BoxContact, pn.CapsuleContact, pn.Distance, pn.Drag, pn.FrameAnchor, pn.GeometryContact,
+    pn.HingeAnchor, pn.HoldPosition, pn.JointCoupling, pn.JointFriction, pn.JointLimit, pn.JointSpring,
+    pn.KnifeEdge, pn.LuGre, pn.PointAnchor, pn.PointContact, pn.PrescribedMotion, pn.Rolling,
+    pn.SampledControl, pn.SigmoidFriction, pn.SphereContact, pn.SpringDamper, pn.Table,
+    pn.UserConstraint, pn.UserContact, pn.UserForce, pn.UserFriction, pn.UserLaw, pn.Wrench,
+    pn.box_contacts,
 ]  # fmt: skip
 TIMES = [pn.constant, pn.polynomial, pn.sinusoid, pn.spline]
 # Where a description belongs in a scene.
@@ -25,7 +32,8 @@ PLACES = {
     "constraints": ("Distance", "FrameAnchor", "HingeAnchor", "JointCoupling", "KnifeEdge", "PointAnchor",
                     "PrescribedMotion", "Rolling", "UserConstraint"),
     "laws": ("Drag", "JointFriction", "LuGre", "SigmoidFriction", "UserFriction", "UserLaw"),
-    "contacts": ("PointContact",),
+    "contacts": ("GeometryContact", "JointLimit", "PointContact", "SphereContact",
+                 "BoxContact", "CapsuleContact", "UserContact", "box_contacts"),
     "forces": ("JointSpring", "SpringDamper", "UserForce", "Wrench"),
 }  # fmt: skip
 
@@ -50,6 +58,19 @@ def drawn(data, function, good):
     return arguments
 
 
+def shapes(model):
+    """A ball at the coupler's tip and the ground."""
+    frame = model.frames[model.getFrameId("coupler_tip")]
+    ball = pin.GeometryObject("ball", frame.parentJoint, frame.placement, coal.Sphere(0.02))
+    ground = pin.GeometryObject(
+        "ground", 0, pin.SE3.Identity(), coal.Halfspace(np.array([0.0, 0.0, 1.0]), -1.0)
+    )
+    collision = pin.GeometryModel()
+    collision.addGeometryObject(ball)
+    collision.addGeometryObject(ground)
+    return collision
+
+
 GOOD = {
     "joint": ["crank_joint"], "joint1": ["crank_joint"], "joint2": ["rocker_joint"], "frame": ["coupler_tip"],
     "frame1": ["coupler_tip"], "frame2": ["rocker_tip"], "axes": ["xz"], "axis": ["y"],
@@ -59,8 +80,16 @@ GOOD = {
     "period": [0.01], "kp": [1.0], "kd": [0.1], "times": [[0.0, 1.0]], "values": [np.zeros((2, 3))],
     "direction": [lambda t, q: [1.0, 0.0, 0.0]], "limit": [lambda t, q, v, r: 0.1], "length": [0.5],
     "damping": [0.1], "phi1": [0.2], "phi2": [5.0],
+    "radius1": [1e-3], "radius2": [1e-3],
+    "segment1": [((0.0, 0.0, 0.0), (0.0, 0.0, 0.1))], "segment2": [((0.0, 0.0, 0.0), (0.1, 0.0, 0.1))],
+    "geometry1": ["ball"], "geometry2": ["ground"], "mu": [0.3], "restitution": [0.5], "lower": [-50.0],
 }  # fmt: skip
 ROW = {"function": [lambda *_: (np.zeros((1, 3)), [0.0])], "size": [1]}
+GAP = {
+    "function": [lambda *_: ([[1.0, 0.0, 0.0]], [0.0])], "gap": [lambda t, q: q[0] + 50.0],
+    "directions": [lambda t, q: [[0.0, 1.0, 0.0]]],
+}  # fmt: skip
+BOX = {"size": [[0.01, 0.02, 0.03]], "frame2": ["universe"]}
 GOOD_TIMES = {
     "value": [0.1], "coefficients": [[1.0, 2.0]], "amplitude": [0.1], "frequency": [2.0],
     "times": [[0.0, 1.0, 2.0]], "values": [[0.0, 1.0, 0.5]],
@@ -71,16 +100,17 @@ GOOD_TIMES = {
 @pytest.mark.parametrize("kind", DESCRIPTIONS, ids=lambda kind: kind.__name__)
 def test_descriptions(kind, scene, examples):
     """A description is refused when it is made, or by the scene, or by the run."""
-    good = GOOD | (ROW if kind is pn.UserConstraint else {})
+    own = {pn.UserConstraint: ROW, pn.UserContact: GAP, pn.box_contacts: BOX, pn.BoxContact: BOX}
+    good = GOOD | own.get(kind, {})
 
     def check(data):
         made = result_or_named_error(lambda: kind(**drawn(data, kind, good)))
         if made is None:
             return None
         place = next((key for key, names in PLACES.items() if kind.__name__ in names), "actuation")
-        parts = {place: made if place == "actuation" else [made]}
-        q0 = scene.q0
-        whole = result_or_named_error(lambda: pn.Scene(scene.model, q0=q0, **parts))
+        parts = {place: made if place == "actuation" or isinstance(made, list) else [made]}
+        parts |= {"q0": scene.q0, "collision_model": shapes(scene.model)}
+        whole = result_or_named_error(lambda: pn.Scene(scene.model, **parts))
         if whole is not None:
             return result_or_named_error(lambda: pn.simulate(whole, 1e-4, method="rk4", dt=5e-5))
         return None
@@ -133,8 +163,10 @@ def test_simulate(scene, examples, tmp_path):
 @few_and_many
 def test_rollout(scene, examples):
     q, v = scene.initial_state()
-    pair = (np.array([q, q]), np.array([v, v]))
-    good = {"scene": [scene], "q": [pair], "method": ["dop853", "dopri5"], "threads": [1, 2]}
+    good = {
+        "scene": [scene], "q": [np.array([q, q])], "v": [np.array([v, v])], "method": ["dop853", "dopri5"],
+        "threads": [1, 2], "parameters": [{"crank_joint": {"mass": [1.0, 2.0]}}],
+    }  # fmt: skip
 
     def check(data):
         arguments = drawn(data, pn.rollout, good)
@@ -145,16 +177,40 @@ def test_rollout(scene, examples):
 
 
 @few_and_many
-@pytest.mark.parametrize("method", ["solve", "acceleration", "project"])
+@pytest.mark.parametrize("method", ["solve", "acceleration", "project", "step"])
 def test_one_instant(method, scene, examples):
     q, v = scene.initial_state()
-    good = {"q": [q], "v": [v], "t": [0.0], "tau": [np.ones(3)], "modes": [[1, -1]]}
+    good = {"q": [q], "v": [v], "t": [0.0], "tau": [np.ones(3)], "modes": [[1, -1]], "dt": [1e-3]}
+    good |= {"method": ["rk4"]} if method == "step" else {}
     function = getattr(scene, method)
     for_all(
         lambda data: result_or_named_error(lambda: function(**drawn(data, function, good))),
         st.data(),
         examples=examples,
     )
+
+
+@few_and_many
+def test_steppers(scene, examples):
+    q, v = scene.initial_state()
+    good = {
+        "period": [1e-3],
+        "q": [q],
+        "v": [v],
+        "tau": [np.ones(3)],
+        "dt": [5e-4],
+        "method": ["rk4", "dop853"],
+    }
+
+    def check(data):
+        made = result_or_named_error(lambda: scene.stepper(**drawn(data, scene.stepper, good)))
+        if made is None:
+            return None
+        result_or_named_error(lambda: made.reset(**drawn(data, made.reset, good)))
+        tau = data.draw(st.one_of(st.just(np.ones(3)), junk), label="tau of the step")
+        return result_or_named_error(lambda: made.step(tau))
+
+    for_all(check, st.data(), examples=examples)
 
 
 @few_and_many
@@ -227,14 +283,129 @@ def test_the_other_functions(function, scene, examples, tmp_path, monkeypatch):
     )
 
 
+STATICS = [pn.equilibrium, pn.inverse_dynamics, pn.rest]
+
+
+@few_and_many
+@pytest.mark.parametrize("function", STATICS, ids=lambda f: f.__name__)
+def test_statics(function, scene, examples):
+    q, v = scene.initial_state()
+    good = {
+        "scene": [scene], "q": [q, None], "v": [v], "a": [scene.acceleration(q, v)],
+        "q0": [q, {"crank_joint": 1.0}], "tau": [np.ones(3), {"crank_joint": 0.1}], "t": [0.0], "starts": [1],
+        "actuated": [["crank_joint"]], "bounds": [(-10.0, 10.0)],
+    }  # fmt: skip
+    if function is pn.inverse_dynamics:
+        good["q"] = [q]
+    for_all(
+        lambda data: result_or_named_error(lambda: function(**drawn(data, function, good))),
+        st.data(),
+        examples=examples,
+    )
+
+
+@few_and_many
+def test_cones(examples):
+    good = {
+        "W": [np.eye(3), np.ones((3, 3))], "w0": [np.array([-1.0, 0.3, 0.0])], "mu": [0.5, [0.5]],
+        "dims": [None, 3, [3]], "limits": [()], "start": [None, np.zeros(3)],
+    }  # fmt: skip
+    for_all(
+        lambda data: result_or_named_error(
+            lambda: pn.cone_complementarity(**drawn(data, pn.cone_complementarity, good))
+        ),
+        st.data(),
+        examples=2 * examples,
+    )
+
+
+@few_and_many
+def test_contacts_of_geometry(scene, examples):
+    good = {"model": [scene.model], "collision_model": [shapes(scene.model)]}
+    for_all(
+        lambda data: result_or_named_error(
+            lambda: pn.geometry_contacts(**drawn(data, pn.geometry_contacts, good))
+        ),
+        st.data(),
+        examples=examples,
+    )
+
+
+@few_and_many
+@pytest.mark.parametrize("function", [pn.sweep_grid, pn.sweep_samples], ids=lambda f: f.__name__)
+def test_parameters_of_sweeps(function, examples):
+    good = {"n": [4], "seed": [0, 1]}
+    ranges = st.one_of(st.just((0.0, 1.0)), st.just([1, 2, 3]), junk)
+
+    def check(data):
+        arguments = drawn(data, function, good) if function is pn.sweep_samples else {}
+        named = data.draw(st.dictionaries(st.sampled_from(["mu", "mass"]), ranges, max_size=2))
+        return result_or_named_error(lambda: function(**arguments, **named))
+
+    for_all(check, st.data(), examples=2 * examples)
+
+
+@few_and_many
+def test_stores(scene, examples, tmp_path):
+    kept = pn.sweep(pn.load, [{"name": "loaded_joint"}], 1e-3, jobs=1, store=tmp_path / "store")
+    folders = st.one_of(st.sampled_from([kept.folder, str(kept.folder)]), junk)
+    for_all(lambda folder: result_or_named_error(lambda: pn.Sweep(folder)), folders, examples=examples)
+
+
+@few_and_many
+def test_render(scene, examples, tmp_path, monkeypatch):
+    """What is asked for is checked before a browser is started, which here gives one picture for all."""
+    picture = io.BytesIO()
+    Image.new("RGB", (2, 2)).save(picture, "PNG")
+
+    async def pictures(page, size, times, kind):
+        return [picture.getvalue()] * len(times)
+
+    monkeypatch.setattr(rendering, "_pictures", pictures)
+    monkeypatch.chdir(tmp_path)
+    good = {"run": [pn.simulate(scene, 1e-3)], "path": [str(tmp_path / "still.png"), "a.gif"], "time": [5e-4]}
+    for_all(
+        lambda data: result_or_named_error(lambda: pn.render(**drawn(data, pn.render, good))),
+        st.data(),
+        examples=2 * examples,
+    )
+
+
 def test_the_public_names_are_all_drawn():
     """A new public function is fuzzed, or is one of these."""
-    drawn_by_lot = {x.__name__ for x in (*DESCRIPTIONS, *TIMES)}
+    drawn_by_lot = {x.__name__ for x in (*DESCRIPTIONS, *TIMES, *STATICS)}
     drawn_by_lot |= {"simulate", "rollout", "solve", "Scene", "load", "resume", "replay", "plot", "sweep"}
-    plain = {"Event", "LawRecord", "Stats", "Trajectory", "Solution", "robots"}
-    errors = {
+    drawn_by_lot |= {
+        "cone_complementarity",
+        "geometry_contacts",
+        "sweep_grid",
+        "sweep_samples",
+        "Sweep",
+        "render",
+    }
+    plain = {
+        "ConeResiduals",
+        "ConeSolution",
+        "Equilibrium",
+        "Event",
+        "FrameRecord",
+        "InverseDynamics",
+        "JointRecord",
+    }
+    plain |= {
+        "RunArrays",
+        "Stepper",
+        "LawRecord",
+        "ProjectionReport",
+        "Rest",
+        "Stats",
+        "Trajectory",
+        "Solution",
+        "robots",
+    }
+    told = {
         n
         for n in pn.__all__
-        if isinstance(getattr(pn, n), type) and issubclass(getattr(pn, n), PinNonidealError)
+        if isinstance(getattr(pn, n), type) and issubclass(getattr(pn, n), (PinNonidealError, Warning))
     }
-    assert set(pn.__all__) == drawn_by_lot | plain | errors
+    assert set(pn.__all__) == drawn_by_lot | plain | told

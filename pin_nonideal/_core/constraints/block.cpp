@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "math/unrolled.hpp"
+#include "tree/articulated.hpp"
 
 namespace pn {
 
@@ -22,6 +23,7 @@ Block::Block(std::string its_name, Kind what)
 }
 
 void Block::lay_out(const Mechanism& m) {
+    deep = false;
     support.clear();
     parent.clear();
     entries.clear();
@@ -35,6 +37,7 @@ void Block::lay_out(const Mechanism& m) {
         if (in[d]) {
             place[d] = static_cast<int>(support.size());
             support.push_back(d);
+            deep |= m.is_deep[d] != 0;
         }
     for (int d : support) parent.push_back(m.dof_parent[d] < 0 ? -1 : place[m.dof_parent[d]]);
     if (!frames(kind).first) return;
@@ -46,7 +49,13 @@ void Block::lay_out(const Mechanism& m) {
         if (std::find(d1.begin(), d1.end(), d) == d1.end()) entries.push_back({place[d], d, -1.0});
 }
 
-PN_WIDE void fill_A(const Block& block, const Terms& terms, const RowValues& values, double* A) {
+// A unit wrench on the two bodies of a block, about their reference points; these differ when the bodies belong to
+// different trees, or to a deep one.
+static PN_INLINE Force about(const Wrench& w, const Body& body) {
+    return {w.force, w.couple + (w.point - body.ref).cross(w.force)};
+}
+
+PN_WIDE void fill_A(const Block& block, const Mechanism& m, const Terms& terms, const RowValues& values, double* A) {
     const int r = static_cast<int>(block.kept.size()), n = static_cast<int>(block.support.size());
     if (!values.geometric) {
         for (int l = 0; l < n; ++l)
@@ -56,20 +65,39 @@ PN_WIDE void fill_A(const Block& block, const Terms& terms, const RowValues& val
     std::fill(A, A + static_cast<size_t>(r) * n, 0.0);
     for (int k = 0; k < r; ++k) {
         const Wrench& w = values.wrench[block.kept[k]];
-        // About the reference points of the two bodies (they differ when the bodies belong to different trees).
-        const Force f1{w.force, w.couple + (w.point - terms.body[block.joint1].ref).cross(w.force)};
-        const Force f2{w.force, w.couple + (w.point - terms.body[block.joint2].ref).cross(w.force)};
-        for (const Block::Entry& e : block.entries)
-            A[e.place * r + k] = e.sign > 0.0 ? dot(terms.J[e.dof], f1) : -dot(terms.J[e.dof], f2);  // Eq. (3)
+        const Force f1 = about(w, terms.body[block.joint1]), f2 = about(w, terms.body[block.joint2]);
+        for (const Block::Entry& e : block.entries) {
+            const Force f = block.deep ? about(w, terms.body[m.dof_joint[e.dof]]) : e.sign > 0.0 ? f1 : f2;
+            A[e.place * r + k] = e.sign > 0.0 ? dot(terms.J[e.dof], f) : -dot(terms.J[e.dof], f);  // Eq. (3)
+        }
     }
 }
 
-void scale_rows(const Mechanism& m, const Terms& terms, const Block& block, const double* A, double* B) {
+// The part of deep trees: of a row of bodies the wrench itself enters the sweep, of another its numbers.
+static void scale_deep_rows(const Mechanism& m, Terms& terms, const Block& block, const RowValues& values, double* B) {
+    const int r = static_cast<int>(block.kept.size());
+    for (int k = 0; k < r; ++k) {
+        Force f1, f2;
+        if (values.geometric) {
+            const Wrench& w = values.wrench[block.kept[k]];
+            f1 = about(w, terms.body[block.joint1]);
+            f2 = about(w, terms.body[block.joint2]);
+            for (size_t l = 0; l < block.support.size(); ++l)
+                if (m.is_deep[block.support[l]]) B[l * r + k] = 0.0;
+        }
+        scale_row_articulated(m, terms, block.support, block.joint1, f1, block.joint2, f2, B + k, r);
+    }
+}
+
+void scale_rows(const Mechanism& m, Terms& terms, const Block& block, const RowValues& values, const double* A,
+                double* B) {
     const int n = static_cast<int>(block.support.size());
     std::copy(A, A + block.kept.size() * n, B);
+    if (block.deep) scale_deep_rows(m, terms, block, values, B);
     with_rows(static_cast<int>(block.kept.size()), [&](auto r) {
         for (int l = 0; l < n; ++l) {
             const int dof = block.support[l];
+            if (m.is_deep[dof]) continue;
             const double* row = terms.L.data() + m.row_offset[dof];
             double* __restrict x = B + l * r;
             for (int p = block.parent[l], s = 1; p >= 0; p = block.parent[p], ++s) {
@@ -91,6 +119,18 @@ void add_transpose(const Block& block, const std::vector<double>& B, const VecX&
             y[block.support[p]] += sum;
         }
     });
+}
+
+void add_transpose(const Block& block, const Mechanism& m, const Terms& terms, const RowValues& values,
+                   const std::vector<double>& A, const VecX& lam, VecX& y, std::vector<Force>& body) {
+    const size_t r = block.kept.size();
+    for (size_t l = 0; l < block.support.size(); ++l) {
+        const int dof = block.support[l];
+        if (values.geometric && m.is_deep[dof]) continue;
+        for (size_t k = 0; k < r; ++k) y[dof] += A[block.offset + l * r + k] * lam[block.row + k];
+    }
+    if (!values.geometric) return;
+    for (size_t k = 0; k < r; ++k) add_wrench(block, terms, values.wrench[block.kept[k]], lam[block.row + k], body);
 }
 
 void multiply(const Block& block, const std::vector<double>& B, const VecX& x, VecX& r) {

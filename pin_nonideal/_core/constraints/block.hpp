@@ -24,6 +24,7 @@ struct Block {
     std::vector<int> parent;       // place in support of each dof's parent, or -1
     struct Entry { int place, dof; double sign; };
     std::vector<Entry> entries;    // where A of a geometric kind may differ from zero
+    bool deep = false;             // some of them belong to a deep tree
     int offset = 0;                // of its support.size() x kept.size() entries in Evaluation::A and ::B
 
     Block() = default;
@@ -34,9 +35,10 @@ struct Block {
 };
 
 // A on the block's support from the wrenches or the dense rows; dof-major.
-void fill_A(const Block& block, const Terms& terms, const RowValues& values, double* A);
-// B = A R^-T on it, that is B^T = D^-1/2 L^-T A^T.
-void scale_rows(const Mechanism& m, const Terms& terms, const Block& block, const double* A, double* B);
+void fill_A(const Block& block, const Mechanism& m, const Terms& terms, const RowValues& values, double* A);
+// B = A R^-T on it, that is B^T = D^-1/2 L^-T A^T, or in deep trees sweeps of the rows' wrenches.
+void scale_rows(const Mechanism& m, Terms& terms, const Block& block, const RowValues& values, const double* A,
+                double* B);
 
 // y += B^T lam and r = B x, with lam and r by kept row of the scene; the same functions serve A with the array A.
 void add_transpose(const Block& block, const std::vector<double>& B, const VecX& lam, VecX& y);
@@ -44,6 +46,9 @@ void multiply(const Block& block, const std::vector<double>& B, const VecX& x, V
 
 // force += A^T f for a force along the rows of a block.
 void add_along(const Block& block, const std::vector<double>& rows, const Vec3& f, VecX& force);
+// y += A^T lam for the rows of a block, what acts on bodies of deep trees as forces on them into `body`.
+void add_transpose(const Block& block, const Mechanism& m, const Terms& terms, const RowValues& values,
+                   const std::vector<double>& A, const VecX& lam, VecX& y, std::vector<Force>& body);
 // Adds a unit wrench times its size to the forces on the two bodies of a block, about their reference points.
 void add_wrench(const Block& block, const Terms& terms, const Wrench& unit, double size, std::vector<Force>& body);
 

@@ -13,7 +13,7 @@ void RowValues::resize(const Kind& kind, int nv) {
     if (geometric) return;
     A = MatX::Zero(rows, nv);
     b = VecX::Zero(rows);
-    scratch = VecX::Zero(std::max(rows, nv));
+    scratch = VecX::Zero(std::max(rows, 2 * nv));  // rows, or two directions one after the other
 }
 
 template <Part part, class K, class At>

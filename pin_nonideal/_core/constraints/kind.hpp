@@ -10,6 +10,10 @@
 #include <utility>
 #include <variant>
 
+#include "constraints/kinds/box.hpp"
+#include "constraints/kinds/box_slip.hpp"
+#include "constraints/kinds/capsules.hpp"
+#include "constraints/kinds/capsules_slip.hpp"
 #include "constraints/kinds/contact.hpp"
 #include "constraints/kinds/contact_slip.hpp"
 #include "constraints/kinds/coupling.hpp"
@@ -20,18 +24,21 @@
 #include "constraints/kinds/hinge.hpp"
 #include "constraints/kinds/hinge_slip.hpp"
 #include "constraints/kinds/knife.hpp"
+#include "constraints/kinds/limit.hpp"
 #include "constraints/kinds/motion.hpp"
 #include "constraints/kinds/point.hpp"
 #include "constraints/kinds/rolling.hpp"
 #include "constraints/kinds/turn_slip.hpp"
 #include "constraints/kinds/user.hpp"
+#include "constraints/kinds/user_gap.hpp"
 #include "constraints/kinds/user_slip.hpp"
 
 namespace pn {
 
-using Kind = std::variant<PointRows, ContactRow, FrameRows, HingeRows, DistanceRows, KnifeRows, RollingRows,
-                          CouplingRows, MotionRows, UserRows, DofRows, HingeSlipRows, TurnSlipRows, ContactSlipRows,
-                          CouplingSlipRow, UserSlipRow>;
+using Kind = std::variant<PointRows, ContactRow, CapsulesRow, BoxRow, FrameRows, HingeRows, DistanceRows, KnifeRows,
+                          RollingRows, CouplingRows, MotionRows, LimitRow, UserRows, UserGapRow, DofRows,
+                          HingeSlipRows, TurnSlipRows, ContactSlipRows, CapsulesSlipRows, BoxSlipRows, CouplingSlipRow,
+                          UserSlipRows>;
 
 // Rows of one constraint before any is left out.
 struct RowValues {
@@ -131,6 +138,15 @@ inline bool has_affine_rate(const Kind& kind) {
 }
 inline bool has_comparable_rows(const Kind& kind) {
     return std::visit([](const auto& k) { return k.comparable_rows; }, kind);
+}
+// The row whose multiplier should press, or -1.
+inline int pressing_row(const Kind& kind) {
+    return std::visit([](const auto& k) {
+        if constexpr (answers<std::decay_t<decltype(k)>>([](const auto& own) -> decltype(own.pressing) { return {}; }))
+            return k.pressing;
+        else
+            return -1;
+    }, kind);
 }
 inline Shown shown(const Kind& kind) {
     return std::visit([](const auto& k) { return k.shown; }, kind);

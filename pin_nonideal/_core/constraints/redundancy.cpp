@@ -2,14 +2,16 @@
 
 namespace pn {
 
-void share_multipliers(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
-                       RowSystem& s, const VecX& lam, VecX& shared) {
-    shared = lam;
-    if (!s.redundant) return;
-    // A_dependent = W A_active; x + W^T y = lam with least |x|^2 + |y|^2 is y = (I + W W^T)^-1 W lam, x = lam - W^T y.
+std::vector<int> dependent_rows(const RowSystem& s) {
     std::vector<int> dependent;
-    for (int r = 0; r < layout.rows; ++r)
-        if (s.required[r] && !s.active[r]) dependent.push_back(r);
+    if (!s.redundant) return dependent;
+    for (size_t r = 0; r < s.required.size(); ++r)
+        if (s.required[r] && !s.active[r]) dependent.push_back(static_cast<int>(r));
+    return dependent;
+}
+
+MatX dependence(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s,
+                const std::vector<int>& dependent) {
     const int d = static_cast<int>(dependent.size());
     MatX W(d, layout.rows);
     VecX column(s.Q.rows()), unit = VecX::Zero(layout.rows), products(layout.rows), weights(layout.rows);
@@ -23,10 +25,42 @@ void share_multipliers(const RowLayout& layout, const std::vector<Block>& blocks
         solve_rows(layout, s, products, weights);
         W.row(k) = weights.transpose();
     }
-    const MatX S = MatX::Identity(d, d) + W * W.transpose();
-    const VecX y = S.ldlt().solve(W * lam);
+    return W;
+}
+
+void DescribedRows::finish(int kept) {
+    weight = VecX::Zero(kept);
+    for (const Row& row : rows) {
+        if (row.kept < 0) continue;
+        copied |= weight[row.kept] > 0.0;
+        weight[row.kept] += row.factor * row.factor;
+    }
+    for (Row& row : rows)
+        if (row.kept >= 0) row.part = row.factor / weight[row.kept];
+}
+
+void share_multipliers(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
+                       const DescribedRows& all, RowSystem& s, const VecX& lam, VecX& shared) {
+    shared = lam;
+    const std::vector<int> dependent = dependent_rows(s);
+    if (dependent.empty()) return;
+    // With weights g and x + W^T y = lam, sum(x^2/g) + sum(y^2/g) is least where (1/g + W (1/g) W^T) y = W (1/g) lam.
+    const MatX W = dependence(layout, blocks, B, s, dependent);
+    const VecX inverse = all.weight.cwiseInverse();
+    MatX S = W * inverse.asDiagonal() * W.transpose();
+    for (size_t k = 0; k < dependent.size(); ++k) S(k, k) += inverse[dependent[k]];
+    const VecX y = S.ldlt().solve(W * inverse.cwiseProduct(lam));
     shared -= W.transpose() * y;
-    for (int k = 0; k < d; ++k) shared[dependent[k]] = y[k];
+    for (size_t k = 0; k < dependent.size(); ++k) shared[dependent[k]] = y[k];
+}
+
+MatX free_multipliers(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
+                      const DescribedRows& all, RowSystem& s) {
+    const std::vector<int> dependent = dependent_rows(s);
+    MatX free = -dependence(layout, blocks, B, s, dependent).transpose();
+    for (size_t k = 0; k < dependent.size(); ++k) free(dependent[k], static_cast<Eigen::Index>(k)) = 1.0;
+    const MatX S = free.transpose() * all.weight.cwiseInverse().asDiagonal() * free;
+    return S.llt().matrixL().solve(free.transpose()).transpose();
 }
 
 }  // namespace pn

@@ -16,10 +16,17 @@ constexpr double refined_pivot_ratio = 1e6;
 // A configuration that gives a larger inertia [kg m^2] has run away.
 constexpr double runaway_inertia = 1e30;
 
+// Part of gravity's acceleration that rounding leaves where forces balance.
+constexpr double balance_rounding = 1e-14;
+// Part of the terms of a sum that rounding may leave of it.
+constexpr double sum_rounding = 1e-13;
+
 static void factor_mass(const Program& p, Workspace& w, double t) {
     const int dof = factorize(p.mechanism, w.now.terms);
     if (dof < 0) return;
-    if (!w.now.terms.q.allFinite() || !(w.now.terms.M[p.mechanism.row_offset[dof]] < runaway_inertia))
+    const Mechanism& m = p.mechanism;
+    const double inertia = m.is_deep[dof] ? w.now.terms.D[dof] : w.now.terms.M[m.row_offset[dof]];
+    if (!w.now.terms.q.allFinite() || !(inertia < runaway_inertia))
         throw Failure(Failure::Kind::not_finite, t);
     throw Failure(Failure::Kind::singular_mass, t, {dof});
 }
@@ -27,18 +34,20 @@ static void factor_mass(const Program& p, Workspace& w, double t) {
 void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     place_bodies(p.mechanism, w.now.terms, q, p.constrained_joints, p.constrained_angles);
     const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
-    for (int i = 0; i < p.constraints; ++i) evaluate(p.blocks[i].kind, state, Part::residual, w.now.values[i]);
+    for (int i = 0; i < p.constraints; ++i)
+        if (!w.now.idle[i]) evaluate(p.blocks[i].kind, state, Part::residual, w.now.values[i]);
 }
 
 // Residuals and A, Eq. (3); and the users' own b.
 static void place_rows(const Program& p, Workspace& w, double t, const VecX& v) {
     const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
     for (size_t i = 0; i < p.blocks.size(); ++i) {
+        if (w.now.idle[i]) continue;
         const Block& block = p.blocks[i];
         RowValues& values = w.now.values[i];
         evaluate(block.kind, state, Part::place, values);
         if (values.has_A) continue;
-        fill_A(block, w.now.terms, values, w.now.A.data() + block.offset);
+        fill_A(block, p.mechanism, w.now.terms, values, w.now.A.data() + block.offset);
         values.has_A = values.constant_A;
     }
 }
@@ -47,6 +56,7 @@ static void place_rows(const Program& p, Workspace& w, double t, const VecX& v) 
 static void move_rows(const Program& p, Workspace& w, double t, const VecX& v) {
     const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
     for (size_t i = 0; i < p.blocks.size(); ++i) {
+        if (w.now.idle[i]) continue;
         const Block& block = p.blocks[i];
         RowValues& values = w.now.values[i];
         evaluate(block.kind, state, Part::motion, values);
@@ -86,6 +96,18 @@ void configure_velocity(const Program& p, Workspace& w, double t, const VecX& v)
     if (!p.affine_rates) factor_placed_rows(p, w, t, v);
 }
 
+// F as the solution takes it: in deep trees the bias and the given forces on bodies are wrenches.
+static void place_wrenches(const Program& p, Workspace& w) {
+    Evaluation& now = w.now;
+    now.joint_F = now.F;
+    for (int dof : p.mechanism.deep_dofs)
+        now.joint_F[dof] = p.driven || now.has_override ? now.tau[dof] + now.joint_external[dof] : 0.0;
+    for (int i : p.mechanism.deep_joints) {
+        now.wrench[i] = -1.0 * now.terms.deep.bias[i];
+        if (p.has_body_forces) now.wrench[i] += now.body_force[i];
+    }
+}
+
 void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v) {
     ++w.counters.evaluations;
     move_bodies(p.mechanism, w.now.terms, v);
@@ -95,12 +117,31 @@ void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v) {
         given_forces(p, w, t, w.now.terms.q, v);
         w.now.F += w.now.tau + w.now.external;
     }
+    if (!p.mechanism.deep_dofs.empty()) place_wrenches(p, w);
     if (!p.blocks.empty()) move_rows(p, w, t, v);
+}
+
+// Where closed contacts carry the weight, accelerations of rounding are none: M a below the rounding of the forces that
+// add up to it.
+static bool is_balanced(const Program& p, Workspace& w) {
+    const auto closed = std::find(w.state.closed.begin(), w.state.closed.end(), char(1));
+    if (closed == w.state.closed.end() || p.moves_in_time) return false;
+    if (w.now.a.cwiseAbs().maxCoeff() <= balance_rounding * p.mechanism.gravity.norm()) return true;
+    VecX &left = w.scratch.work, &size = w.scratch.trial;
+    multiply_M(p.mechanism, w.now.terms, w.now.a, left);
+    size = w.now.F.cwiseAbs();
+    for (int i : w.now.rows.blocks) {
+        const Block& block = p.blocks[i];
+        const double* entry = w.now.A.data() + block.offset;
+        for (int dof : block.support)
+            for (size_t k = 0; k < block.kept.size(); ++k) size[dof] += std::abs(*entry++ * w.now.lam[block.row + k]);
+    }
+    return (left.cwiseAbs().array() <= sum_rounding * size.array()).all();
 }
 
 void solve_dynamics(const Program& p, Workspace& w, double t, const VecX& v) {
     if (!p.has_laws()) {
-        solve_acceleration(p, w, w.now.F);
+        solve_motion(p, w, false);
     } else {
         w.now.v = v;
         w.now.speed = v.cwiseAbs().maxCoeff();
@@ -108,7 +149,7 @@ void solve_dynamics(const Program& p, Workspace& w, double t, const VecX& v) {
         solve_with_laws(p, w, t, w.now.terms.q, v, w.now.C_smooth);
     }
     if (!w.now.a.allFinite()) throw Failure(Failure::Kind::not_finite, t);
-    if (is_immobile(p, w) && (v.array() == 0.0).all()) w.now.a.setZero();
+    if ((v.array() == 0.0).all() && (is_immobile(p, w) || is_balanced(p, w))) w.now.a.setZero();
 }
 
 void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
@@ -117,15 +158,38 @@ void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const Vec
     solve_dynamics(p, w, t, v);
 }
 
-void violations(const Program& p, const Workspace& w, double& position, double& velocity) {
+void evaluate_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) {
+    const int i = p.gaps[gap].block;
+    const Block& block = p.blocks[i];
+    RowValues& values = w.now.values[i];
+    const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
+    evaluate(block.kind, state, Part::place, values);
+    evaluate(block.kind, state, Part::motion, values);
+    if (!values.has_A) fill_A(block, p.mechanism, w.now.terms, values, w.now.A.data() + block.offset);
+    values.has_A = values.constant_A;
+}
+
+// A contact violates where its gap is negative; that of an open one is looked at here only.
+static void gap_violations(const Program& p, Workspace& w, double t, const VecX& v, double& position,
+                           double& velocity) {
+    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
+        const RowValues& values = w.now.values[p.gaps[i].block];
+        if (!w.state.closed[i]) evaluate_gap(p, w, t, v, i);
+        else velocity = std::max(velocity, std::abs(values.rate[0]));
+        position = std::max(position, -values.residual[0]);
+    }
+}
+
+void violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity) {
     position = velocity = 0.0;
-    for (int i = 0; i < p.constraints; ++i) {
+    for (int i = 0; i < p.first_gap; ++i) {
         const RowValues& values = w.now.values[i];
         for (int k = 0; k < values.rows; ++k) {
             position = std::max(position, std::abs(values.residual[k]));
             velocity = std::max(velocity, std::abs(values.rate[k]));
         }
     }
+    gap_violations(p, w, t, v, position, velocity);
 }
 
 }  // namespace pn

@@ -21,7 +21,11 @@ void update_kinematics(const Program& p, Workspace& w, double t, const VecX& q, 
 void evaluate_rows(const Program& p, Workspace& w, double t, const VecX& v);
 void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 
-// Largest residual and rate over all rows of all descriptions at the state last evaluated.
-void violations(const Program& p, const Workspace& w, double& position, double& velocity);
+// Residual, rate, drift and A of the row of a gap, open or closed, for bodies in motion.
+void evaluate_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
+
+// Largest residual and rate over all rows of all descriptions at the state last evaluated; of contacts that may open
+// the depth, and the rate of closed ones.
+void violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity);
 
 }  // namespace pn

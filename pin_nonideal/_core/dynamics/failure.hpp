@@ -11,7 +11,8 @@ namespace pn {
 
 struct Failure : std::exception {
     enum class Kind {
-        singular_mass, inconsistent, not_finite, paradox, not_converged, closure, step_size, stiff, steps, interrupted
+        singular_mass, inconsistent, not_finite, paradox, not_converged, closure, step_size, stiff, steps, wall,
+        interrupted, impact_energy
     };
     Kind kind;
     double time = 0.0;

@@ -106,17 +106,21 @@ static void actuation_torque(const Program& p, Workspace& w, double t, const Vec
 void given_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     actuation_torque(p, w, t, q, v, w.now.tau);
     w.now.external.setZero();
+    w.now.joint_external.setZero();
     if (p.forces.empty()) return;
     const Apply apply{p, w, t, q, v};
     if (p.has_body_forces) std::fill(w.now.body_force.begin(), w.now.body_force.end(), Force{Vec3::Zero(), Vec3::Zero()});
     for (const GivenForce& f : p.forces) std::visit(apply, f);
+    if (!p.mechanism.deep_dofs.empty()) w.now.joint_external = w.now.external;
     if (!p.has_body_forces) return;
     // From the leaves to the root: each joint feels the forces on its subtree.
     std::copy(w.now.body_force.begin(), w.now.body_force.end(), w.scratch.subtree_force.begin());
     for (int i = static_cast<int>(p.mechanism.joints.size()) - 1; i > 0; --i) {
         const Joint& j = p.mechanism.joints[i];
         for (int k = j.iv; k < j.iv + j.nv; ++k) w.now.external[k] += dot(w.now.terms.J[k], w.scratch.subtree_force[i]);
-        if (j.parent != 0) w.scratch.subtree_force[j.parent] += w.scratch.subtree_force[i];
+        if (j.parent == 0) continue;
+        const Force& f = w.scratch.subtree_force[i];
+        w.scratch.subtree_force[j.parent] += j.deep ? before(f, w.now.terms.deep.shift[i]) : f;
     }
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "dynamics/reactions.hpp"
 #include "dynamics/solution.hpp"
 #include "dynamics/split.hpp"
 #include "dynamics/uniqueness.hpp"
@@ -22,6 +23,7 @@ constexpr int fixed_point_limit = 30, newton_limit = 30;
 // at least: it costs about one motion a step then. Over so short a time no growth comes from here to one.
 constexpr double safe_growth = 0.5;
 constexpr int kept_steps = 4;
+constexpr int most_pieces = 30;  // of the loads that contacts share, one solution each
 
 struct Implicit : Unknowns {
     using Unknowns::Unknowns;
@@ -35,6 +37,7 @@ struct Implicit : Unknowns {
     // Whether the equation contracts, with y its solution; the motion is then again that of y.
     bool contracts(const VecX& y) {
         ReactionEquation& arrays = w.scratch.equation;
+        const HeldPiece piece(p, w);
         equation(y, arrays);
         if (!arrays.finite()) throw Failure(Failure::Kind::not_finite, t);
         arrays.steepest(w.scratch.jacobian);
@@ -42,10 +45,33 @@ struct Implicit : Unknowns {
         if (!(bound < 1.0 - least_determinant_told)) return false;
         w.state.growth = bound;
         w.state.steps_since = 0;
-        w.state.unique = Uniqueness::shown;
+        w.state.unique = shares_pressing(p, w) ? Uniqueness::not_shown : Uniqueness::shown;
         set(y);
         motion();
         return true;
+    }
+
+    // Piece after piece of the loads, until a solution lies in its own.
+    void solve_pieces(VecX& y) {
+        VecX g(n);
+        const VecX start = y;
+        try {
+            for (int turn = 0; turn < most_pieces; ++turn) {
+                image(y, g);
+                {
+                    const HeldPiece piece(p, w);
+                    solve_bearings(y);
+                }
+                if (is_motion(y)) return;
+            }
+        } catch (const Failure& failure) {
+            if (failure.kind != Failure::Kind::paradox || failure.solutions == Failure::Solutions::several) throw;
+            decide_over_pieces(*this, start, y, failure);
+            image(y, g);
+            return;
+        }
+        decide_over_pieces(*this, start, y, Failure(Failure::Kind::not_converged, t, elements()));
+        image(y, g);
     }
 
     // The equation as arrays, its solution near y, and whether that is the only one.
@@ -143,7 +169,8 @@ struct Implicit : Unknowns {
         if (!iterate() || (bearings && is_due() && !contracts(y))) {
             VecX& solution = w.scratch.solution;
             solution = y.head(n);
-            if (bearings) solve_bearings(solution);
+            if (bearings && shares_pressing(p, w)) solve_pieces(solution);
+            else if (bearings) solve_bearings(solution);
             else solve_laws(solution);
             y.head(n) = solution;
         } else if (!bearings) {
@@ -181,8 +208,7 @@ void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, co
     w.now.determinant = 1.0;
     if (!p.needs_reactions) {
         w.now.C = known;
-        w.scratch.trial = w.now.F + w.now.C;
-        solve_acceleration(p, w, w.scratch.trial);
+        solve_motion(p, w, true);
         return;
     }
     w.now.base_C = known;  // C that does not change while the reactions are sought

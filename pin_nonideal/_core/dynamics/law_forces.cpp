@@ -14,10 +14,11 @@ struct GeneralizedForce {
     VecX* dz = nullptr;
 
     void on_dof(int dof, double force) { C[dof] += force; }
-    void on_body(int joint, const Force& f) {
+    void on_body(int joint, Force f) {
         for (int i = joint; i != 0; i = p.mechanism.joints[i].parent) {
             const Joint& j = p.mechanism.joints[i];
             for (int dof = j.iv; dof < j.iv + j.nv; ++dof) C[dof] += dot(now.terms.J[dof], f);
+            if (j.deep) f = before(f, now.terms.deep.shift[i]);
         }
     }
     void along(int block, const Vec3& f) { add_along(p.blocks[block], now.A, f, C); }

@@ -11,6 +11,7 @@ namespace pn {
 
 // Columns: these, and from there on each law.
 constexpr const char* scene_powers[] = {"actuation", "forces", "constraints"};
+constexpr int constraint_power = 2;
 constexpr int first_law_power = std::size(scene_powers);
 int power_count(const Program& p);
 std::vector<std::string> power_names(const Program& p);

@@ -17,6 +17,32 @@ void Program::add(Law law) {
     laws.push_back(std::move(law));
 }
 
+// Rows of descriptions by the kept rows that stand for them.
+static void number_descriptions(Program& p) {
+    int next = p.user_rows;
+    for (size_t i = p.constraints; i < p.blocks.size(); ++i) {
+        p.blocks[i].user_row = next;
+        next += p.blocks[i].total;
+    }
+    p.described = {};
+    std::vector<DescribedRows::Row>& rows = p.described.rows;
+    rows.resize(next);
+    for (const Block& block : p.blocks)
+        for (size_t k = 0; k < block.kept.size(); ++k)
+            rows[block.user_row + block.kept[k]].kept = block.row + static_cast<int>(k);
+    for (const Program::Copy& copy : p.copies) {
+        rows[copy.row].kept = rows[copy.first].kept;
+        rows[copy.row].factor = copy.factor;
+    }
+    p.described.finish(p.layout.rows);
+}
+
+VecX Program::user_multipliers(const VecX& lam) const {
+    VecX all(user_rows);
+    for (int row = 0; row < user_rows; ++row) all[row] = described.share(row, lam);
+    return all;
+}
+
 void Program::finish() {
     int row = 0;
     entries = 0;
@@ -34,15 +60,29 @@ void Program::finish() {
     constrained_dofs.clear();
     for (int dof = 0; dof < mechanism.nv; ++dof)
         if (reached[dof]) constrained_dofs.push_back(dof);
-    // A contact whose normal nothing moves along has no row: it carries nothing and never pulls.
-    const auto bare = [&](int block) { return blocks[block].kept.empty(); };
+    number_descriptions(*this);
+    // A contact whose normal nothing moves along carries nothing and never pulls.
+    const auto normal = [&](int block) { return blocks[block].user_row + pressing_row(blocks[block].kind); };
+    const auto bare = [&](int block) { return described.rows[normal(block)].kept < 0; };
     contacts.erase(std::remove_if(contacts.begin(), contacts.end(), bare), contacts.end());
+    pressing.resize(contacts.size());
+    std::transform(contacts.begin(), contacts.end(), pressing.begin(), normal);
+    for (Gap& gap : gaps) {
+        gap.elements.clear();
+        gap.sliding = -1;
+    }
+    for (size_t e = 0; e < frictions.size(); ++e) {
+        Friction& f = frictions[e];
+        f.gap = f.anchor >= first_gap ? f.anchor - first_gap : -1;
+        if (f.gap < 0) continue;
+        gaps[f.gap].elements.push_back(static_cast<int>(e));
+        // What resists spinning and rolling has a kind of its own.
+        if (!std::holds_alternative<TurnSlipRows>(blocks[f.block].kind)) gaps[f.gap].sliding = static_cast<int>(e);
+    }
     for (Friction& f : frictions) {
         if (f.load != Friction::Load::multiplier) continue;
-        const Block& anchor = blocks[f.anchor];
-        const auto kept = std::find(anchor.kept.begin(), anchor.kept.end(), f.anchor_row);
-        f.row = anchor.row + static_cast<int>(kept - anchor.kept.begin());
-        if (kept == anchor.kept.end()) f.load = Friction::Load::none;
+        f.row = blocks[f.anchor].user_row + f.anchor_row;
+        if (described.rows[f.row].kept < 0) f.load = Friction::Load::none;
     }
     for (const Friction& f : frictions) needs_reactions |= f.reaction != Reaction::none;
     // Kinds stand together, so that the order of their descriptions decides no sum.

@@ -6,19 +6,38 @@
 #include <variant>
 #include <vector>
 
-#include "constraints/row_layout.hpp"
+#include "constraints/redundancy.hpp"
 #include "dynamics/failure.hpp"
 #include "forces/friction.hpp"
 #include "forces/given_forces.hpp"
 
 namespace pn {
 
+// A contact that may open: its gap is a row as long as it is closed.
+struct Gap {
+    int block = 0;
+    double restitution = 0.0;
+    std::vector<int> elements;  // of friction there
+    int sliding = -1;           // of them the one along its plane, whose forces lie in Coulomb's cone
+};
+
+// What restitution e of a contact means in an impact: of rates of its gap, or of impulses.
+enum class ImpactLaw { newton, poisson };
+
 struct Program {
     Mechanism mechanism;
-    std::vector<Block> blocks;  // constraints first, then directions of friction
-    int constraints = 0;        // number of constraint blocks
-    std::vector<int> contacts;  // blocks of contacts, whose multiplier should press
+    std::vector<Block> blocks;  // constraints first, then gaps, then directions of friction
+    int constraints = 0;        // number of blocks of constraints and contacts, gaps among them
+    int first_gap = 0;          // block of the first gap
+    std::vector<Gap> gaps;
+    ImpactLaw impact_law = ImpactLaw::newton;
+    std::vector<int> all_contacts;  // blocks of all contacts, in the order of their descriptions
+    std::vector<int> contacts;  // blocks of contacts that are kept and of wheels, whose normal force should press
+    std::vector<int> pressing;  // the rows of these forces, among those of all descriptions
     int user_rows = 0;          // rows of all constraint descriptions
+    struct Copy { int row, first; double factor; };
+    std::vector<Copy> copies;   // rows of descriptions that are not kept because they are multiples of others
+    DescribedRows described;
     RowLayout layout;
     size_t entries = 0;         // of A and B
 
@@ -45,10 +64,15 @@ struct Program {
 
     // Of the implicit reaction equation at most: a limit for each element, a force for each of the user's laws.
     size_t unknowns() const { return frictions.size() + static_cast<size_t>(user_laws) * mechanism.nv; }
-    // Rows of constraints come first, rows of friction's directions after them.
+    // Rows of constraints and gaps come first, rows of friction's directions after them.
     int constraint_rows() const {
         return constraints < static_cast<int>(blocks.size()) ? blocks[constraints].row : layout.rows;
     }
+
+    // The share of one row of a block's description in multipliers by kept row, see `share_multipliers`.
+    double share(const Block& block, int row, const VecX& lam) const { return described.share(block.user_row + row, lam); }
+    // Those of all rows of constraints and contacts, as users number them.
+    VecX user_multipliers(const VecX& lam) const;
 
     // A law, with places for its states.
     void add(Law law);

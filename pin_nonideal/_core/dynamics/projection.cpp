@@ -133,7 +133,7 @@ void require_closed(const Program& p, const Workspace& w, double t) {
     double largest = 0.0;
     int worst = -1;
     for (int i = 0; i < p.constraints; ++i)
-        for (int k = 0; k < w.now.values[i].rows; ++k) {
+        for (int k = 0; k < w.now.values[i].rows && !w.now.idle[i]; ++k) {
             const double gap = std::abs(w.now.values[i].residual[k]);
             if (gap <= allowed || gap <= allowed * row_size(w, p.blocks[i], k) || gap < largest) continue;
             largest = gap;
@@ -209,10 +209,43 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
     return moves;
 }
 
+// Largest residual of the rows that count as dependent.
+static double dependent_residual(const Program& p, const Workspace& w) {
+    double largest = 0.0;
+    for (int i : w.now.rows.blocks) {
+        const Block& block = p.blocks[i];
+        for (size_t k = 0; k < block.kept.size(); ++k) {
+            const int row = block.row + static_cast<int>(k);
+            if (w.now.rows.active[row] || row >= p.constraint_rows()) continue;
+            largest = std::max(largest, std::abs(w.now.values[i].residual[block.kept[k]]));
+        }
+    }
+    return largest;
+}
+
+bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
+    if (!w.now.rows.redundant) return false;
+    const std::vector<Mode> modes = w.state.mode;
+    if (std::find(modes.begin(), modes.end(), sticking) == modes.end()) return false;
+    if (dependent_residual(p, w) <= creeping_gap * scene_size(p, w)) return false;
+    std::vector<Mode> released = modes;
+    std::replace(released.begin(), released.end(), sticking, unloaded);
+    set_modes(p, w, released);
+    configure(p, w, t, q, v);
+    if (w.now.rows.orthogonal) {
+        decide_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+        factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+    }
+    project_position(p, w, t, q, v);
+    set_modes(p, w, modes);
+    configure(p, w, t, q, v);
+    return true;
+}
+
 // What sticks along a single dof has exactly no velocity there, like a joint that is locked, and not one of rounding.
 static void rest_alone(const Program& p, const Workspace& w, VecX& v) {
     for (int i : w.now.rows.blocks) {
-        if (i < p.constraints) continue;
+        if (i < p.first_gap) continue;
         const Block& block = p.blocks[i];
         const size_t n = block.kept.size();
         for (size_t k = 0; k < n; ++k) {
@@ -263,26 +296,44 @@ void remove_normal_part(const Program& p, Workspace& w, Eigen::Ref<VecX> motion)
     motion -= w.scratch.work;
 }
 
-void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
+static void configure_anew(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     set_modes(p, w, std::vector<Mode>(p.frictions.size(), slip_plus));
     configure(p, w, t, q, v);
-    if (w.now.rows.blocks.empty()) return;
-    if (w.now.rows.orthogonal) {  // their Cholesky factor does not show that they are independent
-        decide_rows(p.layout, p.blocks, w.now.B, w.now.rows);
-        factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+    if (w.now.rows.blocks.empty() || !w.now.rows.orthogonal) return;
+    // Their Cholesky factor does not show that they are independent.
+    decide_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+    factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+}
+
+// What has gone through its plane comes out to it; whether it rests there or strikes its velocity tells later.
+static void project_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
+    update_kinematics(p, w, t, q, v);
+    std::vector<char> inside(p.gaps.size(), 0);
+    for (size_t i = 0; i < p.gaps.size(); ++i) {
+        evaluate_gap(p, w, t, v, static_cast<int>(i));
+        inside[i] = w.now.values[p.gaps[i].block].residual[0] < 0.0 && !p.blocks[p.gaps[i].block].kept.empty();
     }
-    project(p, w, t, q, v);
+    set_closed(p, w, inside);
+    configure_anew(p, w, t, q, v);
+    project_position(p, w, t, q, v);
+    set_closed(p, w, std::vector<char>(p.gaps.size(), 0));
+}
+
+void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
+    if (!p.gaps.empty()) project_out(p, w, t, q, v);
+    configure_anew(p, w, t, q, v);
+    if (!w.now.rows.blocks.empty()) project(p, w, t, q, v);
 }
 
 Closure close(const Program& p, Workspace& w, double t, VecX& q, VecX& v, double far) {
     Closure found;
     update_kinematics(p, w, t, q, v);
-    violations(p, w, found.before, found.rate);
+    violations(p, w, t, v, found.before, found.rate);
     found.after = found.before;
     if (!(found.before <= far)) return found;
     project_anew(p, w, t, q, v);
     update_kinematics(p, w, t, q, v);
-    violations(p, w, found.after, found.rate);
+    violations(p, w, t, v, found.after, found.rate);
     return found;
 }
 

@@ -25,6 +25,9 @@ constexpr double immobile_speed = 1e-8;
 // down to rounding, in singular positions too.
 constexpr double open_gap = 1e-9;
 
+// What sticks gives way to a gap of this part of the scene's size in rows that count as dependent.
+constexpr double creeping_gap = 1e-11;
+
 // To a step's move h v1, v1 = v0 + h a, adds the least one that follows the constraints to third order. Without it gaps are
 // h^2/2 b, since h v0 + h^2/2 a is what follows them to second order; the multipliers of h^3 are those that the projection
 // after the step before has shown. The workspace is that of (v0, a).
@@ -36,6 +39,9 @@ void learn_third_order(Workspace& w, double h);
 // Moves q; the workspace must hold factors near (t, q), and is left configured there. v is only what a user's own rows are
 // shown.
 bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
+// Closes what rows that count as dependent have left open, where elements stick: these hold them by too small a part of
+// their forces to be kept (rank_tolerance_sticking), and creep by as little.
+bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 // Moves v; the workspace must be configured at (t, q).
 bool project_velocity(const Program& p, Workspace& w, double t, VecX& v);
 // Moves both, and leaves the workspace configured there.

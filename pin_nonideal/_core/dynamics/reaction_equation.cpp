@@ -16,18 +16,26 @@ constexpr double kept_weight = 1e-2;     // of the weights before, so that none 
 void ReactionEquation::resize(int size, int vectors) {
     constant.resize(size);
     element.resize(vectors);
+    directed.assign(vectors, 0);
     offset.resize(3, vectors);
     columns.resize(3 * vectors, size);
 }
 
 void ReactionEquation::image(const VecX& y, double s, VecX& g) const {
     g = s * constant;
-    for (int k = 0; k < vectors(); ++k) g[element[k]] += vector(k, y, s).norm();
+    for (int k = 0; k < vectors(); ++k) {
+        const Eigen::Vector3d load = vector(k, y, s);
+        g[element[k]] += directed[k] ? load[0] : load.norm();
+    }
 }
 
 void ReactionEquation::slope(const VecX& y, double s, MatX& J) const {
     J.setZero(size(), size());
     for (int k = 0; k < vectors(); ++k) {
+        if (directed[k]) {
+            J.row(element[k]) += columns.row(3 * k);
+            continue;
+        }
         const Eigen::Vector3d load = vector(k, y, s);
         const double length = load.norm();
         if (length == 0.0) continue;

@@ -17,6 +17,9 @@ struct ReactionEquation {
     std::vector<int> element;  // of each vector
     MatX offset;               // b_k, (3, vectors)
     MatX columns;              // P_k one below the other, (3 vectors, elements)
+    // Vectors that count by their first component, with its sign: loads of contacts that may open, beyond which friction
+    // goes through zero. All solutions are found as if they were lengths.
+    std::vector<char> directed;
 
     // For a number of elements and vectors.
     void resize(int size, int vectors);

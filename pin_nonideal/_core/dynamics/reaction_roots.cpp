@@ -66,6 +66,7 @@ MatX among(const MatX& L, const std::vector<int>& rows, const std::vector<int>& 
 
 Search::Search(const ReactionEquation& given) : eq_(given), n_(given.size()) {
     // Unknowns of the size that the loads without friction give them, alone or through each other.
+    std::fill(eq_.directed.begin(), eq_.directed.end(), char(0));
     eq_.steepest(L_);
     const VecX own = eq_.steepest_in_s();
     scale_ = own + L_ * own;

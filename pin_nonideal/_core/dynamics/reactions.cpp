@@ -4,6 +4,7 @@
 
 #include "constraints/redundancy.hpp"
 #include "dynamics/law_forces.hpp"
+#include "math/nonnegative.hpp"
 
 namespace pn {
 
@@ -12,11 +13,14 @@ static void gather_body_forces(const Program& p, Workspace& w, std::vector<Force
     const Evaluation& now = w.now;
     if (p.has_body_forces) std::copy(now.body_force.begin(), now.body_force.end(), body.begin());
     else std::fill(body.begin(), body.end(), Force{Vec3::Zero(), Vec3::Zero()});
-    for (int i : now.rows.blocks) {  // multipliers of constraints, and of what sticks at an anchor or contact
+    for (size_t i = 0; i < p.blocks.size(); ++i) {  // of constraints, and of what sticks at an anchor or contact
         const Block& block = p.blocks[i];
         if (!now.values[i].geometric) continue;
-        for (size_t k = 0; k < block.kept.size(); ++k)
-            add_wrench(block, now.terms, now.values[i].wrench[block.kept[k]], now.reactions.lam[block.row + k], body);
+        for (int k = 0; k < block.total; ++k) {
+            const int kept = p.described.rows[block.user_row + k].kept;
+            if (kept < 0 || !now.rows.required[kept]) continue;
+            add_wrench(block, now.terms, now.values[i].wrench[k], p.share(block, k, now.reactions.lam), body);
+        }
     }
     if (now.ideal) return;
     for (size_t e = 0; e < p.frictions.size(); ++e) {  // what slips there, or is tried while modes are sought
@@ -35,11 +39,18 @@ static void sweep_tree(const Mechanism& m, const Evaluation& now, Reactions& r) 
     r.motion[0] = {Vec3::Zero(), Vec3::Zero()};
     for (int i = 1; i < n; ++i) {
         const Joint& j = m.joints[i];
-        r.motion[i] = r.motion[j.parent];
+        r.motion[i] = j.deep ? further(r.motion[j.parent], now.terms.deep.shift[i]) : r.motion[j.parent];
         for (int k = j.iv; k < j.iv + j.nv; ++k) r.motion[i] += now.a[k] * now.terms.J[k];
     }
     for (int i = n - 1; i > 0; --i) {
         const Joint& j = m.joints[i];
+        if (j.deep) {  // body by body, all of it: sums of the subtrees would cancel
+            r.momentum[i] += now.terms.body[i].own * r.motion[i];
+            r.momentum[i] += now.terms.deep.bias[i];
+            r.momentum[i] -= r.body[i];
+            if (j.parent != 0) r.momentum[j.parent] += before(r.momentum[i], now.terms.deep.shift[i]);
+            continue;
+        }
         for (int k = j.iv; k < j.iv + j.nv; ++k)
             r.momentum[i] += Force{now.a[k] * now.terms.Ag[k].lin, now.a[k] * now.terms.Ag[k].ang};
         if (j.parent == 0) continue;
@@ -48,13 +59,69 @@ static void sweep_tree(const Mechanism& m, const Evaluation& now, Reactions& r) 
     }
 }
 
+// Part of a unit vector of multipliers that exert no force below which a contact takes no part in it.
+static constexpr double takes_part = 1e-9;
+
+// Where the least-norm split among redundant rows has a contact pull, the least-norm one in which none does, if there is;
+// else one with the least pulls.
+static void press_all(const Program& p, Workspace& w, Reactions& r) {
+    const Evaluation& now = w.now;
+    std::vector<int> gaps;
+    bool pulls = false;
+    for (size_t i = 0; i < p.gaps.size(); ++i) {
+        const Block& block = p.blocks[p.gaps[i].block];
+        if (!w.state.closed[i] || block.kept.empty()) continue;
+        gaps.push_back(static_cast<int>(i));
+        pulls |= r.lam[block.row] < 0.0;
+    }
+    r.presses = true;
+    if (!r.holds_unloaded) {
+        r.unloaded.assign(p.gaps.size(), 0);
+        if (!pulls) return;
+    }
+    const MatX free = free_multipliers(p.layout, p.blocks, now.B, p.described, w.now.rows);
+    MatX Z(gaps.size(), free.cols());
+    VecX N(gaps.size());
+    std::vector<char> held(gaps.size());
+    for (size_t k = 0; k < gaps.size(); ++k) {
+        const int row = p.blocks[p.gaps[gaps[k]].block].row;
+        Z.row(k) = free.row(row);
+        if (!(Z.row(k).norm() > takes_part)) Z.row(k).setZero();
+        N[k] = r.lam[row];
+        held[k] = r.unloaded[gaps[k]];
+    }
+    if (r.holds_unloaded) {
+        r.lam += free * shortest_with_zeros(Z, N, held);
+        return;
+    }
+    const Nonnegative found = shortest_nonnegative(Z, N);
+    r.lam += free * found.z;
+    r.presses = found.met;
+    for (size_t k = 0; k < gaps.size(); ++k) {
+        r.unloaded[gaps[k]] = found.held[k];
+        double& load = r.lam[p.blocks[p.gaps[gaps[k]].block].row];
+        if (found.met) load = found.held[k] ? 0.0 : std::max(load, 0.0);
+    }
+}
+
 const Reactions& reactions(const Program& p, Workspace& w) {
     Reactions& r = w.now.reactions;
     if (r.current) return r;
     r.current = true;
     r.swept = false;
-    share_multipliers(p.layout, p.blocks, w.now.B, w.now.rows, w.now.lam, r.lam);
+    share_multipliers(p.layout, p.blocks, w.now.B, p.described, w.now.rows, w.now.lam, r.lam);
+    r.presses = true;
+    if (shares_pressing(p, w)) press_all(p, w, r);
     return r;
+}
+
+double normal_force(const Program& p, Workspace& w, int contact) {
+    return p.described.share(p.pressing[contact], reactions(p, w).lam);
+}
+
+Press contact_press(const Program& p, Workspace& w, int contact) {
+    const VecX& shared = reactions(p, w).lam;
+    return press(p.layout, p.blocks, w.now.B, p.described, p.pressing, w.now.rows, shared, contact);
 }
 
 Force joint_wrench(const Program& p, Workspace& w, int joint) {
@@ -66,6 +133,7 @@ Force joint_wrench(const Program& p, Workspace& w, int joint) {
         sweep_tree(p.mechanism, w.now, r);
     }
     const Body& b = w.now.terms.body[joint];
+    if (p.mechanism.joints[joint].deep) return r.momentum[joint];
     const int parent = p.mechanism.joints[joint].parent;
     Force f = b.f;
     f += r.momentum[joint];
@@ -81,10 +149,10 @@ Force anchor_wrench(const Program& p, Workspace& w, int index) {
     const Block& block = p.blocks[index];
     const RowValues& values = w.now.values[index];
     Force f{Vec3::Zero(), Vec3::Zero()};
-    for (size_t k = 0; k < block.kept.size(); ++k) {
+    for (int k = 0; k < block.total; ++k) {
         if (!values.geometric) continue;
-        const Wrench& unit = values.wrench[block.kept[k]];
-        const double lam = r.lam[block.row + k];
+        const Wrench& unit = values.wrench[k];
+        const double lam = p.share(block, k, r.lam);
         f.lin += lam * unit.force;
         f.ang += lam * unit.couple;
     }
@@ -120,7 +188,7 @@ Force carried_wrench(const Program& p, Workspace& w, int index) {
     const Frame& frame = *frames(own.kind).first;
     const Body& body = now.terms.body[frame.joint];
     WrenchAbout wrench{now, body.ref + body.p + body.R * frame.p};
-    for (size_t k = 0; k < own.kept.size(); ++k) wrench.add(index, own.kept[k], r.lam[own.row + k]);
+    for (int k = 0; k < own.total; ++k) wrench.add(index, k, p.share(own, k, r.lam));
     for (size_t e = 0; e < p.frictions.size(); ++e) {
         const Friction& f = p.frictions[e];
         if (f.anchor != index) continue;

@@ -19,7 +19,10 @@ LoadVectors load_vectors(const Program& p, Workspace& w, const Friction& f) {
     using Load = Friction::Load;
     const Vec3 none = Vec3::Zero();
     if (f.load == Load::none || f.load == Load::user) return {none, none, none};
-    if (f.load == Load::multiplier) return {f.mu * reactions(p, w).lam[f.row] * Vec3::UnitX(), none, none};
+    if (f.load == Load::multiplier) {
+        const double share = p.described.share(f.row, reactions(p, w).lam);
+        return {f.mu * share * Vec3::UnitX(), none, none};
+    }
     Force r;
     Vec3 axis;
     if (f.joint > 0) {
@@ -43,6 +46,8 @@ double load_limit(const Program& p, Workspace& w, const Friction& f, double t, c
     if (f.load == Friction::Load::user) return f.user_limit(p, t, q, v, w);
     double limit = f.constant;
     if (f.load == Friction::Load::none) return limit;
+    // Stages beyond the instant at which a contact opens see a force that pulls: friction goes through zero with it.
+    if (f.gap >= 0) return limit + f.mu * p.described.share(f.row, reactions(p, w).lam);
     for (const Vec3& vector : load_vectors(p, w, f)) limit += vector.norm();
     return limit;
 }

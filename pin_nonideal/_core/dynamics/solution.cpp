@@ -11,7 +11,7 @@ constexpr int refinement_passes = 2;
 void scale_rows(const Program& p, Workspace& w) {
     for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
-        scale_rows(p.mechanism, w.now.terms, block, w.now.A.data() + block.offset,
+        scale_rows(p.mechanism, w.now.terms, block, w.now.values[i], w.now.A.data() + block.offset,
                    w.now.B.data() + block.offset);  // Eq. (7)
     }
 }
@@ -27,9 +27,9 @@ static void row_residuals(const Program& p, const Evaluation& now, const std::ve
 }
 
 // x, a force, becomes the acceleration under it and the constraints A a = b; lam are their multipliers.
-static void constrained_solve(const Program& p, Workspace& w, VecX& x, const VecX& b, VecX& lam) {
+static void constrained_solve(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b, VecX& lam) {
     Evaluation& now = w.now;
-    solve_R(p.mechanism, now.terms, x);  // a_s' = R^-1 (F + C), Eq. (5)
+    solve_R(p.mechanism, now.terms, x, body);  // a_s' = R^-1 (F + C), Eq. (5)
     if (!now.rows.blocks.empty()) {
         row_residuals(p, now, now.B, x, b, w.scratch.r);
         solve_rows(p.layout, now.rows, w.scratch.r, lam);  // J B^T (b - B a_s') = B^T lam, Eqs. (38), (39)
@@ -38,37 +38,65 @@ static void constrained_solve(const Program& p, Workspace& w, VecX& x, const Vec
     solve_Rt(p.mechanism, now.terms, x);  // without rows a = M^-1 F, Eq. (1)
 }
 
-void solve_acceleration(const Program& p, Workspace& w, const VecX& force, const VecX& b, VecX& a, VecX& lam) {
+// What the forces and multipliers leave of M a: in w.scratch.scaled_free, and of the bodies of deep trees in body_residual.
+static void force_residual(const Program& p, Workspace& w, const VecX& force, const Force* body, const VecX& a,
+                           const VecX& lam) {
     Evaluation& now = w.now;
     Scratch& scratch = w.scratch;
-    a = force;
-    constrained_solve(p, w, a, b, lam);
-    if (now.rows.blocks.empty() || !now.rows.refine) return;
-    for (int pass = 0; pass < refinement_passes; ++pass) {  // their residual is solved for again
+    if (p.mechanism.deep_dofs.empty()) {
         multiply_M(p.mechanism, now.terms, a, scratch.scaled);
         scratch.scaled_free = force - scratch.scaled;
         for (int i : now.rows.blocks) add_transpose(p.blocks[i], now.A, lam, scratch.scaled_free);
+        return;
+    }
+    multiply_M(p.mechanism, now.terms, a, scratch.scaled, scratch.body_inertia.data());
+    scratch.scaled_free = force - scratch.scaled;
+    for (int i : p.mechanism.deep_joints) {
+        scratch.body_residual[i] = body ? body[i] : Force{};
+        scratch.body_residual[i] -= scratch.body_inertia[i];
+    }
+    for (int i : now.rows.blocks)
+        add_transpose(p.blocks[i], p.mechanism, now.terms, now.values[i], now.A, lam, scratch.scaled_free,
+                      scratch.body_residual);
+}
+
+void solve_acceleration(const Program& p, Workspace& w, const VecX& force, const VecX& b, VecX& a, VecX& lam,
+                        const std::vector<Force>* body) {
+    Evaluation& now = w.now;
+    Scratch& scratch = w.scratch;
+    a = force;
+    constrained_solve(p, w, a, body ? body->data() : nullptr, b, lam);
+    if (now.rows.blocks.empty() || !now.rows.refine) return;
+    for (int pass = 0; pass < refinement_passes; ++pass) {  // their residual is solved for again
+        force_residual(p, w, force, body ? body->data() : nullptr, a, lam);
         row_residuals(p, now, now.A, a, b, scratch.residual);
-        constrained_solve(p, w, scratch.scaled_free, scratch.residual, scratch.lam_step);
+        constrained_solve(p, w, scratch.scaled_free, scratch.body_residual.data(), scratch.residual, scratch.lam_step);
         a += scratch.scaled_free;
         lam += scratch.lam_step;
     }
 }
 
-void solve_acceleration(const Program& p, Workspace& w, const VecX& force) {
+void solve_motion(const Program& p, Workspace& w, bool with_laws, const VecX& b, VecX& a, VecX& lam) {
+    const bool deep = !p.mechanism.deep_dofs.empty();
+    const VecX& given = deep ? w.now.joint_F : w.now.F;
+    if (with_laws) w.scratch.trial = given + w.now.C;
+    solve_acceleration(p, w, with_laws ? w.scratch.trial : given, b, a, lam, deep ? &w.now.wrench : nullptr);
+}
+
+void solve_motion(const Program& p, Workspace& w, bool with_laws) {
     w.now.renew();
-    solve_acceleration(p, w, force, w.now.b, w.now.a, w.now.lam);
+    solve_motion(p, w, with_laws, w.now.b, w.now.a, w.now.lam);
 }
 
 bool is_immobile(const Program& p, const Workspace& w) {
-    if (p.moves_in_time || p.frictions.empty()) return false;
+    if (p.moves_in_time || (p.frictions.empty() && p.gaps.empty())) return false;
     int held = 0;
     for (char locked : w.now.terms.locked) held += locked;
     bool sticks = held > 0;
     for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
         for (size_t k = 0; k < block.kept.size(); ++k) held += w.now.rows.active[block.row + k];
-        sticks |= i >= p.constraints;
+        sticks |= i >= p.first_gap;
     }
     return sticks && held >= p.mechanism.nv;
 }

@@ -9,11 +9,13 @@ namespace pn {
 // B = A R^-T of the rows in use.
 void scale_rows(const Program& p, Workspace& w);
 
-// Acceleration and multipliers for a given force F + C and right-hand side b, by the factors in the workspace; refined
-// where light bodies spoil them.
-void solve_acceleration(const Program& p, Workspace& w, const VecX& force, const VecX& b, VecX& a, VecX& lam);
-// Those of the motion at hand, under its own b: w.now.a and w.now.lam.
-void solve_acceleration(const Program& p, Workspace& w, const VecX& force);
+// Acceleration and multipliers under a generalized force and right-hand side b, by the factors in the workspace; refined
+// where light bodies spoil them. `body` adds forces on the bodies of deep trees.
+void solve_acceleration(const Program& p, Workspace& w, const VecX& force, const VecX& b, VecX& a, VecX& lam,
+                        const std::vector<Force>* body = nullptr);
+// Those of the motion at hand, under its own F, and C where the laws act: w.now.a and w.now.lam under its own b, or others.
+void solve_motion(const Program& p, Workspace& w, bool with_laws);
+void solve_motion(const Program& p, Workspace& w, bool with_laws, const VecX& b, VecX& a, VecX& lam);
 
 // Whether sticking elements and constraints leave no freedom at all: then nothing moves, exactly.
 bool is_immobile(const Program& p, const Workspace& w);

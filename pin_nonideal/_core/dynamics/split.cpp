@@ -1,6 +1,7 @@
 #include "dynamics/split.hpp"
 
 #include "constraints/redundancy.hpp"
+#include "dynamics/reactions.hpp"
 #include "dynamics/solution.hpp"
 #include "tree/factor.hpp"
 
@@ -25,7 +26,7 @@ IdealMotion::IdealMotion(const Program& program, Workspace& workspace) : p(progr
         }
         w.state.ideal_decided = true;
     }
-    solve_acceleration(p, w, w.now.F);
+    solve_motion(p, w, false);
     w.now.ideal = true;
 }
 
@@ -39,20 +40,11 @@ IdealMotion::~IdealMotion() {
     scale_rows(p, w);
 }
 
-static void to_user_rows(const Program& p, const VecX& kept, VecX& out) {
-    out = VecX::Zero(p.user_rows);
-    for (int i = 0; i < p.constraints; ++i) {
-        const Block& block = p.blocks[i];
-        for (size_t k = 0; k < block.kept.size(); ++k) out[block.user_row + block.kept[k]] = kept[block.row + k];
-    }
-}
-
 void split_forces(const Program& p, Workspace& w, Split& out) {
     const int nv = p.mechanism.nv;
     const VecX a = w.now.a, lam = w.now.lam;
-    VecX shared;
-    share_multipliers(p.layout, p.blocks, w.now.B, w.now.rows, lam, shared);
-    to_user_rows(p, shared, out.lam);
+    VecX shared = reactions(p, w).lam;
+    out.lam = p.user_multipliers(shared);
     out.C = p.has_laws() ? w.now.C : VecX(VecX::Zero(nv));
     VecX total = VecX::Zero(nv);
     for (size_t i = 0; i < p.blocks.size(); ++i) {
@@ -66,11 +58,11 @@ void split_forces(const Program& p, Workspace& w, Split& out) {
         if (w.now.terms.locked[dof]) out.C[dof] += holding_forces(p, w)[dof] + left_over[dof];
     {
         const IdealMotion ideal(p, w);
-        share_multipliers(p.layout, p.blocks, w.now.B, w.now.rows, w.now.lam, shared);
+        share_multipliers(p.layout, p.blocks, w.now.B, p.described, w.now.rows, w.now.lam, shared);
         out.F_ideal = VecX::Zero(nv);
         for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.A, shared, out.F_ideal);
         if (w.now.rows.blocks.empty()) shared.setZero();
-        to_user_rows(p, shared, out.lam_ideal);
+        out.lam_ideal = p.user_multipliers(shared);
     }
     out.F_nonideal = total - out.F_ideal + out.C;  // Eq. (39)
     w.now.a = a;

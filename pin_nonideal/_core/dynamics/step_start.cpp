@@ -2,20 +2,52 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
+#include "tree/factor.hpp"
 
 namespace pn {
 
 // Rows that were found dependent must be met by the solution all the same, to this part of their terms; of
 // accelerations in play a thousandth counts, and as many m/s^2 where nothing is accelerated.
 constexpr double consistency_tolerance = 1e-6, background = 1e-3;
+// By which the drifts of the rows that one depends on may enter its own.
+constexpr double dependence_growth = 10.0;
+// Modes that change do not stop what moves by more than this part of its energy. Where rows that elements hold would, by
+// up to this part of their forces, they hold nothing; it is sought in steps of this factor.
+constexpr double stopped_part = 1e-9, most_unheld = 1e-3, unheld_growth = 3.0;
+
+static bool sticks_anywhere(const Workspace& w) {
+    return std::count(w.state.mode.begin(), w.state.mode.end(), sticking) > 0;
+}
+
+// Length of x in the metric of M, of the part that the rows see.
+static double scaled_length(const Program& p, Workspace& w, const VecX& x) {
+    VecX& scaled = w.scratch.scaled;
+    multiply_M(p.mechanism, w.now.terms, x, scaled);
+    for (int dof = 0; dof < p.mechanism.nv; ++dof)
+        if (w.now.terms.locked[dof]) scaled[dof] = 0.0;
+    solve_R(p.mechanism, w.now.terms, scaled);
+    double square = 0.0;
+    for (int dof : p.constrained_dofs) square += scaled[dof] * scaled[dof];
+    return std::sqrt(square);
+}
+
+// What a row of unit length that counts as dependent may lack while elements stick: it keeps a part of itself below the
+// tolerance beside the others, which sees the motion (and its drift the velocities, as fast as they turn).
+static double unseen(const Program& p, Workspace& w, const VecX& v) {
+    if (!sticks_anywhere(w)) return 0.0;
+    return dependence_growth * w.state.rank_tolerance *
+           (scaled_length(p, w, w.now.a) + scaled_length(p, w, v) * v.cwiseAbs().maxCoeff());
+}
 
 // Residual of the dependent rows; the worst block, or -1 when all are met.
-static int contradicting_block(const Program& p, Workspace& w, double& worst) {
+static int contradicting_block(const Program& p, Workspace& w, const VecX& v, double& worst) {
     int found = -1;
     double excess = 1.0;
+    std::optional<double> lacking;  // of a row of unit length
     const double reach = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm() + background;  // accelerations in play
     for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
@@ -30,7 +62,10 @@ static int contradicting_block(const Program& p, Workspace& w, double& worst) {
                 sum += term;
                 size += std::abs(term);
             }
-            const double allowed = consistency_tolerance * (size + background * reach);
+            double allowed = consistency_tolerance * (size + background * reach);
+            if (std::abs(sum) <= allowed * excess) continue;
+            if (!lacking) lacking = unseen(p, w, v);
+            allowed += *lacking / w.now.rows.scale[row];
             if (std::abs(sum) > allowed * excess) {
                 excess = std::abs(sum) / allowed;
                 worst = sum;
@@ -42,8 +77,7 @@ static int contradicting_block(const Program& p, Workspace& w, double& worst) {
 }
 
 static void choose_rows(const Program& p, Workspace& w) {
-    const bool sticks = std::count(w.state.mode.begin(), w.state.mode.end(), sticking) > 0;
-    decide_rows(p.layout, p.blocks, w.now.B, w.now.rows, sticks ? rank_tolerance_sticking : rank_tolerance);
+    decide_rows(p.layout, p.blocks, w.now.B, w.now.rows, sticks_anywhere(w) ? w.state.rank_tolerance : rank_tolerance);
     factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
     ++w.counters.factorizations;
 }
@@ -76,11 +110,11 @@ static void move_step(const Program& p, Workspace& w, double t, const VecX& v, b
     solve_dynamics(p, w, t, v);
     if (w.now.rows.blocks.empty() || !w.now.rows.redundant) return;
     double residual = 0.0;
-    int block = contradicting_block(p, w, residual);
+    int block = contradicting_block(p, w, v, residual);
     if (block >= 0 && !chosen) {  // what was dependent at an earlier step is not any more
         choose_rows(p, w);
         solve_dynamics(p, w, t, v);
-        block = contradicting_block(p, w, residual);
+        block = contradicting_block(p, w, v, residual);
     }
     if (block >= 0) contradict(p, w, t, block, residual);
 }
@@ -88,6 +122,34 @@ static void move_step(const Program& p, Workspace& w, double t, const VecX& v, b
 void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     configure(p, w, t, q, v);
     move_step(p, w, t, v, configure_step(p, w));
+}
+
+// Part of the kinetic energy of v that the rows in use would take from it.
+static double part_stopped(const Program& p, Workspace& w, double t, const VecX& v) {
+    VecX kept = v;
+    project_velocity(p, w, t, kept);
+    const double before = kinetic_energy(p.mechanism, w.now.terms, v);
+    const double after = kinetic_energy(p.mechanism, w.now.terms, kept);
+    configure_velocity(p, w, t, v);
+    return before > 0.0 ? std::abs(before - after) / before : 0.0;
+}
+
+void keep_moving(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    if (!w.now.rows.redundant || !sticks_anywhere(w) || v.cwiseAbs().maxCoeff() <= immobile_speed) return;
+    const auto choose = [&](double tolerance) {
+        w.state.rank_tolerance = tolerance;
+        choose_rows(p, w);
+        move_step(p, w, t, v, true);
+    };
+    double tolerance = w.state.rank_tolerance;
+    while (tolerance < most_unheld && part_stopped(p, w, t, v) > stopped_part) choose(tolerance *= unheld_growth);
+    if (tolerance >= most_unheld) choose(rank_tolerance_sticking);
+}
+
+void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
+    configure(p, w, t, q, v);
+    configure_step(p, w);
+    project(p, w, t, q, v);
 }
 
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v) {

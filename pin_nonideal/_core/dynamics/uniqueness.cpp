@@ -1,9 +1,12 @@
 #include "dynamics/uniqueness.hpp"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 
+#include "constraints/redundancy.hpp"
 #include "dynamics/reaction_roots.hpp"
+#include "dynamics/reactions.hpp"
 
 namespace pn {
 
@@ -12,6 +15,7 @@ namespace {
 constexpr double difference = 1e-7;      // part of the unknowns' size: square root of the rounding, with a margin
 constexpr double least_size = 1e-300;    // of unknowns that are all zero
 constexpr int newton_limit = 30;
+constexpr int most_sharing = 6;          // contacts that share a load, of which all pieces are looked through
 constexpr int most_mixed = 6;            // laws whose mixtures of branches are all looked at; else one by one
 constexpr double same_solution = 1e-9;   // relative residual at which a point is a solution
 constexpr double other_solution = 1e-6;  // relative distance beyond which it is another one
@@ -52,7 +56,66 @@ void sort_by_distance(const ReactionEquation& equation, const VecX& start, std::
     std::sort(roots.begin(), roots.end(), [&](const VecX& y, const VecX& x) { return rank(y) < rank(x); });
 }
 
+// Of the solutions of the equation those that are motions: its limits are lengths, and where a contact that may open
+// pulls, or takes more than the least load that it shares, there is none.
+std::vector<VecX> motions_of(Unknowns& u, const std::vector<VecX>& roots) {
+    std::vector<VecX> list;
+    for (const VecX& root : roots)
+        if (u.is_motion(root)) list.push_back(root);
+    return list;
+}
+
+// Whether all unknowns are limits of contacts that may open: pressing, they have but one branch.
+bool only_opening(const Unknowns& u) {
+    const std::vector<int> list = u.elements();
+    return std::all_of(list.begin(), list.end(), [&](int e) { return u.p.frictions[e].gap >= 0; });
+}
+
+// Whether a contact that may open pulls: it is about to.
+bool pulls(const Unknowns& u, const VecX& y) {
+    const std::vector<int> list = u.elements();
+    for (size_t i = 0; i < list.size(); ++i)
+        if (u.p.frictions[list[i]].gap >= 0 && y[i] < 0.0) return true;
+    return false;
+}
+
+// Contacts that share a load with others, of those that may open.
+std::vector<int> sharing_gaps(const Unknowns& u) {
+    std::vector<int> list;
+    for (int i = 0; i < static_cast<int>(u.p.gaps.size()); ++i)
+        if (u.w.state.closed[i] && !u.p.blocks[u.p.gaps[i].block].kept.empty()) list.push_back(i);
+    return list;
+}
+
 }  // namespace
+
+void decide_over_pieces(Unknowns& u, const VecX& start, VecX& y, const Failure& failure) {
+    const std::vector<int> gaps = sharing_gaps(u);
+    const int count = static_cast<int>(gaps.size());
+    if (count > most_sharing) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
+    const size_t free = dependent_rows(u.w.now.rows).size();
+    std::vector<VecX> found;
+    ReactionEquation equation;
+    bool complete = true;
+    for (unsigned piece = 0; piece < 1u << count; ++piece) {
+        if (std::bitset<most_sharing>(piece).count() > free) continue;  // so many are never zero together but by chance
+        std::vector<char> unloaded(u.p.gaps.size(), 0);
+        for (int k = 0; k < count; ++k) unloaded[gaps[k]] = piece >> k & 1;
+        const HeldPiece held(u.w, unloaded);
+        u.equation(y, equation);
+        if (!equation.finite()) throw Failure(Failure::Kind::not_finite, u.t);
+        ReactionRoots roots = all_roots(equation);
+        complete &= roots.complete && !roots.at_edge;
+        for (const VecX& root : roots.y)
+            if (u.is_motion(root) && determinant_at(equation, root) > least_determinant_told) found.push_back(root);
+    }
+    if (found.empty() && !complete) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
+    if (found.empty()) throw failure;
+    const auto distance = [&](const VecX& root) { return (root - start).norm(); };
+    y = *std::min_element(found.begin(), found.end(),
+                          [&](const VecX& one, const VecX& other) { return distance(one) < distance(other); });
+    u.w.state.unique = Uniqueness::not_shown;
+}
 
 void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, VecX& y, bool solved) {
     RunState& state = u.w.state;
@@ -61,10 +124,27 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     state.growth = growth(L);
     state.steps_since = 0;
     const bool contracts = state.growth < 1.0 - least_determinant_told;
-    state.unique = contracts ? Uniqueness::shown : Uniqueness::not_shown;
+    const bool in_pieces = shares_pressing(u.p, u.w);  // of which one alone shows nothing of the others
+    state.unique = contracts && !in_pieces ? Uniqueness::shown : Uniqueness::not_shown;
     if (contracts && solved) return;
+    if (solved && determinant_at(equation, y) > least_determinant_told) {
+        const bool linear = only_opening(u);
+        if (linear && !in_pieces) state.unique = Uniqueness::shown;
+        if (linear || pulls(u, y)) return;
+    }
     ReactionRoots roots = all_roots(equation);
     std::vector<VecX>& found = roots.y;
+    if (!found.empty() && !u.p.gaps.empty()) {
+        sort_by_distance(equation, start, found);
+        const std::vector<VecX> motions = motions_of(u, found);
+        if (motions.empty() && in_pieces) {  // the search goes on in the piece of the nearest one
+            y = found.front();
+            return;
+        }
+        if (!motions.empty()) found = motions;  // else a contact pulls, and is about to open
+        // What comes in from infinite loads is then a motion in which some contact pulls, unless det(I - dg/dy) is zero.
+        if (only_opening(u) && determinant_at(equation, found.front()) > least_determinant_told) roots.at_edge = false;
+    }
     const double edge = std::min(1.0 - state.growth, 0.0);
     if (!roots.complete && solved && found.empty()) found.push_back(y);
     if (found.empty() && !roots.complete) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
@@ -74,7 +154,7 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     for (const VecX& root : found) least = std::min(least, determinant_at(equation, root));
     y = found.front();
     if (found.size() == 1 && !roots.at_edge) {
-        if (roots.complete) state.unique = Uniqueness::shown;
+        if (roots.complete && !in_pieces) state.unique = Uniqueness::shown;
         return;
     }
     state.unique = Uniqueness::several;

@@ -13,6 +13,10 @@ constexpr double least_determinant_told = 1e-8;
 // it or the failure shows two.
 void decide(Unknowns& unknowns, const ReactionEquation& equation, const VecX& start, VecX& y, bool solved);
 
+// Where one piece of the loads that contacts share has no solution, as `failure` says: y becomes the solution nearest to
+// `start` in any piece, or the failure holds of all.
+void decide_over_pieces(Unknowns& unknowns, const VecX& start, VecX& y, const Failure& failure);
+
 // With functions of the user's among the unknowns, whose dg/dy at y is J: a failure where the determinant tells of
 // others and Newton's method finds one. That it finds none shows nothing. Where the run is to continue, y becomes the
 // one in which a small change of the loads changes little.

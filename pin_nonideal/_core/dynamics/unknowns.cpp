@@ -2,9 +2,13 @@
 
 #include <cmath>
 
+#include "dynamics/reactions.hpp"
 #include "dynamics/solution.hpp"
 
 namespace pn {
+
+// Part of the unknowns that rounding leaves of a solution where two pieces of the loads meet.
+static constexpr double same_piece = 1e-11;
 
 Unknowns::Unknowns(const Program& program, Workspace& workspace, double time, const VecX& q_, const VecX& v_)
     : p(program), w(workspace), t(time), q(q_), v(v_) {
@@ -29,8 +33,7 @@ void Unknowns::motion() {
     w.now.C = w.now.base_C;
     add_slip_forces(p, w, true, w.now.C);
     each([](size_t) {}, [&](const UserLaw& law) { w.now.C += w.now.user_C[law.index]; });
-    w.scratch.trial = w.now.F + w.now.C;
-    solve_acceleration(p, w, w.scratch.trial);
+    solve_motion(p, w, true);
 }
 
 void Unknowns::image(const VecX& y, VecX& g) {
@@ -45,6 +48,14 @@ void Unknowns::image(const VecX& y, VecX& g) {
         w.now.load[e] = load_limit(p, w, p.frictions[e], t, q, v);
         g[k++] = limit_under(p, w, static_cast<int>(e), w.now.load[e]);
     }, [&](const UserLaw& law) { g.segment(k, nv) = ask(p, law, w, t, q, v); k += nv; });
+}
+
+bool Unknowns::is_motion(const VecX& y) {
+    if (p.gaps.empty()) return true;
+    const FreeLoads free(w);
+    VecX g(n);
+    image(y, g);
+    return (g - y.head(n)).cwiseAbs().maxCoeff() <= same_piece * (g.cwiseAbs().maxCoeff() + y.head(n).cwiseAbs().maxCoeff());
 }
 
 void Unknowns::equation(const VecX& y, ReactionEquation& found) {
@@ -69,6 +80,7 @@ void Unknowns::equation(const VecX& y, ReactionEquation& found) {
             }
             if (column < 0) found.constant[i] = factor * f.constant;
             for (int k = 0; k < vectors; ++k) found.element[vectors * i + k] = i;
+            found.directed[vectors * i] = f.gap >= 0;
             ++i;
         }, [](const UserLaw&) {});
     };

@@ -31,7 +31,11 @@ struct Unknowns {
     void motion();
     void image(const VecX& y, VecX& g);
     // g as arrays, by the motion for each unknown in turn. Steps are as large as the unknowns: g hides only lengths.
+    // Where contacts share a load, it is that of the piece that is held.
     void equation(const VecX& y, ReactionEquation& found);
+    // Whether a solution of that is one of y = g(y): no contact that may open pulls, and where some share a load it lies
+    // in the piece that was held.
+    bool is_motion(const VecX& y);
 };
 
 }  // namespace pn

@@ -8,11 +8,14 @@ namespace pn {
 static void size(const Program& p, RunState& state) {
     const size_t elements = p.frictions.size();
     state.mode = Modes(elements);
+    state.closed.assign(p.gaps.size(), 1);
     state.slip_direction.assign(elements, Vec3::UnitX());
     state.last_direction = state.slip_direction;
+    state.lingers.assign(p.frictions.size(), 0);
     state.z = VecX::Zero(p.states);
     state.held_torque = VecX::Zero(p.mechanism.nv);
     state.unknown = VecX::Zero(p.unknowns());
+    if (!p.gaps.empty() || !p.frictions.empty()) state.percussion = VecX::Zero(p.layout.rows);
     state.third_order_lam = VecX::Zero(p.layout.rows);
 }
 
@@ -22,16 +25,18 @@ static void size(const Program& p, Evaluation& now) {
     const Force no_force{Vec3::Zero(), Vec3::Zero()};
     now.terms.allocate(p.mechanism);
     for (VecX* x : {&now.tau, &now.external, &now.F, &now.C, &now.C_smooth, &now.base_C, &now.a, &now.v, &now.holding,
-                    &now.override_torque})
+                    &now.override_torque, &now.joint_F, &now.joint_external})
         *x = VecX::Zero(nv);
     now.values.resize(p.blocks.size());
     for (size_t i = 0; i < p.blocks.size(); ++i) now.values[i].resize(p.blocks[i].kind, nv);
+    now.idle.assign(p.blocks.size(), 0);
     now.A.assign(p.entries, 0.0);
     now.B.assign(p.entries, 0.0);
     for (VecX* x : {&now.b, &now.lam, &now.closing_lam, &now.reactions.lam}) *x = VecX::Zero(p.layout.rows);
     now.rows.allocate(p.layout, static_cast<int>(p.blocks.size()), nv);
     now.ideal_rows = now.rows;
     now.body_force.assign(bodies, no_force);
+    now.wrench.assign(bodies, no_force);
     now.reactions.body.assign(bodies, no_force);
     now.reactions.momentum.assign(bodies, no_force);
     now.reactions.motion.assign(bodies, Motion{Vec3::Zero(), Vec3::Zero()});
@@ -51,7 +56,7 @@ static void size(const Program& p, const Evaluation& now, Scratch& scratch) {
     scratch.position_lam_steps.assign(projection_limit, scratch.position_lam);
     scratch.ideal_locked.assign(nv, 0);
     scratch.unknown = scratch.image = scratch.shifted = VecX::Zero(p.unknowns());
-    scratch.subtree_force = now.body_force;
+    scratch.subtree_force = scratch.body_inertia = scratch.body_residual = now.body_force;
     scratch.law_force.assign(p.law_names.size(), VecX::Zero(nv));
 }
 
@@ -64,6 +69,14 @@ Workspace::Workspace(const Program& p) {
 
 void select_rows(const Program& p, Workspace& w) {
     for (int r = 0; r < p.layout.rows; ++r) w.now.rows.required[r] = r < p.constraint_rows();
+    for (size_t i = 0; i < p.gaps.size(); ++i) {
+        const Gap& gap = p.gaps[i];
+        const Block& block = p.blocks[gap.block];
+        const char open = !w.state.closed[i];
+        w.now.idle[gap.block] = open;
+        for (int e : gap.elements) w.now.idle[p.frictions[e].block] = open;
+        if (open) std::fill_n(w.now.rows.required.begin() + block.row, block.kept.size(), char(0));
+    }
     std::fill(w.now.terms.locked.begin(), w.now.terms.locked.end(), char(0));
     for (size_t e = 0; e < p.frictions.size(); ++e) {
         const Block& block = p.blocks[p.frictions[e].block];
@@ -75,15 +88,31 @@ void select_rows(const Program& p, Workspace& w) {
     }
     w.now.rows.use_required(p.blocks);
     w.state.ideal_decided = false;
+    w.state.rank_tolerance = rank_tolerance_sticking;
 }
 
 void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes) {
     w.state.mode.values_ = modes;
+    for (size_t i = 0; i < p.gaps.size(); ++i)
+        if (!w.state.closed[i])
+            for (int e : p.gaps[i].elements) w.state.mode.values_[e] = unloaded;
     for (size_t e = 0; e < modes.size(); ++e)
-        if (modes[e] == unloaded) w.now.slip_force[e] = Vec3::Zero();
+        if (w.state.mode[e] == unloaded) w.now.slip_force[e] = Vec3::Zero();
     w.state.steps_since = never_decided;
     w.now.renew();
     select_rows(p, w);
+}
+
+void set_closed(const Program& p, Workspace& w, const std::vector<char>& closed) {
+    std::vector<Mode> modes = w.state.mode;
+    for (size_t i = 0; i < closed.size(); ++i) {
+        const Block& block = p.blocks[p.gaps[i].block];
+        if (!closed[i]) w.now.lam.segment(block.row, block.kept.size()).setZero();
+        if (closed[i] == w.state.closed[i]) continue;
+        for (int e : p.gaps[i].elements) modes[e] = unloaded;
+    }
+    w.state.closed = closed;
+    set_modes(p, w, modes);
 }
 
 }  // namespace pn

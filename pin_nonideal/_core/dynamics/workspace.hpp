@@ -13,6 +13,7 @@ constexpr int projection_limit = 12;
 
 struct Counters {
     long evaluations = 0, factorizations = 0, projections = 0, iterations = 0;
+    double signorini = 0.0, coulomb = 0.0, dissipation = 0.0;  // largest misses of the laws of contact in time stepping
 };
 
 // Whether the motion is the only one that the laws allow; where functions of the user's are among them it is never shown.
@@ -22,15 +23,19 @@ constexpr int never_decided = 1 << 30;
 // What the next step needs of those before it, beside the state (q, v) itself and the choice of independent rows.
 struct RunState {
     Modes mode;
+    std::vector<char> closed;  // of each gap, to be changed by set_closed alone
     // For elements of two or three directions: of the step's start, and where slip last had a clear direction.
     std::vector<Vec3> slip_direction, last_direction;
+    std::vector<char> lingers;  // slips on in its mode though it came to rest: rounding alone tells which way
     bool seeks_directions = false;  // steps find last_direction themselves: slip is too slow to tell it
     bool indeterminate = false;   // what sticks shares its load in several ways: one multiplier says little
+    double rank_tolerance = rank_tolerance_sticking;  // of the rows while elements stick, in these modes
     VecX z;                       // states of laws, at the stage evaluated last
     VecX held_torque;             // of sampled control
     bool has_held = false;
     VecX unknown;                 // of the implicit reaction equation, by element and law: where its next solution starts
     bool warm = false;
+    VecX percussion;              // of contacts and friction in the time step before, by row and over its length
     VecX third_order_lam;         // multipliers of third order in the step, over its cube
     bool ideal_decided = false;   // which rows are independent without what sticks, over this step
     Uniqueness unique = Uniqueness::shown;  // of the motion in these modes, as decided last
@@ -42,6 +47,11 @@ struct RunState {
 struct Reactions {
     bool current = false;  // made of that motion
     bool swept = false;    // through the joints of the tree as well
+    bool presses = true;   // the loads of contacts that may open, redundant as they are, can all press
+    // Contacts that may open and carry nothing, so that none that shares its load pulls. While it is held, loads are
+    // linear in the motion, and may pull.
+    std::vector<char> unloaded;
+    bool holds_unloaded = false;
     VecX lam;              // by kept row; least norm among redundant rows
     std::vector<Force> body;  // external forces on each body, then their subtree sums
     std::vector<Motion> motion;
@@ -52,11 +62,15 @@ struct Reactions {
 struct Evaluation {
     Terms terms;
     std::vector<RowValues> values;  // of each block
+    std::vector<char> idle;  // blocks of open contacts, which are no rows and are not evaluated
     std::vector<double> A, B;
     RowSystem rows, ideal_rows;  // ideal: of the constraints without what sticks; IdealMotion swaps them in
     VecX b, lam;  // by kept row
     VecX closing_lam;  // multipliers of the move that closed the position last
     VecX tau, external, F, C, C_smooth, base_C, a;  // generalized forces and acceleration
+    // F as the solution takes it, where trees are deep: their bias and the given forces on their bodies are wrenches.
+    VecX joint_F, joint_external;
+    std::vector<Force> wrench;
     Reactions reactions;
     VecX holding;                     // M a - F - C - A^T lam: what holds the locked dofs
     bool has_holding = false;
@@ -92,6 +106,7 @@ struct Scratch {
     ReactionNewton newton;
     MatX jacobian;
     std::vector<Force> subtree_force;
+    std::vector<Force> body_inertia, body_residual;  // of refinement in deep trees
     std::vector<VecX> law_force;  // of each law, for its power
 };
 
@@ -105,10 +120,18 @@ struct Workspace {
     explicit Workspace(const Program& p);
 };
 
-// Rows that must hold in these modes: constraints, and elements that stick elsewhere than in a joint (a joint that
-// sticks is locked instead, which costs less than letting it move). All count as independent until a step begins.
+// Rows that must hold in these modes: constraints, closed gaps, and elements that stick elsewhere than in a joint (a
+// joint that sticks is locked instead, which costs less than letting it move). All count as independent until a step
+// begins.
 void select_rows(const Program& p, Workspace& w);
 // The one way to change modes: what hangs on them (rows that must hold, locked dofs, forces, reactions) follows.
 void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes);
+// The same for contacts: friction of those that open ends, that of those that close has no mode yet.
+void set_closed(const Program& p, Workspace& w, const std::vector<char>& closed);
+// Whether an element rubs at a contact that is open.
+inline bool is_open(const Program& p, const Workspace& w, int element) {
+    const int gap = p.frictions[element].gap;
+    return gap >= 0 && !w.state.closed[gap];
+}
 
 }  // namespace pn

@@ -25,8 +25,9 @@ struct Friction {
     Reaction reaction = Reaction::none;
     int joint = -1;   // tree joint that carries the load
     int anchor = -1;  // or the block (of an anchor, a contact or a coupling) that does
+    int gap = -1;        // where that is a contact that may open: its number, as Program::finish finds it
     int anchor_row = 0;  // where one multiplier is the load: which of the anchor's
-    int row = -1;        // and its place among the kept rows, as Program::finish finds it
+    int row = -1;        // and its place among the rows of all descriptions, as Program::finish finds it
     Vec3 axis = Vec3::UnitZ();  // in the joint's frame, or in frame 1 of the anchor
     int axis_dof = -1;          // dof whose axis it is, where it is fixed in no frame
     std::function<double(const Program& p, double t, const VecX& q, const VecX& v, Workspace& w)> user_limit;

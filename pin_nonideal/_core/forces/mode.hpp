@@ -5,8 +5,8 @@
 
 namespace pn {
 
-// An element slips one way (+1, -1; +1 for several directions), sticks, or, while the modes are being sought, carries no
-// friction at all.
+// An element slips one way (+1, -1; +1 for several directions), sticks, or carries no friction at all: that of an open
+// contact, or while the modes are being sought.
 // Numbers, so that the sign of a slip is the mode.
 enum Mode : signed char { slip_minus = -1, sticking = 0, slip_plus = 1, unloaded = 2 };
 inline bool slips(Mode mode) { return mode == slip_plus || mode == slip_minus; }

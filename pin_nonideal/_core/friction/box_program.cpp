@@ -12,6 +12,7 @@ namespace pn {
 namespace {
 
 constexpr double met = 1e-9;  // part of the accelerations in play that counts as none
+constexpr double at_limit = 1e-12;  // part of it within which a force is
 // Least root of a pivot of W, scaled to a unit diagonal, with which Cholesky's factor is as good as an orthogonal one.
 constexpr double regular_pivot = 1e-3;
 
@@ -104,10 +105,14 @@ VecX least_norm_solution(const MatX& W, const VecX& r) {
 }
 
 // Block principal pivoting, single (least index) once it fails to make progress.
-VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s) {
+VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* near) {
     const int n = static_cast<int>(s.size());
     VecX f = VecX::Zero(n);
     std::vector<char> is_free(n, 1);
+    for (int i = 0; near && i < n; ++i) {
+        is_free[i] = std::abs((*near)[i]) < s[i] * (1.0 - at_limit);
+        if (!is_free[i]) f[i] = (*near)[i] > 0.0 ? s[i] : -s[i];
+    }
     int fewest = n + 1, patience = 10;
     for (int it = 0; it < 200 + 50 * n; ++it) {
         for (int i = 0; i < n; ++i)

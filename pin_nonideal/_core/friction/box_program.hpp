@@ -12,6 +12,7 @@ constexpr double rank_threshold = 1e-13;
 // x of least norm with W x = r, W symmetric without negative eigenvalues; of a part of r where no x gives all of it.
 VecX least_norm_solution(const MatX& W, const VecX& r);
 
-VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s);
+// `near`: forces of a program like this one, whose choice of those that are at their limits is tried first.
+VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* near = nullptr);
 
 }  // namespace pn

@@ -6,6 +6,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 
+#include "friction/lorentz.hpp"
+
 namespace pn {
 
 namespace {
@@ -23,62 +25,6 @@ constexpr int most_steps = 60, most_newton = 12;
 constexpr double gap_tolerance = 1e-17;  // of z . y, part of the accelerations in play; rounding may end it before
 constexpr double to_boundary = 0.99;     // of the way to the cone's boundary that a step takes
 constexpr double newton_tolerance = 4e-16, condition = 1e-12;
-
-// A vector of the cone's algebra; elements of one or two directions leave the rest of the tail zero.
-struct Cone {
-    double head = 0.0;
-    Vector3d tail = Vector3d::Zero();
-
-    double dot(const Cone& o) const { return head * o.head + tail.dot(o.tail); }
-    double determinant() const { return (head - tail.norm()) * (head + tail.norm()); }
-    Cone mirrored() const { return {head, -tail}; }
-    Cone operator+(const Cone& o) const { return {head + o.head, tail + o.tail}; }
-    Cone operator-(const Cone& o) const { return {head - o.head, tail - o.tail}; }
-    Cone operator*(double k) const { return {k * head, k * tail}; }
-};
-
-Cone product(const Cone& a, const Cone& b) { return {a.dot(b), a.head * b.tail + b.head * a.tail}; }
-
-// x with product(a, x) = b.
-Cone quotient(const Cone& b, const Cone& a) {
-    const double head = (a.head * b.head - a.tail.dot(b.tail)) / a.determinant();
-    return {head, (b.tail - head * a.tail) / a.head};
-}
-
-// Largest step along d that stays in the cone.
-double room(const Cone& u, const Cone& d) {
-    const double a = d.head * d.head - d.tail.squaredNorm();
-    const double b = u.head * d.head - u.tail.dot(d.tail), c = u.determinant();
-    const double root = std::sqrt(std::max(b * b - a * c, 0.0)), q = -(b + std::copysign(root, b));
-    double least = HUGE_VAL;
-    if (a != 0.0 && q / a > 0.0) least = q / a;
-    if (q != 0.0 && c / q > 0.0) least = std::min(least, c / q);
-    return least;
-}
-
-// The symmetric map T with T y = T^-1 z.
-struct Scaling {
-    Cone w, v;     // T^2 = beta (2 w w^T - J), T = sqrt(beta) (2 v v^T - J), J the mirror
-    double root;   // sqrt(beta)
-    Cone scaled;   // T y
-
-    Scaling(const Cone& z, const Cone& y) {
-        const double dz = z.determinant(), dy = y.determinant();
-        const Cone zn = z * (1.0 / std::sqrt(dz)), yn = y * (1.0 / std::sqrt(dy));
-        const double gamma = std::sqrt(0.5 * (1.0 + zn.dot(yn)));
-        w = (zn + yn.mirrored()) * (0.5 / gamma);
-        v = w;
-        v.head += 1.0;
-        v = v * (1.0 / std::sqrt(2.0 * v.head));
-        root = std::sqrt(std::sqrt(dz / dy));
-        scaled = forth(y);
-    }
-    Cone forth(const Cone& u) const { return (v * (2.0 * v.dot(u)) - u.mirrored()) * root; }
-    Cone back(const Cone& u) const {
-        const Cone m = v.mirrored();
-        return (m * (2.0 * m.dot(u)) - u.mirrored()) * (1.0 / root);
-    }
-};
 
 struct ConeProgram {
     const MatX& W;
@@ -298,10 +244,17 @@ VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dim
     return f;
 }
 
-VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s) {
+VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s,
+                      const VecX* near) {
     if (alpha0.size() == 0) return VecX::Zero(0);
-    if (std::all_of(dims.begin(), dims.end(), [](int d) { return d == 1; })) return box_program(W, alpha0, s);
+    if (std::all_of(dims.begin(), dims.end(), [](int d) { return d == 1; })) return box_program(W, alpha0, s, near);
     return ball_program(W, alpha0, dims, s);
+}
+
+VecX onset_accelerations(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s) {
+    constexpr double beyond = 1e-6;  // part of the load by which it is raised
+    const VecX more = (1.0 + beyond) * alpha0;
+    return more + W * friction_program(W, more, dims, s);
 }
 
 }  // namespace pn

@@ -11,6 +11,10 @@ namespace pn {
 
 VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s);
 // The same, as a box program where every element has one direction.
-VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s);
+VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s,
+                      const VecX* near = nullptr);
+// Slip accelerations a little beyond the load at which elements give way: there they are rounding, and forces of elements
+// that share a load tell the directions in which all begin to move together only to its root.
+VecX onset_accelerations(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s);
 
 }  // namespace pn

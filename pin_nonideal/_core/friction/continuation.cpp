@@ -2,7 +2,6 @@
 
 #include <optional>
 
-#include "dynamics/projection.hpp"
 #include "dynamics/slip.hpp"
 #include "dynamics/step_start.hpp"
 
@@ -52,7 +51,7 @@ bool go_on(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const Mod
     for (int round = 0; round < rounds; ++round) {
         set_modes(p, w, modes);
         try {
-            project(p, w, t, q, v);
+            project_into_modes(p, w, t, q, v);
             if ((v - v_before).cwiseAbs().maxCoeff() > least_speed * (1.0 + v_before.cwiseAbs().maxCoeff())) break;
             begin_step(p, w, t, q, v);
         } catch (const Failure& failure) {

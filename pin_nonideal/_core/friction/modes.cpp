@@ -17,14 +17,10 @@ namespace pn {
 
 namespace {
 
-constexpr double slack = 1e-9;            // part of the limit by which a mode may miss its condition by rounding
-constexpr double at_limit = 1e-13;        // part of the limit by which rounding may miss it
-constexpr double no_acceleration = 1e-12; // part of the accelerations in play that is rounding
 constexpr double limit_tolerance = 1e-12; // relative change of the limits at which the turns end
 constexpr double least_limit = 1e-300;    // a limit of zero divides by this
 constexpr int most_turns = 100;           // of forces and limits
-constexpr double unsolved = 10.0;         // what the equation lacks leaves so much in the accelerations
-constexpr double beyond = 1e-6;           // part of the load by which it is raised to see slip begin
+constexpr int most_pieces = 30;           // of the loads that contacts share
 
 bool contains(const std::vector<int>& list, int e) { return std::find(list.begin(), list.end(), e) != list.end(); }
 
@@ -71,76 +67,36 @@ struct Search {
         return std::all_of(list.begin(), list.end(), [&](int e) {
             if (w.state.mode[e] == sticking)
                 return friction_force(p, w, e).norm() <= static_limit(p, w, e, t, q, v) * (1.0 + at_limit);
-            return p.frictions[e].dim == 1 && slip_rate_along_mode(p, w, e) >= -slack * size;
+            return p.frictions[e].dim == 1 && slip_rate_along_mode(p, w, e) >= -limit_slack * size;
         });
-    }
-
-    // What an element at rest does under a force at or below its limit; its direction of slip, that of the acceleration
-    // where this tells it, stays in the workspace.
-    Mode mode_of(int e, const VecX& force, const VecX& slip, double limit, bool slides, bool told) {
-        const bool gives_way = contains(question.breaking, e) && force.norm() >= limit * (1.0 - slack);
-        if (!gives_way && !slides) return sticking;
-        const VecX direction = told ? VecX(slip.normalized()) : VecX(-force.normalized());
-        Vec3 along;
-        for (int k = 0; k < direction.size(); ++k) along[k] = direction[k];
-        if (direction.size() > 1) w.state.slip_direction[e] = w.state.last_direction[e] = along;
-        return direction.size() > 1 || along[0] > 0.0 ? slip_plus : slip_minus;
-    }
-
-    // Slip accelerations a little beyond the load at which elements give way: there they are rounding, and forces of
-    // elements that share a load tell the directions in which all begin to move together only to its root.
-    VecX onset_accelerations(const FrictionProblem& problem, const VecX& limits) const {
-        const VecX more = (1.0 + beyond) * problem.alpha0;
-        return more + problem.W * friction_program(problem.W, more, problem.dims, limits);
-    }
-
-    // Modes that the forces f of a program mean: what is below its limit sticks.
-    std::vector<Mode> modes_of(const FrictionProblem& problem, const VecX& f, const VecX& limits) {
-        const VecX alpha = problem.alpha0 + problem.W * f;
-        const double size = problem.alpha0.cwiseAbs().maxCoeff();
-        std::vector<Mode> modes = question.modes;
-        VecX onset;
-        for (size_t i = 0, at = 0; i < list.size(); at += problem.dims[i], ++i) {
-            const VecX force = f.segment(at, problem.dims[i]), slip = alpha.segment(at, problem.dims[i]);
-            const bool slides = force.norm() >= limits[i] * (1.0 - at_limit) && slip.norm() > no_acceleration * size;
-            const bool slowly = problem.dims[i] > 1 && force.norm() >= limits[i] * (1.0 - slack) &&
-                                slip.norm() < beyond * size;
-            if (slowly && onset.size() == 0) onset = onset_accelerations(problem, limits);
-            const VecX begins = slowly ? VecX(onset.segment(at, problem.dims[i])) : slip;
-            const bool told = (slides || slowly) && begins.norm() > no_acceleration * size;
-            modes[list[i]] = mode_of(list[i], force, begins, limits[i], slides, told);
-        }
-        return modes;
-    }
-
-    // The same of a solution of the equation of rest, which is as exact as what it lacks.
-    std::vector<Mode> modes_of(const RestEquation& equation, const VecX& x) {
-        VecX alpha, limits;
-        equation.respond(x, alpha, limits);
-        const double noise = no_acceleration + unsolved * equation.error(x);
-        std::vector<Mode> modes = question.modes;
-        for (size_t i = 0; i < list.size(); ++i) {
-            const RestElement& e = equation.elements[i];
-            const VecX force = x.segment(e.row, e.dim), slip = alpha.segment(e.row, e.dim);
-            const bool at_its_limit = force.norm() >= limits[i] * (1.0 - at_limit) ||
-                                      (force - e.rho * slip).norm() > limits[i] * (1.0 + at_limit);
-            const bool accelerates = e.rho * slip.norm() > noise * equation.force_in_play(i, x, limits);
-            const bool slides = !e.may_stick || (at_its_limit && accelerates);
-            modes[list[i]] = mode_of(list[i], force, slip, limits[i], slides, slides);
-        }
-        return modes;
     }
 
     // Forces of all elements for the factors of their limits at hand, among all motions of a few elements; of more the
     // one in which all stick, or else any.
-    bool find(const RestProblem& problem, VecX& x) {
+    bool find(RestProblem& problem, VecX& x) {
         const RestEquation& equation = problem.equation;
         const AllMotions all = all_motions(equation);
-        if (all.complete) return choose(problem, all.forces, x);
+        if (all.complete && !problem.has_pieces()) {
+            std::vector<VecX> motions;
+            for (const VecX& forces : all.forces)
+                if (problem.is_motion(forces)) motions.push_back(forces);
+            // Where a contact pulls in all of them, it is about to open.
+            return choose(problem, motions.empty() ? all.forces : motions, x);
+        }
         VecX held = equation.holding_forces();
         if (!refine_rest(equation, held) || !all_stick(equation, held)) return solve_rest(equation, x);
         x = held;
         return true;
+    }
+
+    // The same in piece after piece of the loads that contacts share, until the motion lies in its own.
+    bool find_in_pieces(RestProblem& problem, VecX& x) {
+        for (int turn = 0; turn < most_pieces; ++turn) {
+            if (!find(problem, x)) return false;
+            if (!problem.has_pieces() || problem.is_motion(x)) return true;
+            problem.enter_piece(x);
+        }
+        return false;
     }
 
     // What rested goes on resting: of several motions the one in which all that sticks in any other sticks, and more.
@@ -243,7 +199,7 @@ struct Search {
         double change = 0.0;
         for (int turn = 0; turn < most_turns; ++turn) {
             const VecX f = friction_program(problem.W, problem.alpha0, problem.dims, limits);
-            const std::vector<Mode> next = modes_of(problem, f, limits);
+            const std::vector<Mode> next = modes_of(w, question, problem, f, limits);
             if (next == modes && change <= limit_tolerance) return true;
             modes = next;
             change = follow(problem, f, modes, limits);
@@ -262,6 +218,7 @@ struct Search {
     }
 
     void run() {
+        if (question.answered) return apply(question.modes, false);
         if (keeps_suggestion()) return;
         unload(false);
         std::vector<Mode> modes = question.modes;
@@ -293,16 +250,16 @@ struct Search {
         RestEquation& equation = problem.equation;
         if (trusted && (contraction(equation) < 1.0 || !is_searched(equation))) return false;
         VecX x = VecX::Zero(equation.n);
-        bool solved = find(problem, x), one_limit = true;
+        bool solved = find_in_pieces(problem, x), one_limit = true;
         if (!solved && release(problem, equation, std::vector<Mode>(p.frictions.size(), slip_plus))) {
             one_limit = false;  // some stick by one limit and slip by another: the search had not all of these motions
-            solved = find(problem, x);
+            solved = find_in_pieces(problem, x);
         }
-        while (solved && release(problem, equation, modes_of(equation, x))) solved = find(problem, x);
+        while (solved && release(problem, equation, modes_of(w, question, equation, x))) solved = find_in_pieces(problem, x);
         if (trusted && !(proven && solved)) return false;
         if (!solved && proven && one_limit && !found)
             paradox(problem, std::min(0.0, equation.determinant_far_away()), {});
-        if (solved) settle(equation, x, modes_of(equation, x));
+        if (solved) settle(equation, x, modes_of(w, question, equation, x));
         return solved;
     }
 
@@ -328,7 +285,8 @@ void follow_velocity(const Program& p, Workspace& w, int e, ModeQuestion& questi
 ModeQuestion question(const Program& p, Workspace& w, const VecX& v, int also) {
     ModeQuestion asked{w.state.mode, {}, {}};
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
-        if (e != also && !at_rest(p, w, e, v)) {
+        if (is_open(p, w, e)) continue;
+        if (e != also && !at_rest(p, w, e, v) && !w.state.lingers[e]) {
             follow_velocity(p, w, e, asked);
             continue;
         }
@@ -344,6 +302,7 @@ ModeQuestion first_question(const Program& p, Workspace& w, double t, const VecX
     w.state.warm = false;
     update_kinematics(p, w, t, q, v);
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
+        if (is_open(p, w, e)) continue;
         asked.modes[e] = sticking;
         if (hardly_slips(p, w, e, v)) asked.at_rest.push_back(e);
         else follow_velocity(p, w, e, asked);

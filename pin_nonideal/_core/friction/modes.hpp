@@ -4,20 +4,15 @@
 // solved for all elements at once; limits that depend on the load wrap it in an outer iteration.
 #pragma once
 
-#include "dynamics/workspace.hpp"
+#include "friction/beginning.hpp"
 
 namespace pn {
 
 // Slip slower than this part of the scene's speed is rest: rounding of the located event.
 constexpr double rest_speed = 1e-11;
+// Slip up to this part of it may be left where rows that stick are all but redundant: they raise rounding.
+constexpr double raised_rest = 1e-9;
 
-// Modes to be found: those of elements that move are known, the others are at rest along their directions.
-struct ModeQuestion {
-    std::vector<Mode> modes;  // of all elements; what those at rest hold is no matter
-    std::vector<int> at_rest;
-    std::vector<int> breaking;  // of those at rest: stuck until now and has just reached its limit, so that it slips as
-                                // soon as its force is at the limit, though its acceleration is still zero
-};
 // By the slip velocities of the rows evaluated last: elements that stick or have come to rest (`also` among them), and
 // the way the others go.
 ModeQuestion question(const Program& p, Workspace& w, const VecX& v, int also = -1);

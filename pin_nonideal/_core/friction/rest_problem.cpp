@@ -7,6 +7,8 @@
 
 namespace pn {
 
+// Part of the limits that rounding leaves where two pieces of the loads meet.
+constexpr double same_piece = 1e-10;
 // Part of the accelerations in play that is rounding.
 constexpr double no_acceleration = 1e-12;
 
@@ -20,6 +22,7 @@ RestProblem::RestProblem(const Program& program, Workspace& workspace, double ti
     : p(program), w(workspace), t(time), q(q_), v(v_), problem_(program, workspace, joined(resting, slipping)) {
     problem_.clean(p, w);
     without_ = w.now.a;
+    lam_without_ = w.now.lam;
     equation.n = problem_.rows;
     equation.W = problem_.W;
     equation.alpha0 = problem_.slip_accelerations(p, w);
@@ -84,27 +87,52 @@ void RestProblem::collect_loads() {
         }
         return out;
     };
+    const HeldPiece piece(p, w);
+    move(VecX::Zero(equation.n));
     equation.still = collect();
     equation.loads.resize(rows, equation.n);
-    const VecX a = w.now.a, lam = w.now.lam;
-    const double size = a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm() + 1.0;
+    const double size = without_.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm() + 1.0;
     for (size_t i = 0; i < problem_.elements.size(); ++i) {
-        Vec3& force = w.now.slip_force[problem_.elements[i]];
         for (int k = 0; k < equation.elements[i].dim; ++k) {
             const int column = equation.elements[i].row + k;
             const double most = problem_.response.col(column).cwiseAbs().maxCoeff();
             const double unit = most > 0.0 ? size / most : 1.0;  // a motion as large as the one without
-            w.now.a = a + unit * problem_.response.col(column);
-            w.now.lam = lam + unit * problem_.multipliers.col(column);
-            force = Vec3::Zero();
-            force[k] = unit;
+            move(unit * VecX::Unit(equation.n, column));
             equation.loads.col(column) = (collect() - equation.still) / unit;
         }
-        force = Vec3::Zero();
     }
-    w.now.a = a;
-    w.now.lam = lam;
+    move(VecX::Zero(equation.n));
+}
+
+void RestProblem::move(const VecX& x) {
+    w.now.a = without_ + problem_.response * x;
+    w.now.lam = lam_without_ + problem_.multipliers * x;
+    for (size_t i = 0; i < problem_.elements.size(); ++i) {
+        Vec3& force = w.now.slip_force[problem_.elements[i]];
+        force = Vec3::Zero();
+        for (int k = 0; k < equation.elements[i].dim; ++k) force[k] = x[equation.elements[i].row + k];
+    }
     w.now.renew();
+}
+
+bool RestProblem::is_motion(const VecX& x) {
+    if (p.gaps.empty() || equation.loads.rows() == 0) return true;
+    move(x);
+    VecX alpha, limits;
+    equation.respond(x, alpha, limits);
+    double off = 0.0, size = limits.cwiseAbs().maxCoeff();
+    for (size_t i = 0; i < problem_.elements.size(); ++i) {
+        if (equation.elements[i].vectors == 0) continue;
+        const double limit = equation.elements[i].factor * load_limit(p, w, friction(i), t, q, v);
+        off = std::max(off, std::abs(limit - limits[i]));
+        size = std::max(size, limit);
+    }
+    return off <= same_piece * size;
+}
+
+void RestProblem::enter_piece(const VecX& x) {
+    move(x);
+    collect_loads();
 }
 
 void RestProblem::ask(const VecX& x, VecX& alpha, VecX& limits) {

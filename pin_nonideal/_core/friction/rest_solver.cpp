@@ -37,10 +37,11 @@ struct Turns {
             for (int j = 0; j < count; ++j) W(i, j) = e.W(rows[i], rows[j]);
     }
 
-    // The forces that the limits under x allow.
-    VecX next(const VecX& x) {
+    // Under x: forces of those that slip in any case, limits of those that may stick, and what the others leave for them.
+    void ask(const VecX& x, VecX& out, VecX& held, VecX& own) {
         equation.respond(x, alpha, limits);
-        VecX out = x, held(dims.size());
+        out = x;
+        held.resize(dims.size());
         int free = 0;
         for (size_t i = 0; i < equation.elements.size(); ++i) {
             const RestElement& e = equation.elements[i];
@@ -49,11 +50,14 @@ struct Turns {
         }
         VecX before = out;
         for (int r : rows) before[r] = 0.0;
-        const VecX driven = alpha + equation.W * (before - x);  // what the others leave
-        VecX own(rows.size());
-        for (size_t k = 0; k < rows.size(); ++k) own[k] = driven[rows[k]];
-        const VecX forces = friction_program(W, own, dims, held);
-        for (size_t k = 0; k < rows.size(); ++k) out[rows[k]] = forces[k];
+        own = (alpha + equation.W * (before - x))(rows);
+    }
+
+    // The forces that the limits under x allow.
+    VecX next(const VecX& x) {
+        VecX out, held, own;
+        ask(x, out, held, own);
+        out(rows) = friction_program(W, own, dims, held);
         return out;
     }
 
@@ -121,6 +125,15 @@ bool refine_rest(const RestEquation& equation, VecX& x) {
         error = there;
     }
     return error <= rounding;
+}
+
+VecX onset_accelerations(const RestEquation& equation, const VecX& x) {
+    Turns turns(equation);
+    VecX out, held, own;
+    turns.ask(x, out, held, own);
+    VecX accelerations = turns.alpha;
+    accelerations(turns.rows) = onset_accelerations(turns.W, own, turns.dims, held);
+    return accelerations;
 }
 
 bool solve_rest(const RestEquation& equation, VecX& x) {

@@ -11,4 +11,7 @@ bool solve_rest(const RestEquation& equation, VecX& x);
 // Newton's method alone, near a solution.
 bool refine_rest(const RestEquation& equation, VecX& x);
 
+// Slip accelerations a little beyond the load of a solution x, by the limits that it has.
+VecX onset_accelerations(const RestEquation& equation, const VecX& x);
+
 }  // namespace pn

@@ -105,6 +105,10 @@ PN_INLINE Vec3 transpose_times(const Mat3& m, const Vec3& v) { return {m.c[0].do
 PN_INLINE Mat3 transpose_times(const Mat3& a, const Mat3& b) {
     return {transpose_times(a, b.c[0]), transpose_times(a, b.c[1]), transpose_times(a, b.c[2])};
 }
+PN_INLINE Mat3 transposed(const Mat3& m) {
+    return {Vec3(m.c[0][0], m.c[1][0], m.c[2][0]), Vec3(m.c[0][1], m.c[1][1], m.c[2][1]),
+            Vec3(m.c[0][2], m.c[1][2], m.c[2][2])};
+}
 // a b^T
 PN_INLINE Mat3 times_transpose(const Mat3& a, const Mat3& b) {
     Mat3 out;
@@ -120,13 +124,19 @@ struct Motion {
 struct Force {
     Vec3 lin, ang;
     PN_INLINE Force& operator+=(const Force& o) { lin += o.lin; ang += o.ang; return *this; }
+    PN_INLINE Force& operator-=(const Force& o) { lin -= o.lin; ang -= o.ang; return *this; }
 };
 
+PN_INLINE Force operator*(double s, const Force& f) { return {s * f.lin, s * f.ang}; }
 PN_INLINE Motion operator*(double s, const Motion& m) { return {s * m.lin, s * m.ang}; }
 PN_INLINE Motion operator+(const Motion& a, const Motion& b) { return {a.lin + b.lin, a.ang + b.ang}; }
 
 // Power of a force on a motion.
 PN_INLINE double dot(const Motion& m, const Force& f) { return sum(m.lin.x * f.lin.x + m.ang.x * f.ang.x); }
+
+// A motion about a reference point that lies r further, and a force about one that lies r before.
+PN_INLINE Motion further(const Motion& m, const Vec3& r) { return {m.lin + m.ang.cross(r), m.ang}; }
+PN_INLINE Force before(const Force& f, const Vec3& r) { return {f.lin, f.ang + r.cross(f.lin)}; }
 
 // Rate of change of a motion b carried by v, and of a force f carried by v.
 PN_INLINE Motion cross(const Motion& v, const Motion& b) {
@@ -152,5 +162,48 @@ struct Inertia {
         return {mass * m.lin - first.cross(m.ang), second * m.ang + first.cross(m.lin)};
     }
 };
+
+// Inertia of a body and of others that hang on it by joints free to move: its mass depends on the direction.
+struct ArticulatedInertia {
+    Mat3 lin, couple, ang;  // force (lin a + couple w, couple^T a + ang w) for the motion (a, w)
+
+    PN_INLINE ArticulatedInertia& operator+=(const ArticulatedInertia& o) {
+        lin += o.lin;
+        couple += o.couple;
+        ang += o.ang;
+        return *this;
+    }
+    PN_INLINE Force operator*(const Motion& m) const {
+        return {lin * m.lin + couple * m.ang, transpose_times(couple, m.lin) + ang * m.ang};
+    }
+};
+
+PN_INLINE ArticulatedInertia articulated(const Inertia& Y) {
+    const Vec3 &x = Vec3::UnitX(), &y = Vec3::UnitY(), &z = Vec3::UnitZ();
+    return {Mat3(Y.mass * x, Y.mass * y, Y.mass * z), Mat3(x.cross(Y.first), y.cross(Y.first), z.cross(Y.first)),
+            Y.second};
+}
+// Less what a free dof with this gain f takes of it, which stands to the dof's force u as u / D.
+PN_INLINE void release(ArticulatedInertia& P, const Force& u, const Force& gain) {
+    for (int k = 0; k < 3; ++k) {
+        P.lin.c[k] -= gain.lin[k] * u.lin;
+        P.couple.c[k] -= gain.ang[k] * u.lin;
+        P.ang.c[k] -= gain.ang[k] * u.ang;
+    }
+}
+// About a reference point that lies r before.
+PN_INLINE ArticulatedInertia before(const ArticulatedInertia& P, const Vec3& r) {
+    const Vec3 &a = P.lin.c[0], &b = P.lin.c[1], &c = P.lin.c[2];
+    const Mat3 turned(r[2] * b - r[1] * c, r[0] * c - r[2] * a, r[1] * a - r[0] * b);  // lin [r]
+    Mat3 half, ang = P.ang;
+    ArticulatedInertia out{P.lin, P.couple, ang};
+    for (int k = 0; k < 3; ++k) {
+        half.c[k] = r.cross(P.couple.c[k] - 0.5 * turned.c[k]);
+        out.couple.c[k] -= turned.c[k];
+    }
+    const Mat3 other = transposed(half);
+    for (int k = 0; k < 3; ++k) out.ang.c[k] += half.c[k] + other.c[k];
+    return out;
+}
 
 }  // namespace pn

@@ -2,6 +2,7 @@
 // Python before it comes here.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -37,6 +38,33 @@ inline Numbers to_numpy(std::vector<double>&& x) {  // its numbers stay where th
 }
 inline Numbers to_numpy(const double* data, size_t n) { return to_numpy(std::vector<double>(data, data + n)); }
 inline Numbers to_numpy(const VecX& x) { return to_numpy(x.data(), x.size()); }
+
+// The array that a function of the user is called with: the next call brings its numbers in the same one, unless it was
+// kept.
+class HandedArray {
+public:
+    HandedArray() = default;
+    HandedArray(const HandedArray&) {}  // a copy of the function has its own
+    HandedArray& operator=(const HandedArray&) = delete;
+
+    const nb::object& operator()(const double* x, size_t n) {
+        if (data_ == nullptr || n != size_ || Py_REFCNT(array_.ptr()) > 1) {
+            const Numbers fresh = to_numpy(x, n);
+            data_ = fresh.data();
+            size_ = n;
+            array_ = nb::cast(fresh);
+        } else {
+            std::copy(x, x + n, data_);
+        }
+        return array_;
+    }
+    const nb::object& operator()(const VecX& x) { return (*this)(x.data(), static_cast<size_t>(x.size())); }
+
+private:
+    nb::object array_;
+    double* data_ = nullptr;
+    size_t size_ = 0;
+};
 
 inline void read_into(const nb::object& from, VecX& to) {
     const Array a = nb::cast<Array>(from);

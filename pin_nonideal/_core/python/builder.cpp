@@ -1,5 +1,7 @@
 #include "python/builder.hpp"
 
+#include <algorithm>
+
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
@@ -23,9 +25,25 @@ int Builder::add(const std::string& name, Kind kind, Role role) {
     if (role == Role::direction) return index;
     p->blocks[index].user_row = p->user_rows;
     p->user_rows += p->blocks[index].total;
-    p->constraints = index + 1;
-    if (role == Role::contact) p->contacts.push_back(index);
+    p->constraints = p->first_gap = index + 1;
+    if (pressing_row(p->blocks[index].kind) >= 0) p->contacts.push_back(index);
     return index;
+}
+
+void Builder::let_open(double restitution) {
+    p->contacts.pop_back();
+    p->gaps.push_back({p->constraints - 1, restitution, {}, -1});
+    p->first_gap = p->gaps.front().block;
+}
+
+void Builder::order_contacts(const std::vector<int>& blocks) {
+    p->all_contacts = blocks;
+    int row = p->user_rows;
+    for (int block : blocks) row = std::min(row, p->blocks[block].user_row);
+    for (int block : blocks) {
+        p->blocks[block].user_row = row;
+        row += p->blocks[block].total;
+    }
 }
 
 int Builder::add_law(const std::string& name) {
@@ -163,7 +181,8 @@ void bind_enums(nb::module_& m) {
     nb::enum_<Mode>(m, "Mode", nb::is_arithmetic(), "How a frictional element moves: slip one way or the other, or rest.")
         .value("slip_minus", slip_minus)
         .value("sticking", sticking)
-        .value("slip_plus", slip_plus);
+        .value("slip_plus", slip_plus)
+        .value("unloaded", unloaded, "carries no friction: its contact is open, or what asks does so without it");
     nb::enum_<Shown>(m, "Shown", "What a replay shows of a constraint.")
         .value("nothing", Shown::nothing)
         .value("anchor", Shown::anchor)
@@ -173,6 +192,9 @@ void bind_enums(nb::module_& m) {
         .value("edge", Shown::edge)
         .value("drive", Shown::drive)
         .value("gear", Shown::gear);
+    nb::enum_<ImpactLaw>(m, "ImpactLaw", "What restitution means in an impact.")
+        .value("newton", ImpactLaw::newton, "rate at which a gap opens over that at which it closed")
+        .value("poisson", ImpactLaw::poisson, "impulse of expansion over that of compression");
     nb::enum_<Reaction>(m, "Reaction", "Of which motion a law reads the reactions.")
         .value("none", Reaction::none)
         .value("ideal", Reaction::ideal)
@@ -188,6 +210,12 @@ nb::class_<Builder> bind_builder(nb::module_& m) {
         .def("keep_rows", [](Builder& b, int block, std::vector<int> rows) {
             b.p->blocks[block].kept = std::move(rows);
         }, "block"_a, "rows"_a)
+        .def("add_copy", [](Builder& b, int row, int first, double factor) {
+            b.p->copies.push_back({row, first, factor});
+        }, "row"_a, "first"_a, "factor"_a)
+        .def("let_open", &Builder::let_open, "restitution"_a)
+        .def("set_impact", [](Builder& b, ImpactLaw law) { b.p->impact_law = law; }, "law"_a)
+        .def("order_contacts", &Builder::order_contacts, "blocks"_a)
         .def("finish", &Builder::finish);
     bind_friction(builder);
     bind_laws(builder);

@@ -17,6 +17,10 @@ struct Builder {
     // Return the index of the new block or law. Directions of friction follow all constraints.
     int add(const std::string& name, Kind kind, Role role);
     int add_law(const std::string& name);
+    // The contact that was added last may open. Those that may follow all that are kept.
+    void let_open(double restitution);
+    // Rows of contacts in the order of these blocks.
+    void order_contacts(const std::vector<int>& blocks);
     // A program of its own, which nothing that is added later changes.
     std::shared_ptr<const Program> finish() const;
 };

@@ -12,13 +12,7 @@ using namespace nanobind::literals;
 namespace pn {
 
 Numbers ReactionView::lam() const {
-    VecX out = VecX::Zero(p->user_rows);
-    for (int i = 0; i < p->constraints; ++i) {
-        const Block& block = p->blocks[i];
-        for (size_t k = 0; k < block.kept.size(); ++k)
-            out[block.user_row + block.kept[k]] = reactions(*p, *w).lam[block.row + k];
-    }
-    return to_numpy(out);
+    return to_numpy(p->user_multipliers(reactions(*p, *w).lam));
 }
 
 static Numbers six(const Force& f, const Mat3& R) {
@@ -58,25 +52,26 @@ static void read_head(const nb::object& from, VecX& to) {
 
 template <>
 std::function<OfState> user_function(nb::callable f) {
-    return [f](double t, const VecX& q, const VecX& v, VecX& out) {
+    return [f, q_in = HandedArray(), v_in = HandedArray()](double t, const VecX& q, const VecX& v, VecX& out) mutable {
         nb::gil_scoped_acquire gil;
-        read_head(f(t, to_numpy(q), to_numpy(v)), out);
+        read_head(f(t, q_in(q), v_in(v)), out);
     };
 }
 
 template <>
 std::function<OfPosition> user_function(nb::callable f) {
-    return [f](double t, const VecX& q, VecX& out) {
+    return [f, q_in = HandedArray()](double t, const VecX& q, VecX& out) mutable {
         nb::gil_scoped_acquire gil;
-        read_head(f(t, to_numpy(q)), out);
+        read_head(f(t, q_in(q)), out);
     };
 }
 
 template <>
 std::function<Rows> user_function(nb::callable f) {
-    return [f](double t, const VecX& q, const VecX& v, MatX& A, VecX& b) {
+    return [f, q_in = HandedArray(), v_in = HandedArray()](double t, const VecX& q, const VecX& v, MatX& A,
+                                                           VecX& b) mutable {
         nb::gil_scoped_acquire gil;
-        const auto [A_out, b_out] = nb::cast<std::pair<Array2, Array>>(f(t, to_numpy(q), to_numpy(v)));
+        const auto [A_out, b_out] = nb::cast<std::pair<Array2, Array>>(f(t, q_in(q), v_in(v)));
         A = map(A_out);
         b.head(A.rows()) = map(b_out);
     };
@@ -91,23 +86,25 @@ std::function<void(double, double*)> wrench_function(nb::object f) {
 }
 
 decltype(Friction::user_limit) limit_function(nb::object f) {
-    return [f](const Program& p, double t, const VecX& q, const VecX& v, Workspace& w) {
+    return [f, q_in = HandedArray(), v_in = HandedArray()](const Program& p, double t, const VecX& q, const VecX& v,
+                                                           Workspace& w) mutable {
         nb::gil_scoped_acquire gil;
-        return nb::cast<double>(f(t, to_numpy(q), to_numpy(v), ReactionView{&p, &w}));
+        return nb::cast<double>(f(t, q_in(q), v_in(v), ReactionView{&p, &w}));
     };
 }
 
 decltype(UserLaw::function) law_function(nb::object f, int states, bool reads_reactions) {
-    return [f, states, reads_reactions](const Program& p, double t, const VecX& q, const VecX& v, Workspace& w, VecX& C,
-                                        const double* z, double* dz) {
+    return [f, states, reads_reactions, q_in = HandedArray(), v_in = HandedArray(), z_in = HandedArray()](
+               const Program& p, double t, const VecX& q, const VecX& v, Workspace& w, VecX& C, const double* z,
+               double* dz) mutable {
         nb::gil_scoped_acquire gil;
         nb::object view = reads_reactions ? nb::cast(ReactionView{&p, &w}) : nb::none();
         if (states == 0) {
-            read_into(f(t, to_numpy(q), to_numpy(v), view), C);
+            read_into(f(t, q_in(q), v_in(v), view), C);
             return;
         }
         const auto [force, rate] = nb::cast<std::pair<Array, Array>>(
-            f(t, to_numpy(q), to_numpy(v), view, to_numpy(z, states)));
+            f(t, q_in(q), v_in(v), view, z_in(z, states)));
         C = map(force);
         std::copy(rate.data(), rate.data() + states, dz);
     };

@@ -37,12 +37,14 @@ void bind_failures(nb::module_& m) {
         .value("singular_mass", Kind::singular_mass, "elements: the degree of freedom")
         .value("inconsistent", Kind::inconsistent, "elements: blocks of rows; value: residual")
         .value("not_finite", Kind::not_finite)
+        .value("impact_energy", Kind::impact_energy, "elements: blocks of the contacts; value: energy gained")
         .value("paradox", Kind::paradox, "elements: frictional elements; value: determinant")
         .value("not_converged", Kind::not_converged, "elements: frictional elements whose modes were not found")
         .value("closure", Kind::closure, "elements: the block of rows; value: gap")
         .value("step_size", Kind::step_size, "value: number of steps so far, when it would never end")
         .value("stiff", Kind::stiff, "elements: the degree of freedom; value: rate")
         .value("steps", Kind::steps, "value: number of steps, which is all that the run may take")
+        .value("wall", Kind::wall, "value: wall time, which is all that the run may take")
         .value("interrupted", Kind::interrupted);
     core_failure = PyErr_NewException("pin_nonideal._core.CoreFailure", nullptr, nullptr);
     m.attr("CoreFailure") = nb::steal(core_failure).inc_ref();

@@ -4,6 +4,8 @@
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 
 #include "python/options.hpp"
 #include "python/runner.hpp"
@@ -18,6 +20,11 @@ namespace {
 using Tick = Function<void(double)>;                       // with the time
 using Interpolant = nb::typed<nb::callable, Numbers(double)>;  // the state at a time inside a step
 
+Options with_events(Options options, const std::vector<UserEventTuple>& events) {
+    options.events = user_events(events);
+    return options;
+}
+
 // A run with all that it works in.
 struct Followed {
     std::shared_ptr<const Program> p;
@@ -26,8 +33,9 @@ struct Followed {
     Recording out;
     FollowedRun run;
 
-    Followed(std::shared_ptr<const Program> program, Options asked, const Tick& tick)
-        : p(std::move(program)), options(std::move(asked)), w(*p), run(*p, w, options, out) {
+    Followed(std::shared_ptr<const Program> program, const Options& asked, const Tick& tick,
+             const std::vector<UserEventTuple>& events)
+        : p(std::move(program)), options(with_events(asked, events)), w(*p), run(*p, w, options, out) {
         if (tick) options.tick = [tick](double t) { (*tick)(t); };
     }
 
@@ -56,13 +64,14 @@ struct Followed {
 void bind_followed(nb::module_& m) {
     constexpr auto own = nb::rv_policy::automatic;
     nb::class_<Followed>(m, "FollowedRun")
-        .def(nb::init<std::shared_ptr<const Program>, Options, const Tick&>(), "program"_a, "options"_a,
-             "tick"_a = nb::none())
+        .def(nb::init<std::shared_ptr<const Program>, const Options&, const Tick&, const std::vector<UserEventTuple>&>(),
+             "program"_a, "options"_a, "tick"_a = nb::none(), "events"_a = std::vector<UserEventTuple>())
         .def("start", [](Followed& f, const Array& q, const Array& v) { f.run.start(map(q), map(v)); }, "q"_a, "v"_a)
         .def("derivative", &Followed::derivative, "t"_a, "y"_a)
         .def("jacobian", &Followed::jacobian, "t"_a, "y"_a)
         .def("follow", &Followed::follow, "t"_a, "interpolant"_a)
         .def_prop_ro("t", [](const Followed& f) { return f.run.time(); })
+        .def_prop_ro("done", [](const Followed& f) { return f.run.done(); })
         .def_prop_ro("y", [](const Followed& f) { return to_numpy(f.run.state()); }, own)
         .def_prop_ro("rate", [](const Followed& f) { return to_numpy(f.run.state_rate()); }, own)
         .def("outcome", [](Followed& f) { return Outcome{f.w.counters, std::move(f.out)}; });

@@ -5,13 +5,16 @@
 #include <nanobind/stl/vector.h>
 
 #include "friction/cone_program.hpp"
+#include "python/batch.hpp"
 #include "python/builder.hpp"
 #include "python/callbacks.hpp"
+#include "python/cones.hpp"
 #include "python/constraints.hpp"
 #include "python/failures.hpp"
 #include "python/followed.hpp"
 #include "python/program.hpp"
 #include "python/runs.hpp"
+#include "python/stepped.hpp"
 #include "run/checkpoint.hpp"
 
 using namespace pn;
@@ -27,8 +30,11 @@ NB_MODULE(_core, m) {
     bind_constraints(m, builder);
     nb::class_<Runner> runner = bind_runner(m);
     bind_runs(m, runner);
+    bind_batch(m);
     bind_followed(m);
+    bind_stepped(m);
     bind_program(m);
+    bind_cones(m);
 
     // The friction program on arrays, for tests against enumeration.
     m.def("friction_program", [](const Array2& W, const Array& alpha0, const std::vector<int>& dims,

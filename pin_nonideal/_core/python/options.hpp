@@ -6,6 +6,18 @@
 #include "python/arrays.hpp"
 #include "run/simulation.hpp"
 
+namespace pn {
+
+// A function of the user t, q, v -> number, the direction in which it counts, and how many of it end the run.
+using OfInstant = nb::typed<nb::callable, double(double, Numbers, Numbers)>;
+using UserEventTuple = std::tuple<OfInstant, int, long>;
+std::vector<UserEvent> user_events(const std::vector<UserEventTuple>& given);
+// Called between steps with t, q, v -> True to stop, torques, or None.
+using Callback = Function<nb::object(double, Numbers, Numbers)>;
+decltype(Options::callback) user_callback(const Callback& given);
+
+}  // namespace pn
+
 namespace nanobind::detail {
 
 // The one place that reads Python's RunOptions.
@@ -23,11 +35,13 @@ struct type_caster<pn::Options> {
             value.rtol = number("rtol");
             value.dt = number("dt");
             value.output_dt = number("output_dt");
+            value.max_wall = number("max_wall");
             value.max_steps = nanobind::cast<long>(from.attr("max_steps"));
             pn::read_into(from.attr("atol"), value.atol);
             value.record = {wanted("a"), wanted("forces"), wanted("energy"), wanted("power"),
-                            wanted("laws"), wanted("reactions")};
+                            wanted("laws"), wanted("reactions"), wanted("tau"), wanted("dense")};
             value.continues = nanobind::cast<std::string>(from.attr("several")) == "continue";
+            value.strict = wanted("strict");
             return true;
         } catch (const std::exception&) {
             return false;

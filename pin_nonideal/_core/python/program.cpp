@@ -16,6 +16,9 @@ void bind_program(nb::module_& m) {
         .def_prop_ro("constraints", &constraint_rows)
         .def_prop_ro("rows", [](const Program& p) { return p.user_rows; })
         .def_prop_ro("states", [](const Program& p) { return p.states; })
+        .def_prop_ro("framed_contacts", &framed_contacts)
+        .def_prop_ro("contacts", [](const Program& p) { return p.all_contacts; })
+        .def_prop_ro("first_gap", [](const Program& p) { return p.first_gap; })
         .def_prop_ro("law_names", [](const Program& p) { return p.law_names; })
         .def_prop_ro("power_names", &power_names)
         .def_prop_ro("law_supports", &law_supports)
@@ -24,6 +27,11 @@ void bind_program(nb::module_& m) {
             std::vector<int> laws;
             for (const Friction& f : p.frictions) laws.push_back(f.law);
             return laws;
+        })
+        .def_prop_ro("element_sizes", [](const Program& p) {
+            std::vector<int> sizes;
+            for (const Friction& f : p.frictions) sizes.push_back(f.dim);
+            return sizes;
         })
         .def_prop_ro("element_names", [](const Program& p) {
             std::vector<std::string> names;

@@ -7,54 +7,24 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include "contact/closing.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/slip.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/modes.hpp"
+#include "python/buffers.hpp"
+#include "python/cleared.hpp"
+#include "tree/factor.hpp"
 #include "tree/liegroup.hpp"
 
 using namespace nanobind::literals;
 
 namespace pn {
 
-namespace {
-
-constexpr double unit_tolerance = 1e-6;  // of quaternions and (cos, sin) pairs, as at Python's door
-
-// A contiguous buffer of doubles, without the detour over an array object.
-class Buffer {
-public:
-    Buffer(nb::handle object, int flags) {
-        if (PyObject_GetBuffer(object.ptr(), &view_, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | flags) != 0) {
-            PyErr_Clear();
-            throw std::invalid_argument("expected a contiguous array of floats");
-        }
-    }
-    ~Buffer() { PyBuffer_Release(&view_); }
-    Buffer(const Buffer&) = delete;
-    Buffer& operator=(const Buffer&) = delete;
-    void check(Eigen::Index n) const {
-        if (view_.ndim != 1 || view_.shape[0] != n || view_.format == nullptr || view_.format[0] != 'd')
-            throw std::invalid_argument("expected an array of floats of the model's size");
-    }
-    double* data() const { return static_cast<double*>(view_.buf); }
-
-private:
-    Py_buffer view_;
-};
-
-void read_buffer(nb::handle from, VecX& to) {
-    const Buffer buffer(from, 0);
-    buffer.check(to.size());
-    to = Eigen::Map<const VecX>(buffer.data(), to.size());
-    if (!to.allFinite()) throw std::invalid_argument("expected finite numbers");
-}
-
-}  // namespace
-
 Runner::Runner(std::shared_ptr<const Program> program)
-    : p(std::move(program)), w(std::make_unique<Workspace>(*p)), q(p->mechanism.nq), v(p->mechanism.nv) {}
+    : p(std::move(program)), w(std::make_unique<Workspace>(*p)), first(w->state), q(p->mechanism.nq),
+      v(p->mechanism.nv) {}
 
 void Runner::set(const Array& q_in, const Array& v_in, const std::optional<Array>& tau) {
     const Mechanism& m = p->mechanism;
@@ -70,8 +40,28 @@ void Runner::set(const Array& q_in, const Array& v_in, const std::optional<Array
 }
 
 void Runner::choose_modes(double t, const std::optional<std::vector<Mode>>& modes) {
-    if (!modes) return resolve_modes(*p, *w, t, q, v, first_question(*p, *w, t, q, v));
-    first_question(*p, *w, t, q, v);  // which way what slips goes
+    if (!p->gaps.empty()) return choose_contacts(t, modes);
+    choose_friction(t, modes, nullptr);
+}
+
+// Contacts that touch and do not leave are closed, as far as their loads press; modes given are those of all elements.
+void Runner::choose_contacts(double t, const std::optional<std::vector<Mode>>& modes) {
+    set_closed(*p, *w, std::vector<char>(p->gaps.size(), 0));
+    ClosingQuestion question;
+    question.rest = touching_contacts(*p, *w, t, q, v, starting_width * scene_size(*p, *w)).rest;
+    question.struck = true;
+    close_contacts(*p, *w, t, q, v, question, [&](const RestingMotion* together) {
+        update_kinematics(*p, *w, t, q, v);
+        choose_friction(t, modes, together);
+    });
+}
+
+void Runner::choose_friction(double t, const std::optional<std::vector<Mode>>& modes, const RestingMotion* together) {
+    ModeQuestion asked = first_question(*p, *w, t, q, v);  // which way what slips goes, too
+    if (!modes) {
+        if (together) together->answer(*p, *w, asked);
+        return resolve_modes(*p, *w, t, q, v, asked);
+    }
     set_modes(*p, *w, *modes);
     w->state.warm = false;
     begin_step(*p, *w, t, q, v);
@@ -85,9 +75,9 @@ void Runner::acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle
     if (!std::isfinite(t)) throw std::invalid_argument("expected a finite time");
     w->now.has_override = !tau.is_none();
     if (w->now.has_override) read_buffer(tau, w->now.override_torque);
-    if (p->frictions.empty()) begin_step(*p, *w, t, q, v);
+    if (p->frictions.empty() && p->gaps.empty()) begin_step(*p, *w, t, q, v);
     else choose_modes(t, {});
-    const Buffer target(out, PyBUF_WRITABLE);
+    const NumberBuffer target(out, PyBUF_WRITABLE);
     target.check(w->now.a.size());
     std::copy(w->now.a.data(), w->now.a.data() + w->now.a.size(), target.data());
 }
@@ -103,11 +93,13 @@ Instant Runner::solve(const Array& q_in, const Array& v_in, double t, const std:
         const Mode mode = w->state.mode[e];
         Vec3 f = friction_force(*p, *w, element);
         out.friction.push_back(to_numpy(&f[0], p->frictions[e].dim));
-        out.limits.push_back(mode == sticking ? static_limit(*p, *w, element, t, q, v) : w->now.limit[e]);
+        out.limits.push_back(mode == sticking   ? static_limit(*p, *w, element, t, q, v)
+                             : mode == unloaded ? 0.0 : w->now.limit[e]);
         out.modes.push_back(mode);
     }
     Split split;
     split_forces(*p, *w, split);
+    append_closed(*p, *w, out.closed);
     out.a = to_numpy(w->now.a);
     out.F_ideal = to_numpy(split.F_ideal);
     out.F_nonideal = to_numpy(split.F_nonideal);
@@ -132,24 +124,46 @@ std::tuple<Numbers, Numbers, Numbers, Numbers> Runner::rows(const Array& q_in, c
     set(q_in, v_in, {});
     kinematics(p->mechanism, w->now.terms, q, v);
     evaluate_rows(*p, *w, t, v);
-    const int nv = p->mechanism.nv;
-    std::vector<double> A(static_cast<size_t>(p->user_rows) * nv, 0.0), b, phi, rate;
+    for (int i = 0; i < static_cast<int>(p->gaps.size()); ++i) evaluate_gap(*p, *w, t, v, i);
+    const Mechanism& m = p->mechanism;
+    const int nv = m.nv;
+    std::vector<double> A(static_cast<size_t>(p->user_rows) * nv, 0.0), b(p->user_rows), phi = b, rate = b;
     for (int i = 0; i < p->constraints; ++i) {
         Block all = p->blocks[i];
         all.kept.clear();
         for (int k = 0; k < all.total; ++k) all.kept.push_back(k);
         const RowValues& values = w->now.values[i];
         std::vector<double> local(all.support.size() * all.total);
-        fill_A(all, w->now.terms, values, local.data());
+        fill_A(all, m, w->now.terms, values, local.data());
         for (int k = 0; k < all.total; ++k) {
+            const int row = all.user_row + k;
             for (size_t l = 0; l < all.support.size(); ++l)
-                A[static_cast<size_t>(all.user_row + k) * nv + all.support[l]] = local[l * all.total + k];
-            b.push_back(-values.drift[k]);
-            phi.push_back(values.residual[k]);
-            rate.push_back(values.rate[k]);
+                A[static_cast<size_t>(row) * nv + all.support[l]] = local[l * all.total + k];
+            b[row] = -values.drift[k];
+            phi[row] = values.residual[k];
+            rate[row] = values.rate[k];
         }
     }
     return {to_numpy(std::move(A)), to_numpy(std::move(b)), to_numpy(std::move(phi)), to_numpy(std::move(rate))};
+}
+
+Numbers Runner::slip_rows(const Array& q_in, const Array& v_in, double t) {
+    set(q_in, v_in, {});
+    kinematics(p->mechanism, w->now.terms, q, v);
+    evaluate_rows(*p, *w, t, v);
+    const int nv = p->mechanism.nv;
+    std::vector<double> rows;
+    for (const Friction& f : p->frictions) {
+        const Block& block = p->blocks[f.block];
+        std::vector<double> local(block.support.size() * f.dim);
+        fill_A(block, p->mechanism, w->now.terms, w->now.values[f.block], local.data());
+        for (int k = 0; k < f.dim; ++k) {
+            rows.resize(rows.size() + nv, 0.0);
+            for (size_t l = 0; l < block.support.size(); ++l)
+                rows[rows.size() - nv + block.support[l]] = local[l * f.dim + k];
+        }
+    }
+    return to_numpy(std::move(rows));
 }
 
 std::pair<Numbers, Numbers> Runner::terms(const Array& q_in, const Array& v_in) {
@@ -158,10 +172,21 @@ std::pair<Numbers, Numbers> Runner::terms(const Array& q_in, const Array& v_in) 
     inertia(p->mechanism, w->now.terms);
     const Mechanism& m = p->mechanism;
     std::vector<double> M(static_cast<size_t>(m.nv) * m.nv, 0.0);
-    for (int k = 0; k < m.nv; ++k)
-        for (int i = k, s = 0; i >= 0; i = m.dof_parent[i], ++s)
-            M[k * m.nv + i] = M[i * m.nv + k] = w->now.terms.M[m.row_offset[k] + s];
+    VecX unit = VecX::Zero(m.nv), column = unit;
+    for (int k = 0; k < m.nv; ++k) {
+        unit[k] = 1.0;
+        multiply_M(m, w->now.terms, unit, column);
+        std::copy(column.data(), column.data() + m.nv, M.begin() + static_cast<size_t>(k) * m.nv);
+        unit[k] = 0.0;
+    }
     return {to_numpy(std::move(M)), to_numpy(w->now.terms.nle)};
+}
+
+std::pair<double, double> Runner::energies(const Array& q_in, const Array& v_in) {
+    set(q_in, v_in, {});
+    kinematics(p->mechanism, w->now.terms, q, v);
+    inertia(p->mechanism, w->now.terms);
+    return {kinetic_energy(p->mechanism, w->now.terms, v), potential_energy(p->mechanism, w->now.terms)};
 }
 
 std::tuple<Numbers, Numbers, double, double, double> Runner::project(const Array& q_in, const Array& v_in, double t,
@@ -173,8 +198,7 @@ std::tuple<Numbers, Numbers, double, double, double> Runner::project(const Array
 
 Outcome Runner::simulate(const Array& q_in, const Array& v_in, const Options& options) {
     const VecX q0 = map(q_in), v0 = map(v_in);
-    w->state.z = VecX::Zero(p->states);
-    w->now.has_override = false;
+    clear(*p, *w, first);
     Recording recording;
     {
         nb::gil_scoped_release release;
@@ -214,6 +238,7 @@ nb::class_<Runner> bind_runner(nb::module_& m) {
         .def_ro("lam_ideal", &Instant::lam_ideal, own)
         .def_ro("rank", &Instant::rank)
         .def_ro("modes", &Instant::modes)
+        .def_ro("closed", &Instant::closed)
         .def_ro("friction", &Instant::friction, own)
         .def_ro("limits", &Instant::limits)
         .def_ro("unique", &Instant::unique);
@@ -222,7 +247,9 @@ nb::class_<Runner> bind_runner(nb::module_& m) {
         .def("acceleration", &Runner::acceleration, "q"_a, "v"_a, "t"_a, "tau"_a.none(), "out"_a)
         .def("solve", &Runner::solve, "q"_a, "v"_a, "t"_a = 0.0, "tau"_a = nb::none(), "modes"_a = nb::none())
         .def("rows", &Runner::rows, "q"_a, "v"_a, "t"_a)
+        .def("slip_rows", &Runner::slip_rows, "q"_a, "v"_a, "t"_a)
         .def("terms", &Runner::terms, "q"_a, "v"_a)
+        .def("energies", &Runner::energies, "q"_a, "v"_a)
         .def("project", &Runner::project, "q"_a, "v"_a, "t"_a, "far"_a)
         .def("time_evaluations", &Runner::time_evaluations, "q"_a, "v"_a, "t"_a, "count"_a)
         .def_prop_ro("rank", &Runner::constraint_rank)

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "contact/resting.hpp"
 #include "python/arrays.hpp"
 #include "run/simulation.hpp"
 
@@ -17,6 +18,7 @@ struct Instant {
     Numbers a, F_ideal, F_nonideal, C, F, lam, lam_ideal;
     int rank;
     std::vector<Mode> modes;
+    std::vector<std::int8_t> closed;  // of each contact
     std::vector<Numbers> friction;  // force of each element along its directions
     std::vector<double> limits;
     std::optional<bool> unique;  // nothing: not shown
@@ -32,6 +34,7 @@ struct Outcome {
 struct Runner {
     std::shared_ptr<const Program> p;
     std::unique_ptr<Workspace> w;
+    RunState first;  // of a new workspace
     VecX q, v;
 
     explicit Runner(std::shared_ptr<const Program> program);
@@ -43,8 +46,12 @@ struct Runner {
     int constraint_rank() const;
     // All rows of all constraints, dropped ones too: A (by rows), b, residual, rate.
     std::tuple<Numbers, Numbers, Numbers, Numbers> rows(const Array& q_in, const Array& v_in, double t);
+    // Directions along which frictional elements slip: rows of all, whose rates are slip velocities.
+    Numbers slip_rows(const Array& q_in, const Array& v_in, double t);
     // M (dense, by rows) and the bias forces.
     std::pair<Numbers, Numbers> terms(const Array& q_in, const Array& v_in);
+    // Kinetic energy, and potential energy in gravity [J].
+    std::pair<double, double> energies(const Array& q_in, const Array& v_in);
     // q and v on the constraints, and the largest residual before (beyond `far` nothing moves), residual and rate
     // after.
     std::tuple<Numbers, Numbers, double, double, double> project(const Array& q_in, const Array& v_in, double t,
@@ -59,6 +66,8 @@ private:
     void set(const Array& q_in, const Array& v_in, const std::optional<Array>& tau);
     // Modes by velocity, and at rest by the complementarity problem; or the ones given.
     void choose_modes(double t, const std::optional<std::vector<Mode>>& modes);
+    void choose_contacts(double t, const std::optional<std::vector<Mode>>& modes);
+    void choose_friction(double t, const std::optional<std::vector<Mode>>& modes, const RestingMotion* together);
 };
 
 nb::class_<Runner> bind_runner(nb::module_& m);

@@ -1,14 +1,10 @@
 #include "python/runs.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <condition_variable>
-#include <mutex>
-#include <system_error>
-#include <thread>
 
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -16,6 +12,9 @@
 #include "dynamics/projection.hpp"
 #include "python/failures.hpp"
 #include "python/options.hpp"
+#include "python/run_programs.hpp"
+#include "python/share_out.hpp"
+#include "run/inside_samples.hpp"
 
 using namespace nanobind::literals;
 
@@ -25,6 +24,7 @@ namespace {
 
 using Tick = Function<void(double)>;     // with the time
 using Save = Function<void(nb::bytes)>;  // with the state of a checkpoint
+using Hint = Function<void(double, int, double, bool)>;  // at steps that follow a fast motion
 
 // Now and then between two steps: Python's signals, and progress.
 void watch(Options& o, const Tick& tick) {
@@ -47,6 +47,36 @@ void keep(Options& o, const Save& save, double interval) {
     o.save_interval = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(interval));
 }
 
+void tell(Options& o, const Hint& hint) {
+    if (!hint) return;
+    o.hint = [hint](double t, int dof, double rate, bool decays) {
+        nb::gil_scoped_acquire gil;
+        (*hint)(t, dof, rate, decays);
+    };
+}
+
+// Samples inside steps of a run with record "dense": states there, and what each of their steps held.
+Outcome samples_inside(const Program& p, const Options& options, const Array& t, const Array2& y, const Array2& modes,
+                      const Array2& directions, const Array2& torque, const Array& moved) {
+    InsideStates inside;
+    inside.t.assign(t.data(), t.data() + t.shape(0));
+    inside.moved.assign(moved.data(), moved.data() + moved.shape(0));
+    const size_t elements = p.frictions.size();
+    for (size_t k = 0; k < t.shape(0); ++k) {
+        inside.y.emplace_back(map(y).row(k));
+        inside.directions.emplace_back(map(directions).row(k));
+        if (torque.shape(0) > 0) inside.torque.emplace_back(map(torque).row(k));
+        std::vector<Mode> held(elements);
+        for (size_t e = 0; e < elements; ++e) held[e] = static_cast<Mode>(static_cast<int>(map(modes)(k, e)));
+        inside.modes.push_back(std::move(held));
+    }
+    Workspace w(p);
+    w.continues = options.continues;
+    Recording out;
+    sample_inside(p, w, inside, options.record, out);
+    return {w.counters, std::move(out)};
+}
+
 // What stopped a run: a failure of the core, what a function of the user raised, or None.
 nb::object stopped(const Outcome& outcome) {
     const Recording& r = outcome.recording;
@@ -62,87 +92,67 @@ nb::object stopped(const Outcome& outcome) {
 }
 
 // Recorded numbers as an array that keeps their run alive; empty when they were not recorded.
+template <class Number>
+auto shown(std::vector<Number>& numbers, nb::handle run) {
+    numbers.reserve(1);  // an array has an address, one without numbers too
+    return nb::ndarray<nb::numpy, Number, nb::ndim<1>>(numbers.data(), {numbers.size()}, run);
+}
 template <auto field>
 auto recorded(nb::handle_t<Outcome> run) {
-    auto& numbers = nb::cast<Outcome&>(run).recording.*field;
-    numbers.reserve(1);  // an array has an address, one without numbers too
-    using Number = typename std::decay_t<decltype(numbers)>::value_type;
-    return nb::ndarray<nb::numpy, Number, nb::ndim<1>>(numbers.data(), {numbers.size()}, run);
+    return shown(nb::cast<Outcome&>(run).recording.*field, run);
+}
+template <auto field>
+auto dense(nb::handle_t<Outcome> run) {
+    return shown(nb::cast<Outcome&>(run).recording.dense.*field, run);
 }
 
 }  // namespace
 
-static int useful_threads(size_t count, int threads) { return static_cast<int>(std::min<size_t>(threads, count)); }
-
-// Calls work(i, k) for every i below `count`, drawn from one counter by threads k; number 0 is the caller's. What one of
-// them throws, a signal of Python's among it, stops the drawing and is thrown at the end.
-template <class Work>
-static void share_out(size_t count, int threads, std::atomic<bool>& stopped, Work work) {
-    nb::gil_scoped_release release;
-    std::atomic<size_t> next{0};
-    std::mutex mutex;
-    std::condition_variable ended;
-    int running = 0;
-    std::exception_ptr error;
-    const auto keep = [&](const std::exception_ptr& thrown) {
-        const std::lock_guard<std::mutex> guard(mutex);
-        if (!error) error = thrown;
-        stopped = true;
-    };
-    const auto draw = [&](int k) {
-        try {
-            for (size_t i = next++; i < count && !stopped; i = next++) work(i, k);
-        } catch (...) {
-            keep(std::current_exception());
-        }
-    };
-    const auto follow = [&](int k) {
-        draw(k);
-        const std::lock_guard<std::mutex> guard(mutex);
-        --running;
-        ended.notify_one();
-    };
-    const int useful = useful_threads(count, threads);
-    std::vector<std::thread> pool;
-    pool.reserve(useful);
-    for (int k = 1; k < useful; ++k) {
-        std::unique_lock<std::mutex> guard(mutex);
-        try {
-            pool.emplace_back(follow, k);
-        } catch (const std::system_error&) {
-            break;  // fewer threads do the same work
-        }
-        ++running;
-    }
-    draw(0);
-    std::unique_lock<std::mutex> guard(mutex);
-    while (!ended.wait_for(guard, std::chrono::milliseconds(50), [&] { return running == 0; })) {
-        guard.unlock();
-        {
+std::vector<UserEvent> user_events(const std::vector<UserEventTuple>& given) {
+    std::vector<UserEvent> events;
+    for (const auto& [function, direction, terminal] : given) {
+        const auto call = [f = function, q_in = HandedArray(), v_in = HandedArray()](double t, const VecX& q,
+                                                                                     const VecX& v) mutable {
             nb::gil_scoped_acquire gil;
-            if (PyErr_CheckSignals() != 0) keep(std::make_exception_ptr(nb::python_error()));
-        }
-        guard.lock();
+            return nb::cast<double>(f(t, q_in(q), v_in(v)));
+        };
+        events.push_back({call, direction, terminal});
     }
-    guard.unlock();
-    for (std::thread& thread : pool) thread.join();
-    if (error) std::rethrow_exception(error);
+    return events;
+}
+
+decltype(Options::callback) user_callback(const Callback& given) {
+    if (!given) return {};
+    return [f = *given, q_in = HandedArray(), v_in = HandedArray()](double t, const VecX& q, const VecX& v,
+                                                                    VecX& torque) mutable {
+        nb::gil_scoped_acquire gil;
+        const nb::object told = f(t, q_in(q), v_in(v));
+        if (told.is_none()) return Options::Told::go_on;
+        if (told.is(Py_True)) return Options::Told::stop;
+        read_into(told, torque);
+        return Options::Told::torque;
+    };
 }
 
 // q and v of many states on the constraints, by rows, and the largest residual and rate of each afterwards: NaN where
 // the state could not be taken. On several threads, each state as by Runner::project.
 static std::tuple<Numbers, Numbers, Numbers, Numbers> nearest_states(const Program& p, const Array2& q_in,
                                                                      const Array2& v_in, double t, double far,
-                                                                     int threads) {
+                                                                     int threads, const std::vector<NumberTuple>& names,
+                                                                     const Array2& values) {
     RowMajor q = map(q_in), v = map(v_in);
     VecX after = VecX::Constant(q.rows(), NAN), rate = after;
-    std::vector<std::unique_ptr<Workspace>> spaces(useful_threads(q.rows(), threads));
+    const int useful = useful_threads(q.rows(), threads);
+    RunPrograms programs(p, names, values, useful);
+    std::vector<std::unique_ptr<Workspace>> spaces(useful);
     std::atomic<bool> stopped{false};
     share_out(q.rows(), threads, stopped, [&](size_t i, int k) {
-        if (!spaces[k]) spaces[k] = std::make_unique<Workspace>(p);
+        const Program& mine = programs.of(i, k);
+        // A workspace knows the terms of its configuration, which other numbers change.
+        if (!spaces[k] || !names.empty()) spaces[k] = std::make_unique<Workspace>(mine);
         VecX q_one = q.row(i), v_one = v.row(i);
         try {
-            const Closure found = close(p, *spaces[k], t, q_one, v_one, far);
+            const Closure found = close(mine, *spaces[k], t, q_one, v_one, far);
             after[i] = found.after;
             rate[i] = found.rate;
             q.row(i) = q_one;
@@ -152,6 +162,12 @@ static std::tuple<Numbers, Numbers, Numbers, Numbers> nearest_states(const Progr
         }
     });
     return {to_numpy(q.data(), q.size()), to_numpy(v.data(), v.size()), to_numpy(after), to_numpy(rate)};
+}
+
+// A program with the numbers of one run.
+static std::shared_ptr<const Program> with_numbers(const Program& p, const std::vector<NumberTuple>& names,
+                                                   const Array2& values) {
+    return std::make_shared<Program>(RunPrograms(p, names, values, 1).of(0, 0));
 }
 
 static bool is_interrupt(const std::exception_ptr& error) {
@@ -169,8 +185,10 @@ static bool is_interrupt(const std::exception_ptr& error) {
 // Outcomes of runs from many states, on several threads, each with a workspace of its own. Where one is interrupted
 // all stop, and those not begun are None.
 static nb::typed<nb::list, std::optional<Outcome>> rollout(const Program& p, const Array2& q, const Array2& v,
-                                                           Options options, int threads) {
+                                                           Options options, int threads,
+                                                           const std::vector<NumberTuple>& names, const Array2& values) {
     const size_t count = q.shape(0);
+    RunPrograms programs(p, names, values, useful_threads(count, threads));
     std::vector<std::optional<Outcome>> outcomes(count);
     std::atomic<bool> stopped{false};
     const auto stop = [&stopped](double t) {
@@ -186,9 +204,10 @@ static nb::typed<nb::list, std::optional<Outcome>> rollout(const Program& p, con
     const auto q_all = map(q), v_all = map(v);
     try {
         share_out(count, threads, stopped, [&](size_t i, int k) {
-            Workspace space(p);
+            const Program& program = programs.of(i, k);
+            Workspace space(program);
             Recording mine;  // neighbors in one array would share lines of cache between the threads
-            simulate(p, space, q_all.row(i), v_all.row(i), k == 0 ? own : options, mine);
+            simulate(program, space, q_all.row(i), v_all.row(i), k == 0 ? own : options, mine);
             if (is_interrupt(mine.error)) stopped = true;
             outcomes[i] = Outcome{space.counters, std::move(mine)};
         });
@@ -211,7 +230,13 @@ static void bind_outcome(nb::module_& m) {
     nb::class_<Event>(m, "Event")
         .def_ro("time", &Event::time)
         .def_ro("kind", &Event::kind)
-        .def_ro("element", &Event::element);
+        .def_ro("element", &Event::element)
+        .def_ro("energy_change", &Event::energy_change)
+        .def_prop_ro("impulse", [](const Event& e) { return to_numpy(VecX(e.impulse.eigen())); },
+                     nb::rv_policy::automatic)
+        .def_prop_ro("v_minus", [](const Event& e) { return to_numpy(e.v_minus); }, nb::rv_policy::automatic)
+        .def_prop_ro("v_plus", [](const Event& e) { return to_numpy(e.v_plus); }, nb::rv_policy::automatic)
+        .def_prop_ro("of_contact", [](const Event& e) { return Event::of_contact(e.kind); });
     nb::class_<Outcome>(m, "Outcome")
         .def_prop_ro("t", recorded<&R::t>)
         .def_prop_ro("q", recorded<&R::q>)
@@ -224,6 +249,7 @@ static void bind_outcome(nb::module_& m) {
             return largest;
         })
         .def_prop_ro("a", recorded<&R::a>)
+        .def_prop_ro("tau", recorded<&R::tau>)
         .def_prop_ro("F_ideal", recorded<&R::F_ideal>)
         .def_prop_ro("F_nonideal", recorded<&R::F_nonideal>)
         .def_prop_ro("lam", recorded<&R::lam>)
@@ -234,14 +260,27 @@ static void bind_outcome(nb::module_& m) {
         .def_prop_ro("law_forces", recorded<&R::law_forces>)
         .def_prop_ro("limits", recorded<&R::limits>)
         .def_prop_ro("reactions", recorded<&R::reactions>)
+        .def_prop_ro("contact_forces", recorded<&R::contact_forces>)
         .def_prop_ro("modes", recorded<&R::modes>)
+        .def_prop_ro("dense_times", dense<&DenseOutput::times>)
+        .def_prop_ro("dense_states", dense<&DenseOutput::states>)
+        .def_prop_ro("dense_modes", dense<&DenseOutput::modes>)
+        .def_prop_ro("dense_directions", dense<&DenseOutput::directions>)
+        .def_prop_ro("dense_torque", dense<&DenseOutput::torque>)
+        .def_prop_ro("dense_moved", dense<&DenseOutput::moved>)
+        .def_prop_ro("closed", recorded<&R::closed>)
         .def_prop_ro("events", [](const Outcome& o) { return o.recording.events; })
         .def_prop_ro("steps", [](const Outcome& o) { return o.recording.steps; })
         .def_prop_ro("rejected", [](const Outcome& o) { return o.recording.rejected; })
+        .def_prop_ro("limited", [](const Outcome& o) { return o.recording.limited; })
+        .def_prop_ro("rounding", [](const Outcome& o) { return o.recording.rounding; })
         .def_prop_ro("evaluations", [](const Outcome& o) { return o.counters.evaluations; })
         .def_prop_ro("factorizations", [](const Outcome& o) { return o.counters.factorizations; })
         .def_prop_ro("projections", [](const Outcome& o) { return o.counters.projections; })
         .def_prop_ro("iterations", [](const Outcome& o) { return o.counters.iterations; })
+        .def_prop_ro("contact_misses", [](const Outcome& o) {
+            return std::make_tuple(o.counters.signorini, o.counters.coulomb, o.counters.dissipation);
+        })
         .def_prop_ro("stopped", stopped, nb::for_getter(nb::sig("def stopped(self) -> BaseException | None")));
 }
 
@@ -255,19 +294,30 @@ void bind_runs(nb::module_& m, nb::class_<Runner>& runner) {
     bind_outcome(m);
     runner
         .def("simulate", [](Runner& r, const Array& q, const Array& v, Options options, const Tick& tick,
-                            const Save& save, double save_interval) {
+                            const Save& save, double save_interval, const std::vector<UserEventTuple>& events,
+                            const Callback& callback, const Hint& hint) {
             watch(options, tick);
+            tell(options, hint);
             keep(options, save, save_interval);
+            options.events = user_events(events);
+            options.callback = user_callback(callback);
             return r.simulate(q, v, options);
-        }, "q"_a, "v"_a, "options"_a, "tick"_a = nb::none(), "save"_a = nb::none(), "save_interval"_a = 0.0)
+        }, "q"_a, "v"_a, "options"_a, "tick"_a = nb::none(), "save"_a = nb::none(), "save_interval"_a = 0.0,
+           "events"_a = std::vector<UserEventTuple>(), "callback"_a = nb::none(), "hint"_a = nb::none())
         .def("resume", [](Runner& r, const nb::bytes& state, Options options, const Tick& tick, const Save& save,
                           double save_interval) {
             watch(options, tick);
             keep(options, save, save_interval);
             return r.resume(state, options);
         }, "state"_a, "options"_a, "tick"_a = nb::none(), "save"_a = nb::none(), "save_interval"_a = 0.0);
-    m.def("nearest_states", &nearest_states, "program"_a, "q"_a, "v"_a, "t"_a, "far"_a, "threads"_a);
-    m.def("rollout", &rollout, "program"_a, "q"_a, "v"_a, "options"_a, "threads"_a);
+    m.def("nearest_states", &nearest_states, "program"_a, "q"_a, "v"_a, "t"_a, "far"_a, "threads"_a,
+          "names"_a, "values"_a);
+    m.def("dense_points", [](const std::string& method) { return DenseRecorder::points(method_named(method)); }, "method"_a);
+    m.def("sample_inside", &samples_inside, "program"_a, "options"_a, "t"_a, "y"_a, "modes"_a, "directions"_a, "torque"_a,
+          "moved"_a);
+    m.def("rollout", &rollout, "program"_a, "q"_a, "v"_a, "options"_a, "threads"_a,
+          "names"_a, "values"_a);
+    m.def("with_numbers", &with_numbers, "program"_a, "names"_a, "values"_a);
 }
 
 }  // namespace pn

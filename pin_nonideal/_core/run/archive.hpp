@@ -24,6 +24,15 @@ public:
     // A vector whose length changes over a run.
     template <class T>
     void list(std::vector<T>& x) { resized(x); }
+    void sized(VecX& x) {
+        Eigen::Index n = x.size();
+        raw(&n, sizeof n);
+        if (reads) {
+            require(n >= 0 && static_cast<size_t>(n) <= bytes.size() - at);
+            x.resize(n);
+        }
+        raw(x.data(), n * sizeof(double));
+    }
     void require(bool fits) const {
         if (!fits) throw std::invalid_argument("the state does not fit the scene");
     }

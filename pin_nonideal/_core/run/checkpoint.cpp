@@ -10,8 +10,8 @@
 namespace pn {
 
 static void fields(Archive& a, Counters& x) {
-    auto& [evaluations, factorizations, projections, iterations] = x;
-    a(evaluations, factorizations, projections, iterations);
+    auto& [evaluations, factorizations, projections, iterations, signorini, coulomb, dissipation] = x;
+    a(evaluations, factorizations, projections, iterations, signorini, coulomb, dissipation);
 }
 
 void fields(Archive& a, Modes& x) {
@@ -20,35 +20,51 @@ void fields(Archive& a, Modes& x) {
 }
 
 static void fields(Archive& a, RunState& x) {
-    auto& [mode, slip_direction, last_direction, seeks_directions, indeterminate, z, held_torque, has_held, unknown,
-           warm, third_order_lam, ideal_decided, unique, growth, steps_since] = x;
-    a(mode, slip_direction, last_direction, seeks_directions, indeterminate, z, held_torque, has_held, unknown, warm,
-      third_order_lam, ideal_decided, unique, growth, steps_since);
+    auto& [mode, closed, slip_direction, last_direction, lingers, seeks_directions, indeterminate,
+           rank_tolerance, z, held_torque, has_held, unknown, warm, percussion, third_order_lam, ideal_decided, unique,
+           growth, steps_since] = x;
+    a(mode, closed, slip_direction, last_direction, lingers, seeks_directions, indeterminate,
+      rank_tolerance, z, held_torque, has_held, unknown, warm, percussion, third_order_lam, ideal_decided, unique,
+      growth, steps_since);
 }
 
 static void fields(Archive& a, Progress& x) {
-    auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, recent_events, slip_at_start,
-           pulls, several, stiff_steps, quiet_steps, turning_steps] = x;
-    a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, slip_at_start, pulls, several,
-      stiff_steps, quiet_steps, turning_steps);
+    auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, recent_events, bridged_time,
+           bridged_end, slip_at_start, pulls, gaps, impact_energy, several, stiff_steps, quiet_steps, rounding, next_look,
+           turning_steps] = x;
+    a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, bridged_time, bridged_end,
+      slip_at_start, pulls, gaps.width, gaps.rate, gaps.separation, impact_energy, several, stiff_steps, quiet_steps,
+      rounding, next_look, turning_steps);
     a.list(recent_events);
 }
 
 static void fields(Archive& a, Event& x) {
-    auto& [time, kind, element] = x;
-    a(time, kind, element);
+    auto& [time, kind, element, impulse, energy_change, v_minus, v_plus] = x;
+    a(time, kind, element, impulse, energy_change);
+    a.sized(v_minus);
+    a.sized(v_plus);
+}
+
+static void fields(Archive& a, DenseOutput& x) {
+    auto& [times, states, step_modes, directions, torque, moved] = x;
+    for (auto* numbers : {&times, &states, &directions, &torque, &moved}) a.list(*numbers);
+    a.list(step_modes);
 }
 
 static void fields(Archive& a, Recording& x) {
     // A run that failed or raised has no next step.
-    auto& [t, q, v, violation, violation_rate, acceleration, F_ideal, F_nonideal, lam, lam_ideal, energy, power, z,
-           law_forces, limits, reactions, modes, events, steps, rejected, failure, error] = x;
-    for (auto* samples : {&t, &q, &v, &violation, &violation_rate, &acceleration, &F_ideal, &F_nonideal, &lam, &lam_ideal,
-                          &energy, &power, &z, &law_forces, &limits, &reactions})
+    auto& [t, q, v, violation, violation_rate, acceleration, tau, F_ideal, F_nonideal, lam, lam_ideal, energy, power, z,
+           law_forces, limits, reactions, contact_forces, modes, closed, events, dense, steps, rejected, limited, rounding,
+           failure, error] = x;
+    for (auto* samples : {&t, &q, &v, &violation, &violation_rate, &acceleration, &tau, &F_ideal, &F_nonideal, &lam,
+                          &lam_ideal, &energy, &power, &z, &law_forces, &limits, &reactions,
+                          &contact_forces})
         a.list(*samples);
     a.list(modes);
+    a.list(closed);
     a.list(events);
-    a(steps, rejected);
+    fields(a, dense);
+    a(steps, rejected, limited, rounding);
 }
 
 // One thing of an evaluation outlives it: which rows are independent, decided at the start of a step and kept until that

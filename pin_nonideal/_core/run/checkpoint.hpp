@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "run/gap_search.hpp"
 #include "run/recorder.hpp"
 
 namespace pn {
@@ -18,10 +19,15 @@ struct Progress {
     long samples = 0;           // of the output grid, so far
     long next_period = 0;       // of sampled control
     std::vector<double> recent_events;  // times, for the count of those that come too thick
+    double bridged_time = 0.0, bridged_end = 0.0;  // for which a cluster of them was stepped over last, and until when
     std::vector<double> slip_at_start;  // of the step, by element
-    std::vector<char> pulls;            // by contact
+    std::vector<char> pulls;            // by contact that is kept
+    GapState gaps;                      // at the step's start
+    double impact_energy = 0.0;         // of all impacts so far
     bool several = false;               // the laws allow other motions too, which was told
     long stiff_steps = 0, quiet_steps = 0;  // near the border of stability, and since then away from it
+    VecX rounding;          // of the rates as measured last, raised to what tolerances must allow
+    long next_look = 7;     // at that: number of the step
     int turning_steps = 0;  // in a row that were stiff while slip turned; negative: not to be counted yet
 };
 

@@ -7,11 +7,16 @@ namespace pn {
 
 class ErrorNorm {
 public:
-    // atol by tangent coordinate, velocity and state of a law.
-    ErrorNorm(System& system, double rtol, const VecX& atol);
+    // atol by tangent coordinate, velocity and state of a law; so is the rounding of their rates, below which nothing is
+    // asked for.
+    ErrorNorm(System& system, double rtol, const VecX& atol, const VecX& rounding);
 
     // Errors that a step of size h between these states may make.
     void set_tolerances(const VecX& y0, const VecX& y1, double h);
+    // Whether rounding makes more than the tolerances allow.
+    bool is_limited() const { return limited_; }
+    // Raises the rounding of each rate to the size of dy.
+    void raise(VecX& rounding, const VecX& dy, const VecX& y);
     // Root mean square of dy at y, each coordinate as a part of its tolerance.
     double operator()(const VecX& dy, const VecX& y);
     // Step of a method of this order from y, where the rate is dy; `limit` at most. Leaves the workspace elsewhere.
@@ -23,7 +28,10 @@ private:
 
     System& system_;
     double rtol_, share_tolerance_ = 1.0;
+    bool resolves_shares_ = true;  // of contacts, in a step so long
     VecX atol_, tolerance_, tangent_;
+    const VecX& rounding_;
+    bool limited_ = false;
 };
 
 }  // namespace pn

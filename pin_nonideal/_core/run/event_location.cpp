@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "contact/gaps.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/slip.hpp"
@@ -28,14 +30,18 @@ constexpr double time_rounding = 2e-16, corrected_width = 1e-13;
 // Part of the step by which its end moves along the rate there, instead of the step being taken again: what that leaves
 // out is half the square of it, of the step's own change of the rate.
 constexpr double moved_part = 1e-6;
-constexpr double release_width = 1e-12;  // bisection of the instant of a release
+// The instant of a release is found to this part of the step or of the time. A secant of the rates beyond it is believed
+// where they have fallen to this part, and keeps off its root by this part of the way.
+constexpr double release_width = 1e-12, least_fall = 0.7, short_of_root = 1e-2;
+// Where the step does not show yet what its interpolant does, it goes on by this part of it, then by so many times that.
+constexpr double least_later = 1e-11, further_part = 10.0;
 
 }  // namespace
 
 EventLocator::EventLocator(System& system, Stepper& stepper, const std::vector<double>& slip_at_start,
-                           const std::vector<char>& pulls)
+                           const std::vector<char>& pulls, const GapState& gaps_at_start)
     : system_(system), stepper_(stepper), p(system.p), w(system.w), slip_at_start_(slip_at_start),
-      search_(system, stepper, pulls) {}
+      search_(system, stepper, pulls, gaps_at_start) {}
 
 double EventLocator::shorten_toward_rest(const VecX& rate, double size) {
     for (int e = 0; e < system_.ne; ++e) {
@@ -62,7 +68,7 @@ double EventLocator::margin_at_end(const Watch& watch) {
 
 // Slip of several directions that has come to rest at the end of a fixed step.
 bool EventLocator::has_arrived(int e) const {
-    if (p.frictions[e].dim == 1 || stepper_.method.adaptive() || w.state.mode[e] == sticking) return false;
+    if (p.frictions[e].dim == 1 || stepper_.method.adaptive() || !slips(w.state.mode[e])) return false;
     const double speed = system_.velocity(stepper_.y1).cwiseAbs().maxCoeff();
     const double slip = slip_velocity(w.now, p.frictions[e]).norm();
     return slip < slip_at_start_[e] && slip <= arrived_speed * (1.0 + speed);
@@ -84,13 +90,15 @@ void EventLocator::correct_end_to(double size, double full) {
 // along one direction, else it is that of the interpolant, then a secant's.
 void EventLocator::step_onto(const Crossing& crossing) {
     const Watch& watch = crossing.watch;
-    const bool known_rate = watch.kind == Watch::Kind::slip && p.frictions[watch.index].dim == 1;
+    const bool of_gap = watch.kind == Watch::Kind::gap;
+    const bool known_rate = of_gap || (watch.kind == Watch::Kind::slip && p.frictions[watch.index].dim == 1);
     const double full = stepper_.h, resolution = time_rounding * std::max(std::abs(stepper_.t0), full);
     double rate = crossing.slope / full;
     end_step_at(std::clamp(crossing.part, 0.0, 1.0) * full);
     double size = stepper_.h, here = margin_at_end(watch);
     for (int it = 0; it < correction_passes; ++it) {
-        if (known_rate) rate = slip_rate_along_mode(p, w, watch.index);
+        if (of_gap) rate = gap_rate(p, w, watch.index);
+        else if (known_rate) rate = slip_rate_along_mode(p, w, watch.index);
         if (!(rate < 0.0)) return;  // it hardly dipped: from here on it moves away again, and no root lies ahead
         const double next = std::clamp(size - here / rate, 0.0, full), change = next - size, before = here;
         if (std::abs(change) <= resolution || (it > 0 && std::abs(change) < corrected_width * full)) return;
@@ -117,48 +125,112 @@ std::optional<FoundEvent> EventLocator::locate() {
     for (int e = system_.ne - 1; e >= 0; --e)
         if (has_arrived(e)) return found(EventKind::rest_or_limit, e);
     const std::optional<Crossing> crossing = search_.first();
+    if (crossing) step_onto(*crossing);
+    if (const auto lifted = lift_together()) return lifted;  // which may come earlier
     if (!crossing) return release_together();
-    step_onto(*crossing);
     const Watch& watch = crossing->watch;
+    if (watch.kind == Watch::Kind::gap) return found(EventKind::touch, watch.index);
+    if (watch.kind == Watch::Kind::load) return found(EventKind::lift, watch.index);
     if (watch.kind == Watch::Kind::contact) return found(EventKind::pull, watch.index);
     const bool reverses = watch.kind == Watch::Kind::slip && passes_by_rest(watch.index);
     if (const auto released = release_together()) return released;  // which may come earlier
     return found(reverses ? EventKind::reversal : EventKind::rest_or_limit, watch.index);
 }
 
-// Whether all elements at rest at the step's end that stuck before it can stick on.
-bool EventLocator::can_hold(const std::vector<Mode>& modes, ModeQuestion& asked) {
-    const double t = stepper_.t0 + stepper_.h;
-    system_.read(stepper_.y1);
+// How fast what stuck before begins to slip at a state of the step, where forces within all limits do not hold it any
+// more; nothing where they do.
+std::optional<double> EventLocator::release_rate(double t, const VecX& y, const std::vector<Mode>& modes,
+                                                 ModeQuestion& asked) {
+    system_.read(y);
     asked = {modes, {}, {}};
     for (int e = 0; e < system_.ne; ++e)
-        if (at_rest(p, w, e, system_.v)) asked.at_rest.push_back(e);
+        if (!is_open(p, w, e) && at_rest(p, w, e, system_.v)) asked.at_rest.push_back(e);
     resolve_modes(p, w, t, system_.q, system_.v, asked);
-    const bool all_stick = std::all_of(asked.at_rest.begin(), asked.at_rest.end(), [&](int e) {
-        return w.state.mode[e] == sticking || modes[e] != sticking;
-    });
+    double rate = 0.0;
+    for (int e : asked.at_rest)
+        if (modes[e] == sticking && w.state.mode[e] != sticking)
+            rate = std::max(rate, std::abs(slip_rate_along_mode(p, w, e)));
+    const double noise = no_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     set_modes(p, w, modes);
     begin_step(p, w, t, system_.q, system_.v);
-    return all_stick;
+    if (rate <= noise) return std::nullopt;  // what the others hold does not move, whatever its force
+    return rate;
+}
+
+std::optional<double> EventLocator::release_rate_at_end(const std::vector<Mode>& modes, ModeQuestion& asked) {
+    return release_rate(stepper_.t0 + stepper_.h, stepper_.y1, modes, asked);
+}
+
+// Whether all loads that redundant contacts share can press, at the step's end and at its stages.
+bool EventLocator::all_press() {
+    for (const Stepper::Look& look : stepper_.looks())
+        for (int i = 0; i < system_.ng; ++i)
+            if (w.state.closed[i] && system_.load(*look.rate, i) < 0.0) return false;
+    return true;
+}
+
+// Redundant contacts stay closed as long as some loads do that press all of them, whatever their least-norm split says.
+// Halves the step down to the instant from which on none do.
+std::optional<FoundEvent> EventLocator::lift_together() {
+    if (p.gaps.empty() || !w.now.rows.redundant || all_press()) return std::nullopt;
+    double low = 0.0, high = stepper_.h;
+    while (high - low > release_width * std::max(std::abs(stepper_.t0), stepper_.h)) {
+        const double mid = 0.5 * (low + high);
+        end_step_at(mid);
+        (all_press() ? low : high) = mid;
+    }
+    end_step_at(high);
+    return FoundEvent{EventKind::lift, -1, stepper_.t0 + stepper_.h};
+}
+
+// The part of the step at which, by its interpolant, nothing holds any more what begins to slip at its end at this rate.
+// Closes in from beyond by the rates at which slip begins there, which fall to zero toward it where limits do not jump,
+// and by halves else.
+double EventLocator::release_part(double rate, const std::vector<Mode>& modes, ModeQuestion& asked) {
+    const double full = stepper_.h, width = release_width * std::max(std::abs(stepper_.t0) / full, 1.0);
+    double low = 0.0, high = 1.0, beyond = 0.0, rate_beyond = 0.0;
+    bool falls = false;  // the rate, as the instant comes near
+    VecX y(system_.ny);
+    stepper_.make_interpolant();
+    while (high - low > width) {
+        double next = 0.5 * (low + high);
+        if (falls) {
+            const double vanishes = high - rate * (beyond - high) / (rate_beyond - rate);
+            if (high - vanishes <= width) break;
+            if (vanishes > low) next = vanishes + short_of_root * (high - vanishes);
+        }
+        const double t = stepper_.t0 + next * full;
+        stepper_.interpolate(next, y);
+        system_.read(y);
+        update_kinematics(p, w, t, system_.q, system_.v);
+        const std::optional<double> there = release_rate(t, y, modes, asked);
+        falls = there && *there < least_fall * rate;
+        if (there) {
+            beyond = std::exchange(high, next);
+            rate_beyond = std::exchange(rate, *there);
+        } else {
+            low = next;
+        }
+    }
+    return high;
 }
 
 // Where redundant elements stick together, the multiplier of one says little: they hold as long as some forces within
-// all limits do, those of elements included that slip but do not move. Halves the step down to the instant at which
-// none do.
+// all limits do, those of elements included that slip but do not move. The step is taken again up to where its
+// interpolant shows that none do, and a little further where the step itself does not show it yet.
 std::optional<FoundEvent> EventLocator::release_together() {
     if (!w.state.indeterminate) return std::nullopt;
     const double full = stepper_.h;
     const std::vector<Mode> modes = w.state.mode;
     ModeQuestion asked;
-    if (can_hold(modes, asked)) return std::nullopt;
-    double low = 0.0, high = full;
-    while (high - low > release_width * std::max(std::abs(stepper_.t0), full)) {
-        const double mid = 0.5 * (low + high);
-        end_step_at(mid);
-        (can_hold(modes, asked) ? low : high) = mid;
+    const std::optional<double> rate = release_rate_at_end(modes, asked);
+    if (!rate) return std::nullopt;
+    const double part = release_part(*rate, modes, asked);
+    for (double later = 0.0;; later = std::max(further_part * later, least_later)) {
+        end_step_at(std::min(part + later, 1.0) * full);
+        if (release_rate_at_end(modes, asked) || part + later >= 1.0) break;
     }
-    end_step_at(high);
-    return FoundEvent{EventKind::released_together, asked.at_rest.front(), stepper_.t0 + high};
+    return FoundEvent{EventKind::released_together, asked.at_rest.front(), stepper_.t0 + stepper_.h};
 }
 
 }  // namespace pn

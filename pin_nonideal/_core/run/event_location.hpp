@@ -17,19 +17,23 @@ struct FoundEvent {
         rest_or_limit,      // an element has come to rest, or what sticks has reached its limit
         released_together,  // redundant elements at rest cannot hold any longer, this one among them
         reversal,           // the slip of an element has turned without coming to rest
-        pull,               // a contact begins to pull
+        pull,               // a contact that is kept begins to pull
+        lift,               // one that may open carries nothing any more, or several together cannot press
+        touch,              // a gap closes
+        user,               // a function of the user crosses zero
     } kind;
-    int index;  // of the friction element, or of the contact that pulls
+    int index;  // of the friction element, of the contact that pulls, or of the gap; -1 for several gaps
     double time;
 
-    bool changes_modes() const { return kind == Kind::rest_or_limit || kind == Kind::released_together; }
+    bool changes_modes() const { return kind != Kind::reversal && kind != Kind::pull && kind != Kind::user; }
+    bool of_gap() const { return kind == Kind::lift || kind == Kind::touch; }
 };
 
 class EventLocator {
 public:
     // Slip speed of each element of several directions when its step began, and whether each contact pulls by then.
     EventLocator(System& system, Stepper& stepper, const std::vector<double>& slip_at_start,
-                 const std::vector<char>& pulls);
+                 const std::vector<char>& pulls, const GapState& gaps_at_start);
 
     // Ends the step just taken at its first event; the workspace is evaluated at the step's end either way.
     std::optional<FoundEvent> locate();
@@ -47,8 +51,12 @@ private:
     void correct_end_to(double size, double full);
     void step_onto(const Crossing& crossing);
 
-    bool can_hold(const std::vector<Mode>& modes, ModeQuestion& asked);
+    std::optional<double> release_rate(double t, const VecX& y, const std::vector<Mode>& modes, ModeQuestion& asked);
+    std::optional<double> release_rate_at_end(const std::vector<Mode>& modes, ModeQuestion& asked);
+    double release_part(double rate, const std::vector<Mode>& modes, ModeQuestion& asked);
     std::optional<FoundEvent> release_together();
+    bool all_press();
+    std::optional<FoundEvent> lift_together();
 
     System& system_;
     Stepper& stepper_;

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "contact/gaps.hpp"
 #include "dynamics/evaluation.hpp"
+#include "dynamics/reactions.hpp"
 #include "dynamics/slip.hpp"
 #include "math/roots.hpp"
 
@@ -40,13 +42,21 @@ constexpr double confirmed_width = 1e-4;
 
 }  // namespace
 
-EventSearch::EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls)
-    : system_(system), stepper_(stepper), p(system.p), w(system.w), pulls_(pulls), probe_(VecX::Zero(system.ny)),
+EventSearch::EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls,
+                         const GapState& gaps_at_start)
+    : system_(system), stepper_(stepper), p(system.p), w(system.w), pulls_(pulls),
+      gaps_(system, stepper, gaps_at_start), probe_(VecX::Zero(system.ny)),
       probe_rate_(probe_) {}
 
 double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
-    if (watch.kind == Watch::Kind::contact) return w.now.lam[p.blocks[p.contacts[watch.index]].row];
-    if (watch.kind == Watch::Kind::slip) return slip_along_mode(p, w, watch.index);
+    if (watch.kind == Watch::Kind::contact) return contact_press(p, w, watch.index).margin;
+    if (watch.kind == Watch::Kind::load) return w.now.lam[p.blocks[p.gaps[watch.index].block].row];
+    if (watch.kind == Watch::Kind::gap) {
+        system_.read(y);
+        evaluate_gap(p, w, t, system_.v, watch.index);
+        return gap_width(p, w, watch.index) - gaps_.plane(watch.index);
+    }
+    if (watch.kind == Watch::Kind::slip) return slip_along_mode(p, w, watch.index) + allowance(watch.index);
     system_.read(y);
     return static_limit(p, w, watch.index, t, system_.q, system_.v) * (1.0 + limit_rounding) -
            friction_force(p, w, watch.index).norm();
@@ -56,6 +66,11 @@ double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
 
 double EventSearch::noise() const {
     return fresh_slip * rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff());
+}
+
+// By how much what lingers at rest may go against its mode.
+double EventSearch::allowance(int e) const {
+    return w.state.lingers[e] ? raised_rest * (1.0 + system_.velocity(stepper_.y0).cwiseAbs().maxCoeff()) : 0.0;
 }
 
 // Whether what sticks is past its limit at the step's end, or may have been inside, between two stages.
@@ -78,15 +93,15 @@ bool EventSearch::may_reach_limit(int e) {
 }
 
 // Whether what slips goes the other way at the step's end, or may have done so inside.
-bool EventSearch::may_stop(int e) const { return slip_along_mode(p, w, e) < -noise() || dips(e); }
+bool EventSearch::may_stop(int e) const { return slip_along_mode(p, w, e) + allowance(e) < -noise() || dips(e); }
 
 // A dip through zero and back. Speeds and their rates are known at the stages and at both ends: cubics through them
 // tell where one may have been below zero in between.
 bool EventSearch::dips(int e) const {
     if (stepper_.method.order < 2) return false;
     const std::vector<Stepper::Look>& looks = stepper_.looks();
-    const auto speed = [&](size_t k) { return system_.slip(*looks[k].rate, e); };
-    const double below_rest = -noise();
+    const double allowed = allowance(e), below_rest = -noise();
+    const auto speed = [&](size_t k) { return system_.slip(*looks[k].rate, e) + allowed; };
     double least = HUGE_VAL, most = -HUGE_VAL;
     bool below = false;
     for (size_t k = 0; k < looks.size(); ++k) {
@@ -95,6 +110,7 @@ bool EventSearch::dips(int e) const {
         below |= k > 0 && k + 1 < looks.size() && speed(k) < below_rest;
     }
     if (below) return true;
+    if (most <= allowed - below_rest) return false;  // held by what sticks, it never left rest
     for (size_t k = 0; k + 1 < looks.size(); ++k) {
         const double length = (looks[k + 1].part - looks[k].part) * stepper_.h;
         const double inside = least_inside(speed(k), length * system_.slip_rate(*looks[k].rate, e), speed(k + 1),
@@ -104,30 +120,66 @@ bool EventSearch::dips(int e) const {
     return false;
 }
 
+// Contacts that begin to pull: one of those that share a load, where none of them pulls yet.
+void EventSearch::add_pulls(std::vector<Watch>& list) {
+    const auto may_pull = [&](int i) { return !pulls_[i] && normal_force(p, w, i) < 0.0; };
+    const int n = static_cast<int>(p.contacts.size());
+    int first = 0;
+    while (first < n && !may_pull(first)) ++first;
+    if (first == n) return;
+    std::vector<char> told = pulls_;
+    for (int i = first; i < n; ++i) {
+        if (told[i] || !may_pull(i)) continue;
+        const Press found = contact_press(p, w, i);
+        if (found.must_pull && std::none_of(found.sharing.begin(), found.sharing.end(), [&](int j) { return told[j]; }))
+            list.push_back({Watch::Kind::contact, i});
+        for (int j : found.sharing) told[j] = 1;
+    }
+}
+
+// Whether the normal force of a closed contact pulls at the step's end, or may have done so inside, between two stages.
+bool EventSearch::may_pull(int gap) {
+    const std::vector<Stepper::Look>& looks = stepper_.looks();
+    const auto load = [&](size_t k) { return system_.load(*looks[k].rate, gap); };
+    double least = load(0), most = least, fall = 0.0;
+    for (size_t k = 1; k < looks.size(); ++k) {
+        least = std::min(least, load(k));
+        most = std::max(most, load(k));
+    }
+    for (size_t k = 2; k < looks.size(); ++k)
+        fall = std::max(fall, rise_between(looks[k - 2].part, -load(k - 2), looks[k - 1].part, -load(k - 1),
+                                           looks[k].part, -load(k)));
+    return least - times_parabola * fall - range_between * (most - least) < -load_rounding(p, w, gap);
+}
+
 // What lies past its event at the step's end (the workspace is evaluated there), or may have crossed inside.
 std::vector<Watch> EventSearch::crossed() {
     std::vector<Watch> list;
-    if (stepper_.method.order > 1)
-        for (int i = 0; i < static_cast<int>(p.contacts.size()); ++i)
-            if (!pulls_[i] && w.now.lam[p.blocks[p.contacts[i]].row] < 0.0)
-                list.push_back({Watch::Kind::contact, i});
+    if (stepper_.method.order > 1) add_pulls(list);
     for (int e = 0; e < system_.ne; ++e) {
+        if (w.state.mode[e] == unloaded) continue;
         if (w.state.mode[e] != sticking) {
             if (may_stop(e)) list.push_back({Watch::Kind::slip, e});
         } else if (!w.state.indeterminate && may_reach_limit(e)) {
             list.push_back({Watch::Kind::stick, e});
         }
     }
+    if (p.gaps.empty()) return list;
+    for (int i = 0; i < system_.ng && !w.now.rows.redundant; ++i)  // redundant ones are asked together
+        if (w.state.closed[i] && !is_bare(p, i) && may_pull(i)) list.push_back({Watch::Kind::load, i});
+    for (int gap : gaps_.doubtful()) list.push_back({Watch::Kind::gap, gap});
     return list;
 }
 
 // --- Where it crosses -----------------------------------------------------------------------------------------------
 
+bool EventSearch::integrates() const { return stepper_.method.order > 1 && !stepper_.method.outside(); }
+
 EventSearch::Source EventSearch::source(const Watch& watch) const {
     if (watch.kind == Watch::Kind::contact) return Source::evaluation;
-    const bool integrates_shares = stepper_.method.order > 1 && !stepper_.method.outside();
-    if (watch.kind == Watch::Kind::stick) return integrates_shares ? Source::shares : Source::evaluation;
-    if (system_.on_constraints) return Source::evaluation;
+    if (watch.kind == Watch::Kind::gap) return Source::kinematics;
+    if (watch.kind == Watch::Kind::load) return integrates() ? Source::shares : Source::evaluation;
+    if (watch.kind == Watch::Kind::stick) return integrates() ? Source::shares : Source::evaluation;
     return p.blocks[p.frictions[watch.index].block].dof >= 0 ? Source::velocities : Source::kinematics;
 }
 
@@ -159,14 +211,17 @@ double EventSearch::share_error(int e) const {
 }
 
 double EventSearch::margin_inside(const Watch& watch, Source source, double part) {
-    const Friction* f = watch.kind == Watch::Kind::contact ? nullptr : &p.frictions[watch.index];
+    const bool of_element = watch.kind == Watch::Kind::slip || watch.kind == Watch::Kind::stick;
+    const Friction* f = of_element ? &p.frictions[watch.index] : nullptr;
+    if (source == Source::shares && !of_element)
+        return stepper_.interpolated_rate(part, system_.ns + 2 * system_.ne + watch.index);
     if (source == Source::shares) {
         return 1.0 + limit_rounding - doubt_ - std::abs(interpolated_share(watch.index, part));
     }
     if (source == Source::velocities) {
         const int first = system_.nq + p.blocks[f->block].dof;
-        if (f->dim == 1) return w.state.mode[watch.index] * stepper_.interpolated(part, first);
-        double along = 0.0;
+        double along = allowance(watch.index);
+        if (f->dim == 1) return along + w.state.mode[watch.index] * stepper_.interpolated(part, first);
         for (int k = 0; k < f->dim; ++k)
             along += w.state.slip_direction[watch.index][k] * stepper_.interpolated(part, first + k);
         return along;
@@ -228,7 +283,11 @@ std::optional<double> EventSearch::confirm(const Watch& watch, double part, doub
 }
 
 Crossing EventSearch::cross(const Watch& watch, Source from) {
-    if (from == Source::shares) doubt_ = share_error(watch.index);
+    if (watch.kind == Watch::Kind::gap) {
+        const auto touch = gaps_.first_touch(watch.index);
+        return touch ? Crossing{watch, touch->part, touch->slope} : Crossing{watch, beyond, 0.0};
+    }
+    if (from == Source::shares && watch.kind == Watch::Kind::stick) doubt_ = share_error(watch.index);
     const double part = first_crossing(watch, from);
     if (part == beyond) return {watch, part, 0.0};
     const double before = std::max(0.0, part - slope_part), after = before + slope_part;
@@ -238,6 +297,10 @@ Crossing EventSearch::cross(const Watch& watch, Source from) {
 // The crossing that the shares' rates tell, as the motion on the interpolant has it.
 Crossing EventSearch::confirmed(const Crossing& told) {
     system_.read(stepper_.y1);
+    if (told.watch.kind == Watch::Kind::load) {
+        const auto part = confirm(told.watch, told.part, told.slope);
+        return part ? Crossing{told.watch, *part, told.slope} : cross(told.watch, Source::evaluation);
+    }
     const double limit = static_limit(p, w, told.watch.index, stepper_.t0 + stepper_.h, system_.q, system_.v);
     const auto part = confirm(told.watch, told.part, told.slope * limit);
     return part ? Crossing{told.watch, *part, told.slope * limit} : cross(told.watch, Source::evaluation);

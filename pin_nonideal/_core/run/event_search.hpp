@@ -1,5 +1,5 @@
 // Where in a step just taken a margin first crosses zero: of the slip speed of what slips, of what is left to the limit of
-// what sticks, of the normal force of a contact.
+// what sticks, of the normal force of a contact, of the gap of an open one.
 //
 // Speeds, forces and limits at the stages tell what may have crossed. The method's own interpolant tells where: of slip
 // by its velocities, which take no evaluation, of what sticks by the rate of the shares that it integrates, which one or
@@ -10,14 +10,14 @@
 #include <vector>
 
 #include "friction/modes.hpp"
-#include "run/stepper.hpp"
+#include "run/gap_search.hpp"
 
 namespace pn {
 
 // What may cross zero inside the step.
 struct Watch {
-    enum class Kind { slip, stick, contact } kind;
-    int index;  // of the friction element, or of the contact
+    enum class Kind { slip, stick, contact, load, gap } kind;
+    int index;  // of the friction element, or of the contact: of one that is kept, or of a gap
 };
 
 struct Crossing {
@@ -28,7 +28,7 @@ struct Crossing {
 class EventSearch {
 public:
     // Whether each contact pulls by the step's start.
-    EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls);
+    EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls, const GapState& gaps_at_start);
 
     // The first crossing; the workspace must be evaluated at the step's end, and is so again where there is none.
     std::optional<Crossing> first();
@@ -42,12 +42,16 @@ private:
     enum class Source { velocities, shares, kinematics, evaluation };
 
     double noise() const;
+    double allowance(int element) const;
     bool may_reach_limit(int element);
     bool may_stop(int element) const;
     bool dips(int element) const;
+    void add_pulls(std::vector<Watch>& list);
     std::vector<Watch> crossed();
+    bool may_pull(int gap);
 
     Source source(const Watch& watch) const;
+    bool integrates() const;
     double interpolated_share(int element, double part) const;
     double share_error(int element) const;
     double margin_inside(const Watch& watch, Source source, double part);
@@ -61,6 +65,7 @@ private:
     const Program& p;
     Workspace& w;
     const std::vector<char>& pulls_;
+    GapSearch gaps_;
     double doubt_ = 0.0;        // of the share that is looked at
     VecX probe_, probe_rate_;
 };

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "contact/closing.hpp"
+#include "contact/impact.hpp"
+#include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/slip.hpp"
 #include "dynamics/step_start.hpp"
@@ -16,20 +19,26 @@ constexpr double directed_slip = 1e-12;
 // Part of its limit by which a sticking element may pass it by rounding.
 constexpr double limit_rounding = 1e-9;
 
+bool hardly_moves(const System& system, int e) {
+    const double slip = slip_velocity(system.w.now, system.p.frictions[e]).norm();
+    return slip <= raised_rest * (1.0 + system.v.cwiseAbs().maxCoeff());
+}
+
 // Modes of the elements at rest together, and the state that goes with them; those that turn out to move are taken off
 // the list.
-void resolve_together(System& system, double t, ModeQuestion& asked) {
+void resolve_together(System& system, double t, ModeQuestion& asked, bool strikes) {
     const Program& p = system.p;
     Workspace& w = system.w;
     std::vector<int>& resting = asked.at_rest;
     for (;;) {
         resolve_modes(p, w, t, system.q, system.v, asked);
+        if (!strikes) keep_moving(p, w, t, system.q, system.v);
         // What sticks from now on has no slip velocity at all, not one of rounding.
         project(p, w, t, system.q, system.v);
         begin_step(p, w, t, system.q, system.v);
         // Nearly redundant elements that stuck together leave one that slips a velocity, which may oppose its mode.
         const auto moving = std::stable_partition(resting.begin(), resting.end(), [&](int e) {
-            return at_rest(p, w, e, system.v) || slip_along_mode(p, w, e) >= 0.0;
+            return hardly_moves(system, e) || slip_along_mode(p, w, e) >= 0.0;
         });
         if (moving == resting.end()) return;
         std::for_each(moving, resting.end(), [&](int e) { follow_velocity(p, w, e, asked); });
@@ -59,6 +68,15 @@ void seek_directions(System& system, const std::vector<int>& resting, bool sough
             ((seeks && sought && turning(system)) || std::any_of(resting.begin(), resting.end(), begins));
 }
 
+// What came to rest in vain lingers there, until its mode changes or it moves.
+void linger(RunState& state, const std::vector<Mode>& before, const FoundEvent& event) {
+    for (size_t e = 0; e < before.size(); ++e)
+        if (before[e] != state.mode[e]) state.lingers[e] = 0;
+    const int e = event.index;
+    if (event.kind == FoundEvent::Kind::rest_or_limit && slips(before[e]) && before[e] == state.mode[e])
+        state.lingers[e] = 1;
+}
+
 }  // namespace
 
 bool turning(const System& system) {
@@ -71,42 +89,160 @@ Event::Kind kind_of_change(Mode before, Mode after) {
     return after == sticking ? Event::Kind::stick : before == sticking ? Event::Kind::slip : Event::Kind::reverse;
 }
 
+namespace {
+
+// Modes of stick and slip for the contacts that are closed, and the state on the constraints that goes with them.
+struct FrictionSwitch {
+    System& system;
+    double t;
+    const std::optional<FoundEvent>& event;  // of friction, if it is one
+    const std::vector<Mode>& before;
+    ModeQuestion asked;
+    int held = -1;  // what has just reached its limit
+
+    // `together`: of all contacts, where that is known.
+    void find(const RestingMotion* together) {
+        const Program& p = system.p;
+        Workspace& w = system.w;
+        if (p.frictions.empty()) {
+            begin_step(p, w, t, system.q, system.v);
+            return keep_on_planes();
+        }
+        const bool known = event && !event->of_gap();
+        const bool strikes = event && event->kind == FoundEvent::Kind::touch;  // what stuck may move
+        asked = event && !strikes ? question(p, w, system.v, known ? event->index : -1)
+                                  : first_question(p, w, t, system.q, system.v);
+        held = known && before[event->index] == sticking && !is_open(p, w, event->index) ? event->index : -1;
+        if (known && event->kind == FoundEvent::Kind::released_together) asked.breaking = asked.at_rest;
+        else if (held >= 0) asked.breaking = {held};
+        if (together) together->answer(p, w, asked);
+        if (asked.answered || !known || !go_on(p, w, t, system.q, system.v, asked, event->index))
+            resolve_together(system, t, asked, strikes);
+    }
+
+    // What sticks until it has just come to its limit: it gives way.
+    std::vector<int> breaking() const {
+        std::vector<int> list;
+        if (!event || event->of_gap()) return list;
+        for (int e = 0; e < system.ne; ++e)
+            if (before[e] == sticking && (event->kind == FoundEvent::Kind::released_together || e == event->index))
+                list.push_back(e);
+        return list;
+    }
+
+    // What touches lies on its plane, and moves along it.
+    void keep_on_planes() {
+        const std::vector<char>& closed = system.w.state.closed;
+        if (std::find(closed.begin(), closed.end(), char(1)) == closed.end()) return;
+        project(system.p, system.w, t, system.q, system.v);
+        begin_step(system.p, system.w, t, system.q, system.v);
+    }
+};
+
+// What has come to rest but for rounding.
+void rest(System& system, double t) {
+    system.v.setZero();
+    begin_step(system.p, system.w, t, system.q, system.v);
+}
+
+// Contacts among those that rest on each other are closed, and the rest of the modes with them.
+void close_and_find(System& system, double t, bool starts, FrictionSwitch& friction) {
+    const Program& p = system.p;
+    const auto& event = friction.event;
+    const double width = starts ? starting_width * scene_size(p, system.w) : touching_width;
+    const bool landing = starts || event->kind == FoundEvent::Kind::touch;
+    ClosingQuestion question;
+    question.rest = touching_contacts(p, system.w, t, system.q, system.v, width).rest;
+    if (event && event->kind == FoundEvent::Kind::lift) question.opening = event->index;
+    if (event && !event->of_gap()) question.arrived = event->index;
+    question.breaking = friction.breaking();
+    question.struck = landing;
+    const VecX q = system.q, v = system.v;
+    close_contacts(p, system.w, t, q, v, question, [&](const RestingMotion* together) {
+        system.q = q;
+        system.v = v;
+        update_kinematics(p, system.w, t, q, v);
+        friction.find(together);
+        if (landing && !p.moves_in_time && system.v.cwiseAbs().maxCoeff() <= rest_speed) rest(system, t);
+    });
+}
+
+}  // namespace
+
+std::vector<Event> changes_since(const System& system, double t, const std::vector<char>& closed,
+                                 const std::vector<Mode>& before, int turned) {
+    const Program& p = system.p;
+    const RunState& now = system.w.state;
+    std::vector<Event> changes;
+    for (size_t i = 0; i < closed.size(); ++i)
+        if (closed[i] != now.closed[i])
+            changes.push_back({t, closed[i] ? Event::Kind::lift_off : Event::Kind::touch_down, p.gaps[i].block});
+    for (int e = 0; e < system.ne; ++e) {
+        const bool begins = before[e] == unloaded && slips(now.mode[e]);  // a contact that slides from the first
+        if (e == turned || (before[e] != now.mode[e] && now.mode[e] != unloaded && !begins))
+            changes.push_back({t, kind_of_change(before[e], now.mode[e]), e});
+    }
+    return changes;
+}
+
 std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event) {
     const Program& p = system.p;
     Workspace& w = system.w;
     system.read(y);
     system.read_law_states(y);
-    if (p.frictions.empty()) {
-        begin_step(p, w, t, system.q, system.v);
-        system.rate_of_evaluation(t, y, dy);
-        return {};
-    }
     const std::vector<Mode> before = w.state.mode;
+    const std::vector<char> closed = w.state.closed;
     const std::vector<Vec3> directions = w.state.slip_direction;
-    ModeQuestion asked =
-        event ? question(p, w, system.v, event->index) : first_question(p, w, t, system.q, system.v);
-    const int held = event && before[event->index] == sticking ? event->index : -1;
-    if (event && event->kind == FoundEvent::Kind::released_together) asked.breaking = asked.at_rest;
-    else if (held >= 0) asked.breaking = {held};
-    if (!event || !go_on(p, w, t, system.q, system.v, asked, event->index)) resolve_together(system, t, asked);
-    seek_directions(system, asked.at_rest, event.has_value());
-    system.write(y);
-    w.state.indeterminate = shares_load(system, t, asked.at_rest, held);
-    system.rate_of_evaluation(t, y, dy);
-    std::vector<Event> changes;
-    if (!event) return changes;
-    for (int e = 0; e < system.ne; ++e) {
-        const bool turned = e == event->index && before[e] == 1 && w.state.mode[e] == 1 && p.frictions[e].dim > 1 &&
-                            directions[e].dot(w.state.slip_direction[e]) < 0.0;
-        if (before[e] != w.state.mode[e] || turned) changes.push_back({t, kind_of_change(before[e], w.state.mode[e]), e});
+    FrictionSwitch friction{system, t, event, before, {}};
+    if (p.gaps.empty()) friction.find(nullptr);
+    else close_and_find(system, t, !event, friction);
+    if (!p.frictions.empty() || !p.gaps.empty()) {
+        seek_directions(system, friction.asked.at_rest, event.has_value());
+        system.write(y);
+        w.state.indeterminate = shares_load(system, t, friction.asked.at_rest, friction.held);
     }
-    return changes;
+    system.rate_of_evaluation(t, y, dy);
+    if (!event) return {};
+    linger(w.state, before, *event);
+    const int e = event->of_gap() ? -1 : event->index;
+    const bool turned = e >= 0 && before[e] == 1 && w.state.mode[e] == 1 && p.frictions[e].dim > 1 &&
+                        directions[e].dot(w.state.slip_direction[e]) < 0.0;
+    return changes_since(system, t, closed, before, turned ? e : -1);
+}
+
+bool contacts_strike(System& system, double t, const VecX& y, bool starts) {
+    system.read(y);
+    const double width = starts ? starting_width * scene_size(system.p, system.w) : touching_width;
+    return touching_contacts(system.p, system.w, t, system.q, system.v, width).strikes;
+}
+
+Strike strike_contacts(System& system, double t, VecX& y, bool starts) {
+    const Program& p = system.p;
+    const std::vector<char> closed = system.w.state.closed;
+    const std::vector<Mode> modes = system.w.state.mode;
+    system.read(y);
+    const double width = starts ? starting_width * scene_size(p, system.w) : touching_width;
+    const Touching found = touching_contacts(p, system.w, t, system.q, system.v, width);
+    const Impact impact = strike(p, system.w, t, system.q, system.v, found.touch);
+    system.write(y);
+    set_closed(p, system.w, closed);  // what changes by it is still to be found
+    set_modes(p, system.w, modes);
+    Strike out;
+    for (size_t i = 0; i < impact.gaps.size(); ++i) {
+        if (!(impact.impulse[i].norm() > 0.0)) continue;
+        out.events.push_back({t, Event::Kind::impact, p.gaps[impact.gaps[i]].block, impact.impulse[i], impact.work[i],
+                              impact.v_minus, impact.v_plus});
+        out.work += impact.work[i];
+    }
+    out.work_of_constraints = impact.energy_change - out.work;
+    return out;
 }
 
 void remember_directions(System& system, std::vector<double>& slip) {
     Workspace& w = system.w;
     for (int e = 0; e < system.ne; ++e) {
         const Friction& f = system.p.frictions[e];
+        if (w.state.lingers[e] && !hardly_moves(system, e)) w.state.lingers[e] = 0;
         if (f.dim == 1 || !slips(w.state.mode[e])) continue;
         const Vec3 u = slip_velocity(w.now, f);
         slip[e] = u.norm();

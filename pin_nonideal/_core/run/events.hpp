@@ -14,6 +14,21 @@ namespace pn {
 // where there was no event.
 std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event);
 
+// What has changed between modes before and now: contacts that open or close, then elements that stick or slip, and one
+// that has `turned`.
+std::vector<Event> changes_since(const System& system, double t, const std::vector<char>& closed,
+                                 const std::vector<Mode>& before, int turned = -1);
+
+// Whether contacts strike at (t, y): they touch and approach each other.
+bool contacts_strike(System& system, double t, const VecX& y, bool starts);
+// Their impact, which changes the velocity: an event a contact with an impulse, the work of these, and that of moving
+// constraints.
+struct Strike {
+    std::vector<Event> events;
+    double work = 0.0, work_of_constraints = 0.0;
+};
+Strike strike_contacts(System& system, double t, VecX& y, bool starts);
+
 // Whether some element of several directions slips.
 bool turning(const System& system);
 

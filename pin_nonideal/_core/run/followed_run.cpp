@@ -46,7 +46,8 @@ bool FollowedRun::follow(double end, const OutsideStep::Interpolant& interpolant
     stepper.start_rate() = rate;
     stepper.follow(t, end - t, interpolant);
     system.project_and_evaluate(end, stepper.y1, stepper.end_rate());
-    const std::optional<FoundEvent> event = bridges_cluster() ? std::nullopt : locate_event();
+    event.reset();
+    if (!bridges_cluster()) find_event();
     accept({stepper.h, end, true}, event);
     record(event);
     system.on_constraints = w.now.rows.distance < near_singular && !w.now.rows.blocks.empty();

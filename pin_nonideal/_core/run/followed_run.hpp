@@ -19,6 +19,7 @@ public:
     bool follow(double end, const OutsideStep::Interpolant& interpolant);
 
     double time() const { return t; }
+    using Simulation::done;
     VecX state() const { return y.head(system.ns); }
     VecX state_rate() const { return rate.head(system.ns); }
 

@@ -46,19 +46,20 @@ void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
     y.segment(system_.nq, system_.nv) = v1_;
 }
 
-// The motion without friction of the elements, constraints met at the end of the step.
+// The motion without friction of the elements, constraints met at the end of the step: half of what rows change by
+// themselves in a step is still to come at its middle.
 void Moreau::solve_without_friction(double t) {
     set_modes(p, w, std::vector<Mode>(system_.ne, unloaded));
     begin_step(p, w, t, q_mid_, v0_);
     VecX b = w.now.b;
     for (int i = 0; i < p.constraints; ++i) {
         const Block& block = p.blocks[i];
-        for (size_t k = 0; k < block.kept.size(); ++k) b[block.row + k] = -w.now.values[i].rate[block.kept[k]] / h_;
+        for (size_t k = 0; k < block.kept.size(); ++k)
+            b[block.row + k] = 0.5 * b[block.row + k] - w.now.values[i].rate[block.kept[k]] / h_;
     }
-    const VecX force = w.now.F + (p.has_laws() ? w.now.C : VecX(VecX::Zero(system_.nv)));
     a_free_ = w.now.a;
     lam_free_ = w.now.lam;
-    solve_acceleration(p, w, force, b, a_free_, lam_free_);
+    solve_motion(p, w, p.has_laws(), b, a_free_, lam_free_);
 }
 
 // Slip velocities at the step's end over h take the place of slip accelerations.
@@ -67,8 +68,10 @@ FrictionProblem Moreau::pose_problem() {
     problem.clean(p, w);
     problem.alpha0 = problem.along(p, w, a_free_);
     int at = 0;
-    for (const Friction& friction : p.frictions)
-        for (int k = 0; k < friction.dim; ++k) problem.alpha0[at++] += w.now.values[friction.block].rate[k] / h_;
+    for (const Friction& friction : p.frictions) {
+        const RowValues& values = w.now.values[friction.block];
+        for (int k = 0; k < friction.dim; ++k) problem.alpha0[at++] += values.rate[k] / h_ + 0.5 * values.drift[k];
+    }
     return problem;
 }
 
@@ -99,13 +102,18 @@ double Moreau::update_limits(double t) {
 
 // Friction forces, with limits for the load of this very step.
 void Moreau::solve_friction(const FrictionProblem& problem, double t) {
+    VecX near(problem.rows);  // forces of the last step, whose modes mostly last
+    int at = 0;
+    for (const Friction& friction : p.frictions)
+        for (int k = 0; k < friction.dim; ++k) near[at++] = w.state.percussion[p.blocks[friction.block].row + k];
     force_.setZero(problem.rows);
     for (int pass = 0; pass < load_passes; ++pass) {
         apply_forces(problem);
         const double change = update_limits(t + 0.5 * h_);
         const double largest = system_.ne > 0 ? std::max(0.0, limit_.maxCoeff()) : 0.0;
         if (pass > 0 && (change <= load_tolerance * largest || !p.needs_reactions)) return;
-        force_ = friction_program(problem.W, problem.alpha0, problem.dims, limit_);
+        force_ = friction_program(problem.W, problem.alpha0, problem.dims, limit_, &near);
+        near = force_;
         force_limit_ = limit_;
         if (pass + 1 == load_passes) throw Failure(Failure::Kind::not_converged, t, elements_);
     }
@@ -118,6 +126,7 @@ std::vector<Mode> Moreau::end_velocity(const FrictionProblem& problem) {
     v1_ = v0_ + h_ * (a_free_ + problem.response * force_);
     for (int e = 0, at = 0; e < system_.ne; at += problem.dims[e], ++e) {
         const int dim = problem.dims[e];
+        w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim) = force_.segment(at, dim);
         const bool held = force_.segment(at, dim).norm() < force_limit_[e] * (1.0 - limit_rounding);
         modes[e] = held ? sticking : dim > 1 || alpha[at] > 0.0 ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[e].block];

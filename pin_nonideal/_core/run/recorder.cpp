@@ -7,6 +7,10 @@
 
 namespace pn {
 
+void append_closed(const Program& p, const Workspace& w, std::vector<std::int8_t>& to) {
+    for (int block : p.all_contacts) to.push_back(block < p.first_gap || w.state.closed[block - p.first_gap]);
+}
+
 static void append(std::vector<double>& to, const VecX& x) { to.insert(to.end(), x.data(), x.data() + x.size()); }
 
 void Recorder::reserve(size_t samples) {
@@ -22,6 +26,20 @@ std::vector<int> reaction_blocks(const Program& p) {
     return blocks;
 }
 
+std::vector<int> framed_contacts(const Program& p) {
+    std::vector<int> blocks;
+    for (int block : p.all_contacts)
+        if (frames(p.blocks[block].kind).first) blocks.push_back(block);
+    return blocks;
+}
+
+void Recorder::record_contacts() {
+    for (int block : framed_contacts(p)) {
+        const Vec3 force = carried_wrench(p, w, block).lin;
+        for (int k = 0; k < 3; ++k) out.contact_forces.push_back(force[k]);
+    }
+}
+
 void Recorder::record_laws(double t) {
     std::vector<VecX>& force = w.scratch.law_force;
     law_forces(p, w, system.v, force);
@@ -29,7 +47,7 @@ void Recorder::record_laws(double t) {
         for (int dof : supports_[l]) out.law_forces.push_back(force[l][dof]);
     for (size_t e = 0; e < p.frictions.size(); ++e)
         out.limits.push_back(w.state.mode[e] == sticking ? static_limit(p, w, e, t, system.q, system.v)
-                                                         : w.now.limit[e]);
+                             : w.state.mode[e] == unloaded ? 0.0 : w.now.limit[e]);
 }
 
 void Recorder::record_reactions() {
@@ -46,7 +64,7 @@ void Recorder::record_reactions() {
     }
 }
 
-void Recorder::sample(double t, const VecX& y, double moved_energy, bool evaluated) {
+void Recorder::sample(double t, const VecX& y, const Jumps& jumps, bool evaluated) {
     system.read(y);
     if (!evaluated && options.evaluates()) {
         system.read_law_states(y);
@@ -55,7 +73,7 @@ void Recorder::sample(double t, const VecX& y, double moved_energy, bool evaluat
         update_kinematics(p, w, t, system.q, system.v);
     }
     double position, velocity;
-    violations(p, w, position, velocity);
+    violations(p, w, t, system.v, position, velocity);
     out.t.push_back(t);
     append(out.q, system.q);
     append(out.v, system.v);
@@ -63,7 +81,9 @@ void Recorder::sample(double t, const VecX& y, double moved_energy, bool evaluat
     out.violation_rate.push_back(velocity);
     if (system.nz > 0) append(out.z, y.segment(system.nq + system.nv, system.nz));
     for (size_t e = 0; e < p.frictions.size(); ++e) out.modes.push_back(w.state.mode[e]);
+    append_closed(p, w, out.closed);
     if (options.a) append(out.a, w.now.a);
+    if (options.tau) append(out.tau, w.now.tau);
     if (options.power) {
         power_.setZero(power_count(p));
         powers(p, w, system.v, power_.data());
@@ -75,9 +95,11 @@ void Recorder::sample(double t, const VecX& y, double moved_energy, bool evaluat
         out.energy.push_back(kinetic_energy(p.mechanism, w.now.terms, system.v));
         out.energy.push_back(potential_energy(p.mechanism, w.now.terms));
         append(out.energy, y.segment(system.nq + system.nv + system.nz, system.nw));
-        out.energy.push_back(moved_energy);
+        if (!p.gaps.empty()) out.energy.push_back(jumps.impacts);
+        out.energy.push_back(jumps.projection);
     }
     if (options.forces) {
+        record_contacts();
         split_forces(p, w, split_);
         append(out.F_ideal, split_.F_ideal);
         append(out.F_nonideal, split_.F_nonideal);

@@ -4,9 +4,10 @@
 #include <cmath>
 
 #include "dynamics/evaluation.hpp"
+#include "dynamics/power.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/step_start.hpp"
-#include "run/events.hpp"
+#include "run/bouncing.hpp"
 
 namespace pn {
 
@@ -19,6 +20,8 @@ constexpr double rest_step = 0.1, rest_part_step = 0.002;
 // is made one of two even steps instead of a long and a tiny one.
 constexpr double whole_way = 1.0 - 1e-10, even_part = 0.5;
 
+// Part of a step that is tried next where the event inside it is not found.
+constexpr double shortened = 0.3;
 // A step of fewer spacings of floating-point times than these leads nowhere.
 constexpr double least_spacings = 4.0;
 // Steps below this part of the time are short enough to tell what fails of its own.
@@ -30,15 +33,13 @@ constexpr double least_progress = 1e-10;
 
 // Progress is told after so many steps.
 constexpr long steps_a_tick = 16;
-// Room for samples is taken at once up to this number; longer runs may stop before they fill it.
-constexpr double most_reserved = 1e5;
 
-// Chatter: this many events within its time make the run go on by time stepping for a while, in so many steps.
+// Chatter: this many events within its time make the run go on by time stepping for a while, in so many steps. Where it
+// goes on right after, the while is made longer by this factor, up to the longest [s].
 constexpr int chatter_events = 60;
 constexpr int chatter_steps = 50;
+constexpr double chatter_growth = 2.0, longest_chatter = 1e-2;
 
-// Part of a step to which the instant is found from which on several motions are possible.
-constexpr double several_width = 1e-12;
 // Of the step: where directions of slip relax faster, stability holds the explicit methods short (at 3 to 6); it is
 // believed after some steps in a row, and asked again some steps after it turned out otherwise.
 constexpr double stiff = 2.5;
@@ -46,11 +47,11 @@ constexpr int stiff_in_a_row = 6, patience = 20;
 // Where directions are not found in a step of this length [s], the method asked for has to find a way.
 constexpr double shortest_sought = 1e-9;
 
+// Part of the works of an impact that rounding may make a gain of.
+constexpr double gain_rounding = 1e-12;
+
 // Part of a step of time stepping that is not worth one of its own.
 constexpr double least_part = 1e-9;
-// Times closer than this part of them, or this many seconds, are the same.
-constexpr double time_rounding = 1e-12;
-double same_time(double t) { return time_rounding * std::max(1.0, std::abs(t)); }
 // Number of whole lengths in a time that should be a multiple of them; their quotient may miss it by so much of itself
 // and of one.
 constexpr double quotient_rounding = 1e-14, count_rounding = 1e-9;
@@ -61,16 +62,21 @@ double whole_lengths(double time, double length) {
 }  // namespace
 
 Simulation::Simulation(const Program& program, Workspace& workspace, const Options& run_options, Recording& recording)
-    : p(program), w(workspace), options(run_options), out(recording), t_end(options.t0 + options.duration),
-      system(program, workspace, options.record.energy), norm(system, options.rtol, options.atol),
+    : p(program), w(workspace), options(run_options), out(recording), t_end(options.end()),
+      system(program, workspace, options.record.energy), norm(system, options.rtol, options.atol, rounding),
       stepper(options.method, system, norm), control(options.method, options.rtol),
-      stiffness(system, stepper, *this, t_end, run_options.max_steps),
-      locator(system, stepper, slip_at_start, pulls), moreau(system),
-      recorder(system, options.record, recording), sample_(VecX::Zero(system.ny)) {
-    y = rate = configured_y = sample_;
-    w.continues = options.continues;
+      stiffness(system, stepper, *this, run_options),
+      floor(system, stepper, norm, *this, recording),
+      locator(system, stepper, slip_at_start, pulls, gaps), moreau(system), moreau_contacts(system),
+      output(system, stepper, *this, run_options, recording), notices(system, stepper, *this, recording),
+      user_events(run_options.events, system, stepper) {
+    y = rate = configured_y = VecX::Zero(system.ny);
+    // Time stepping finds its motion in velocities; of accelerations, which are recorded only, the nearest do.
+    const bool in_time = options.method.scheme == Method::Scheme::moreau;
+    w.continues = options.continues || (in_time && system.ng > 0);
     slip_at_start.assign(p.frictions.size(), 0.0);
     pulls.assign(p.contacts.size(), 0);
+    gaps = GapState(p.gaps.size());
 }
 
 void Simulation::start(const VecX& q0, const VecX& v0) {
@@ -79,46 +85,51 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
     y.head(system.nq) = q0;
     y.segment(system.nq, system.nv) = v0;
     if (system.nz > 0) y.segment(system.nq + system.nv, system.nz) = w.state.z;
-    samples = 1;
-    // The steps of adaptive methods are not known before.
-    const double apart = options.output_dt > 0.0 ? options.output_dt : options.dt;
-    if (apart > 0.0) recorder.reserve(static_cast<size_t>(std::min(options.duration / apart + 2.0, most_reserved)));
+    output.begin();
     w.state.has_held = false;
     w.state.warm = false;
     sample_control();
+    if (system.ng > 0) {
+        set_closed(p, w, std::vector<char>(p.gaps.size(), 0));
+        strike(true);
+    }
     switch_modes(system, t, y, rate, std::nullopt);
-    emit(t, y, true);
-    report_pulls(std::nullopt);
-    report_several(false);
+    remember_gaps();
+    output.now();
+    notices.pulls(std::nullopt);
+    notices.several(false);
+    user_events.start(t, y);
     h = options.dt;
     if (options.method.adaptive()) {
         h = norm.initial_step(options.method.order, t, y, rate, t_end - t);
         system.read(y);
         begin_step(p, w, t, system.q, system.v);
     }
-    configured_now();
+    output.configured_now();
 }
 
 void Simulation::run() {
     const bool in_time = options.method.scheme == Method::Scheme::moreau;
-    while (t < t_end) {
-        between_steps();
+    while (!done() && between_steps()) {
         if (in_time) {
             step_in_time(t_end, options.dt);
             continue;
         }
         Proposal proposal = propose();
-        while (!control_error(proposal, integrate(proposal))) proposal = propose();
-        stiffness.look();
-        const std::optional<FoundEvent> event = locate_event();
+        while (!control_error(proposal, integrate(proposal)) || !locate_event(proposal)) proposal = propose();
         accept(proposal, event);
         record(event);
+    }
+    if (t < t_end) {  // ended by the user, with a last sample here
+        system.read(y);
+        evaluate(p, w, t, system.q, system.v);
+        output.now();
     }
     if (options.save) save();
 }
 
 // The only place where a run is interrupted or saved: what is left here is all that the next step needs.
-void Simulation::between_steps() {
+bool Simulation::between_steps() {
     try {
         if (options.tick && ++ticks % steps_a_tick == 0) options.tick(t);
     } catch (...) {
@@ -130,6 +141,22 @@ void Simulation::between_steps() {
         throw Failure(Failure::Kind::step_size, t, {}, static_cast<double>(out.steps));
     if (options.max_steps > 0 && out.steps >= options.max_steps)
         throw Failure(Failure::Kind::steps, t, {}, static_cast<double>(out.steps));
+    if (options.max_wall > 0.0 && std::chrono::duration<double>(Clock::now() - begun).count() > options.max_wall)
+        throw Failure(Failure::Kind::wall, t, {}, options.max_wall);
+    return !options.callback || ask_callback();
+}
+
+bool Simulation::ask_callback() {
+    system.read(y);
+    const Options::Told told = options.callback(t, system.q, system.v, w.scratch.work);
+    if (told != Options::Told::torque) return told == Options::Told::go_on;
+    w.now.has_override = true;
+    w.now.override_torque = w.scratch.work;
+    // The torque jumps here: the derivative is taken anew.
+    begin_step(p, w, t, system.q, system.v);
+    system.rate_of_evaluation(t, y, rate);
+    output.configured_now();
+    return true;
 }
 
 void Simulation::save() {
@@ -152,7 +179,7 @@ void Simulation::sample_control() {
     // The torque jumps here: the derivative is taken anew.
     begin_step(p, w, t, system.q, system.v);
     system.rate_of_evaluation(t, y, rate);
-    configured_now();
+    output.configured_now();
 }
 
 // Where actuation jumps or bends next.
@@ -197,8 +224,9 @@ Simulation::Proposal Simulation::propose() {
 // --- Integrate ------------------------------------------------------------------------------------------------------
 
 std::optional<double> Simulation::integrate(const Proposal& proposal) {
+    if (system.ne > 0) before_step = w.state;
     stepper.y0 = y;
-    stepper.y0.tail(2 * system.ne).setZero();  // what elements watch is theirs over one step
+    stepper.y0.tail(2 * system.ne + system.ng).setZero();  // what elements watch is theirs over one step
     stepper.start_rate() = rate;
     try {
         return try_step(proposal.size);
@@ -251,23 +279,58 @@ bool Simulation::control_error(const Proposal& proposal, std::optional<double> e
     throw Failure(Failure::Kind::step_size, t);
 }
 
+// --- Locate events --------------------------------------------------------------------------------------------------
+
+void Simulation::find_event() {
+    event = locator.locate();
+    if (user_events.locate(event.has_value()))
+        event = FoundEvent{FoundEvent::Kind::user, user_events.found().front(), stepper.t0 + stepper.h};
+}
+
+bool Simulation::locate_event(const Proposal& proposal) {
+    stiffness.look();
+    floor.look();
+    try {
+        find_event();
+        return true;
+    } catch (const Failure& failure) {
+        // The step taken again up to an event went where the whole one did not: it is too long.
+        const double tiny = tiny_step * std::max(1.0, std::abs(t));
+        if (!options.method.adaptive() || proposal.size < tiny || failure.kind == Failure::Kind::interrupted) throw;
+    }
+    ++out.rejected;
+    h = shortened * proposal.size;
+    if (system.ne > 0) w.state = before_step;
+    system.read(y);
+    begin_step(p, w, t, system.q, system.v);
+    return false;
+}
+
+void Simulation::tell_user_events() {
+    for (int k : user_events.found()) out.events.push_back({t, Event::Kind::user, k});
+}
+
 // --- Accept ---------------------------------------------------------------------------------------------------------
 
 void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent>& event) {
     ++out.steps;
+    out.limited += norm.is_limited();
     t = event ? event->time : proposal.last ? proposal.stop : stepper.t0 + stepper.h;
     moved_energy += system.moved_energy;
     remember_directions(system, slip_at_start);
     y = stepper.y1;
     rate = stepper.end_rate();
-    configured_now();
-    if (!event || !event->changes_modes()) report_pulls(event);
-    emit_inside_step(report_several(true));
+    output.configured_now();
+    remember_gaps();
+    output.keep_step();
+    tell_user_events();
+    if (!event || !event->changes_modes()) notices.pulls(event);
+    output.inside_step(notices.several(true));
     stepper.end_directions();
     choose_stepper();
     if (!event) return;
     if (event->changes_modes()) change_modes(*event);
-    report_several(false);
+    notices.several(false);
     if (event->kind != FoundEvent::Kind::reversal) return;
     recent_events.push_back(t);
     bridge_cluster(event->index);
@@ -290,127 +353,91 @@ void Simulation::choose_stepper() {
     }
 }
 
+void Simulation::remember_gaps() {
+    if (system.ng == 0) return;
+    system.read(y);
+    look_at_gaps(system, t, gaps);
+}
+
+bool Simulation::strike(bool starts) {
+    if (system.ng == 0 || !contacts_strike(system, t, y, starts)) return false;
+    output.before_jump();
+    const Strike found = strike_contacts(system, t, y, starts);
+    for (const Event& event : found.events) out.events.push_back(event);
+    impact_energy += found.work;
+    if (system.energy && p.moves_in_time) system.work(y)[constraint_power] += found.work_of_constraints;
+    else moved_energy += found.work_of_constraints;
+    double size = 0.0;
+    for (const Event& event : found.events) size += std::abs(event.energy_change);
+    if (!options.strict || !(found.work > gain_rounding * size)) return true;
+    std::vector<int> blocks;
+    for (const Event& event : found.events) blocks.push_back(event.element);
+    throw Failure(Failure::Kind::impact_energy, t, blocks, found.work);
+}
+
 void Simulation::change_modes(const FoundEvent& event) {
     const Modes before = w.state.mode;
+    const bool struck = event.kind == FoundEvent::Kind::touch && strike(false);
     for (const Event& change : switch_modes(system, t, y, rate, event)) {
         out.events.push_back(change);
-        recent_events.push_back(t);
+        if (!struck) recent_events.push_back(t);
     }
+    remember_gaps();
+    if (struck) return end_bouncing();
     if (std::equal(before.begin(), before.end(), w.state.mode.begin())) recent_events.push_back(t);
-    configured_now();
-    bridge_cluster(event.index);
+    output.configured_now();
+    bridge_cluster(event.of_gap() ? 0 : event.index);
+}
+
+// What bounces too low to be integrated comes to rest.
+void Simulation::end_bouncing() {
+    output.now();
+    output.configured_now();
+    const double stop = options.output_dt > 0.0 ? std::min(next_stop(), output.next()) : next_stop();
+    VecX y_end = y, rate_end = rate;
+    const RunState state = w.state;
+    const std::optional<Rest> rest = bounce_to_rest(system, t, stop, y_end, rate_end);
+    if (!rest) {
+        set_closed(p, w, state.closed);
+        w.state = state;
+        select_rows(p, w);
+        system.read(y);
+        return begin_step(p, w, t, system.q, system.v);
+    }
+    t = rest->time;
+    y = y_end;
+    rate = rate_end;
+    impact_energy += rest->work;
+    for (const Event& event : rest->events) out.events.push_back(event);
+    output.configured_now();
+    remember_gaps();
 }
 
 // Events that come too thick are bridged by time stepping, which needs none.
 void Simulation::bridge_cluster(int element) {
     if (recent_events.size() > chatter_events) recent_events.erase(recent_events.begin());
     if (recent_events.size() < chatter_events || t - recent_events.front() > chatter_time) return;
+    const bool again = bridged_time > 0.0 && recent_events.front() - bridged_end < bridged_time;
     recent_events.clear();
-    if (!options.method.outside()) stiffness.require_time_steps(chatter_time / chatter_steps);
+    bridged_time = again ? std::min(chatter_growth * bridged_time, longest_chatter) : chatter_time;
+    const double dt = bridged_time / chatter_steps;
+    if (!options.method.outside()) stiffness.require_time_steps(dt);
     out.events.push_back({t, Event::Kind::chatter, element});
     if (options.method.outside()) return;  // whose steps go on without a look at events
-    const double stop = std::min(t_end, t + chatter_time);
+    const double stop = std::min(t_end, t + bridged_time);
     w.state.seeks_directions = false;
-    while (t < stop) step_in_time(stop, chatter_time / chatter_steps);
+    while (t < stop) step_in_time(stop, dt);
+    bridged_end = t;
     switch_modes(system, t, y, rate, std::nullopt);
-    configured_now();
+    remember_gaps();
+    output.configured_now();
 }
 
 // --- Record ---------------------------------------------------------------------------------------------------------
 
 void Simulation::record(const std::optional<FoundEvent>& event) {
-    if (event && event->changes_modes()) {
-        emit(t, y, true);
-        return;
-    }
-    const bool on_grid = options.output_dt > 0.0 && std::abs(next_sample() - t) <= same_time(t);
-    if (options.output_dt != 0.0 && !on_grid && t < t_end) return;
-    samples += on_grid;
-    if (stepper.has_interpolant()) {
-        system.read(y);
-        evaluate(p, w, t, system.q, system.v);
-        configured_now();
-    }
-    emit(t, y, true);
-}
-
-void Simulation::configured_now() {
-    configured_t = t;
-    configured_y = y;
-}
-
-void Simulation::emit(double at, const VecX& state, bool evaluated) {
-    if (!out.t.empty() && at <= out.t.back()) return;
-    recorder.sample(at, state, moved_energy, evaluated);
-}
-
-void Simulation::emit_between(double at) {
-    stepper.make_interpolant();
-    stepper.interpolate((at - stepper.t0) / stepper.h, sample_);
-    if (!w.now.rows.blocks.empty()) {
-        system.read(sample_);
-        project(p, w, at, system.q, system.v);
-        system.write(sample_);
-    }
-    if (!w.now.rows.blocks.empty() || options.record.evaluates() || p.constraints > 0) {
-        configured_t = at;
-        configured_y = sample_;
-    }
-    emit(at, sample_, false);
-}
-
-void Simulation::emit_inside_step(std::optional<double> between) {
-    const double end = t - same_time(t);
-    while (options.output_dt > 0.0 && next_sample() < end) {
-        if (between && *between < next_sample()) {
-            emit_between(*between);
-            between.reset();
-        }
-        emit_between(next_sample());
-        ++samples;
-    }
-    if (between && *between < end) emit_between(*between);
-}
-
-// A maintained contact that would have to pull, told once each time it begins.
-void Simulation::report_pulls(const std::optional<FoundEvent>& event) {
-    const bool found = event && event->kind == FoundEvent::Kind::pull;
-    for (int i = 0; i < static_cast<int>(p.contacts.size()); ++i) {
-        const bool pull = (found && i == event->index) || w.now.lam[p.blocks[p.contacts[i]].row] < 0.0;
-        if (pull && !pulls[i]) out.events.push_back({t, Event::Kind::pull, p.contacts[i]});
-        pulls[i] = pull;
-    }
-}
-
-// Where the laws begin to allow other motions too, told once each time; returns when, where that lies inside the step.
-std::optional<double> Simulation::report_several(bool after_step) {
-    const bool before = several;
-    several = w.state.unique == Uniqueness::several || w.now.several;
-    if (before || !several) return std::nullopt;
-    const int element = w.now.several_element;
-    const double at = after_step && w.state.unique == Uniqueness::several ? last_unique() : t;
-    out.events.push_back({at, Event::Kind::several, element});
-    return at;
-}
-
-// Halves the step just taken, on its interpolant, toward the last instant at which its motion is the only one. The
-// workspace is left as it was.
-double Simulation::last_unique() {
-    const RunState kept = w.state;
-    stepper.make_interpolant();
-    double low = 0.0, high = 1.0;
-    while (high - low > several_width) {
-        const double mid = 0.5 * (low + high);
-        stepper.interpolate(mid, sample_);
-        system.read(sample_);
-        w.state.steps_since = never_decided;
-        evaluate(p, w, stepper.t0 + mid * stepper.h, system.q, system.v);
-        (w.state.unique == Uniqueness::several ? high : low) = mid;
-    }
-    w.state = kept;
-    system.read(y);
-    evaluate(p, w, t, system.q, system.v);
-    return stepper.t0 + high * stepper.h;
+    if (event && event->changes_modes()) output.now();
+    else output.end_step(!user_events.found().empty());
 }
 
 // --- Time stepping --------------------------------------------------------------------------------------------------
@@ -418,27 +445,31 @@ double Simulation::last_unique() {
 void Simulation::step_in_time(double stop, double dt) {
     sample_control();
     double end = std::min({t + dt, stop, next_stop()});
-    if (options.output_dt > 0.0) end = std::min(end, std::max(next_sample(), std::nextafter(t, stop)));
+    if (options.output_dt > 0.0) end = std::min(end, std::max(output.next(), std::nextafter(t, stop)));
     if (stop - end < least_part * dt) end = stop;
     const Modes before = w.state.mode;
-    moreau.step(t, end - t, y, moved_energy);
+    const std::vector<char> closed = w.state.closed;
+    const double from = t;
+    const VecX y_from = options.record.dense ? y : VecX();
+    if (system.ng > 0) moreau_contacts.step(t, end - t, y, moved_energy, impact_energy);
+    else moreau.step(t, end - t, y, moved_energy);
     ++out.steps;
     t = end;
     system.read(y);
     // Factors of the new modes: what sticks must not move as the rest is projected.
     begin_step(p, w, t, system.q, system.v);
     system.project_and_evaluate(t, y, rate);
-    configured_now();
+    output.configured_now();
     remember_directions(system, slip_at_start);
     moved_energy += system.moved_energy;
-    for (int e = 0; e < system.ne; ++e)
-        if (before[e] != w.state.mode[e])
-            out.events.push_back({t, kind_of_change(before[e], w.state.mode[e]), e});
-    report_pulls(std::nullopt);
-    report_several(false);
-    const bool on_grid = options.output_dt > 0.0 && next_sample() <= t + same_time(t);
-    samples += on_grid;
-    if (options.output_dt == 0.0 || on_grid || t >= t_end) emit(t, y, true);
+    for (const Event& change : changes_since(system, t, closed, before)) out.events.push_back(change);
+    notices.pulls(std::nullopt);
+    notices.several(false);
+    output.keep_time_step(from, y_from);
+    user_events.look_at_end(t, y);
+    tell_user_events();
+    if (!user_events.found().empty()) output.now();
+    output.end_time_step();
 }
 
 // --- Runs -----------------------------------------------------------------------------------------------------------

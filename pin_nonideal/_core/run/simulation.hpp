@@ -1,32 +1,21 @@
 // The time loop: propose a step, integrate it, control the error, locate an event, accept, record.
 #pragma once
 
-#include <chrono>
-#include <functional>
 #include <optional>
+#include <string>
 
 #include "run/checkpoint.hpp"
 #include "run/event_location.hpp"
 #include "run/moreau.hpp"
+#include "run/moreau_contacts.hpp"
+#include "run/notices.hpp"
+#include "run/output.hpp"
+#include "run/rounding.hpp"
 #include "run/step_control.hpp"
 #include "run/stiffness.hpp"
+#include "run/user_events.hpp"
 
 namespace pn {
-
-using Clock = std::chrono::steady_clock;
-
-struct Options {
-    Method method;
-    double t0 = 0.0, duration = 0.0;
-    double rtol = 1e-8, dt = 0.0, output_dt = 0.0;  // output_dt 0: every accepted step
-    VecX atol;                                      // 2 nv + states
-    long max_steps = 0;                             // 0: as many as it takes, and fewer of a stiff scene
-    RecordOptions record;
-    bool continues = false;  // where several motions are possible: with the one nearest to that before; else it fails
-    std::function<void(double t)> tick;  // progress and interruption, called now and then between steps
-    std::function<void(const std::string& state)> save;  // writes a checkpoint; empty: none
-    Clock::duration save_interval{};                     // of wall time
-};
 
 // Runs into `out`; failures end the run there and keep the samples.
 void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, const Options& options, Recording& out);
@@ -52,34 +41,34 @@ protected:
     };
 
     // The six verbs of a step. Integrating gives the norm of the error, 1 at the tolerance, or nothing where the step
-    // would pass too near a singular position; what the control of the error refuses is proposed again.
+    // would pass too near a singular position; what the control of the error refuses is proposed again, and so is a step
+    // inside which an event cannot be located.
     Proposal propose();
     std::optional<double> integrate(const Proposal& proposal);
     bool control_error(const Proposal& proposal, std::optional<double> error);
-    std::optional<FoundEvent> locate_event() { return locator.locate(); }
+    bool locate_event(const Proposal& proposal);
     void accept(const Proposal& proposal, const std::optional<FoundEvent>& event);
     void record(const std::optional<FoundEvent>& event);
 
+    void find_event();
+
     std::optional<double> try_step(double size);
 
-    void between_steps();
+    bool done() const { return t >= t_end || user_events.ends_run(); }
+    // Whether the run goes on.
+    bool between_steps();
+    bool ask_callback();
+    void tell_user_events();
     void save();
     void sample_control();
     double next_stop() const;
-    double next_sample() const { return options.t0 + samples * options.output_dt; }
-
-    void emit(double at, const VecX& state, bool evaluated);
-    // A sample inside the step just taken, from its interpolant.
-    void emit_between(double at);
-    // Samples of the output grid inside the step just taken, and one at a time between.
-    void emit_inside_step(std::optional<double> between);
-    void report_pulls(const std::optional<FoundEvent>& event);
-    std::optional<double> report_several(bool after_step);
-    double last_unique();
-    void configured_now();
 
     void choose_stepper();
     void change_modes(const FoundEvent& event);
+    // An impact of contacts that touch and approach each other; whether there was one.
+    bool strike(bool starts);
+    void end_bouncing();
+    void remember_gaps();
     void bridge_cluster(int element);
     // One step of time stepping, not beyond `stop`.
     void step_in_time(double stop, double dt);
@@ -88,19 +77,25 @@ protected:
     Workspace& w;
     const Options& options;
     Recording& out;
-    const double t_end;
+    double t_end;
     System system;
     ErrorNorm norm;
     Stepper stepper;
     StepControl control;
     StiffnessGuard stiffness;
+    RoundingFloor floor;
     EventLocator locator;
     Moreau moreau;
-    Recorder recorder;
-    VecX sample_;
+    MoreauContacts moreau_contacts;
+    Output output;
+    Notices notices;
+    UserEvents user_events;
     bool turns_stiffly = false;  // the step just taken
     long ticks = 0;
     Clock::time_point next_save;
+    const Clock::time_point begun = Clock::now();
+    std::optional<FoundEvent> event;  // in the step just taken
+    RunState before_step{};
     std::optional<Failure> opened;  // a loop that a trial of this step could not close
 };
 

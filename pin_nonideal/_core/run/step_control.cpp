@@ -22,6 +22,8 @@ constexpr int detour_limit = 3;
 
 }  // namespace
 
+double StepControl::aim(const Method& method) { return std::pow(safety, method.order); }
+
 bool StepControl::needs_detour(double least_pivot, double start_pivot, double end_pivot) const {
     const double way = std::sqrt(start_pivot) + std::sqrt(end_pivot);
     return method_.adaptive() && detours_ < detour_limit && std::sqrt(least_pivot) < clearance * way &&

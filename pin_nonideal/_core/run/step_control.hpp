@@ -15,6 +15,9 @@ class StepControl {
 public:
     StepControl(const Method& method, double rtol) : method_(method), rtol_(rtol) {}
 
+    // Norm of the error at which the next step is as long as the last.
+    static double aim(const Method& method);
+
     // Whether rounding near a singular position would spoil the stages of a step, which one of another length keeps clear
     // of: least pivot of the rows' factor at the stages, and its pivots at both ends.
     bool needs_detour(double least_pivot, double start_pivot, double end_pivot) const;

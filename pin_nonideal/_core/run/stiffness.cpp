@@ -25,11 +25,21 @@ constexpr double least_damping = 0.1;
 constexpr double difference_step = 1e-8;
 constexpr int power_passes = 20;
 
+// A run is looked ahead after so many steps first, and twice as many each time. It takes long where so many seconds are
+// left, and vibrates where so many periods are, by steps longer than this part of one (in radians).
+constexpr long first_look_ahead = 500, never = 1L << 62;
+constexpr double long_time = 3.0, many_radians = 2e4, part_of_period = 0.1;
+
 }  // namespace
 
-StiffnessGuard::StiffnessGuard(System& system, Stepper& stepper, Progress& progress, double t_end, long most_steps)
-    : system_(system), stepper_(stepper), progress_(progress), t_end_(t_end),
-      most_steps_(most_steps > 0 ? static_cast<double>(most_steps) : usual_steps) {}
+StiffnessGuard::StiffnessGuard(System& system, Stepper& stepper, Progress& progress, const Options& options)
+    : system_(system), stepper_(stepper), progress_(progress), options_(options),
+      most_steps_(options.max_steps > 0 ? static_cast<double>(options.max_steps) : usual_steps),
+      next_look_ahead_(options.hint && options.max_steps == 0 ? first_look_ahead : never) {}
+
+double StiffnessGuard::FastestMode::rate() const { return std::hypot(decay, frequency); }
+
+bool StiffnessGuard::FastestMode::decays() const { return decay > least_damping * rate(); }
 
 // Two evaluations at the step's end, of the last stage and of the result, tell how fast the rate changes with the state.
 double StiffnessGuard::stage_rate() const {
@@ -85,9 +95,26 @@ StiffnessGuard::FastestMode StiffnessGuard::fastest_mode() {
     return {-eigenvalue.real(), std::abs(eigenvalue.imag()), dof};
 }
 
+StiffnessGuard::FastestMode StiffnessGuard::mode_here() {
+    const RunState kept = system_.w.state;
+    const FastestMode mode = fastest_mode();
+    system_.w.state = kept;
+    system_.read(stepper_.y1);
+    system_.read_law_states(stepper_.y1);
+    evaluate(system_.p, system_.w, stepper_.t0 + stepper_.h, system_.q, system_.v);
+    system_.w.state = kept;
+    return mode;
+}
+
 void StiffnessGuard::look() {
+    if (stepper_.method.stability == 0.0 || stepper_.collocates()) return;
+    look_for_border();
+    if (++steps_ == next_look_ahead_) look_ahead();
+}
+
+void StiffnessGuard::look_for_border() {
     const double border = stepper_.method.stability, size = stepper_.h, at = stepper_.t0 + size;
-    if (!(t_end_ - at > most_steps_ * size) || border == 0.0 || stepper_.collocates()) return;
+    if (!(options_.end() - at > most_steps_ * size)) return;
     if (size * stage_rate() < near_border * border) {
         if (++progress_.quiet_steps == quiet_steps) progress_.stiff_steps = 0;
         return;
@@ -95,20 +122,32 @@ void StiffnessGuard::look() {
     progress_.quiet_steps = 0;
     if (++progress_.stiff_steps < suspicious_steps) return;
     progress_.stiff_steps = 0;
-    const FastestMode mode = fastest_mode();
-    const double rate = std::hypot(mode.decay, mode.frequency);
-    if (size * rate > near_border * border && mode.decay > least_damping * rate)
-        throw Failure(Failure::Kind::stiff, at, {mode.dof}, rate);
-    system_.read(stepper_.y1);
-    system_.read_law_states(stepper_.y1);
-    evaluate(system_.p, system_.w, at, system_.q, system_.v);
+    const FastestMode mode = mode_here();
+    if (size * mode.rate() > near_border * border && mode.decays())
+        throw Failure(Failure::Kind::stiff, at, {mode.dof}, mode.rate());
+}
+
+void StiffnessGuard::look_ahead() {
+    next_look_ahead_ = 2 * steps_;
+    const double size = stepper_.h, at = stepper_.t0 + size, left = options_.end() - at;
+    const double so_far = std::chrono::duration<double>(Clock::now() - begun_).count();
+    if (so_far / static_cast<double>(steps_) * (left / size) < long_time) return;
+    const Counters kept = system_.w.counters;  // when this comes depends on the clock
+    const FastestMode mode = mode_here();
+    system_.w.counters = kept;
+    const double radians = size * mode.rate();
+    const bool follows =
+        mode.decays() ? radians > near_border * stepper_.method.stability && left < most_steps_ * size
+                      : radians > part_of_period && mode.rate() * left > many_radians;
+    if (!follows) return;
+    next_look_ahead_ = never;
+    options_.hint(at, mode.dof, mode.rate(), mode.decays());
 }
 
 void StiffnessGuard::require_time_steps(double size) {
     const FastestMode mode = fastest_mode();
-    const double rate = std::hypot(mode.decay, mode.frequency);
-    if (size * rate > euler_border && mode.decay > least_damping * rate)
-        throw Failure(Failure::Kind::stiff, stepper_.t0 + stepper_.h, {mode.dof}, rate);
+    if (size * mode.rate() > euler_border && mode.decays())
+        throw Failure(Failure::Kind::stiff, stepper_.t0 + stepper_.h, {mode.dof}, mode.rate());
 }
 
 }  // namespace pn

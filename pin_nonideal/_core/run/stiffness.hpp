@@ -3,17 +3,18 @@
 #pragma once
 
 #include "run/checkpoint.hpp"
+#include "run/options.hpp"
 #include "run/stepper.hpp"
 
 namespace pn {
 
 class StiffnessGuard {
 public:
-    // The most steps that a stiff run may take; 0: the usual number.
-    StiffnessGuard(System& system, Stepper& stepper, Progress& progress, double t_end, long most_steps);
+    // A stiff run may take as many steps as the options allow, or the usual number of them.
+    StiffnessGuard(System& system, Stepper& stepper, Progress& progress, const Options& options);
 
     // After a step that the error control accepts, with the workspace evaluated at its end, and left so. Throws a Failure
-    // with the dof that is stiff, and its rate [1/s].
+    // with the dof that is stiff, and its rate [1/s]. What will take long for a fast motion, but not for ever, is hinted at.
     void look();
     // The same at once, unless what decays fastest lets time stepping take steps of this size.
     void require_time_steps(double size);
@@ -22,8 +23,14 @@ private:
     struct FastestMode {
         double decay, frequency;  // [1/s]
         int dof;                  // whose force does most to it
+        double rate() const;
+        bool decays() const;
     };
 
+    void look_for_border();
+    void look_ahead();
+    // Of the motion at the step's end, which the workspace is at before and after.
+    FastestMode mode_here();
     double stage_rate() const;
     VecX difference(const VecX& direction, VecX& force);
     FastestMode fastest_mode();
@@ -31,7 +38,10 @@ private:
     System& system_;
     Stepper& stepper_;
     Progress& progress_;
-    const double t_end_, most_steps_;
+    const Options& options_;
+    const double most_steps_;
+    const Clock::time_point begun_ = Clock::now();
+    long steps_ = 0, next_look_ahead_;
     VecX probe_, probe_rate_;
 };
 

@@ -5,6 +5,7 @@
 #include "dynamics/evaluation.hpp"
 #include "dynamics/power.hpp"
 #include "dynamics/projection.hpp"
+#include "dynamics/reactions.hpp"
 #include "dynamics/slip.hpp"
 #include "dynamics/step_start.hpp"
 #include "tree/liegroup.hpp"
@@ -13,11 +14,13 @@ namespace pn {
 
 // Below any limit of friction [N or N m]: what carries none at all still has a share.
 constexpr double least_limit = 1e-300;
+// What a contact holds of its limit is not told beyond this: where its load jumps to none it has opened.
+constexpr double most_share = 10.0;
 
 System::System(const Program& program, Workspace& workspace, bool with_energy)
     : p(program), w(workspace), energy(with_energy), nq(p.mechanism.nq), nv(p.mechanism.nv), nz(p.states),
       nw(with_energy ? power_count(p) : 0), ne(static_cast<int>(p.frictions.size())),
-      ns(nq + nv + nz + nw), ny(ns + 2 * ne),
+      ng(static_cast<int>(p.gaps.size())), ns(nq + nv + nz + nw), ny(ns + 2 * ne + ng),
       q(VecX::Zero(nq)), v(VecX::Zero(nv)) {}
 
 void System::read(const VecX& y) {
@@ -54,6 +57,7 @@ void System::write_rate(double t, VecX& dy) {
     if (nz > 0) dy.segment(nq + nv, nz) = w.now.dz;
     if (energy) powers(p, w, v, dy.data() + nq + nv + nz);
     watch(t, dy);
+    watch_loads(dy);
 }
 
 void System::watch(double t, VecX& dy) {
@@ -68,7 +72,18 @@ void System::watch(double t, VecX& dy) {
             const double limit = static_limit(p, w, e, t, q, v);
             const Vec3 force = friction_force(p, w, e);  // of one direction with its sign: smooth where it passes zero
             share = (p.frictions[e].dim == 1 ? force[0] : force.norm()) / std::max(limit, least_limit);
+            if (p.frictions[e].gap >= 0) share = std::clamp(share, -most_share, most_share);
         }
+    }
+}
+
+void System::watch_loads(VecX& dy) {
+    double* loads = dy.data() + ns + 2 * ne;
+    for (int i = 0; i < ng; ++i) {
+        loads[i] = 0.0;
+        if (!w.state.closed[i] || p.blocks[p.gaps[i].block].kept.empty()) continue;
+        if (!w.now.rows.redundant) loads[i] = w.now.lam[p.blocks[p.gaps[i].block].row];
+        else loads[i] = reactions(p, w).presses ? 1.0 : -1.0;
     }
 }
 
@@ -84,6 +99,7 @@ void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
     read(y);
     read_law_states(y);
     bool moved = project_position(p, w, t, q, v);
+    moved |= project_past_sticking(p, w, t, q, v);
     require_closed(p, w, t);
     moved |= begin_step_on_rates(p, w, t, v);
     write(y);

@@ -2,7 +2,8 @@
 // integrals of the ledger's powers. watch has two numbers for each frictional element, whose rates the stages leave
 // behind: of one that sticks force / limit, so that the step control resolves a load that comes and goes while nothing
 // moves, and the stages tell whether a limit was passed; of one that slips its slip speed and the rate of that, which
-// tell whether it came to rest inside the step.
+// tell whether it came to rest inside the step. Of each gap one number follows, whose rate is the normal force while it
+// is closed: where redundant contacts share it, +1 while all can press and -1 where they cannot.
 //
 // q is integrated in ambient coordinates (a quaternion as four numbers): the right-hand side extends smoothly off the
 // unit sphere, so the order is kept, and lengths are restored at the step's end.
@@ -22,7 +23,7 @@ struct System {
     bool seeks_directions = true;  // the steps can find directions of slip that is too slow to tell them
     double smallest_pivot = 1.0;  // of the rows' factor, over the evaluations since it was set
     double moved_energy = 0.0;    // by the last projection of a step's end, where the ledger is kept
-    const int nq, nv, nz, nw, ne, ns, ny;  // sizes of q, v, z, work, elements, y without watch, y
+    const int nq, nv, nz, nw, ne, ng, ns, ny;  // sizes of q, v, z, work, elements, gaps, y without watch, y
     VecX q, v;                         // of the state read last
 
     System(const Program& program, Workspace& workspace, bool with_energy);
@@ -38,6 +39,8 @@ struct System {
     double slip(const VecX& dy, int element) const { return dy[ns + 2 * element]; }
     double slip_rate(const VecX& dy, int element) const { return dy[ns + 2 * element + 1]; }
 
+    double load(const VecX& dy, int gap) const { return dy[ns + 2 * ne + gap]; }
+
     void derivative(double t, const VecX& y, VecX& dy);
     // dy from the evaluation that the workspace holds.
     void rate_of_evaluation(double t, const VecX& y, VecX& dy);
@@ -49,6 +52,7 @@ private:
     // dy at q and v, from the evaluation there.
     void write_rate(double t, VecX& dy);
     void watch(double t, VecX& dy);
+    void watch_loads(VecX& dy);
     double energy_at(const VecX& y);
 };
 

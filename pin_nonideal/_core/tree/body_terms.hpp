@@ -2,7 +2,8 @@
 //
 // Everything is expressed in world axes about one reference point per kinematic tree: the place of its first joint
 // that turns, frozen for the instant of the evaluation. This keeps numbers small for a robot that has walked far, on a
-// floating base or on sliding joints.
+// floating base or on sliding joints. In a deep tree each body has its own, its joint's place: about a point a hundred
+// links away an inertia would keep few digits of the body.
 #pragma once
 
 #include <vector>
@@ -21,6 +22,16 @@ struct Body {
     Inertia own, Y;                        // of the body (the own pass's), and of the subtree
 };
 
+// What a deep tree keeps instead of rows of M.
+struct Articulation {
+    std::vector<Vec3> shift;  // by joint: from the parent's reference point to its own
+    std::vector<Force> bias;  // by joint: bias force of the body alone
+    std::vector<ArticulatedInertia> inertia;  // by joint: of what hangs on it, free to move
+    std::vector<Force> gain;  // by dof: what a unit of force left to move it takes of the force on its body
+    std::vector<Force> forces;    // of the sweep toward the roots
+    std::vector<Motion> motions;  // of that toward the leaves
+};
+
 struct BodyTerms {
     std::vector<Body> body;
     std::vector<Motion> J;  // motion per unit velocity of each dof
@@ -31,6 +42,7 @@ struct BodyTerms {
     VecX D, inv_sqrt_D;
     std::vector<char> locked;  // dofs that cannot move: they drop out of the factor, and R^-1 x is zero there
     VecX q;  // configuration with unit quaternions
+    Articulation deep;
 };
 
 // A motion of a body, and an inertia that it carries, from its own axes and origin to the world's axes and the reference
@@ -52,6 +64,13 @@ PN_INLINE Inertia in_world(const Body& b, double mass, const Vec3& com, const Ma
     Y.second.c[1] += square * Vec3::UnitY() - c[1] * Y.first;
     Y.second.c[2] += square * Vec3::UnitZ() - c[2] * Y.first;
     return Y;
+}
+
+// Bias force of a body alone.
+PN_INLINE Force bias_force(const Body& b) {
+    Force f = b.own * b.a;
+    f += cross(b.v, b.own * b.v);
+    return f;
 }
 
 // World position, velocity and classical acceleration (at zero qdd, without gravity) of the point of a body at x.

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tree/articulated.hpp"
+
 namespace pn {
 
 int factorize(const Mechanism& m, Terms& terms) {
     // From the leaves to the root: row k eliminates itself from the rows of its ancestors.
     terms.L = terms.M;
     for (int k = m.nv - 1; k >= 0; --k) {
+        if (m.is_deep[k]) continue;
         const int depth = m.depth[k];
         const int* up = m.ancestors.data() + m.row_offset[k];
         double* __restrict row = terms.L.data() + m.row_offset[k];
@@ -44,13 +47,14 @@ int factorize(const Mechanism& m, Terms& terms) {
             row[s] = f;
         }
     }
-    return -1;
+    return m.deep_dofs.empty() ? -1 : factorize_articulated(m, terms);
 }
 
-void solve_R(const Mechanism& m, const Terms& terms, VecX& x) {
+void solve_R(const Mechanism& m, Terms& terms, VecX& x, const Force* body) {
+    if (!m.deep_dofs.empty()) solve_R_articulated(m, terms, body, x);
     for (int k = m.nv - 1; k >= 0; --k) {
         const double xk = x[k];
-        if (xk == 0.0) continue;
+        if (xk == 0.0 || m.is_deep[k]) continue;
         const double* row = terms.L.data() + m.row_offset[k];
         const int* up = m.ancestors.data() + m.row_offset[k];
         for (int s = 1; s <= m.depth[k]; ++s) x[up[s]] -= row[s] * xk;
@@ -72,17 +76,23 @@ static inline void solve_Rt_row(const Mechanism& m, const Terms& terms, int k, V
     x[k] = even + odd;
 }
 
-void solve_Rt(const Mechanism& m, const Terms& terms, VecX& x) {
-    for (int k = 0; k < m.nv; ++k) solve_Rt_row(m, terms, k, x);
+void solve_Rt(const Mechanism& m, Terms& terms, VecX& x) {
+    if (!m.deep_dofs.empty()) solve_Rt_articulated(m, terms, m.deep_dofs, x);
+    for (int k = 0; k < m.nv; ++k)
+        if (!m.is_deep[k]) solve_Rt_row(m, terms, k, x);
 }
 
-void solve_Rt(const Mechanism& m, const Terms& terms, const std::vector<int>& dofs, VecX& x) {
-    for (int k : dofs) solve_Rt_row(m, terms, k, x);
+void solve_Rt(const Mechanism& m, Terms& terms, const std::vector<int>& dofs, VecX& x) {
+    if (!m.deep_dofs.empty()) solve_Rt_articulated(m, terms, dofs, x);
+    for (int k : dofs)
+        if (!m.is_deep[k]) solve_Rt_row(m, terms, k, x);
 }
 
-void multiply_M_locked(const Mechanism& m, const Terms& terms, const VecX& x, VecX& y) {
+void multiply_M_locked(const Mechanism& m, Terms& terms, const VecX& x, VecX& y) {
     y.setZero();
+    if (!m.deep_dofs.empty()) multiply_M_articulated(m, terms, x, nullptr, y);
     for (int k = 0; k < m.nv; ++k) {
+        if (m.is_deep[k]) continue;
         const double* row = terms.M.data() + m.row_offset[k];
         const int *up = m.ancestors.data() + m.row_offset[k], depth = m.depth[k];
         const double xk = x[k];
@@ -93,9 +103,11 @@ void multiply_M_locked(const Mechanism& m, const Terms& terms, const VecX& x, Ve
     }
 }
 
-void multiply_M(const Mechanism& m, const Terms& terms, const VecX& x, VecX& y) {
+void multiply_M(const Mechanism& m, Terms& terms, const VecX& x, VecX& y, Force* body) {
     y.setZero();
+    if (!m.deep_dofs.empty()) multiply_M_articulated(m, terms, x, body, y);
     for (int k = 0; k < m.nv; ++k) {
+        if (m.is_deep[k]) continue;
         const double* row = terms.M.data() + m.row_offset[k];
         const int* up = m.ancestors.data() + m.row_offset[k];
         y[k] += row[0] * x[k];

@@ -2,7 +2,8 @@
 //
 // Every joint hangs on one parent; each degree of freedom (dof) hangs on the dof before it on the way to the root.
 // M(q) and its factor are nonzero only where one dof is an ancestor of the other, so both are stored as one short
-// row per dof: the entries of that dof with itself, its parent, its parent's parent, ... up to the root.
+// row per dof: the entries of that dof with itself, its parent, its parent's parent, ... up to the root. Dofs of deep
+// trees have no such rows (tree/articulated.hpp).
 #pragma once
 
 #include <memory>
@@ -19,6 +20,7 @@ struct Joint {
     JointKind kind = JointKind::other;
     bool unbounded = false;  // configuration is (cos, sin) of the angle
     int parent = 0, root = 0;
+    bool deep = false;       // of a deep tree: its body has a reference point of its own, the joint's place
     int reference = 0;       // joint of the tree's reference point: the first that turns, or the root
     bool recenters = false;  // this joint is it, and not the root: the reference point moves here
     int iq = 0, iv = 0, nv = 0;
@@ -56,6 +58,9 @@ struct Mechanism {
     Vec3 gravity = Vec3::Zero();
     VecX armature;
     std::vector<int> dof_parent, depth, row_offset;  // row of dof j: row_offset[j] + 0 .. depth[j]
+    std::vector<int> dof_joint;  // joint that each dof belongs to
+    std::vector<int> deep_joints, deep_dofs;  // of the deep trees, each after its parent
+    std::vector<char> is_deep;                // by dof
     std::vector<int> ancestors;  // dof of each entry of the rows
     int row_entries = 0;
     std::shared_ptr<const void> model;  // a copy of the pinocchio model, for what only Pinocchio computes

@@ -152,12 +152,17 @@ OwnPass::OwnPass(const Mechanism& m) : cos_sin(m.joints.size()), others(m), rest
     motion.S.resize(most);
 }
 
-// Places body i behind its parent.
-static PN_INLINE void place_body(const Mechanism& m, OwnPass& pass, BodyTerms& terms, int i) {
+// Places body i behind its parent; `shift` is where, in a deep tree.
+static PN_INLINE void place_body(const Mechanism& m, OwnPass& pass, BodyTerms& terms, int i, Vec3& shift) {
     const Joint& j = m.joints[i];
     if (j.kind == JointKind::other) pass.others.evaluate(i, terms.q, pass.rest, pass.motion);
-    place(j, terms.body[j.parent], terms.q, pass.cos_sin[i], terms.body[i], pass.motion);
+    Body& b = terms.body[i];
+    place(j, terms.body[j.parent], terms.q, pass.cos_sin[i], b, pass.motion);
     if (j.recenters) recenter(m, i, terms);
+    if (!j.deep) return;
+    shift = b.p;
+    b.ref += b.p;
+    b.p = Vec3::Zero();
 }
 
 // Inertia of a body in its place.
@@ -177,14 +182,15 @@ static PN_INLINE void find_cos_sin(OwnPass& pass, const BodyTerms& terms, const 
 PN_WIDE void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms, const std::vector<int>& joints,
                           const std::vector<Angle>& angles) {
     find_cos_sin(pass, terms, angles);
-    for (int i : joints) place_body(m, pass, terms, i);
+    Vec3 shift;  // those of the factors stay
+    for (int i : joints) place_body(m, pass, terms, i, shift);
 }
 
 PN_WIDE void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms) {
     find_cos_sin(pass, terms, m.angles);
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
-        place_body(m, pass, terms, i);
+        place_body(m, pass, terms, i, terms.deep.shift[i]);
         const Joint& j = m.joints[i];
         columns(j, terms.body[i], pass.motion, terms.J.data() + j.iv);
         weigh_body(j, terms.body[i]);
@@ -200,8 +206,8 @@ PN_WIDE void move_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms, co
         const Joint& j = m.joints[i];
         Body& b = terms.body[i];
         const Body& parent = terms.body[j.parent];
-        b.v = parent.v;
-        b.a = parent.a;
+        b.v = j.deep ? further(parent.v, terms.deep.shift[i]) : parent.v;
+        b.a = j.deep ? further(parent.a, terms.deep.shift[i]) : parent.a;
         const Motion r = relative_velocity(j, terms.J, v);
         b.v += r;
         b.a += cross(b.v, r);
@@ -216,6 +222,7 @@ PN_WIDE void mass_matrix(const Mechanism& m, OwnPass&, BodyTerms& terms) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = n - 1; i > 0; --i) {
         const Joint& j = m.joints[i];
+        if (j.deep) continue;
         const Body& b = terms.body[i];
         for (int dof = j.iv + j.nv - 1; dof >= j.iv; --dof) {
             terms.Ag[dof] = b.Y * terms.J[dof];
@@ -232,14 +239,14 @@ PN_WIDE void bias_forces(const Mechanism& m, OwnPass&, BodyTerms& terms) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
         Body& b = terms.body[i];
-        b.f = b.own * b.a;
-        b.f += cross(b.v, b.own * b.v);
+        b.f = bias_force(b);
+        if (m.joints[i].deep) terms.deep.bias[i] = b.f;
     }
     for (int i = n - 1; i > 0; --i) {
         const Joint& j = m.joints[i];
         const Body& b = terms.body[i];
         for (int dof = j.iv; dof < j.iv + j.nv; ++dof) terms.nle[dof] = dot(terms.J[dof], b.f);  // in F of Eq. (1)
-        if (j.parent != 0) terms.body[j.parent].f += b.f;
+        if (j.parent != 0) terms.body[j.parent].f += j.deep ? before(b.f, terms.deep.shift[i]) : b.f;
     }
 }
 

@@ -25,6 +25,24 @@ void place(const Mechanism& m, const pinocchio::Data& data, int i, Body& b) {
     b.p = Vec3(data.oMi[i].translation()) - b.ref;
 }
 
+// Calls act(k, column) with each column of a joint's motion subspace, where it lies: no copy on the heap.
+template <class Act>
+void each_column(const Model::JointData& joint, const Act& act) {
+    boost::apply_visitor([&](const auto& kind) {
+        const auto& S = kind.S_accessor().matrix();
+        for (int k = 0; k < S.cols(); ++k)
+            act(k, Motion{S.col(k).template head<3>(), S.col(k).template tail<3>()});
+    }, joint.toVariant());
+}
+
+// Shift, inertia and columns of a body in a deep tree, about its own reference point.
+void place_deep(const pinocchio::Data& data, BodyTerms& terms, const Joint& j, size_t i) {
+    Body& b = terms.body[i];
+    terms.deep.shift[i] = terms.body[j.parent].R * Vec3(data.liMi[i].translation());
+    b.own = in_world(b, j.mass, j.com, j.inertia);
+    each_column(data.joints[i], [&](int k, const Motion& column) { terms.J[j.iv + k] = in_world(b, column); });
+}
+
 }  // namespace
 
 struct PinocchioJoints::Data {
@@ -49,11 +67,7 @@ void PinocchioJoints::evaluate(int i, const VecX& q, const VecX& v, JointMotion&
     const auto placement = pinocchio::joint_transform(data);
     out.R = placement.rotation();
     out.p = placement.translation();
-    boost::apply_visitor([&](const auto& kind) {  // the matrix where it lies: no copy on the heap
-        const auto& S = kind.S_accessor().matrix();
-        for (int k = 0; k < S.cols(); ++k)
-            out.S[k] = Motion{S.col(k).template head<3>(), S.col(k).template tail<3>()};
-    }, data.toVariant());
+    each_column(data, [&](int k, const Motion& column) { out.S[k] = column; });
     out.bias = motion(pinocchio::bias(data));
 }
 
@@ -88,6 +102,10 @@ void place_bodies(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms) {
         const Joint& j = m.joints[i];
         Body& b = terms.body[i];
         place(m, data, static_cast<int>(i), b);
+        if (j.deep) {
+            place_deep(data, terms, j, i);
+            continue;
+        }
         for (int dof = j.iv; dof < j.iv + j.nv; ++dof) {
             const Vec3 lin = data.J.col(dof).head<3>(), ang = data.J.col(dof).tail<3>();
             terms.J[dof] = {lin + ang.cross(b.ref), ang};
@@ -106,11 +124,13 @@ void move_bodies(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms, cons
 }
 
 void mass_matrix(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms) {
+    if (static_cast<int>(m.deep_dofs.size()) == m.nv) return;
     auto& [owner, model, data] = pass.data();
     // In local axes: about the world's origin a robot that has walked far would lose digits.
     pinocchio::crba(model, data, Vector(terms.q), pinocchio::Convention::LOCAL);  // M, Ycrb
     for (size_t i = 1; i < m.joints.size(); ++i) {
         const Joint& j = m.joints[i];
+        if (j.deep) continue;
         Body& b = terms.body[i];
         const auto& Y = data.Ycrb[i];
         b.Y = in_world(b, Y.mass(), Y.lever(), Y.inertia().matrix());
@@ -130,6 +150,7 @@ void bias_forces(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms) {
         Body& b = terms.body[i];
         b.f.lin = b.R * Vec3(data.f[i].linear());
         b.f.ang = b.R * Vec3(data.f[i].angular()) + b.p.cross(b.f.lin);
+        if (m.joints[i].deep) terms.deep.bias[i] = bias_force(b);
     }
 }
 

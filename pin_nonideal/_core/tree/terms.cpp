@@ -1,5 +1,6 @@
 #include "tree/terms.hpp"
 
+#include "tree/articulated.hpp"
 #include "tree/liegroup.hpp"
 
 namespace pn {
@@ -16,6 +17,14 @@ void Terms::allocate(const Mechanism& m) {
     inv_sqrt_D = VecX::Zero(m.nv);
     locked.assign(m.nv, 0);
     q = VecX::Zero(m.nq);
+    deep.shift.assign(m.joints.size(), Vec3::Zero());
+    if (!m.deep_joints.empty()) {
+        deep.bias.assign(m.joints.size(), Force{Vec3::Zero(), Vec3::Zero()});
+        deep.forces = deep.bias;
+        deep.gain.assign(m.nv, Force{Vec3::Zero(), Vec3::Zero()});
+        deep.motions.assign(m.joints.size(), Motion{Vec3::Zero(), Vec3::Zero()});
+        deep.inertia.assign(m.joints.size(), ArticulatedInertia{});
+    }
     if (m.provider == Provider::pinocchio) pass.emplace<PinocchioPass>(m);
     else pass.emplace<OwnPass>(m);
 }
@@ -55,9 +64,13 @@ void inertia(const Mechanism& m, Terms& terms) {
     bias_forces(m, terms);
 }
 
-double kinetic_energy(const Mechanism& m, const Terms& terms, const VecX& v) {
+double kinetic_energy(const Mechanism& m, Terms& terms, const VecX& v) {
     double twice = 0.0;
+    move_articulated(m, terms, v);
+    for (int i : m.deep_joints) twice += dot(terms.deep.motions[i], terms.body[i].own * terms.deep.motions[i]);
+    for (int dof : m.deep_dofs) twice += m.armature[dof] * v[dof] * v[dof];
     for (int k = 0; k < m.nv; ++k) {
+        if (m.is_deep[k]) continue;
         const double* row = terms.M.data() + m.row_offset[k];
         double sum = 0.5 * row[0] * v[k];
         for (int i = m.dof_parent[k], s = 1; i >= 0; i = m.dof_parent[i], ++s) sum += row[s] * v[i];

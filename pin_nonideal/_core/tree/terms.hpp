@@ -31,7 +31,7 @@ void kinematics(const Mechanism& m, Terms& terms, const VecX& q, const VecX& v);
 // M(q) and nle; needs kinematics.
 void inertia(const Mechanism& m, Terms& terms);
 
-double kinetic_energy(const Mechanism& m, const Terms& terms, const VecX& v);
+double kinetic_energy(const Mechanism& m, Terms& terms, const VecX& v);
 double potential_energy(const Mechanism& m, const Terms& terms);
 
 }  // namespace pn

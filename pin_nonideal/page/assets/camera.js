@@ -12,6 +12,7 @@ class Orbit {
     this.target = new THREE.Vector3();
     this.azimuth = 0; this.elevation = 0.4; this.distance = 1;
     this.pointers = new Map();
+    this.moved = false; // by hand: then the view is not framed anew
     camera.up.copy(this.up);
     element.addEventListener("pointerdown", (e) => { element.setPointerCapture(e.pointerId); this.pointers.set(e.pointerId, e); });
     for (const name of ["pointerup", "pointercancel"])
@@ -42,13 +43,13 @@ class Orbit {
     this.changed();
   }
 
-  /** Looks along a direction so that all of some points just fit into the view. */
-  frame(points, direction) {
-    const away = direction.clone().normalize();
+  /** Looks along a direction so that all of some points just fit into what is not covered of the view, by parts of its width and height. */
+  frame(points, direction, { right: beside, top: above, bottom: below }) {
+    const away = (this.away = direction.clone().normalize());
     this.elevation = Math.asin(Math.max(-0.999, Math.min(0.999, away.dot(this.up))));
     this.azimuth = Math.atan2(away.dot(this.across), away.dot(this.side));
     const right = this.up.clone().cross(away).normalize(), top = away.clone().cross(right);
-    const tall = Math.tan((this.camera.fov * Math.PI) / 360), wide = tall * this.camera.aspect;
+    const half = Math.tan((this.camera.fov * Math.PI) / 360), tall = half * (1 - above - below), wide = half * this.camera.aspect * (1 - beside);
     this.target.set(0, 0, 0);
     for (const axis of [right, top, away]) {
       const along = points.map((point) => point.dot(axis));
@@ -58,12 +59,15 @@ class Orbit {
     for (const point of points) {
       const from = point.clone().sub(this.target);
       const reach = Math.max(Math.abs(from.dot(right)) / wide, Math.abs(from.dot(top)) / tall);
-      this.distance = Math.max(this.distance, from.dot(away) + 1.15 * reach);
+      this.distance = Math.max(this.distance, from.dot(away) + 1.12 * reach);
     }
+    this.target.addScaledVector(right, beside * this.distance * half * this.camera.aspect).addScaledVector(top, (above - below) * this.distance * half);
+    this.moved = false;
     this.place();
   }
 
   zoom(factor) {
+    this.moved = true;
     this.distance *= factor;
     this.place();
   }
@@ -79,6 +83,7 @@ class Orbit {
   dragged(event) {
     const last = this.pointers.get(event.pointerId);
     if (!last) return;
+    this.moved = true;
     const dx = event.clientX - last.clientX, dy = event.clientY - last.clientY;
     if (this.pointers.size === 2) {
       const [a, b] = [...this.pointers.values()], other = a.pointerId === event.pointerId ? b : a;

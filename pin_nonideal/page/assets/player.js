@@ -1,113 +1,155 @@
-// The player: one time for the view, the time line and the plots; buttons, keys and window.replay drive it.
+// The player: one time for the view, the time line and the plots; buttons and keys drive it.
 
-const SPEEDS = [0.05, 0.1, 0.25, 0.5, 1, 2, 4, 10];
 const ICONS = { play: "M7 4.5v15l13-7.5z", pause: "M6 5h4v14H6zM14 5h4v14h-4z" };
+const SPEEDS = Array.from({ length: 27 }, (_, i) => Number(`${[1, 2, 5][i % 3]}e${Math.floor(i / 3) - 4}`)).slice(0, 25);
+const PLAYED = [5, 15]; // a run is played in so many seconds
 const element = (id) => document.getElementById(id);
 
 class Player {
   constructor(THREE, run) {
     this.run = run;
-    this.start = run.times[0]; this.end = run.times[run.times.length - 1];
-    this.time = this.start; this.playing = false; this.hover = null; this.speed = 1;
-    const range = [this.start, this.end], seek = (t) => { this.pause(); this.seek(t); }, hover = (t) => { this.hover = t; this.drawPlots(); };
-    this.scene = new ReplayScene(THREE, run, element("scene"), element("labels"));
-    this.timeline = new Timeline(run, range, element("timeline"), element("tip"), seek, hover);
-    this.plots = run.plots.map((plot) => new Plot(plot, range, element("plots"), seek, hover));
+    const ends = [run, ...run.others].map(({ times }) => [times[0], times[times.length - 1]]);
+    this.start = Math.min(...ends.map(([start]) => start)); this.end = Math.max(...ends.map(([, end]) => end));
+    Object.assign(this, { time: this.start, playing: false, hover: null, loop: null, speed: this.usualSpeed() });
+    this.span = new Span(this.start, this.end);
+    this.span.changed = () => this.resizePlots();
+    this.seekByHand = (t) => { this.pause(); this.seek(t); };
+    this.hovered = (t) => { this.hover = t; this.drawPlots(); };
+    this.stage = new Stage(THREE, run, element("scene"), element("labels"));
+    this.timeline = new Timeline(run, this.span, element("timeline"), element("tip"), this.seekByHand, this.hovered);
+    this.bands = new Bands(run, this.span, element("bands"), element("tip"), this.seekByHand, this.hovered);
+    this.plots = run.plots.map((plot) => this.newPlot(plot));
+    this.table = new ForceTable(run, this.stage.arrows, element("forces"));
     this.writeTexts();
-    this.addForceTable();
     this.listen();
-    this.resize();
-    this.scene.resetView();
     this.seek(this.start);
+    this.resize();
+    this.stage.resetView();
+    this.panel = new Panel(this);
+    this.address = new Address(this);
+    this.capture = new Capture(this);
+  }
+
+  newPlot(plot) { return new Plot(plot, this.span, element("plots"), this.run.looks.curves, this.seekByHand, this.hovered); }
+
+  /** The speed at which the run takes 5 to 15 s; 1 when it does so by itself. */
+  usualSpeed() {
+    const length = this.end - this.start, fits = (speed) => length / speed >= PLAYED[0] && length / speed <= PLAYED[1];
+    return !(length > 0) || fits(1) ? 1 : SPEEDS.find(fits) || (length / SPEEDS[0] < PLAYED[0] ? SPEEDS[0] : SPEEDS[SPEEDS.length - 1]);
   }
 
   writeTexts() {
     const { run } = this;
     element("heading").querySelector("h1").textContent = run.title;
-    element("heading").querySelector("p").textContent = run.subtitle;
-    element("grid-size").textContent = `grid ${readable(this.scene.cell)} m`;
+    element("subtitle").textContent = run.subtitle;
+    element("failure").hidden = !run.failure;
+    if (run.failure) element("failure").textContent = `stopped at ${readable(this.end)} s: ${run.failure}`;
+    if (this.stage.cell) element("grid-size").textContent = `grid ${readable(this.stage.cell)} m`;
     for (const [name, value] of run.facts) {
       const term = document.createElement("dt"), text = document.createElement("dd");
       term.textContent = name; text.textContent = value;
       element("facts").append(term, text);
     }
-    for (const speed of SPEEDS) element("speed").add(new Option(`${speed}×`, speed, speed === 1, speed === 1));
+    for (const speed of SPEEDS) element("speed").add(new Option(`${speed}×`, speed, speed === this.speed, speed === this.speed));
     if (!run.plots.length) element("plots-toggle").hidden = true;
-    if (run.modes.length) {
-      const legend = document.createElement("label");
-      for (const mode of ["1", "-1", "0"]) {
-        const swatch = document.createElement("i");
-        swatch.style.cssText = `width: 10px; height: 10px; border-radius: 2px; background: ${MODE_COLORS[mode]}`;
-        legend.append(swatch, MODE_NAMES[mode]);
-      }
-      element("transport").querySelector(".spring").after(legend);
-    }
+    element("runs").hidden = !run.others.length;
+    if (run.others.length) this.addRuns();
+    element("run-list").open = run.others.length < 8;
+    element("run-list").querySelector("summary").textContent = `${run.others.length + 1} runs`;
+    if (!run.events.times.length) for (const id of ["event-back", "event-forth"]) element(id).hidden = true;
+    const legend = element("legend"), entry = ({ color, name }, title) => {
+      const item = legend.appendChild(document.createElement("span")), swatch = item.appendChild(document.createElement("i"));
+      swatch.style.background = color;
+      item.append(name);
+      item.title = title || name;
+    };
+    const modes = new Set(run.modes.flatMap((band) => [...new Set(band.modes)]));
+    for (const mode of [1, -1, 0, 3, 2]) if (modes.has(mode)) entry(mode === OPEN ? { ...run.looks.modes[mode], color: "var(--open)" } : run.looks.modes[mode]);
+    for (const kind of run.events.kinds) { const look = run.looks.events[kind] || run.looks.events.other; entry({ color: look.color, name: `▾ ${kind}` }, look.means); }
   }
 
-  /** The table of forces: a row for each place, a column for each kind. */
-  addForceTable() {
-    const { arrows } = this.scene, kinds = [...new Set(arrows.map((arrow) => arrow.kind))];
-    if (!arrows.length) return;
-    element("forces").hidden = false;
-    const table = element("forces").querySelector("table"), head = table.insertRow();
-    head.append(document.createElement("th"));
-    for (const kind of kinds) {
-      const cell = document.createElement("th");
-      cell.textContent = kind;
-      cell.style.setProperty("--swatch", FORCE_COLORS[kind]);
-      head.append(cell);
-    }
-    this.cells = [];
-    const rows = new Map();
-    for (const arrow of arrows) {
-      const key = `${arrow.name} ${arrow.unit}`;
-      if (!rows.has(key)) {
-        const row = table.insertRow();
-        row.insertCell().textContent = arrow.name;
-        for (const _ of kinds) row.insertCell();
-        rows.set(key, row);
-      }
-      this.cells.push([arrow, rows.get(key).cells[1 + kinds.indexOf(arrow.kind)]]);
-    }
+  /** A button for each run, and those that place and subtract. */
+  addRuns() {
+    const all = [{ name: this.run.name, color: ink("soft") }, ...this.stage.ghosts.items.map(({ name, tint: [r, g, b] }) => ({ name, color: `rgb(${255 * r} ${255 * g} ${255 * b})` }))];
+    all.forEach(({ name, color }, i) => {
+      const button = document.createElement("button"), swatch = button.appendChild(document.createElement("i"));
+      swatch.style.background = color;
+      button.append(name);
+      button.title = "show or hide this run";
+      button.setAttribute("aria-pressed", "true");
+      button.addEventListener("click", () => {
+        const shown = button.getAttribute("aria-pressed") !== "true";
+        button.setAttribute("aria-pressed", String(shown));
+        for (const item of this.stage.bodies.items) if (item.run === i) item.shown = shown;
+        this.stage.dirty = true;
+      });
+      element("run-list").append(button);
+    });
+  }
+
+  toggleApart() {
+    this.stage.setApart(!this.stage.ghosts.apart);
+    this.showToggles();
+  }
+
+  /** Curves of the other runs, or what they differ by from the first. */
+  toggleDifferences() {
+    this.differing = !this.differing;
+    for (const plot of this.plots) plot.showDifferences(this.differing);
+    this.showToggles();
   }
 
   listen() {
-    const on = (id, action) => element(id).addEventListener("click", () => { action(); element(id).blur(); });
+    const on = (id, action) => element(id).addEventListener("click", action);
     on("play", () => this.toggle());
     on("back", () => this.step(-1));
     on("forth", () => this.step(1));
-    on("reset", () => this.scene.resetView());
+    on("event-back", () => this.toEvent(-1));
+    on("event-forth", () => this.toEvent(1));
+    on("from-here", () => this.setLoop(0));
+    on("to-here", () => this.setLoop(1));
+    on("reset", () => this.stage.resetView());
     on("follow", () => this.toggleFollow());
     on("forces-toggle", () => this.toggleForces());
     on("plots-toggle", () => this.togglePlots());
+    on("apart", () => this.toggleApart());
+    on("differences", () => this.toggleDifferences());
     on("about", () => element("help").showModal());
-    element("speed").addEventListener("change", (e) => { this.speed = Number(e.target.value); e.target.blur(); });
+    element("speed").addEventListener("change", (e) => { this.speed = Number(e.target.value); });
     element("force-scale").querySelector("input").addEventListener("input", (e) => {
-      this.scene.forceScale = 4 ** Number(e.target.value);
+      this.stage.arrows.scale = 4 ** Number(e.target.value);
       this.seek(this.time);
     });
     window.addEventListener("keydown", (e) => this.key(e));
     new ResizeObserver(() => this.resize()).observe(element("stage"));
     window.addEventListener("resize", () => this.resize());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.resize());
     const canvas = element("scene"), tip = element("tip");
     canvas.addEventListener("pointermove", (e) => {
-      const name = e.buttons ? null : this.scene.nearest(e.offsetX, e.offsetY);
+      const name = e.buttons ? null : this.stage.nearest(e.offsetX, e.offsetY);
       tip.hidden = !name;
       if (name) { tip.textContent = name; placeTip(tip, e.clientX, e.clientY - 34); }
     });
     canvas.addEventListener("pointerleave", () => { tip.hidden = true; });
+    if (innerWidth < 640) this.toggleForces();
     this.showToggles();
   }
 
   key(event) {
+    if (event.key === "Escape" && !element("panel").hidden) { this.panel.toggle(); element("panel-toggle").focus(); return; }
     if (event.ctrlKey || event.metaKey || event.altKey || element("help").open) return;
-    if (event.target.tagName === "SELECT" || event.target.type === "range") return;
+    const { tagName, type } = event.target;
+    if (tagName === "SELECT" || type === "range" || type === "search" || type === "text") return;
+    if ((event.key === " " || event.key === "Enter") && (tagName === "BUTTON" || tagName === "INPUT" || tagName === "SUMMARY")) return;
     const actions = {
       " ": () => this.toggle(), ArrowLeft: () => this.step(event.shiftKey ? -10 : -1), ArrowRight: () => this.step(event.shiftKey ? 10 : 1),
-      Home: () => { this.pause(); this.seek(this.start); }, End: () => { this.pause(); this.seek(this.end); },
+      Home: () => this.seekByHand(this.start), End: () => this.seekByHand(this.end),
+      PageUp: () => this.seekByHand(this.time - 0.1 * (this.span.end - this.span.start)), PageDown: () => this.seekByHand(this.time + 0.1 * (this.span.end - this.span.start)),
       ArrowUp: () => this.changeSpeed(1), ArrowDown: () => this.changeSpeed(-1),
+      n: () => this.toEvent(1), b: () => this.toEvent(-1), "[": () => this.setLoop(0), "]": () => this.setLoop(1), "\\": () => this.setLoop(null),
+      "+": () => this.span.zoom(0.5, this.time), "-": () => this.span.zoom(2, this.time), 0: () => this.span.reset(),
       l: () => { element("loop").checked = !element("loop").checked; }, f: () => this.toggleForces(), p: () => this.togglePlots(),
-      c: () => this.toggleFollow(), r: () => this.scene.resetView(), "?": () => element("help").showModal(),
+      c: () => this.toggleFollow(), t: () => this.panel.toggle(), r: () => this.stage.resetView(), "?": () => element("help").showModal(),
     };
     const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!action) return;
@@ -118,24 +160,45 @@ class Player {
   /** Shows the state at a time of the run, held between its ends. */
   seek(time) {
     this.time = Math.max(this.start, Math.min(this.end, Number(time)));
-    this.scene.setTime(this.time);
-    const digits = this.end - this.start < 1 ? 4 : 3;
-    element("clock").querySelector("span").textContent = this.time.toFixed(digits);
+    this.stage.setTime(this.time);
+    const digits = digitsFor(this.end - this.start), text = this.time.toFixed(digits), gap = this.stage.marks.gap();
+    element("clock").querySelector("span").textContent = text;
     element("clock").querySelector("small").textContent = `/ ${this.end.toFixed(digits)} s`;
-    for (const [arrow, cell] of this.cells || []) cell.textContent = `${steady(arrow.value)} ${arrow.unit}`;
+    element("gap").textContent = gap === null ? "" : `gap drawn ${readable(gap)} m`;
+    for (const [name, value] of [["aria-valuemin", this.start], ["aria-valuemax", this.end], ["aria-valuenow", this.time], ["aria-valuetext", `${text} s`]])
+      element("timeline").setAttribute(name, value);
+    this.table.update();
     this.drawPlots();
   }
 
   drawPlots() {
-    this.timeline.draw(this.time, this.hover);
-    for (const plot of this.plots) plot.draw(this.time, this.hover);
+    for (const view of [this.timeline, this.bands, ...this.plots]) view.draw(this.time, this.hover);
   }
 
   /** Goes on by whole frames. */
   step(frames) {
-    const { times } = this.run, here = lastBelow(times, this.time + 1e-9 * (1 + Math.abs(this.time)));
-    this.pause();
-    this.seek(times[Math.max(0, Math.min(times.length - 1, here + frames))]);
+    const { times } = this.run, here = lastBelow(times, this.time + 1e-9 * (this.end - this.start));
+    this.seekByHand(times[Math.max(0, Math.min(times.length - 1, here + frames))]);
+    this.span.show(this.time);
+  }
+
+  /** To the next event, or to the last one before. */
+  toEvent(way) {
+    const times = [...this.run.events.times].sort((a, b) => a - b), near = 1e-9 * (this.end - this.start);
+    const found = way > 0 ? times.find((t) => t > this.time + near) : times.reverse().find((t) => t < this.time - near);
+    if (found === undefined) return;
+    this.seekByHand(found);
+    this.span.show(found);
+  }
+
+  /** The shown time becomes the start (0) or the end (1) of what is repeated; null: all of the run is. */
+  setLoop(end) {
+    const loop = this.loop || [this.start, this.end];
+    if (end !== null) loop[end] = this.time;
+    this.loop = end === null || !(loop[1] > loop[0]) ? null : loop;
+    this.timeline.loop = this.loop;
+    if (this.loop) element("loop").checked = true;
+    this.drawPlots();
   }
 
   play() {
@@ -145,29 +208,24 @@ class Player {
     this.showToggles();
   }
 
-  pause() {
-    this.playing = false;
-    this.showToggles();
-  }
+  pause() { this.playing = false; this.showToggles(); }
 
   toggle() { if (this.playing) this.pause(); else this.play(); }
 
   changeSpeed(by) {
-    const next = SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, SPEEDS.indexOf(this.speed) + by))];
-    this.speed = next;
-    element("speed").value = next;
+    this.speed = SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, SPEEDS.indexOf(this.speed) + by))];
+    element("speed").value = this.speed;
   }
 
   toggleFollow() {
-    this.scene.following = !this.scene.following;
-    this.scene.dirty = true;
+    this.stage.follow(this.stage.following ? null : this.stage.followed);
     this.showToggles();
   }
 
   toggleForces() {
-    this.scene.forcesShown = !this.scene.forcesShown;
-    element("forces").classList.toggle("off", !this.scene.forcesShown);
-    element("forces-toggle").textContent = this.scene.forcesShown ? "hide" : "show";
+    this.stage.arrows.shown = !this.stage.arrows.shown;
+    element("forces").classList.toggle("off", !this.stage.arrows.shown);
+    element("forces-toggle").textContent = this.stage.arrows.shown ? "hide" : "show";
     this.seek(this.time);
   }
 
@@ -179,13 +237,29 @@ class Player {
 
   showToggles() {
     element("play").querySelector("path").setAttribute("d", this.playing ? ICONS.pause : ICONS.play);
-    element("follow").classList.toggle("on", this.scene.following);
-    element("plots-toggle").classList.toggle("on", !element("plots").classList.contains("off"));
+    element("play").setAttribute("aria-label", this.playing ? "pause" : "play");
+    for (const [id, on] of [["follow", this.stage.following], ["plots-toggle", !element("plots").classList.contains("off")], ["apart", this.stage.ghosts.apart], ["differences", Boolean(this.differing)]]) {
+      element(id).classList.toggle("on", on);
+      element(id).setAttribute("aria-pressed", String(on));
+    }
   }
 
   resize() {
-    this.scene.resize();
-    this.timeline.resize();
+    const box = element("forces"), { clientWidth: width, clientHeight: height } = element("stage"), narrow = width < 640;
+    // The view is framed between what lies over it: the heading, the buttons, and beside the table of forces where there is room.
+    const above = element("heading").offsetHeight + 14, below = element("tools").offsetHeight + 12;
+    this.stage.covered = {
+      right: box.hidden || box.classList.contains("off") || narrow ? 0 : Math.min((box.offsetWidth + 12) / Math.max(width, 1), 0.4),
+      top: Math.min(above / Math.max(height, 1), 0.25), bottom: Math.min(below / Math.max(height, 1), 0.2),
+    };
+    this.stage.resize();
+    this.resizePlots();
+  }
+
+  resizePlots() {
+    const left = this.bands.margin();
+    this.timeline.resize(left);
+    this.bands.resize(left);
     for (const plot of this.plots) plot.resize();
     this.drawPlots();
   }
@@ -193,52 +267,17 @@ class Player {
   /** One frame of the screen. */
   tick() {
     if (this.playing) {
-      const now = performance.now(), length = this.end - this.start;
+      const now = performance.now(), repeats = element("loop").checked, [from, to] = (repeats && this.loop) || [this.start, this.end];
       let time = this.time + ((now - this.clock) / 1000) * this.speed;
       this.clock = now;
-      if (time >= this.end) {
-        if (element("loop").checked) time = this.start + ((time - this.start) % length);
-        else { time = this.end; this.pause(); }
+      if (time >= to) {
+        if (repeats) time = from + ((time - from) % (to - from));
+        else { time = to; this.pause(); }
       }
       this.seek(time);
+      if (this.playing) this.span.show(this.time);
     }
-    this.scene.render();
-  }
-
-  /** What scripts and tests may use: window.replay. */
-  door() {
-    const player = this;
-    return {
-      ready: true,
-      seek: (time) => { player.pause(); player.seek(time); player.scene.render(); },
-      play: () => player.play(),
-      pause: () => player.pause(),
-      poses: () => player.scene.poses(),
-      get playing() { return player.playing; },
-      get time() { return player.time; },
-      get start() { return player.start; },
-      get duration() { return player.end - player.start; },
-      get times() { return Array.from(player.run.times); },
-    };
+    this.stage.render();
+    if (this.capture.drawn) this.capture.drawn();
   }
 }
-
-async function main() {
-  const THREE = await loadLibrary(), player = new Player(THREE, await loadRun());
-  const loop = () => { requestAnimationFrame(loop); player.tick(); };
-  player.tick();
-  loop();
-  element("message").hidden = true;
-  window.replay = player.door();
-  window.replayDone = true;
-  if (!/[#&]paused\b/.test(location.hash) && !matchMedia("(prefers-reduced-motion: reduce)").matches) player.play();
-}
-
-window.addEventListener("error", (event) => { window.replayError = window.replayError || String(event.message); });
-main().catch((error) => {
-  window.replayError = String(error);
-  document.body.className = "failed";
-  element("message").hidden = false;
-  element("message").textContent = `This replay cannot be shown.\n${error.message || error}`;
-  console.error(error);
-});

@@ -40,27 +40,35 @@ function creasedMesh(THREE, vertices, triangles) {
 function shapeGeometry(THREE, shape, size) {
   const [a, b, c] = shape.size;
   switch (shape.kind) {
-    case "mesh": {
-      const geometry = creasedMesh(THREE, shape.vertices, shape.triangles);
-      let start = 0;
-      shape.parts.forEach(([count], i) => { geometry.addGroup(start, 3 * count, i); start += 3 * count; });
-      return geometry;
-    }
+    case "mesh": return creasedMesh(THREE, shape.vertices, shape.triangles);
     case "box": return new THREE.BoxGeometry(a, b, c);
-    case "ellipsoid": return new THREE.SphereGeometry(1, 40, 28).scale(a, b, c);
-    case "cylinder": return new THREE.CylinderGeometry(a, a, b, 48).rotateX(Math.PI / 2);
-    case "cone": return new THREE.ConeGeometry(a, b, 48).rotateX(Math.PI / 2);
+    case "ellipsoid": return new THREE.SphereGeometry(1, 28, 18).scale(a, b, c);
+    case "cylinder": return new THREE.CylinderGeometry(a, a, b, 32).rotateX(Math.PI / 2);
+    case "cone": return new THREE.ConeGeometry(a, b, 32).rotateX(Math.PI / 2);
     case "capsule": {
       const outline = [];
-      for (let i = 0; i <= 24; i++) {
-        const angle = -Math.PI / 2 + (Math.PI * i) / 24;
-        outline.push(new THREE.Vector2(a * Math.cos(angle), a * Math.sin(angle) + (i <= 12 ? -b / 2 : b / 2)));
+      for (let i = 0; i <= 12; i++) {
+        const angle = -Math.PI / 2 + (Math.PI * i) / 12;
+        outline.push(new THREE.Vector2(a * Math.cos(angle), a * Math.sin(angle) + (i <= 6 ? -b / 2 : b / 2)));
       }
-      return new THREE.LatheGeometry(outline, 32).rotateX(Math.PI / 2);
+      return new THREE.LatheGeometry(outline, 20).rotateX(Math.PI / 2);
     }
     case "plane": return new THREE.PlaneGeometry(8 * size, 8 * size);
     default: throw new Error(`unknown shape "${shape.kind}"`);
   }
+}
+
+/** A mesh whose parts have colors of their own; `color` is that of the others. */
+function paintedMesh(THREE, geometry, shape, color) {
+  const painted = new THREE.BufferGeometry(), colors = new Float32Array(geometry.attributes.position.array.length);
+  let start = 0;
+  for (const [count, own] of shape.parts) {
+    const { r, g, b } = linearColor(THREE, own || color);
+    for (let i = start; i < start + 3 * count; i++) colors.set([r, g, b], 3 * i);
+    start += 3 * count;
+  }
+  for (const name of ["position", "normal"]) painted.setAttribute(name, geometry.attributes[name]);
+  return painted.setAttribute("color", new THREE.BufferAttribute(colors, 3));
 }
 
 /** Color in the renderer's linear space. */
@@ -76,67 +84,16 @@ function surface(THREE, color) {
   });
 }
 
-/** A mark that shines faintly through what hides it. */
-function markMesh(THREE, geometry, color) {
-  const group = new THREE.Group(), shade = linearColor(THREE, color);
-  const solid = new THREE.MeshStandardMaterial({ color: shade, emissive: shade, emissiveIntensity: 0.35, roughness: 0.6 });
-  const ghost = new THREE.MeshBasicMaterial({ color: shade, transparent: true, opacity: 0.35, depthTest: false, depthWrite: false });
-  const behind = new THREE.Mesh(geometry, ghost);
-  behind.renderOrder = 5;
-  group.add(new THREE.Mesh(geometry, solid), behind);
-  return group;
-}
-
-/** A straight arrow along z whose head keeps its form; set(length) gives its length. */
-class StraightArrow {
-  constructor(THREE, color, size) {
-    this.radius = 0.007 * size;
-    this.group = new THREE.Group();
-    this.shaft = markMesh(THREE, new THREE.CylinderGeometry(1, 1, 1, 16).rotateX(Math.PI / 2).translate(0, 0, 0.5), color);
-    this.head = markMesh(THREE, new THREE.ConeGeometry(2.6, 7, 24).rotateX(Math.PI / 2).translate(0, 0, 3.5), color);
-    this.group.add(this.shaft, this.head);
-  }
-  set(length) {
-    const thick = Math.min(this.radius, length / 10);
-    this.shaft.scale.set(thick, thick, Math.max(length - 7 * thick, 1e-9));
-    this.head.scale.setScalar(thick);
-    this.head.position.z = length - 7 * thick;
-  }
-}
-
-/** An arc about z with a head; set(part) opens it from 0 to 300 degrees, negative parts turn the other way. */
-class ArcArrow {
-  constructor(THREE, color, size) {
-    const radius = 0.075 * size, tube = 0.0065 * size;
-    Object.assign(this, { radius, tube, sweep: (300 * Math.PI) / 180, segments: 90, rings: 10 });
-    const sweep = this.sweep;
-    class Arc extends THREE.Curve {
-      getPoint(s) { return new THREE.Vector3(radius * Math.cos(sweep * s), radius * Math.sin(sweep * s), 0); }
-    }
-    this.group = new THREE.Group();
-    this.arc = new THREE.TubeGeometry(new Arc(), this.segments, tube, this.rings);
-    this.head = markMesh(THREE, new THREE.ConeGeometry(2.8 * tube, 7 * tube, 24), color);
-    this.group.add(markMesh(THREE, this.arc, color), this.head);
-  }
-  set(part) {
-    const opened = Math.min(Math.abs(part), 1), angle = opened * this.sweep;
-    this.arc.setDrawRange(0, Math.round(opened * this.segments) * this.rings * 6);
-    this.head.scale.setScalar(Math.max(Math.min(1, (angle * this.radius) / (9 * this.tube)), 1e-3));
-    this.head.position.set(this.radius * Math.cos(angle), this.radius * Math.sin(angle), 0);
-    this.head.rotation.z = angle;
-    this.group.rotation.x = part < 0 ? Math.PI : 0;
-  }
-}
-
 /** A coil along z of length 1, to be stretched. */
 function coilGeometry(THREE, radius) {
+  const slender = 12; // length over radius at which the wire is round
   class Coil extends THREE.Curve {
     getPoint(s) {
       const wide = radius * Math.min(1, 12 * s, 12 * (1 - s)), angle = 20 * Math.PI * s;
-      return new THREE.Vector3(wide * Math.cos(angle), wide * Math.sin(angle), s);
+      return new THREE.Vector3(wide * Math.cos(angle), wide * Math.sin(angle), slender * radius * s);
     }
   }
-  return new THREE.TubeGeometry(new Coil(), 400, 0.14 * radius, 6);
+  return new THREE.TubeGeometry(new Coil(), 240, 0.14 * radius, 5).scale(1, 1, 1 / (slender * radius));
 }
 
 /** The ground: a grid that fades with distance, and a plane that takes the shadow. */
@@ -164,4 +121,39 @@ function groundMesh(THREE, cell, reach) {
   const group = new THREE.Group();
   group.add(shadow, grid);
   return group;
+}
+
+/** A line some pixels wide through places (flat), each segment a quad that faces the camera; beyond `now` it is faint. */
+class WideLine {
+  constructor(THREE, world, places, times, color, width) {
+    const count = places.length / 3 - 1, geometry = new THREE.BufferGeometry();
+    const here = [], there = [], side = [], moment = [], index = [];
+    for (let i = 0; i < count; i++) {
+      const a = places.slice(3 * i, 3 * i + 3), b = places.slice(3 * i + 3, 3 * i + 6), on = b.map((x, k) => 2 * x - a[k]);
+      for (const s of [-1, 1]) { here.push(...a); there.push(...b); side.push(s); moment.push(times ? times[i] : 0); }
+      for (const s of [-1, 1]) { here.push(...b); there.push(...on); side.push(s); moment.push(times ? times[i + 1] : 0); }
+      index.push(4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 2, 4 * i + 1, 4 * i + 3);
+    }
+    for (const [name, values, size] of [["position", here, 3], ["after", there, 3], ["side", side, 1], ["moment", moment, 1]])
+      geometry.setAttribute(name, new THREE.Float32BufferAttribute(values, size));
+    geometry.setIndex(index);
+    this.uniforms = { color: { value: linearColor(THREE, color) }, width: { value: width }, pixels: { value: new THREE.Vector2(1, 1) }, now: { value: times ? -1e38 : 1 } };
+    this.mesh = new THREE.Mesh(geometry, new THREE.ShaderMaterial({
+      transparent: true, depthWrite: false, side: THREE.DoubleSide, uniforms: this.uniforms,
+      vertexShader: `
+        attribute vec3 after; attribute float side; attribute float moment; uniform vec2 pixels; uniform float width; uniform float now; varying float later;
+        void main() {
+          vec4 a = projectionMatrix * modelViewMatrix * vec4(position, 1.0), b = projectionMatrix * modelViewMatrix * vec4(after, 1.0);
+          vec2 along = (b.xy / b.w - a.xy / a.w) * pixels;
+          along = length(along) > 1e-6 ? normalize(along) : vec2(1.0, 0.0);
+          a.xy += vec2(-along.y, along.x) * side * width / pixels * a.w;
+          later = moment > now ? 1.0 : 0.0;
+          gl_Position = a;
+        }`,
+      fragmentShader: "uniform vec3 color; varying float later; void main() { gl_FragColor = linearToOutputTexel(vec4(color, later > 0.5 ? 0.3 : 0.95)); }",
+    }));
+    this.mesh.frustumCulled = false;
+    this.mesh.renderOrder = 3;
+    world.add(this.mesh);
+  }
 }

@@ -13,6 +13,7 @@ struct ContactRow {
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr Shown shown = Shown::contact;
+    static constexpr int pressing = 0;
 
     Frame frame1, frame2;
     Vec3 normal;

@@ -8,11 +8,8 @@
 
 namespace pn {
 
-struct ContactSlipRows {
+struct ContactSlipRows : SlipDirections {
     static constexpr const char* name = "contact_slip";
-    static constexpr Role role = Role::direction;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr Shown shown = Shown::nothing;
 
     Frame frame1, frame2;
     double radius;
@@ -24,11 +21,7 @@ struct ContactSlipRows {
                           Datum{"tangent2", &ContactSlipRows::tangent2}, Datum{"normal", &ContactSlipRows::normal});
     }
     int size() const { return 2; }
-    bool is_holonomic(int) const { return false; }
-    bool moves_in_time() const { return false; }
 
-    template <class Sides, class Out>
-    PN_INLINE void residual(const Sides&, Out&) const {}
     template <class Sides, class Out>
     PN_INLINE void rows(const Sides& s, Out& out) const {
         const auto contact = s.a.x - radius * (s.b.R * normal);

@@ -31,4 +31,16 @@ enum class Shown {
     gear      // the same on two joints
 };
 
+// What directions of friction between two frames have in common: their rates are slip velocities, and nothing is kept.
+struct SlipDirections {
+    static constexpr Role role = Role::direction;
+    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
+    static constexpr Shown shown = Shown::nothing;
+
+    bool is_holonomic(int) const { return false; }
+    bool moves_in_time() const { return false; }
+    template <class Sides, class Out>
+    void residual(const Sides&, Out&) const {}
+};
+
 }  // namespace pn

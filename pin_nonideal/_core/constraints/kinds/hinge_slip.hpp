@@ -8,11 +8,8 @@
 
 namespace pn {
 
-struct HingeSlipRows {
+struct HingeSlipRows : SlipDirections {
     static constexpr const char* name = "hinge_slip";
-    static constexpr Role role = Role::direction;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr Shown shown = Shown::nothing;
 
     Frame frame1, frame2;
     Vec3 axis;
@@ -22,11 +19,7 @@ struct HingeSlipRows {
                           Datum{"axis", &HingeSlipRows::axis});
     }
     int size() const { return 1; }
-    bool is_holonomic(int) const { return false; }
-    bool moves_in_time() const { return false; }
 
-    template <class Sides, class Out>
-    PN_INLINE void residual(const Sides&, Out&) const {}
     template <class Sides, class Out>
     PN_INLINE void rows(const Sides& s, Out& out) const {
         out.wrench[0] = couple_at(s.a.x, s.a.R * axis);

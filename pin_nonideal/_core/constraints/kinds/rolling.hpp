@@ -13,6 +13,7 @@ struct RollingRows {
     static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr Shown shown = Shown::rolling;
+    static constexpr int pressing = 2;
 
     Frame frame1, frame2;
     double radius;

@@ -10,11 +10,8 @@
 
 namespace pn {
 
-struct TurnSlipRows {
+struct TurnSlipRows : SlipDirections {
     static constexpr const char* name = "turn_slip";
-    static constexpr Role role = Role::direction;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr Shown shown = Shown::nothing;
 
     Frame frame1, frame2;
     std::vector<int> axes;
@@ -24,11 +21,7 @@ struct TurnSlipRows {
                           Datum{"axes", &TurnSlipRows::axes});
     }
     int size() const { return static_cast<int>(axes.size()); }
-    bool is_holonomic(int) const { return false; }
-    bool moves_in_time() const { return false; }
 
-    template <class Sides, class Out>
-    PN_INLINE void residual(const Sides&, Out&) const {}
     template <class Sides, class Out>
     PN_INLINE void rows(const Sides& s, Out& out) const {
         for (size_t k = 0; k < axes.size(); ++k) out.wrench[k] = couple_at(s.a.x, s.b.R.col(axes[k]));

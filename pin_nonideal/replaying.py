@@ -14,22 +14,49 @@ import importlib.util
 import json
 import os
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pinocchio as pin
 
 from .checks import choice, positive
 from .errors import InputError, OutputError
 from .files import file_path, whole_file
-from .page.payload import packed_run
-from .page.signals import Chosen, check_scene
+from .page.payload import packed_runs
+from .page.signals import Chosen, several
+from .page.window import show
 
 if TYPE_CHECKING:
     from .trajectory import Trajectory
 
-SCRIPTS = ("payload.js", "camera.js", "shapes.js", "scene.js", "plots.js", "timeline.js", "player.js")
+# What unpacks the others is read by the browser as it is.
+BOOT = ("payload.js", "boot.js")
+SCRIPTS = (
+    "numbers.js",
+    "kinematics.js",
+    "ghosts.js",
+    "camera.js",
+    "shapes.js",
+    "instances.js",
+    "marks.js",
+    "guides.js",
+    "arrows.js",
+    "elements.js",
+    "overlays.js",
+    "stage.js",
+    "axes.js",
+    "plots.js",
+    "bands.js",
+    "timeline.js",
+    "table.js",
+    "panel.js",
+    "address.js",
+    "capture.js",
+    "player.js",
+    "door.js",
+)
 COMPRESSION = 6  # gzip level; 9 takes several times as long for a few percent
 INLINE_HEIGHT = 640  # height of the page in a notebook [pixels]
 
@@ -70,77 +97,85 @@ class ReplayPage:
 
 
 def replay(
-    run: Trajectory,
+    run: Trajectory | Sequence[Trajectory],
     path: str | os.PathLike[str] | None = None,
     *,
-    fps: float = 60.0,
+    names: Sequence[str] | None = None,
+    fps: float | None = None,
     title: str | None = None,
     plots: Chosen | None = None,
     compress: bool = True,
     forces: bool = True,
-) -> Path | ReplayPage:
+    viewer: Any = None,
+) -> Any:
     """Writes a run as one HTML file that replays it offline, or shows it in a notebook.
 
-    Between the run's samples the page shows the cubic through their q and v.
+    Between the run's samples the page shows the cubic through their q and v, its loops closed.
 
     Args:
         run: what `simulate` returned; with record=("forces", "energy") there are arrows and an energy plot.
+            Of a list the first is shown, and the others as ghosts over it or side by side, on one time line.
         path: file to write; None for a page that a notebook shows in place.
-        fps: frames of the replay a second of simulated time.
+        names: names of several runs; their numbers when None.
+        fps: frames of the replay a second of simulated time; None for frames that follow the motion, close
+            together where it is fast.
         title: heading of the page; the scene's name when None.
-        plots: what is plotted: "energy", "work", "violation", "reactions", "q", "v", "a", names of joints, or
-            pairs of a title "what [unit]" and curves by label, (nt,) each. None: energy, violation, reactions
-            and q, as far as the run has them.
+        plots: what is plotted: "energy", "work", "power", "violation", "reactions", "contacts", "gaps",
+            "tau", "q", "v", "a", names of joints, or pairs of a title "what [unit]" and curves by label,
+            (nt,) each. None: energy, gaps, violation, reactions and q, as far as the run has them.
         compress: False for a page that also opens in browsers older than 2023, three times as large.
         forces: False for a page without arrows of forces.
+        viewer: a `meshcat.Visualizer` whose window is open: it is filled with robot, animation and arrows of
+            forces, and nothing is written.
 
     Returns:
-        The path of the file, or the page.
+        The path of the file, or the page, a `ReplayPage`; with `viewer` Pinocchio's MeshcatVisualizer.
 
     Raises:
-        InputError: fps is not positive, a plot was not recorded, or the run is empty, not finite or
-            without its scene.
+        InputError: fps is not positive, a plot was not recorded, `viewer` comes with a path or several runs,
+            or the run is empty, not finite or without its scene.
         UnknownNameError: a name in `plots` is none of the above.
         OutputError: the file cannot be written.
     """
-    fps = positive("replay: fps", fps)
+    fps = None if fps is None else positive("replay: fps", fps)
     if title is not None and not isinstance(title, str):
         raise InputError(f"replay: title must be a string or None; got {title!r}")
     choice("replay: compress", compress, (True, False))
     choice("replay: forces", forces, (True, False))
-    check_scene(run, "a replay")
-    page = ReplayPage(_page(run, fps, title or run.name, plots, compress, forces))
+    runs, labels = several(run, names, "a replay")
+    if viewer is not None:
+        if path is not None or len(runs) > 1:
+            raise InputError("replay: viewer takes one run and no path")
+        return show(runs[0], viewer, runs[0].name or "robot", forces)
+    packed = packed_runs(runs, labels, fps, title or runs[0].name, plots, forces)
+    page = ReplayPage(_page(packed, title or runs[0].name, compress))
     return page if path is None else page.save(path)
 
 
-def _page(
-    run: Trajectory,
-    fps: float,
-    title: str,
-    plots: Chosen | None,
-    compress: bool,
-    forces: bool,
-) -> str:
-    """The whole page."""
+def _page(content: bytes, title: str, compress: bool) -> str:
+    """The whole page around the packed runs."""
     library, notices = _viewer_library()
     folder = Path(__file__).parent / "page" / "assets"
 
-    def packed(content: bytes) -> str:
-        stored = gzip.compress(content, COMPRESSION, mtime=0) if compress else content
+    def packed(plain: bytes) -> str:
+        stored = gzip.compress(plain, COMPRESSION, mtime=0) if compress else plain
         return base64.b64encode(stored).decode()
+
+    def asset(name: str) -> str:
+        return (folder / name).read_text(encoding="utf-8")
 
     parts = {
         "title": html.escape(title),
         "generator": f"pin_nonideal with Pinocchio {pin.__version__}",
-        "style": (folder / "style.css").read_text(encoding="utf-8"),
+        "style": asset("style.css"),
         "notices": html.escape(notices),
         "library": packed(library),
-        "payload": packed(packed_run(run, fps, title, plots, forces)),
+        "payload": packed(content),
         "zipped": "true" if compress else "false",
-        "scripts": "\n".join((folder / name).read_text(encoding="utf-8") for name in SCRIPTS),
+        "boot": "\n".join(asset(name) for name in BOOT),
+        "scripts": packed("\n".join(['"use strict";', *(asset(name) for name in SCRIPTS)]).encode()),
     }
-    frame = (folder / "page.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found.group(1)], frame)
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found.group(1)], asset("page.html"))
 
 
 def _viewer_library() -> tuple[bytes, str]:

@@ -1,0 +1,60 @@
+"""The consistent configuration nearest to a given one, by SciPy's general optimizers from many starts.
+
+min d^T M(q) d over residual(q + d) = 0, in coordinates in which the metric is the identity; SLSQP takes its
+derivatives by differences and knows nothing of the package.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from scipy.optimize import least_squares, minimize
+
+from .given import mass_matrix
+
+CLOSED = 1e-8  # part of the residuals' size at which a configuration counts as closed
+
+
+def distance(model, q, other):
+    """Length of the move from q to another configuration, in the metric of M(q)."""
+    d = pin.difference(model, q, other)
+    return float(np.sqrt(d @ mass_matrix(model, q) @ d))
+
+
+def nearest_by_search(model, q, residual, size=1.0, starts=8, spread=0.5, unit=1.0, seed=0):
+    """The least distance at which any start ends on the constraints, and the configuration there.
+
+    Args:
+        model: pinocchio.Model.
+        q: where from, (nq,).
+        residual: q -> phi, (m,).
+        size: of a large residual.
+        starts: q itself, and random moves from it.
+        spread: of those [units].
+        unit: a long move of each coordinate, a number or (nv,).
+        seed: of the random moves.
+    """
+    rng = np.random.default_rng(seed)
+    scale = np.linalg.inv(np.linalg.cholesky(mass_matrix(model, q)).T)  # d = scale x
+    longest = np.linalg.norm(np.linalg.solve(scale, unit * np.ones(model.nv)))
+    scale = scale * longest
+
+    def phi(x):
+        return residual(pin.integrate(model, q, scale @ x)) / size
+
+    best, where = np.inf, None
+    for k in range(starts):
+        d = spread * unit * rng.standard_normal(model.nv) if k else np.zeros(model.nv)
+        x = least_squares(phi, np.linalg.solve(scale, d), xtol=1e-15, ftol=1e-15, gtol=1e-15).x
+        constraint = {"type": "eq", "fun": phi}
+        found = minimize(
+            lambda x: 0.5 * x @ x,
+            x,
+            jac=lambda x: x,
+            constraints=constraint,
+            method="SLSQP",
+            options={"ftol": 1e-15, "maxiter": 300},
+        ).x
+        if np.abs(phi(found)).max() < CLOSED and np.linalg.norm(found) < best:
+            best, where = float(np.linalg.norm(found)), pin.integrate(model, q, scale @ found)
+    return best * longest, where

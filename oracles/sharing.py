@@ -1,0 +1,56 @@
+"""How redundant rows share their load, dense: least norm, and whether all that should press can."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import linprog
+
+import pin_nonideal as pn
+
+from .given import given_force, mass_matrix
+from .rows import rows
+from .solutions import kkt_acceleration
+
+HELD = 1e-9  # part of the largest singular value below which A holds nothing
+
+
+def least_norm(A, force):
+    """The shortest lam with A^T lam = force, copies and all."""
+    return np.linalg.lstsq(A.T, force, rcond=HELD)[0]
+
+
+def pressing_rows(scene):
+    """Rows of `lam` whose sign tells whether something presses: normals of contacts and of rolling."""
+    slices = list(scene.constraint_slices.values())
+    said = [*scene.constraints, *scene.contacts]
+    found = []
+    for c, rows_of in zip(said, slices, strict=True):
+        if isinstance(c, pn.PointContact):
+            found.append(rows_of.start)
+        elif isinstance(c, pn.Rolling):
+            found.append(rows_of.start + 2)
+    return found
+
+
+def constraint_force(scene, q, v, t):
+    """A, and the force of constraint M a - F of the motion without laws, by a dense system."""
+    A, b = rows(scene, q, v, t)
+    M, F = mass_matrix(scene.model, q), given_force(scene, q, v, t)
+    return A, M @ kkt_acceleration(M, F, A, b) - F
+
+
+def largest_least_load(A, force, pressing):
+    """The largest s such that all pressing rows can carry s or more at once, by a linear program."""
+    lam = least_norm(A, force)
+    _, s, Vt = np.linalg.svd(A.T)
+    Z = Vt[np.count_nonzero(s > HELD * s[0]) :].T
+    size = np.abs(lam).max()
+    n = Z.shape[1]
+    inequality = np.hstack([-Z[pressing], np.ones((len(pressing), 1))])
+    found = linprog(
+        np.append(np.zeros(n), -1.0),
+        A_ub=inequality,
+        b_ub=lam[pressing] / size,
+        bounds=[(None, None)] * n + [(None, 10.0)],
+    )
+    return -found.fun * size

@@ -1,0 +1,152 @@
+#include "contact/closing.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include "contact/gaps.hpp"
+#include "contact/impact.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/projection.hpp"
+
+namespace pn {
+
+namespace {
+
+using Choice = std::vector<char>;  // of closed gaps
+
+// All choices of so many contacts are looked through where steps from one to the next do not lead to the right one.
+constexpr int most_enumerated = 12;
+// Contacts of which some may share a load in several ways.
+constexpr int may_share = 3;
+
+// The choices tried at one state, as the right one is sought.
+struct Search {
+    const Program& p;
+    Workspace& w;
+    double t;
+    const VecX& v;
+    const Choice& rest;
+    const std::function<void(const RestingMotion*)>& find_modes;
+    const RestingMotion* together = nullptr;
+    std::vector<Choice> tried;
+    std::optional<Failure> failure;  // of the first choice that had no motion
+
+    // The next choice: this one where its motion keeps all conditions, else with one contact more or less; nothing
+    // where it has no motion.
+    std::optional<Choice> better(const Choice& choice) {
+        tried.push_back(choice);
+        set_closed(p, w, choice);
+        try {
+            find_modes(together && together->closed == choice ? together : nullptr);
+        } catch (const Failure& thrown) {
+            if (thrown.kind == Failure::Kind::interrupted || thrown.kind == Failure::Kind::not_finite) throw;
+            if (!failure) failure = thrown;
+            return std::nullopt;
+        }
+        Choice next = choice;
+        int change = pulling_contact(p, w);
+        if (change < 0) change = approaching(choice);
+        if (change >= 0) next[change] = !next[change];
+        return next;
+    }
+
+    // Of the contacts left open the one that would go through its plane fastest, or -1.
+    int approaching(const Choice& choice) {
+        int found = -1;
+        double most = 1.0;
+        for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
+            if (!rest[i] || choice[i]) continue;
+            evaluate_gap(p, w, t, v, i);
+            const double beyond = -gap_acceleration(p, w, i) / acceleration_rounding(p, w, i);
+            if (beyond <= most) continue;
+            most = beyond;
+            found = i;
+        }
+        return found;
+    }
+
+    bool is_new(const Choice& choice) const { return std::find(tried.begin(), tried.end(), choice) == tried.end(); }
+
+    // From one choice to the next until one keeps all conditions.
+    bool walk(Choice choice) {
+        while (is_new(choice)) {
+            const std::optional<Choice> next = better(choice);
+            if (!next) return false;
+            if (*next == choice) return true;
+            choice = *next;
+        }
+        return false;
+    }
+
+    // All choices, those with the most closed first.
+    bool enumerate() {
+        std::vector<int> list;
+        for (int i = 0; i < static_cast<int>(rest.size()); ++i)
+            if (rest[i]) list.push_back(i);
+        if (static_cast<int>(list.size()) > most_enumerated) return false;
+        std::vector<unsigned> order(1u << list.size());
+        for (unsigned k = 0; k < order.size(); ++k) order[k] = k;
+        const auto count = [](unsigned bits) { return __builtin_popcount(bits); };
+        std::stable_sort(order.begin(), order.end(), [&](unsigned a, unsigned b) { return count(a) > count(b); });
+        for (unsigned bits : order) {
+            Choice choice(rest.size(), 0);
+            for (size_t k = 0; k < list.size(); ++k) choice[list[k]] = bits >> k & 1u;
+            if (is_new(choice) && better(choice) == choice) return true;
+        }
+        return false;
+    }
+};
+
+}  // namespace
+
+Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, double width) {
+    Touching out{Choice(p.gaps.size(), 0), Choice(p.gaps.size(), 0)};
+    update_kinematics(p, w, t, q, v);
+    const double still = rest_rate(v);
+    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
+        if (is_bare(p, i)) continue;
+        evaluate_gap(p, w, t, v, i);
+        const double gap = gap_width(p, w, i), rate = gap_rate(p, w, i);
+        out.touch[i] = w.state.closed[i] || gap <= std::max(width, -rate * touching_time);
+        out.rest[i] = out.touch[i] && rate <= still;
+        out.strikes |= out.touch[i] && rate < -still;
+    }
+    return out;
+}
+
+// Contacts that share their load are decided together; else one by one, which tells whether the motion is the only one,
+// and together where that does not end.
+void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                    const ClosingQuestion& question, const std::function<void(const RestingMotion*)>& find_modes) {
+    const RunState before = w.state;
+    const auto together = [&] {
+        set_closed(p, w, before.closed);
+        set_modes(p, w, before.mode);
+        w.state = before;
+        return resting_motion(p, w, t, q, v, question);
+    };
+    const auto close = [&](const Choice& start, const RestingMotion* answer) {
+        Search search{p, w, t, v, question.rest, find_modes, answer, {}, {}};
+        Choice first = start;
+        if (question.opening >= 0) first[question.opening] = 0;
+        if (search.walk(first) || search.enumerate()) return;
+        if (search.failure) throw *search.failure;
+        throw Failure(Failure::Kind::not_converged, t);
+    };
+    const bool many = std::count(question.rest.begin(), question.rest.end(), char(1)) >= may_share;
+    if (many && question.breaking.empty()) {
+        const std::optional<RestingMotion> answer = together();
+        if (answer && answer->shared) return close(answer->closed, &*answer);
+    }
+    try {
+        close(question.rest, nullptr);
+    } catch (const Failure& failure) {
+        const bool undecided = failure.kind == Failure::Kind::not_converged;
+        if (!undecided && !(many && failure.kind == Failure::Kind::paradox)) throw;
+        const std::optional<RestingMotion> answer = together();
+        if (!answer || !(undecided || answer->shared)) throw;
+        close(answer->closed, &*answer);
+    }
+}
+
+}  // namespace pn

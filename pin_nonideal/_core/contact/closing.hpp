@@ -1,0 +1,29 @@
+// Which contacts that touch stay closed: their loads press, and what opens moves apart. All that rest on each other are
+// closed unless their loads cannot press; where several choices would do, the one with the most of them closed.
+#pragma once
+
+#include <functional>
+
+#include "contact/resting.hpp"
+
+namespace pn {
+
+// Gaps narrower than this [m or rad], or closed within this time [s], touch.
+constexpr double touching_width = 1e-12, touching_time = 1e-12;
+// At the start of a run gaps up to this part of the scene's size touch.
+constexpr double starting_width = 1e-10;
+
+// What contacts do at a state: they touch and rest on each other, or strike, or are apart.
+struct Touching {
+    std::vector<char> touch, rest;
+    bool strikes = false;
+};
+// By the widths and rates of the gaps at (t, q, v): those that are closed, or narrower than `width`, touch.
+Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, double width);
+
+// Closes contacts out of those that rest at (t, q, v). `find_modes` finds what sticks and slips for those closed, or takes
+// it from the motion of all of them together where there is one, and leaves the workspace with the motion at v.
+void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                    const ClosingQuestion& question, const std::function<void(const RestingMotion*)>& find_modes);
+
+}  // namespace pn

@@ -1,0 +1,59 @@
+#include "contact/contact_rows.hpp"
+
+#include "dynamics/evaluation.hpp"
+#include "dynamics/solution.hpp"
+#include "dynamics/step_start.hpp"
+
+namespace pn {
+
+void release_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                      const std::vector<char>& touching) {
+    set_closed(p, w, touching);
+    set_modes(p, w, std::vector<Mode>(p.frictions.size(), unloaded));
+    for (const Gap& gap : p.gaps)
+        for (size_t k = 0; k < p.blocks[gap.block].kept.size(); ++k)
+            w.now.rows.required[p.blocks[gap.block].row + k] = 0;
+    w.now.rows.use_required(p.blocks);
+    begin_step(p, w, t, q, v);
+}
+
+ContactRows::ContactRows(const Program& program, Workspace& workspace, const std::vector<int>& list)
+    : p(program), w(workspace), gaps(list) {
+    int rows = 0;
+    for (int gap : gaps) {
+        const int sliding = p.gaps[gap].sliding;
+        const int slips = sliding < 0 ? 0 : static_cast<int>(p.blocks[p.frictions[sliding].block].kept.size());
+        first.push_back(rows);
+        cones.push_back(ConeElement::contact(1 + slips, sliding < 0 ? 0.0 : p.frictions[sliding].mu));
+        rows += 1 + slips;
+    }
+    W.setZero(rows, rows);
+    response.setZero(p.mechanism.nv, rows);
+    velocity.setZero(rows);
+    respond();
+}
+
+void ContactRows::respond() {
+    const int nv = p.mechanism.nv;
+    const VecX no_drift = VecX::Zero(p.layout.rows);
+    VecX unit = no_drift, lam = no_drift, force(nv), change(nv);
+    each_row([&](int at, int block, int k) {
+        const Block& own = p.blocks[block];
+        velocity[at] = w.now.values[block].rate[own.kept[k]];
+        force.setZero();
+        unit[own.row + k] = 1.0;
+        add_transpose(own, w.now.A, unit, force);
+        unit[own.row + k] = 0.0;
+        solve_acceleration(p, w, force, no_drift, change, lam);
+        response.col(at) = change;
+    });
+    each_row([&](int at, int block, int k) {
+        for (int column = 0; column < W.cols(); ++column) {
+            multiply(p.blocks[block], w.now.A, response.col(column), w.scratch.r);
+            W(at, column) = w.scratch.r[p.blocks[block].row + k];
+        }
+    });
+    W = (0.5 * (W + W.transpose())).eval();
+}
+
+}  // namespace pn

@@ -1,0 +1,122 @@
+#include "contact/impact.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <Eigen/Eigenvalues>
+
+#include "contact/contact_rows.hpp"
+#include "dynamics/evaluation.hpp"
+#include "friction/cone_complementarity.hpp"
+#include "friction/modes.hpp"
+
+namespace pn {
+
+namespace {
+
+// Part of the largest response to a percussion that is none, and of the speed that is rounding of a velocity.
+constexpr double no_response = 1e-12, velocity_rounding = 1e-14;
+// Impulses below this part of the largest are rounding.
+constexpr double impulse_rounding = 1e-14;
+
+// Bodies are driven into each other, or no percussions were found.
+[[noreturn]] void refuse(const Program& p, double t, const std::vector<int>& gaps, ConeStatus status) {
+    if (status == ConeStatus::failed) throw Failure(Failure::Kind::not_converged, t);
+    std::vector<int> blocks;
+    for (int gap : gaps) blocks.push_back(p.gaps[gap].block);
+    throw Failure(Failure::Kind::inconsistent, t, blocks);
+}
+
+// Percussions of contacts, and of boxes of dry friction after them, that answer the velocities w0.
+VecX percussions(const ContactRows& rows, double t, const MatX& W, const VecX& w0,
+                 const std::vector<ConeElement>& elements) {
+    VecX P = VecX::Zero(w0.size());
+    const ConeStatus status = ConeComplementarity().solve(W, w0, elements, false, P);
+    if (status != ConeStatus::solved) refuse(rows.p, t, rows.gaps, status);
+    return P;
+}
+
+// Newton's law of restitution: gaps open with e times the rate at which they closed.
+VecX newton(const ContactRows& rows, double t, VecX w0) {
+    for (size_t i = 0; i < rows.gaps.size(); ++i) {
+        double& approach = w0[rows.first[i]];
+        approach += rows.p.gaps[rows.gaps[i]].restitution * std::min(0.0, approach);
+    }
+    return percussions(rows, t, rows.W, w0, rows.cones);
+}
+
+// Poisson's: after the impulses that stop the approach each contact gives e times its own again, and more only where it
+// would be entered. The friction of what it gives has a known limit: a box beside the cone of what comes on top, along
+// the same directions.
+VecX poisson(const ContactRows& rows, double t, const VecX& velocity) {
+    VecX P = percussions(rows, t, rows.W, velocity, rows.cones);
+    std::vector<ConeElement> elements = rows.cones;
+    std::vector<int> row(P.size());
+    std::iota(row.begin(), row.end(), 0);
+    VecX given = VecX::Zero(P.size());
+    const double least = impulse_rounding * P.cwiseAbs().maxCoeff();
+    for (size_t i = 0; i < rows.gaps.size(); ++i) {
+        const double again = rows.p.gaps[rows.gaps[i]].restitution * P[rows.first[i]];
+        if (!(again > least)) continue;
+        given[rows.first[i]] = again;
+        if (!rows.cones[i].slides() || rows.cones[i].bound == 0.0) continue;
+        elements.push_back(ConeElement::box(rows.cones[i].dim - 1, rows.cones[i].bound * again));
+        for (int k = 1; k < rows.cones[i].dim; ++k) row.push_back(rows.first[i] + k);
+    }
+    if (given.isZero(0.0)) return P;
+    P += given;
+    const int n = static_cast<int>(row.size());
+    const VecX after = velocity + rows.W * P;
+    MatX W(n, n);
+    VecX w0(n);
+    for (int i = 0; i < n; ++i) {
+        w0[i] = after[row[i]];
+        for (int j = 0; j < n; ++j) W(i, j) = rows.W(row[i], row[j]);
+    }
+    const VecX more = percussions(rows, t, W, w0, elements);
+    for (int i = 0; i < n; ++i) P[row[i]] += more[i];
+    return P;
+}
+
+// Velocities that no percussion can change are zero but for rounding, where constraints or other contacts hold them:
+// what is left of them would let contacts slip that stick.
+void clean(const ContactRows& rows, double speed, VecX& w0) {
+    const Eigen::SelfAdjointEigenSolver<MatX> modes(rows.W);
+    const VecX& response = modes.eigenvalues();
+    for (int i = 0; i < w0.size() && response[i] <= no_response * response[w0.size() - 1]; ++i) {
+        const double held = modes.eigenvectors().col(i).dot(w0);
+        if (std::abs(held) <= velocity_rounding * (1.0 + speed)) w0 -= held * modes.eigenvectors().col(i);
+    }
+}
+
+}  // namespace
+
+double rest_rate(const VecX& v) { return rest_speed * (1.0 + v.cwiseAbs().maxCoeff()); }
+
+Impact strike(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, const std::vector<char>& touching) {
+    Impact out;
+    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i)
+        if (touching[i]) out.gaps.push_back(i);
+    release_contacts(p, w, t, q, v, touching);
+    const ContactRows rows(p, w, out.gaps);
+    VecX velocity = rows.velocity;
+    clean(rows, v.cwiseAbs().maxCoeff(), velocity);
+    const VecX P = p.impact_law == ImpactLaw::poisson ? poisson(rows, t, velocity) : newton(rows, t, velocity);
+    out.v_minus = v;
+    const double before = kinetic_energy(p.mechanism, w.now.terms, v);
+    v += rows.response * P;
+    out.v_plus = v;
+    out.energy_change = kinetic_energy(p.mechanism, w.now.terms, v) - before;
+    const VecX mean = rows.velocity + 0.5 * rows.W * P;
+    for (size_t i = 0; i < out.gaps.size(); ++i) {
+        Vec3 impulse = Vec3::Zero();
+        for (int k = 0; k < rows.cones[i].dim; ++k) impulse[k] = rows.of(P, i)[k];
+        out.impulse.push_back(impulse);
+        out.work.push_back(rows.of(P, i).dot(rows.of(mean, i)));
+    }
+    set_closed(p, w, touching);  // and their rows count again
+    return out;
+}
+
+}  // namespace pn

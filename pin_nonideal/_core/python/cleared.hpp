@@ -1,0 +1,27 @@
+// Workspaces that are used again for another run, as good as new ones.
+#pragma once
+
+#include <algorithm>
+
+#include "dynamics/workspace.hpp"
+
+namespace pn {
+
+// Back to what a new workspace is, of all that a run reads before it writes it. `first`: the state of a new one.
+inline void clear(const Program& p, Workspace& w, const RunState& first) {
+    const Vec3 none = Vec3::Zero();
+    w.state = first;
+    w.counters = {};
+    w.now.has_override = false;
+    w.now.several = w.now.ideal = false;
+    for (VecX* x : {&w.now.lam, &w.now.closing_lam, &w.now.reactions.lam, &w.now.C, &w.now.C_smooth, &w.now.base_C,
+                    &w.now.a, &w.now.dz})
+        x->setZero();
+    std::fill(w.now.load.begin(), w.now.load.end(), 0.0);
+    std::fill(w.now.limit.begin(), w.now.limit.end(), 0.0);
+    std::fill(w.now.slip_force.begin(), w.now.slip_force.end(), none);
+    set_modes(p, w, first.mode);
+    w.state = first;
+}
+
+}  // namespace pn

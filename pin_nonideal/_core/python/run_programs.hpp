@@ -1,0 +1,43 @@
+// Programs of the runs of a batch that differ in numbers.
+#pragma once
+
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "dynamics/numbers.hpp"
+#include "python/arrays.hpp"
+
+namespace pn {
+
+using NumberTuple = std::tuple<std::string, int, std::string>;  // a NumberName
+
+// Programs of the runs of a batch, which differ in some numbers: one for each thread, with the numbers of its run. They
+// are copied and let go by the thread that holds Python, since they hold its functions.
+class RunPrograms {
+   public:
+    RunPrograms(const Program& p, const std::vector<NumberTuple>& names, const Array2& values, int threads)
+        : common(p), values(map(values)) {
+        if (names.empty()) return;
+        own.assign(threads, p);
+        places.resize(threads);
+        for (int k = 0; k < threads; ++k)
+            for (const auto& [call, index, argument] : names)
+                places[k].push_back(find_number(own[k], {call, index, argument}));
+    }
+    const Program& of(size_t i, int thread) {
+        if (own.empty()) return common;
+        int column = 0;
+        for (const NumberPlace& place : places[thread])
+            for (int j = 0; j < place.size; ++j) place.at[j] = values(i, column++);
+        return own[thread];
+    }
+
+   private:
+    const Program& common;
+    Eigen::Map<const RowMajor> values;
+    std::vector<Program> own;
+    std::vector<std::vector<NumberPlace>> places;
+};
+
+}  // namespace pn

@@ -1,0 +1,155 @@
+#include "run/gap_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/gaps.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/projection.hpp"
+#include "math/roots.hpp"
+
+namespace pn {
+
+namespace {
+
+// Accelerations between the stages of an accepted step stay below so many times the largest at the stages.
+constexpr double between_stages = 2.0;
+// A gap that hovers about its plane is not followed further than so many looks: it has closed.
+constexpr int most_looks = 4000;
+constexpr double rate_rounding = 1e-12;  // part of the rates of a gap that moves evenly
+
+}  // namespace
+
+GapSearch::GapSearch(System& system, Stepper& stepper, const GapState& at_start)
+    : system_(system), stepper_(stepper), p(system.p), w(system.w), start_(at_start), reach_(system.p),
+      end_(p.gaps.size()), bends_(p.gaps.size()), speed_(VecX::Zero(system.nv)),
+      acceleration_(speed_), probe_(VecX::Zero(system.ny)) {}
+
+// Largest |v| and |a| of each dof over the step, from the rates at the stages.
+void GapSearch::bound_rates() {
+    acceleration_.setZero();
+    for (const Stepper::Look& look : stepper_.looks())
+        acceleration_ = acceleration_.cwiseMax(system_.velocity(*look.rate).cwiseAbs());
+    acceleration_ *= between_stages;
+    const auto v0 = system_.velocity(stepper_.y0).cwiseAbs(), v1 = system_.velocity(stepper_.y1).cwiseAbs();
+    // Never farther from both ends than their mean and what half a step of acceleration adds.
+    speed_ = 0.5 * (v0 + v1) + 0.5 * stepper_.h * acceleration_;
+    reach_.bound_bodies(w, speed_, acceleration_, stepper_.h);
+}
+
+// Bounds of a gap between the step's ends; of one of the user's, so many times what its cubic between them and its
+// motion at the end show.
+GapSearch::Bends GapSearch::bends(int gap) const {
+    if (Reach::knows(p, gap)) return {reach_.bound(w, gap), reach_.rise(w, gap)};
+    const double h = stepper_.h, change = (end_[gap].width - start_.width[gap]) / h;
+    const double r0 = start_.rate[gap], r1 = end_[gap].rate;
+    const double most = between_stages * std::max({std::abs(6.0 * change - 4.0 * r0 - 2.0 * r1) / h,
+                                                   std::abs(6.0 * change - 2.0 * r0 - 4.0 * r1) / h,
+                                                   std::abs(gap_acceleration(p, w, gap))});
+    return {most, most};
+}
+
+std::vector<int> GapSearch::doubtful() {
+    std::vector<int> list;
+    const int n = static_cast<int>(p.gaps.size());
+    rounding_ = gap_rounding * scene_size(p, w);
+    bool bounded = false;
+    system_.read(stepper_.y1);
+    for (int i = 0; i < n; ++i) {
+        if (w.state.closed[i] || is_bare(p, i)) continue;
+        if (!bounded) bound_rates();
+        bounded = true;
+        evaluate_gap(p, w, stepper_.t0 + stepper_.h, system_.v, i);
+        end_[i] = look_here(i, 1.0);
+        bends_[i] = bends(i);
+        if (!stays_open(look_at_start(i), end_[i], bends_[i].below)) list.push_back(i);
+    }
+    return list;
+}
+
+// The two parabolas of the bound through both ends lie below the gap; where the higher of them is least it stands.
+bool GapSearch::stays_open(const Look& a, const Look& b, double bound) const {
+    const double length = (b.part - a.part) * stepper_.h, least = -rounding_;
+    if (!(a.width > least) || !(b.width > least)) return false;
+    if (a.separation) return stays_apart(*a.separation, *b.separation, bound, length, least);
+    const double change = b.rate - a.rate + bound * length;  // negative: no bound at all
+    if (change <= 0.0) return change >= -rate_rounding * (std::abs(a.rate) + std::abs(b.rate));
+    const double meet = (a.width - b.width + b.rate * length + 0.5 * bound * length * length) / change;
+    if (!(meet > 0.0 && meet < length)) return true;
+    return a.width + meet * (a.rate - 0.5 * bound * meet) > least;
+}
+
+GapSearch::Look GapSearch::look_at_start(int gap) const {
+    Look out{0.0, start_.width[gap] - plane(gap), start_.rate[gap], std::nullopt};
+    if (!Separation::has(p, gap)) return out;
+    out.separation = start_.separation[gap];
+    out.separation->radius += plane(gap);
+    return out;
+}
+
+// Of the gap that the workspace is evaluated for.
+GapSearch::Look GapSearch::look_here(int gap, double part) const {
+    Look out{part, gap_width(p, w, gap) - plane(gap), gap_rate(p, w, gap), std::nullopt};
+    if (!Separation::has(p, gap)) return out;
+    out.separation = Separation::of(p, w, gap);
+    out.separation->radius += plane(gap);
+    return out;
+}
+
+GapSearch::Look GapSearch::look(int gap, double part) {
+    ++looks_;
+    if (part == 0.0) return look_at_start(gap);
+    stepper_.interpolate(part, probe_);
+    system_.read(probe_);
+    kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
+    evaluate_gap(p, w, stepper_.t0 + part * stepper_.h, system_.v, gap);
+    return look_here(gap, part);
+}
+
+// The root between an instant at which the gap is open, or where it has just closed, and one at which it is through.
+GapSearch::Touch GapSearch::between(int gap, const Look& a, const Look& b) {
+    const double part =
+        root_between(a.part, a.width, b.part, b.width, [&](double at) { return look(gap, at).width; });
+    return {part, look(gap, part).rate * stepper_.h};
+}
+
+std::optional<GapSearch::Touch> GapSearch::search(int gap, const Look& a, const Look& b, const Bends& bends) {
+    const double bound = bends.below;
+    if (stays_open(a, b, bound)) return std::nullopt;
+    const double length = (b.part - a.part) * stepper_.h;
+    // It goes on closing all the way.
+    if (b.width < -rounding_ && a.rate + bends.above * length < 0.0) return between(gap, a, b);
+    if (bends.above * length * length < rounding_ || looks_ > most_looks) {
+        if (b.width < -rounding_ || looks_ > most_looks) return Touch{b.part, b.rate * stepper_.h};
+        return std::nullopt;
+    }
+    // What leaves its plane is sure to be above it for half the time that the bound gives it.
+    if (a.width <= rounding_ && a.rate > 0.0 && !a.separation) {
+        const double sure = a.part + a.rate / (bound * stepper_.h);
+        if (sure < 0.5 * (a.part + b.part) && sure > a.part) {
+            const Look up = look(gap, sure);
+            if (up.width > 0.0) return search(gap, up, b, bends);
+        }
+    }
+    const Look middle = look(gap, 0.5 * (a.part + b.part));
+    if (const auto touch = search(gap, a, middle, bends)) return touch;
+    return search(gap, middle, b, bends);
+}
+
+std::optional<GapSearch::Touch> GapSearch::first_touch(int gap) {
+    looks_ = 0;
+    stepper_.make_interpolant();
+    return search(gap, look_at_start(gap), end_[gap], bends_[gap]);
+}
+
+void look_at_gaps(System& system, double t, GapState& out) {
+    for (int i = 0; i < static_cast<int>(system.p.gaps.size()); ++i) {
+        if (is_bare(system.p, i)) continue;
+        evaluate_gap(system.p, system.w, t, system.v, i);
+        out.width[i] = gap_width(system.p, system.w, i);
+        out.rate[i] = gap_rate(system.p, system.w, i);
+        if (Separation::has(system.p, i)) out.separation[i] = Separation::of(system.p, system.w, i);
+    }
+}
+
+}  // namespace pn

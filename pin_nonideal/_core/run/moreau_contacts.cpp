@@ -1,0 +1,276 @@
+#include "run/moreau_contacts.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/gaps.hpp"
+#include "contact/impact.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/power.hpp"
+#include "dynamics/projection.hpp"
+#include "dynamics/slip.hpp"
+#include "dynamics/solution.hpp"
+#include "dynamics/step_start.hpp"
+#include "tree/factor.hpp"
+#include "tree/liegroup.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr int load_passes = 60;           // of limits that depend on the load
+constexpr double load_tolerance = 1e-12;  // change of the limits, as a part of the largest, that is rounding
+constexpr double limit_rounding = 1e-9;   // part of its limit within which a force is at it
+constexpr double least_response = 1e-13;  // part of a row's free response that the constraints must leave it
+
+}  // namespace
+
+MoreauContacts::MoreauContacts(System& system)
+    : system_(system), p(system.p), w(system.w), active_(system.ng, 0), closed_(system.ng, 0),
+      modes_(system.ne, unloaded), unloaded_(modes_), q_mid_(VecX::Zero(system.nq)),
+      v0_(VecX::Zero(system.nv)), v1_(v0_), a_free_(v0_),
+      power_(VecX::Zero(system.nw)), zero_(VecX::Zero(p.layout.rows)), force_(v0_) {
+    if (system.ng == 0) return;
+    const int most = p.layout.rows;
+    unit_ = lam_ = lam_free_ = zero_;
+    w0_ = f_ = VecX::Zero(most);
+    W_.resize(most, most);
+    response_.resize(system.nv, most);
+    multipliers_.resize(most, most);
+    rows_.reserve(most);
+    parts_.reserve(most);
+    cones_.reserve(most);
+}
+
+void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, double& impact_energy) {
+    const Mechanism& m = p.mechanism;
+    h_ = h;
+    v0_ = system_.velocity(y);
+    force_ = 0.5 * h * v0_;
+    retract(m, y.data(), force_.data(), q_mid_.data());
+    const double middle = t + 0.5 * h;
+    std::copy(w.state.mode.begin(), w.state.mode.end(), modes_.begin());
+    find_active(middle);
+    solve_free(middle);
+    add_rows();
+    respond();
+    solve(middle);
+    end_velocity();
+    if (system_.energy) book_work(y, moved_energy, impact_energy);
+    set_closed(p, w, closed_);
+    set_modes(p, w, modes_);
+    if (system_.nz > 0) y.segment(system_.nq + system_.nv, system_.nz) += h * w.now.dz;
+    force_ = 0.5 * h * v1_;
+    retract(m, q_mid_.data(), force_.data(), y.data());
+    y.segment(system_.nq, system_.nv) = v1_;
+}
+
+// Contacts whose gap is closed at the step's middle, and those that were closed: their loads tell whether they stay so.
+void MoreauContacts::find_active(double t) {
+    update_kinematics(p, w, t, q_mid_, v0_);
+    for (int i = 0; i < system_.ng; ++i) {
+        if (is_bare(p, i)) continue;
+        evaluate_gap(p, w, t, v0_, i);
+        active_[i] = w.state.closed[i] || gap_width(p, w, i) <= 0.0;
+    }
+}
+
+// The motion without contacts and dry friction, constraints met at the step's end: half of what rows change by
+// themselves is still to come at its middle.
+void MoreauContacts::solve_free(double t) {
+    set_closed(p, w, active_);
+    set_modes(p, w, unloaded_);
+    for (const Gap& gap : p.gaps)
+        for (size_t k = 0; k < p.blocks[gap.block].kept.size(); ++k)
+            w.now.rows.required[p.blocks[gap.block].row + k] = 0;
+    w.now.rows.use_required(p.blocks);
+    begin_step(p, w, t, q_mid_, v0_);
+    unit_ = w.now.b;
+    for (int i = 0; i < p.first_gap; ++i) {
+        const Block& block = p.blocks[i];
+        for (size_t k = 0; k < block.kept.size(); ++k)
+            unit_[block.row + k] = 0.5 * unit_[block.row + k] - w.now.values[i].rate[block.kept[k]] / h_;
+    }
+    a_free_ = w.now.a;
+    lam_free_ = w.now.lam;
+    solve_motion(p, w, p.has_laws(), unit_, a_free_, lam_free_);
+    unit_.setZero();
+}
+
+// The coefficient of a contact: the static one where it sticks or comes to rest.
+double MoreauContacts::coefficient(int element) const {
+    const Friction& friction = p.frictions[element];
+    const double speed = slip_velocity(w.now, friction).norm();
+    const bool rests = modes_[element] == sticking || speed <= rest_rate(v0_);
+    return rests ? friction.holding_limit(friction.mu) : friction.kinetic_limit(friction.mu, speed);
+}
+
+void MoreauContacts::add_part(Part part, int block, int kept, ConeElement element) {
+    for (int k = 0; k < kept; ++k) rows_.push_back({block, k});
+    if (part.gap >= 0 && part.element >= 0) {
+        const int slip = p.frictions[part.element].block;
+        for (size_t k = 0; k < p.blocks[slip].kept.size(); ++k) rows_.push_back({slip, static_cast<int>(k)});
+    }
+    parts_.push_back(part);
+    cones_.push_back(element);
+}
+
+// Contacts first, then dry friction that is not their sliding.
+void MoreauContacts::add_rows() {
+    rows_.clear();
+    parts_.clear();
+    cones_.clear();
+    for (int i = 0; i < system_.ng; ++i) {
+        if (!active_[i]) continue;
+        const Gap& gap = p.gaps[i];
+        const int slides = gap.sliding < 0 ? 0 : static_cast<int>(p.blocks[p.frictions[gap.sliding].block].kept.size());
+        const double mu = gap.sliding < 0 ? 0.0 : coefficient(gap.sliding);
+        const double approach = gap.restitution * std::min(0.0, gap_rate(p, w, i));
+        add_part({i, gap.sliding, approach}, gap.block, 1, ConeElement::contact(1 + slides, mu));
+    }
+    for (int e = 0; e < system_.ne; ++e) {
+        const Friction& friction = p.frictions[e];
+        const int gap = friction.gap;
+        if (gap >= 0 && (!active_[gap] || p.gaps[gap].sliding == e)) continue;
+        const int kept = static_cast<int>(p.blocks[friction.block].kept.size());
+        if (kept > 0) add_part({-1, e, 0.0}, friction.block, kept, ConeElement::box(kept, 0.0));
+    }
+}
+
+// What a unit of each force does, and the velocities at the step's end without them, over h.
+void MoreauContacts::respond() {
+    const int n = static_cast<int>(rows_.size());
+    for (int column = 0; column < n; ++column) {
+        const Row& row = rows_[column];
+        const Block& block = p.blocks[row.block];
+        force_.setZero();
+        unit_[block.row + row.k] = 1.0;
+        add_transpose(block, w.now.A, unit_, force_);
+        unit_[block.row + row.k] = 0.0;
+        solve_acceleration(p, w, force_, zero_, v1_, lam_);
+        response_.col(column) = v1_;
+        multipliers_.col(column) = lam_;
+        solve_R(p.mechanism, w.now.terms, force_);
+        const double free = force_.squaredNorm();
+        for (int i = 0; i < n; ++i) {
+            multiply(p.blocks[rows_[i].block], w.now.A, v1_, w.scratch.r);
+            W_(i, column) = w.scratch.r[p.blocks[rows_[i].block].row + rows_[i].k];
+        }
+        if (W_(column, column) <= least_response * free) W_(column, column) = 0.0;
+    }
+    for (int i = 0; i < n; ++i) {
+        for (int j = 0; j < i; ++j) {
+            const bool held = W_(i, i) == 0.0 || W_(j, j) == 0.0;
+            W_(i, j) = W_(j, i) = held ? 0.0 : 0.5 * (W_(i, j) + W_(j, i));
+        }
+        const Block& block = p.blocks[rows_[i].block];
+        const RowValues& values = w.now.values[rows_[i].block];
+        const int k = block.kept[rows_[i].k];
+        multiply(block, w.now.A, a_free_, w.scratch.r);
+        w0_[i] = w.scratch.r[block.row + rows_[i].k] + values.rate[k] / h_ + 0.5 * values.drift[k];
+        f_[i] = w.state.percussion[block.row + rows_[i].k];
+    }
+    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) w0_[at] += parts_[e].approach / h_;
+}
+
+// The motion under the forces f.
+void MoreauContacts::apply() {
+    const int n = static_cast<int>(rows_.size());
+    w.now.a = a_free_;
+    w.now.a.noalias() += response_.leftCols(n) * f_.head(n);
+    w.now.lam = lam_free_;
+    w.now.lam.noalias() += multipliers_.leftCols(n) * f_.head(n);
+    for (Vec3& force : w.now.slip_force) force = Vec3::Zero();
+    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
+        const int head = parts_[e].gap >= 0;
+        if (head) w.now.lam[p.blocks[p.gaps[parts_[e].gap].block].row] = f_[at];
+        if (parts_[e].element < 0) continue;
+        for (int k = head; k < cones_[e].dim; ++k) w.now.slip_force[parts_[e].element][k - head] = f_[at + k];
+    }
+    w.now.renew();
+}
+
+// Takes the limits of dry friction for the load of the motion at hand; whether they are what they were.
+bool MoreauContacts::limits_settle(double t) {
+    double change = 0.0, largest = 0.0;
+    for (size_t e = 0; e < parts_.size(); ++e) {
+        if (!cones_[e].is(ConeElement::Kind::box)) continue;
+        const Friction& friction = p.frictions[parts_[e].element];
+        const double speed = slip_velocity(w.now, friction).norm();
+        const double load = friction.gap >= 0 ? friction.constant + friction.mu * w.now.lam[friction.row]
+                                              : load_limit(p, w, friction, t, w.now.terms.q, v0_);
+        const double limit = speed == 0.0 ? friction.holding_limit(load) : friction.kinetic_limit(load, speed);
+        change = std::max(change, std::abs(limit - cones_[e].bound));
+        largest = std::max(largest, limit);
+        cones_[e].bound = std::max(0.0, limit);
+    }
+    return change <= load_tolerance * largest;
+}
+
+void MoreauContacts::solve(double t) {
+    const int n = static_cast<int>(rows_.size());
+    for (int pass = 0;; ++pass) {
+        apply();
+        if (limits_settle(t) && pass > 0) break;
+        if (pass == load_passes) throw Failure(Failure::Kind::not_converged, t);
+        const auto W = W_.topLeftCorner(n, n);
+        const ConeStatus status = solver_.solve(W, w0_.head(n), cones_, true, f_.head(n), true);
+        if (status != ConeStatus::solved) throw Failure(Failure::Kind::not_converged, t);
+        ++w.counters.iterations;
+    }
+    w.state.percussion.setZero();
+    for (int i = 0; i < n; ++i) w.state.percussion[p.blocks[rows_[i].block].row + rows_[i].k] = f_[i];
+    const ConeResiduals r = ConeComplementarity::residuals(W_.topLeftCorner(n, n), w0_.head(n), cones_, f_.head(n));
+    w.counters.signorini = std::max(w.counters.signorini, r.signorini);
+    w.counters.coulomb = std::max(w.counters.coulomb, r.coulomb);
+    w.counters.dissipation = std::max(w.counters.dissipation, r.dissipation);
+}
+
+// Velocity at the step's end, which contacts stay closed, and the modes: what stays below its limit sticks.
+void MoreauContacts::end_velocity() {
+    v1_ = v0_ + h_ * w.now.a;
+    const double still = rest_rate(v1_);
+    std::fill(closed_.begin(), closed_.end(), char(0));
+    std::fill(modes_.begin(), modes_.end(), unloaded);
+    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
+        const Part& part = parts_[e];
+        const int head = part.gap >= 0, dim = cones_[e].dim - head, n = static_cast<int>(rows_.size());
+        const auto speed = [&](size_t row) { return h_ * (w0_[row] + W_.row(row).head(n).dot(f_.head(n))); };
+        if (head) closed_[part.gap] = speed(at) - part.approach <= still;
+        if (part.element < 0 || (head && !closed_[part.gap])) continue;
+        const double limit = cones_[e].bound * (head ? f_[at] : 1.0);
+        const bool held = f_.segment(at + head, dim).norm() < limit * (1.0 - limit_rounding) || limit == 0.0;
+        const bool forward = dim > 1 || speed(at + head) > 0.0;
+        modes_[part.element] = held && dim > 0 ? sticking : forward ? slip_plus : slip_minus;
+        const Block& block = p.blocks[p.frictions[part.element].block];
+        if (held && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
+    }
+    for (int e = 0; e < system_.ne; ++e)  // what the constraints hold has no mode of its own but rest
+        if (modes_[e] == unloaded && (p.frictions[e].gap < 0 || closed_[p.frictions[e].gap])) modes_[e] = sticking;
+}
+
+// Work over the step, by the mean velocity. Where a slip turns inside the step its mean velocity may go with the
+// friction that meets its end: that is work of the scheme, not of friction.
+void MoreauContacts::book_work(VecX& y, double& moved_energy, double& impact_energy) {
+    const int n = static_cast<int>(rows_.size());
+    w.now.lam = lam_free_;
+    w.now.lam.noalias() += multipliers_.leftCols(n) * f_.head(n);
+    force_ = 0.5 * (v0_ + v1_);
+    powers(p, w, force_, power_.data());
+    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
+        double power = 0.0;
+        for (int k = 0; k < cones_[e].dim; ++k) {
+            const Row& row = rows_[at + k];
+            multiply(p.blocks[row.block], w.now.A, force_, w.scratch.r);
+            const double part = w.scratch.r[p.blocks[row.block].row + row.k] * f_[at + k];
+            if (k == 0 && parts_[e].gap >= 0) impact_energy += h_ * part;
+            else power += part;
+        }
+        if (parts_[e].element < 0) continue;
+        if (power > 0.0) moved_energy += h_ * power;
+        else power_[first_law_power + p.frictions[parts_[e].element].law] += power;
+    }
+    system_.work(y) += h_ * power_;
+}
+
+}  // namespace pn

@@ -1,0 +1,57 @@
+// Time stepping with contacts that may open (Moreau's midpoint rule): those whose gap has closed at the step's middle
+// join, u_n + e u_n- >= 0 at its end with a percussion that presses, Coulomb's cone along it, and all other dry friction
+// beside in its limits. One cone problem a step; the others are no rows.
+#pragma once
+
+#include <vector>
+
+#include "friction/cone_complementarity.hpp"
+#include "run/system.hpp"
+
+namespace pn {
+
+class MoreauContacts {
+public:
+    explicit MoreauContacts(System& system);
+
+    // One step of size h from y at t; the work of contacts along their normals goes into impact_energy, what the scheme
+    // itself adds into moved_energy. The state is left to be projected and evaluated, with the modes of its end.
+    void step(double t, double h, VecX& y, double& moved_energy, double& impact_energy);
+
+private:
+    struct Row {
+        int block, k;
+    };
+    struct Part {              // of the cone problem
+        int gap = -1;          // a contact's,
+        int element = -1;      // and of dry friction: its sliding, or one that is a box
+        double approach = 0.0; // restitution times the rate at which its gap closed, over the step
+    };
+
+    void find_active(double t);
+    void solve_free(double t);
+    void add_rows();
+    void add_part(Part part, int first_block, int kept, ConeElement element);
+    void respond();
+    void solve(double t);
+    void apply();
+    bool limits_settle(double t);
+    void end_velocity();
+    void book_work(VecX& y, double& moved_energy, double& impact_energy);
+    double coefficient(int element) const;
+
+    System& system_;
+    const Program& p;
+    Workspace& w;
+    double h_ = 0.0;
+    std::vector<char> active_, closed_;
+    std::vector<Mode> modes_, unloaded_;
+    std::vector<Row> rows_;
+    std::vector<Part> parts_;
+    std::vector<ConeElement> cones_;
+    VecX q_mid_, v0_, v1_, a_free_, lam_free_, w0_, f_, power_, unit_, zero_, force_, lam_;
+    MatX W_, response_, multipliers_;
+    ConeComplementarity solver_;
+};
+
+}  // namespace pn

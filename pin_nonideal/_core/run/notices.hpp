@@ -1,0 +1,34 @@
+// What a run tells of its motion where no mode changes: contacts that are kept though they pull, and where the laws begin
+// to allow other motions too.
+#pragma once
+
+#include <optional>
+
+#include "run/checkpoint.hpp"
+#include "run/event_location.hpp"
+
+namespace pn {
+
+class Notices {
+public:
+    Notices(System& system, Stepper& stepper, Progress& progress, Recording& out);
+
+    // Contacts and wheels that have to pull, told once each time they begin.
+    void pulls(const std::optional<FoundEvent>& event);
+    // Where the laws begin to allow other motions too, told once each time; returns when, where that lies inside the
+    // step.
+    std::optional<double> several(bool after_step);
+
+private:
+    double last_unique();
+
+    const Program& p;
+    Workspace& w;
+    System& system_;
+    Stepper& stepper_;
+    Progress& progress_;
+    Recording& out_;
+    VecX sample_;
+};
+
+}  // namespace pn

@@ -1,0 +1,147 @@
+"""Contacts as blocks of rows in the core's program."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, get_args
+
+import numpy as np
+
+from pin_nonideal.contacts import BoxContact, Contact, JointLimit, PointContact, UserContact
+from pin_nonideal.core import core
+from pin_nonideal.errors import InputError
+from pin_nonideal.types import Model
+
+from .callbacks import checked
+from .constraints import user_rate, user_rows
+from .names import Resolution, words
+
+# What Pinocchio gives joints without limits [rad or m].
+NO_LIMIT = np.finfo(float).max
+
+
+def lower_contacts(
+    contacts: Sequence[tuple[str, Any]], out: core.Builder, where: Resolution
+) -> Iterator[tuple[str, Any]]:
+    """Adds the normal rows of all contacts; their friction follows all rows (`lower_contact_friction`).
+
+    Those that may open come after those that are kept, and their rows in the order of the descriptions.
+
+    Args:
+        contacts: unique names and descriptions.
+        out: the program under construction.
+        where: frames and joints by name.
+
+    Yields:
+        Each that is in, with its name.
+
+    Raises:
+        InputError, UnknownNameError: what one refers to does not exist or does not fit.
+    """
+    for name, c in contacts:
+        if not isinstance(c, get_args(Contact)):
+            known = ", ".join(kind.__name__ for kind in get_args(Contact))
+            raise InputError(f"a contact must be one of {known}; got {c!r}")
+        if isinstance(c, JointLimit):
+            _check_limit(c, words(c, name), where)
+    blocks: dict[int, list[int]] = {}
+    for opens in (False, True):
+        for i, (name, c) in enumerate(contacts):
+            if getattr(c, "unilateral", True) is opens:
+                blocks[i] = lower_gaps(c, name, out, where)
+                yield name, c
+    out.order_contacts([block for i in range(len(contacts)) for block in blocks[i]])
+
+
+def lower_gaps(c: Any, name: str, out: core.Builder, where: Resolution) -> list[int]:
+    """Adds the normal rows of one contact; its blocks.
+
+    Args:
+        c: the description.
+        name: its unique name.
+        out: the program under construction.
+        where: frames and joints by name.
+    """
+    if isinstance(c, JointLimit):
+        return _stops(c, name, out, where)
+    if isinstance(c, PointContact):
+        return [_on_plane(c, name, out, where)]
+    if isinstance(c, UserContact):
+        who = words(c, name)
+        rows, gap = user_rows(c, 1, who, where), checked(c.gap, f"{who}: gap", (1,))
+        block = out.add_user_gap(name, rows=rows, gap=gap, rate=user_rate(c, 1, who, rows, gap))
+        out.let_open(restitution=c.restitution)
+        return [block]
+    who, radius = words(c, name), c.radius1 + c.radius2
+    if isinstance(c, BoxContact):
+        f1, f2, half = where.box(c, who)
+        block = out.add_box(name, f1, f2, half=half, radius=radius)
+    else:
+        f1, f2, half1, half2 = where.capsules(c, who)
+        block = out.add_capsules(name, f1, f2, half1=half1, half2=half2, radius=radius)
+    out.let_open(restitution=c.restitution)
+    return [block]
+
+
+def _on_plane(c: PointContact, name: str, out: core.Builder, where: Resolution) -> int:
+    f1, f2, (_, _, normal) = where.contact(c, words(c, name))
+    block = out.add_contact(name, f1, f2, normal=normal, radius=c.radius)
+    if c.unilateral:
+        out.let_open(restitution=c.restitution)
+    return block
+
+
+def _stops(c: JointLimit, name: str, out: core.Builder, where: Resolution) -> list[int]:
+    """The finite stops of a joint, "NAME lower" and "NAME upper"."""
+    blocks = []
+    for which, sign, bound in zip(("lower", "upper"), (1.0, -1.0), stops_of(c, name, where), strict=True):
+        if math.isfinite(bound):
+            blocks.append(
+                out.add_limit(f"{name} {which}", where.joint(c.joint, name), bound=bound, sign=sign)
+            )
+            out.let_open(restitution=c.restitution)
+    return blocks
+
+
+def stops_of(c: JointLimit, name: str, where: Resolution) -> tuple[float, float]:
+    """Positions of the lower and upper stop, infinite where there is none.
+
+    Args:
+        c: the description.
+        name: its unique name.
+        where: frames and joints by name.
+    """
+    model, joint = where.model, where.joint(c.joint, words(c, name))
+    at = model.joints[joint].idx_q
+    lower = float(model.lowerPositionLimit[at]) if c.lower is None else c.lower
+    upper = float(model.upperPositionLimit[at]) if c.upper is None else c.upper
+    return (-math.inf if lower <= -NO_LIMIT else lower), (math.inf if upper >= NO_LIMIT else upper)
+
+
+def has_stops(model: Model, at: int) -> bool:
+    """Whether the model bounds a position, on one side at least.
+
+    Args:
+        model: pinocchio.Model.
+        at: place of the position in q.
+    """
+    return bool(model.lowerPositionLimit[at] > -NO_LIMIT or model.upperPositionLimit[at] < NO_LIMIT)
+
+
+def _check_limit(c: JointLimit, who: str, where: Resolution) -> None:
+    """Raises where a joint has no position that stops could bound, or where none is given.
+
+    Raises:
+        InputError, UnknownNameError: see above.
+    """
+    joint = where.model.joints[where.joint(c.joint, who)]
+    if joint.nq != 1:
+        raise InputError(
+            f'{who}: joint "{c.joint}" turns without end and has no stops; it is {joint.shortname()}'
+        )
+    lower, upper = stops_of(c, who, where)
+    if not (math.isfinite(lower) or math.isfinite(upper)):
+        raise InputError(f'{who}: the model gives joint "{c.joint}" no finite limits; give lower or upper')
+    if not lower < upper:
+        raise InputError(f"{who}: lower must be below upper; got {lower:g} and {upper:g}")

@@ -1,0 +1,67 @@
+"""The text of URDF files; `.xacro` files are expanded by the xacro package."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from pin_nonideal.errors import LoadingError
+
+from .meshes import package_folder
+from .xml import read_text
+
+XACRO = threading.Lock()  # xacro finds packages by a function of its module
+
+
+def urdf_text(path: Path, package_dirs: Sequence[str | Path] = ()) -> str:
+    """The text of a URDF file; a `.xacro` file is expanded by the xacro package.
+
+    Args:
+        path: the file.
+        package_dirs: more folders in which `$(find package)` looks.
+
+    Raises:
+        LoadingError: it cannot be read, or cannot be expanded.
+    """
+    if path.suffix.lower() != ".xacro":
+        return read_text(path)
+    try:
+        import xacro
+    except ImportError:
+        raise LoadingError(
+            f'"{path}" must be expanded by xacro, which cannot be imported; pip install xacro, or expand the '
+            "file: xacro FILE > robot.urdf"
+        ) from None
+    try:
+        with _finding_packages(path.parent, package_dirs):
+            return str(xacro.process_file(str(path)).toxml())
+    except Exception as error:  # xacro raises whatever its macros raise
+        raise LoadingError(
+            f'"{path}" cannot be expanded by xacro: {" ".join(str(error).split())}; what it needs can be '
+            "given by hand: xacro FILE NAME:=VALUE > robot.urdf"
+        ) from None
+
+
+@contextmanager
+def _finding_packages(folder: Path, package_dirs: Sequence[str | Path]) -> Iterator[None]:
+    """`$(find package)` of xacro looks where meshes are looked for, before it asks ROS."""
+    with XACRO:
+        try:
+            from xacro import substitution_args as names
+
+            ask_ros = names._eval_find
+        except (ImportError, AttributeError):  # another version of xacro, which asks ROS alone
+            yield
+            return
+
+        def find(package: str) -> str:
+            found = package_folder(package, folder, package_dirs)
+            return str(ask_ros(package)) if found is None else str(found)
+
+        names._eval_find = find
+        try:
+            yield
+        finally:
+            names._eval_find = ask_ros

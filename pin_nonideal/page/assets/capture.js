@@ -1,0 +1,79 @@
+// The view taken away: a picture, or a video of it while it plays.
+
+class Capture {
+  constructor(player) {
+    this.player = player;
+    element("picture").addEventListener("click", () => this.still().toBlob((blob) => this.save(blob, "png")));
+    element("video").hidden = typeof MediaRecorder === "undefined";
+    element("video").addEventListener("click", () => (this.recorder ? this.recorder.stop() : this.record().then((blob) => this.save(blob, "webm"))));
+  }
+
+  /** The view with its background, numbers, title and time on one canvas. */
+  canvas(into = document.createElement("canvas")) {
+    const { stage, run } = this.player, { canvas } = stage, ratio = canvas.width / Math.max(canvas.clientWidth, 1), c = into.getContext("2d", { willReadFrequently: true });
+    stage.dirty = true;
+    stage.render(); // what WebGL has drawn lasts until the end of this task
+    if (into.width !== canvas.width || into.height !== canvas.height) { into.width = canvas.width; into.height = canvas.height; }
+    c.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const sky = c.createLinearGradient(0, 0, 0, canvas.clientHeight);
+    [0, 0.45, 1].forEach((at, i) => sky.addColorStop(at, ink(`sky${i}`)));
+    c.fillStyle = sky;
+    c.fillRect(0, 0, canvas.clientWidth, canvas.clientHeight);
+    c.drawImage(canvas, 0, 0, canvas.clientWidth, canvas.clientHeight);
+    c.textBaseline = "middle"; c.textAlign = "center"; c.font = "600 11px system-ui, sans-serif";
+    for (const span of stage.arrows.spans.filter((item) => item.style.visibility !== "hidden" && item.textContent)) {
+      const [x, y] = span.place, wide = c.measureText(span.textContent).width + 8;
+      c.fillStyle = ink("label"); c.fillRect(x - wide / 2, y - 8, wide, 16);
+      c.fillStyle = span.style.color; c.fillText(span.textContent, x, y);
+    }
+    c.fillStyle = ink("ink"); c.textAlign = "left"; c.font = "600 14px system-ui, sans-serif";
+    c.fillText(`${run.title}  ${this.player.time.toFixed(digitsFor(this.player.end - this.player.start))} s`, 12, 18);
+    return into;
+  }
+
+  /** The same, on one canvas for all. */
+  still() { return this.canvas((this.page = this.page || document.createElement("canvas"))); }
+
+  /** A video of the whole run, or of the part that is repeated, at the chosen speed. */
+  record(rate = 30) {
+    const { player } = this, into = this.canvas(), [from, to] = player.loop || [player.start, player.end], parts = [];
+    const type = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"].find((one) => MediaRecorder.isTypeSupported(one));
+    const stream = into.captureStream(rate), recorder = (this.recorder = new MediaRecorder(stream, { mimeType: type, videoBitsPerSecond: 8e6 }));
+    const repeats = element("loop").checked;
+    element("loop").checked = false;
+    player.seekByHand(from);
+    element("video").classList.add("on");
+    return new Promise((done) => {
+      recorder.ondataavailable = ({ data }) => parts.push(data);
+      recorder.onstop = () => {
+        this.drawn = null; this.recorder = null;
+        player.pause();
+        element("loop").checked = repeats;
+        element("video").classList.remove("on");
+        done(new Blob(parts, { type: "video/webm" }));
+      };
+      this.drawn = () => {
+        this.canvas(into);
+        if ((player.time >= to || !player.playing) && recorder.state === "recording") recorder.stop();
+      };
+      recorder.start();
+      player.play();
+    });
+  }
+
+  save(blob, ending) {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(blob);
+    link.download = `${this.player.run.title.replace(/[^\w.-]+/g, "_").slice(0, 80) || "replay"}.${ending}`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  }
+}
+
+/** A blob as base64 text. */
+async function base64(blob) {
+  const bytes = new Uint8Array(await blob.arrayBuffer());
+  let text = "";
+  for (let i = 0; i < bytes.length; i += 32768) text += String.fromCharCode(...bytes.subarray(i, i + 32768));
+  return btoa(text);
+}

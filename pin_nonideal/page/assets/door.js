@@ -1,0 +1,44 @@
+// The start of the page, and what scripts and tests may use: window.replay.
+
+function door(player) {
+  return {
+    ready: true,
+    seek: (time) => { player.pause(); player.seek(time); player.stage.render(); },
+    play: () => player.play(),
+    pause: () => player.pause(),
+    poses: () => player.stage.poses(),
+    ghosts: () => player.stage.ghosts.poses(),
+    picture: (type = "image/png", time = player.time) => { player.seek(time); return player.capture.still().toDataURL(type, 0.95).split(",")[1]; },
+    video: async (rate) => base64(await player.capture.record(rate)),
+    ringColors: (i) => player.stage.elements.ringColors(i),
+    showForces: (shown) => { if (player.stage.arrows.shown !== shown) player.toggleForces(); },
+    resetView: () => { player.resize(); player.stage.covered = { right: 0, top: 0, bottom: 0 }; player.stage.resetView(); },
+    get runs() { return player.stage.ghosts.items.length + 1; },
+    onScreen: (place) => player.stage.onScreen(new player.stage.THREE.Vector3(...place)),
+    box: () => player.stage.box(),
+    show: (what, shown) => player.stage.show(what, shown),
+    get margin() { return player.timeline.axis.left; },
+    get address() { return player.address.text(); },
+    get gap() { return player.stage.marks.gap(); },
+    get draws() { player.stage.dirty = true; player.stage.render(); const { calls, triangles } = player.stage.renderer.info.render; return { calls, triangles }; },
+    get span() { return [player.span.start, player.span.end]; },
+    get speed() { return player.speed; },
+    get playing() { return player.playing; },
+    get time() { return player.time; },
+    get start() { return player.start; },
+    get duration() { return player.end - player.start; },
+    get times() { return Array.from(player.run.times); },
+  };
+}
+
+async function main() {
+  await runScript("library");
+  const { THREE } = MeshCat, player = new Player(THREE, await loadRun());
+  const loop = () => { requestAnimationFrame(loop); player.tick(); };
+  player.tick();
+  loop();
+  element("message").hidden = true;
+  window.replay = door(player);
+  window.replayDone = true;
+  if (!/[#&]paused\b/.test(location.hash) && !matchMedia("(prefers-reduced-motion: reduce)").matches) player.play();
+}

@@ -1,0 +1,38 @@
+// Numbers for a reader, and places in ascending lists.
+
+/** A number for a reader: four digits, and a power of ten when it is very small or large. */
+function readable(x) {
+  if (!Number.isFinite(x)) return String(x);
+  const size = Math.abs(x);
+  if (size === 0) return "0";
+  if (size < 1e-3 || size >= 1e5) return x.toExponential(2);
+  return String(+x.toPrecision(4));
+}
+
+/** The same with all four digits, so that a changing number keeps its width. */
+function steady(x) {
+  const size = Math.abs(x);
+  return size >= 1e-3 && size < 1e4 ? x.toPrecision(4) : readable(x);
+}
+
+/** Index of the last entry of an ascending array that is not above x; at least 0. */
+function lastBelow(values, x) {
+  let low = 0, high = values.length - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (values[middle] <= x) low = middle; else high = middle - 1;
+  }
+  return low;
+}
+
+/** The interval [k, k + 1] of an ascending array around x, and how far x lies in it: 0 to 1. */
+function bracket(values, x) {
+  const k = Math.min(lastBelow(values, x), Math.max(values.length - 2, 0));
+  const next = Math.min(k + 1, values.length - 1), length = values[next] - values[k];
+  return { k, next, part: length > 0 ? Math.min(Math.max((x - values[k]) / length, 0), 1) : 0 };
+}
+
+/** Fixed digits that tell a thousandth part of a span. */
+function digitsFor(span) {
+  return span > 0 ? Math.max(0, Math.min(9, Math.ceil(3 - Math.log10(span)))) : 3;
+}

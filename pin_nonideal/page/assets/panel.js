@@ -1,0 +1,116 @@
+// The panel: what is in the scene, to be searched, shown, hidden, isolated and followed; signals to be plotted; views.
+
+const VIEWS = { usual: null, front: [0, -1, 0.15], side: [1, 0, 0.15], top: [0, -0.02, 1] };
+
+class Panel {
+  constructor(player) {
+    Object.assign(this, { player, stage: player.stage, box: element("panel"), rows: [], chosen: new Map() });
+    this.fill();
+    element("search").addEventListener("input", (event) => this.search(event.target.value));
+    element("panel-toggle").addEventListener("click", () => this.toggle());
+    for (const name of ["frames", "masses", "inertias", "collisions"]) this.addSwitch(name);
+    element("fade").addEventListener("change", (event) => { this.stage.bodies.fade(event.target.checked ? 0.3 : 1); this.stage.dirty = true; });
+    for (const [name, direction] of Object.entries(VIEWS)) {
+      const button = element("views").appendChild(document.createElement("button"));
+      button.textContent = name;
+      button.addEventListener("click", () => this.stage.resetView(direction ? this.upright(direction) : undefined));
+    }
+    this.box.querySelectorAll("[data-show]").forEach((item) => item.addEventListener("change", () => this.stage.show(item.dataset.show, item.checked)));
+  }
+
+  toggle() {
+    this.box.hidden = !this.box.hidden;
+    element("panel-toggle").setAttribute("aria-expanded", String(!this.box.hidden));
+    if (!this.box.hidden) element("search").focus();
+  }
+
+  /** A direction given for z upwards, where something else is up. */
+  upright(direction) {
+    const { THREE, up } = this.stage, turn = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 0, 1), up);
+    return new THREE.Vector3(...direction).applyQuaternion(turn).toArray();
+  }
+
+  addSwitch(name) {
+    const input = element(`show-${name}`);
+    input.disabled = name === "collisions" && !this.player.run.collisions.length;
+    input.addEventListener("change", () => { this.stage.overlays.on[name] = input.checked; this.stage.dirty = true; });
+  }
+
+  fill() {
+    const { run } = this.player, depth = [0];
+    run.joints.forEach((joint, i) => { if (i) depth[i] = depth[joint.parent] + 1; });
+    run.joints.forEach((joint, i) => {
+      const own = this.stage.bodies.items.filter((item) => item.run === 0 && item.joint === i);
+      if (!i && !own.length) return;
+      this.addRow("bodies", i ? joint.name : "world", depth[i], own, i ? [["follow", () => this.follow(i)], ["path", () => this.path(i)]] : []);
+    });
+    for (const mark of this.stage.marks.items) this.addRow("constraints", `${mark.name} (${mark.kind})`, 0, [mark]);
+    for (const guide of this.stage.guides.items) this.addRow("constraints", `${guide.name} (${guide.kind})`, 0, [guide]);
+    for (const item of this.stage.elements.items) this.addRow("elements", item.name, 0, [item]);
+    for (const arrow of this.stage.arrows.items) this.addRow("arrows", `${arrow.name}, ${arrow.kind} [${arrow.unit}]`, 0, [arrow]);
+    run.signals.forEach((signal) => this.addSignal(signal));
+    for (const group of ["bodies", "constraints", "elements", "arrows", "signals"]) element(`tree-${group}`).parentElement.hidden = !element(`tree-${group}`).children.length;
+  }
+
+  /** A row of the tree: a box that shows or hides its items, a button that shows nothing else of its kind, and others. */
+  addRow(group, name, depth, items, actions = []) {
+    const row = document.createElement("li"), label = document.createElement("label"), input = document.createElement("input");
+    input.type = "checkbox"; input.checked = true;
+    label.style.paddingLeft = `${Math.min(depth, 12) * 9}px`;
+    label.append(input, name);
+    row.append(label);
+    const set = (shown) => { input.checked = shown; for (const item of items) if (group === "arrows") item.visible = shown; else item.shown = shown; };
+    input.addEventListener("change", () => { set(input.checked); this.redraw(); });
+    const only = () => { for (const other of this.rows) if (other.group === group) other.set(other.row === row); this.redraw(); };
+    for (const [text, action] of [["only", only], ...actions]) {
+      const button = row.appendChild(document.createElement("button"));
+      button.textContent = text;
+      button.setAttribute("aria-label", `${text} ${name}`);
+      button.addEventListener("click", action);
+    }
+    element(`tree-${group}`).append(row);
+    this.rows.push({ group, name, row, set });
+  }
+
+  redraw() { this.player.seek(this.player.time); }
+
+  follow(joint) { this.stage.follow(joint); this.player.showToggles(); }
+
+  /** Draws the path of a body's center of mass, or takes it away. */
+  path(joint) {
+    const { guides } = this.stage, line = guides.trails.get(joint);
+    if (line) line.mesh.visible = !line.mesh.visible; else { guides.addTrail(joint, this.player.run.joints[joint].lever); this.stage.resize(); }
+    this.redraw();
+  }
+
+  addSignal(signal) {
+    const row = document.createElement("li"), label = row.appendChild(document.createElement("label")), input = document.createElement("input");
+    input.type = "checkbox";
+    label.append(input, `${signal.label} [${signal.unit}]`);
+    input.addEventListener("change", () => this.plot(signal, input.checked));
+    element("tree-signals").append(row);
+    this.rows.push({ group: "signals", name: signal.label, row, set: () => {} });
+  }
+
+  /** Adds a signal to the plot of its unit, or takes it out; a plot without curves goes. */
+  plot(signal, wanted) {
+    const { player } = this, old = this.chosen.get(signal.unit) || { signals: [] };
+    const signals = wanted ? [...old.signals, signal] : old.signals.filter((one) => one !== signal);
+    if (old.plot) { old.plot.box.remove(); player.plots.splice(player.plots.indexOf(old.plot), 1); }
+    this.chosen.delete(signal.unit);
+    if (signals.length) {
+      const curves = signals.map(({ label, t, values }) => ({ label, t, values }));
+      const plot = player.newPlot({ title: "Chosen", unit: signal.unit, note: "", log: false, t: signals[0].t, curves });
+      this.chosen.set(signal.unit, { signals, plot });
+      player.plots.push(plot);
+      element("plots").classList.remove("off");
+    }
+    player.resize();
+    player.showToggles();
+  }
+
+  search(text) {
+    const wanted = text.trim().toLowerCase();
+    for (const { name, row } of this.rows) row.hidden = !name.toLowerCase().includes(wanted);
+  }
+}

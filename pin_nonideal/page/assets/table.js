@@ -1,0 +1,41 @@
+// The table of forces: a row for each place, a column for each part.
+
+class ForceTable {
+  constructor(run, arrows, box) {
+    Object.assign(this, { arrows, box });
+    this.box.hidden = !arrows.items.length;
+    const kinds = [...new Set(arrows.items.map((arrow) => arrow.kind))], table = box.querySelector("table"), head = table.createTHead().insertRow();
+    const corner = document.createElement("th");
+    corner.textContent = "at";
+    head.append(corner);
+    for (const kind of kinds) {
+      const cell = document.createElement("th");
+      cell.scope = "col";
+      cell.textContent = kind;
+      cell.style.setProperty("--swatch", run.looks.forces[kind]);
+      head.append(cell);
+    }
+    this.parts = arrows.items.length <= 6; // few enough to show components too
+    this.cells = [];
+    const rows = new Map(), body = table.createTBody();
+    for (const arrow of arrows.items) {
+      const key = `${arrow.name} ${arrow.unit}`;
+      if (!rows.has(key)) {
+        const row = body.insertRow();
+        row.insertCell().textContent = arrow.name;
+        for (const _ of kinds) row.insertCell();
+        rows.set(key, row);
+      }
+      this.cells.push([arrow, rows.get(key).cells[1 + kinds.indexOf(arrow.kind)]]);
+    }
+  }
+
+  update() {
+    for (const [arrow, cell] of this.cells) {
+      const text = `${steady(arrow.value)} ${arrow.unit}`, parts = arrow.axis ? "" : `(${arrow.vector.toArray().map((x) => readable(Math.abs(x) < 1e-9 * arrow.value ? 0 : x)).join(", ")})`;
+      cell.textContent = text;
+      cell.title = parts;
+      if (this.parts && parts) cell.appendChild(document.createElement("small")).textContent = parts;
+    }
+  }
+}

@@ -1,0 +1,130 @@
+"""Arrows of what acts where it is said: springs, wrenches, drag, and round bodies on each other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.forces import JointSpring, SpringDamper, Wrench
+from pin_nonideal.laws import Drag
+from pin_nonideal.round_contacts import CapsuleContact, SphereContact, segments
+from pin_nonideal.states.placements import frame_on_joint
+from pin_nonideal.types import Array
+
+from .forces import Arrow, Mark, along, constraints_of
+from .motion import Motion
+
+if TYPE_CHECKING:
+    from pin_nonideal.trajectory import Trajectory
+
+
+def given_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]:
+    """Arrows of the springs, wrenches, laws of drag and round contacts of a scene, where they act.
+
+    Args:
+        run: the run.
+        motion: its motion.
+        marks: of the scene, for the ends of springs.
+    """
+    ends = {mark.name: mark for mark in marks if mark.kind == "spring"}
+    found = _rounds(run, motion)
+    for item in run.scene.forces:
+        if isinstance(item, SpringDamper):
+            found.append(_spring(run, motion, item, ends[item.name or f"spring {item.frame1}"]))
+        elif isinstance(item, JointSpring):
+            joint = run.scene.model.getJointId(item.joint)
+            q, v = run.scene.model.joints[joint].idx_q, run.scene.model.joints[joint].idx_v
+            if run.scene.model.joints[joint].nq == 1:
+                torque = (
+                    -item.stiffness * (motion.q[:, q] - item.rest) - item.damping * motion.of(run.v)[:, v]
+                )
+                name = item.name or f"spring {item.joint}"
+                found += along(run.scene.model, motion, name, "spring", joint, torque)
+        elif isinstance(item, Wrench):
+            found += _wrench(run, motion, item)
+    for law in run.scene.laws:
+        if isinstance(law, Drag):
+            joint, place = frame_on_joint(run.scene.model, law.frame)
+            point = np.asarray(place.translation)
+            slip = _velocity(run, motion, joint, point)
+            speed = np.linalg.norm(slip, axis=1, keepdims=True)
+            push = np.where(
+                speed > 0.0, -law.coefficient * np.maximum(speed, 1e-300) ** (law.exponent - 1.0) * slip, 0.0
+            )
+            found.append(
+                Arrow(law.name or f"drag {law.frame}", "drag", "N", push, joint, motion.point(joint, point))
+            )
+    return found
+
+
+def _spring(run: Trajectory, motion: Motion, item: SpringDamper, mark: Mark) -> Arrow:
+    """The force on the body of its first frame."""
+    first, second = motion.point(mark.joint1, mark.point1), motion.point(mark.joint2, mark.point2)
+    length = np.linalg.norm(first - second, axis=1, keepdims=True)
+    way = np.divide(first - second, length, out=np.zeros_like(first), where=length > 0.0)
+    rate = _velocity(run, motion, mark.joint1, mark.point1) - _velocity(run, motion, mark.joint2, mark.point2)
+    size = item.stiffness * (length - item.rest_length) + item.damping * np.sum(
+        rate * way, axis=1, keepdims=True
+    )
+    return Arrow(mark.name, "spring", "N", -size * way, mark.joint1, first)
+
+
+def _rounds(run: Trajectory, motion: Motion) -> list[Arrow]:
+    """The forces between spheres and capsules, on the body of the first, where they touch."""
+    found, forces = [], getattr(run, "contact_forces", None) or {}
+    for name, item, _ in constraints_of(run.scene):
+        if isinstance(item, SphereContact | CapsuleContact) and name in forces:
+            joints, ends = [], []
+            for frame, segment in zip((item.frame1, item.frame2), segments(item), strict=True):
+                joint, place = frame_on_joint(run.scene.model, frame)
+                joints.append(joint)
+                ends.append([motion.point(joint, place.act(end)) for end in segment])
+            first, second = _nearest(*ends[0], *ends[1])
+            way = second - first
+            length = np.linalg.norm(way, axis=1, keepdims=True)
+            place = first + item.radius1 * np.divide(way, length, out=np.zeros_like(way), where=length > 0.0)
+            force = motion.of(forces[name])
+            found.append(Arrow(name, "total", "N", force, joints[0], place))
+    return found
+
+
+def _nearest(a0: Array, a1: Array, b0: Array, b1: Array) -> tuple[Array, Array]:
+    """The nearest points of two segments, (n, 3) each [Ericson, Real-Time Collision Detection, 5.1.9]."""
+    u, w, between = a1 - a0, b1 - b0, a0 - b0
+    uu, ww, uw = (np.sum(x * y, axis=1) for x, y in ((u, u), (w, w), (u, w)))
+    ub, wb = np.sum(u * between, axis=1), np.sum(w * between, axis=1)
+    across = uu * ww - uw * uw
+
+    def part(value: Array, over: Array) -> Array:
+        return np.clip(np.divide(value, over, out=np.zeros_like(value), where=over > 0.0), 0.0, 1.0)
+
+    s = part(uw * wb - ub * ww, across)
+    t = part(uw * s + wb, ww)
+    s = part(uw * t - ub, uu)
+    return a0 + s[:, None] * u, b0 + t[:, None] * w
+
+
+def _wrench(run: Trajectory, motion: Motion, item: Wrench) -> list[Arrow]:
+    joint, place = frame_on_joint(run.scene.model, item.frame)
+    given: Any = item.value
+    values = np.array([np.asarray(given(t) if callable(given) else given, dtype=float) for t in motion.times])
+    origin, name = motion.point(joint, np.asarray(place.translation)), item.name or f"wrench {item.frame}"
+    return [
+        Arrow(name, "given", unit, part, joint, origin)
+        for unit, part in (("N", values[:, :3]), ("N m", values[:, 3:]))
+    ]
+
+
+def _velocity(run: Trajectory, motion: Motion, joint: int, point: Array) -> Array:
+    """Velocity of a point that a joint carries at each frame, in world axes [m/s], (n, 3)."""
+    if not joint:
+        return np.zeros((len(motion.times), 3))
+    model, v = run.scene.model, motion.of(run.v)
+    data, found = model.createData(), np.empty((len(v), 3))
+    for k, q in enumerate(motion.q):
+        pin.forwardKinematics(model, data, q, v[k])
+        own = data.v[joint]
+        found[k] = data.oMi[joint].rotation @ (own.linear + np.cross(own.angular, point))
+    return found

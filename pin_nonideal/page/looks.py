@@ -1,0 +1,61 @@
+"""Colors and words of what a replay and a figure tell apart: one table for the page and for matplotlib."""
+
+from __future__ import annotations
+
+# Kinds of events, in the order of their legend; whatever else comes is drawn like the last.
+EVENTS = {
+    "stick": ("#475569", "begins to stick"),
+    "slip": ("#0f766e", "begins to slip"),
+    "reverse": ("#7c3aed", "slips the other way"),
+    "pull": ("#dc2626", "a contact that is kept pulls"),
+    "impact": ("#b91c1c", "strikes, with an impulse"),
+    "touch_down": ("#92400e", "closes without an impulse"),
+    "lift_off": ("#0369a1", "opens"),
+    "chatter": ("#0891b2", "a cluster of events, stepped over in time"),
+    "several": ("#db2777", "the laws allow several motions from here on"),
+    "user": ("#65a30d", "a condition of the user's"),
+    "other": ("#64748b", "something else"),
+}
+# Modes of frictional elements and contacts.
+MODES = {
+    1: ("#0f766e", "slip +"),
+    -1: ("#5eead4", "slip -"),
+    0: ("#475569", "stick"),
+    2: ("#e2e8f0", "open"),
+    3: ("#b45309", "closed"),
+}
+OPEN, CLOSED = 2, 3
+UNKNOWN_MODE = ("#f1f5f9", "no mode")
+# Parts of the force of constraint, Eq. (39), and what else acts.
+FORCES = {
+    "ideal": "#2563eb",
+    "nonideal": "#ea580c",
+    "total": "#be185d",
+    "drive": "#7c3aed",
+    "spring": "#4d7c0f",
+    "drag": "#0e7490",
+    "given": "#57534e",
+}
+MARKS = {"anchor": "#d97706", "rod": "#d97706", "spring": "#64748b", "contact": "#475569", "guide": "#a8763e"}
+CURVES = ("#1d4ed8", "#b45309", "#0f766e", "#be123c", "#6d28d9", "#4d7c0f", "#0369a1", "#57534e")
+
+
+def event_color(kind: str) -> str:
+    """Color of a kind of event.
+
+    Args:
+        kind: as `Event.kind` has it.
+    """
+    return EVENTS.get(kind, EVENTS["other"])[0]
+
+
+def table() -> dict[str, object]:
+    """All of it, as the page reads it."""
+    return {
+        "events": {kind: {"color": color, "means": means} for kind, (color, means) in EVENTS.items()},
+        "modes": {str(mode): {"color": color, "name": name} for mode, (color, name) in MODES.items()},
+        "no_mode": {"color": UNKNOWN_MODE[0], "name": UNKNOWN_MODE[1]},
+        "forces": FORCES,
+        "marks": MARKS,
+        "curves": list(CURVES),
+    }

@@ -1,0 +1,1 @@
+"""Scenes at rest, and the torques of a given motion."""

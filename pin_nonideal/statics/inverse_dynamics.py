@@ -1,0 +1,215 @@
+"""inverse_dynamics: the torques that give a scene an acceleration, through loops and against friction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.checks import array, number, sequence
+from pin_nonideal.core import core
+from pin_nonideal.errors import FrictionConvergenceError, InputError
+from pin_nonideal.scene import Scene
+from pin_nonideal.states.named import joint_named, named_configuration, named_velocity
+from pin_nonideal.states.rows import rows_at
+from pin_nonideal.types import Array, State
+
+from .forces import AtRest, null_space
+
+# An acceleration follows the constraints to this part of its terms.
+FOLLOWS = 1e-6
+# Slip below this part of the scene's speed is rest, and so it is for its acceleration.
+AT_REST = 1e-9
+# Passes over friction that depends on the torques, and the part of the forces to which they balance.
+PASSES, BALANCED = 200, 1e-13
+DIFFERENCE = 1e-6  # along the motion, for what rows gain by it
+
+
+@dataclass(frozen=True, eq=False)
+class InverseDynamics:
+    """Torques of a motion.
+
+    Attributes:
+        tau: of all degrees of freedom, zero where nothing is actuated [N m or N], (nv,).
+        lam: multipliers of all rows with them, (m,).
+        left: largest generalized force that they cannot give along a motion that the constraints allow; 0 to
+            rounding where they suffice.
+    """
+
+    tau: Array
+    lam: Array
+    left: float
+
+
+def inverse_dynamics(
+    scene: Scene,
+    q: State,
+    v: State,
+    a: State,
+    actuated: Sequence[str] | None = None,
+    *,
+    bounds: tuple[Any, Any] | None = None,
+    t: float = 0.0,
+) -> InverseDynamics:
+    """Torques with which the scene accelerates by a: of least norm where several do.
+
+    free^T (M a - F - C - tau) = 0 along the motions `free` that the constraints allow, with tau on the
+    actuated joints only and friction C of the very reactions that come with it; the scene's own actuation
+    counts for nothing.  An element that rests and shall go on resting gives nothing: torques hold alone.
+
+    Args:
+        scene: the scene.
+        q: configuration, (nq,) or by joint name, on the constraints.
+        v: velocity, (nv,) or by joint name.
+        a: acceleration, (nv,) or by joint name (zero for the others); it must follow the constraints.
+        actuated: names of the joints that are driven; all when None.
+        bounds: least and largest torques, numbers or arrays of the actuated degrees of freedom.
+        t: time [s].
+
+    Returns:
+        The InverseDynamics; `scene.acceleration(q, v, tau=result.tau)` gives a where `left` is zero.
+
+    Raises:
+        InputError: an argument does not fit, or a breaks the constraints.
+        UnknownNameError: there is no such joint.
+        FrictionConvergenceError: friction that depends on the torques did not settle.
+    """
+    if not isinstance(scene, Scene):
+        raise InputError(f"inverse_dynamics: scene must be a Scene; got {type(scene).__name__}")
+    model, still = scene.model, np.zeros(scene.model.nv)
+    at = named_configuration(model, q, scene.q0, "inverse_dynamics: q")
+    speed = named_velocity(model, v, scene.v0, "inverse_dynamics: v")
+    wanted = named_velocity(model, a, still, "inverse_dynamics: a")
+    time = number("inverse_dynamics: t", t)
+    dofs = _driven(scene, actuated)
+    limits = None if bounds is None else _bounds(bounds, len(dofs))
+    rest = AtRest(scene, still, time)
+    A, b = rows_at(rest.runner, at, speed, time)[:2]
+    _check_follows(scene, A, b, wanted)
+    return _Torques(rest, at, speed, wanted, null_space(A), dofs).solve(limits)
+
+
+def _driven(scene: Scene, actuated: Sequence[str] | None) -> list[int]:
+    """Degrees of freedom of the actuated joints."""
+    if actuated is None:
+        return list(range(scene.model.nv))
+    if isinstance(actuated, str):
+        raise InputError(f"inverse_dynamics: actuated must be a list of joints; got {actuated!r}")
+    joints = [
+        joint_named(scene.model, name, "inverse_dynamics: actuated")
+        for name in sequence("actuated", actuated)
+    ]
+    return [int(scene.model.idx_vs[j]) + k for j in joints for k in range(scene.model.nvs[j])]
+
+
+def _bounds(bounds: Any, count: int) -> tuple[Array, Array]:
+    if not isinstance(bounds, (tuple, list)) or len(bounds) != 2:
+        raise InputError(f"inverse_dynamics: bounds must be a pair (least, largest); got {bounds!r}")
+    least, largest = (
+        np.full(count, float(array(f"bounds[{k}]", x, ())))
+        if np.ndim(x) == 0
+        else array(f"bounds[{k}]", x, (count,))
+        for k, x in enumerate(bounds)
+    )
+    if not (least < largest).all():
+        raise InputError("inverse_dynamics: bounds must leave room: each least torque below the largest")
+    return least, largest
+
+
+def _check_follows(scene: Scene, A: Array, b: Array, a: Array) -> None:
+    """Refuses an acceleration that breaks the constraints: A a = b."""
+    if not len(A):
+        return
+    missed = np.abs(A @ a - b)
+    allowed = FOLLOWS * (np.abs(A) @ np.abs(a) + np.abs(b) + 1.0)
+    if (missed > allowed).any():
+        worst = int(np.argmax(missed / allowed))
+        name = next(n for n, s in scene.constraint_slices.items() if s.start <= worst < s.stop)
+        raise InputError(
+            f'inverse_dynamics: a must follow the constraints, A a = b; "{name}" misses it by '
+            f"{missed[worst]:.2g} (m/s^2 or rad/s^2); take one that scene.acceleration gives, or solve for "
+            "the dependent joints"
+        )
+
+
+class _Torques:
+    """Torques of one motion, in passes over friction that depends on them."""
+
+    def __init__(self, rest: AtRest, q: Array, v: Array, a: Array, free: Array, dofs: list[int]) -> None:
+        self.rest, self.q, self.v, self.a, self.free = rest, q, v, a, free
+        self.select = np.eye(len(v))[:, dofs]
+        self.M = rest.mass(q)
+        self.modes, self.slipping = self._modes()
+
+    def _modes(self) -> tuple[list[Any], Array]:
+        """Modes by the slip, or by its acceleration from rest; and a velocity at which all of them slip."""
+        runner, t, v, model = self.rest.runner, self.rest.t, self.v, self.rest.scene.model
+        rows = [
+            runner.slip_rows(pin.integrate(model, self.q, s * DIFFERENCE * v), v, t).reshape(-1, len(v))
+            for s in (-1.0, 0.0, 1.0)
+        ]
+        gained = (rows[2] - rows[0]) @ v / (2.0 * DIFFERENCE)
+        slip, change = rows[1] @ v, rows[1] @ self.a + gained
+        quiet = AT_REST * (1.0 + np.abs(v).max(initial=0.0))
+        quiet_change = AT_REST * (1.0 + np.abs(self.a).max(initial=0.0))
+        modes, first, begins = [], 0, False
+        for size in self.rest.program.element_sizes:
+            own = slice(first, first + size)
+            first += size
+            moving = np.linalg.norm(slip[own]) > quiet
+            starting = np.linalg.norm(change[own]) > quiet_change
+            along = slip[own][0] if moving else change[own][0]
+            mode = core.Mode.slip_minus if size == 1 and along < 0.0 else core.Mode.slip_plus
+            modes.append(mode if moving or starting else core.Mode.unloaded)
+            begins |= starting and not moving and size > 1
+        ahead = 10.0 * quiet / max(quiet_change, float(np.abs(self.a).max(initial=0.0)))
+        return modes, v + ahead * self.a if begins else v
+
+    def solve(self, limits: tuple[Array, Array] | None) -> InverseDynamics:
+        """Torques of least norm, within their limits, until friction is that of their own reactions."""
+        G = self.free.T @ self.select
+        tau, before = np.zeros(len(self.v)), np.inf
+        for _ in range(PASSES):
+            now = self.rest.runner.solve(self.q, self.slipping, self.rest.t, tau, self.modes)
+            given = now.F - tau + now.C  # beside the torques
+            needed = self.free.T @ (self.M @ self.a - given)
+            u = _least(G, needed, limits)
+            change = self.select @ u - tau
+            tau = self.select @ u
+            scale = float(
+                np.abs(given).max(initial=0.0) + np.abs(tau).max(initial=0.0) + np.abs(self.M @ self.a).max()
+            )
+            size = float(np.abs(change).max(initial=0.0))
+            if size <= BALANCED * scale or (size >= before and size <= 1e3 * BALANCED * scale):
+                break
+            before = size
+        else:
+            raise FrictionConvergenceError(
+                f"inverse_dynamics: friction and torques did not settle in {PASSES} passes; the friction of "
+                f'"{self.rest.scene.name}" depends too much on the torques here',
+                element=", ".join(self.rest.scene.element_names),
+            )
+        lam = self.rest.runner.solve(self.q, self.slipping, self.rest.t, tau, self.modes).lam
+        left = float(np.abs(self.free @ (G @ u - needed)).max(initial=0.0))
+        return InverseDynamics(tau, np.asarray(lam), left)
+
+
+def _least(G: Array, needed: Array, limits: tuple[Array, Array] | None) -> Array:
+    """Least-norm solution of G u = needed, of least residual; within limits, exact on those it touches."""
+    u = np.linalg.lstsq(G, needed, rcond=None)[0]
+    if limits is None or ((limits[0] <= u) & (u <= limits[1])).all():
+        return np.asarray(u)
+    from scipy.optimize import lsq_linear
+
+    least, largest = limits
+    weight = 1e4 * max(1.0, float(np.linalg.norm(G)))
+    rows = np.vstack([weight * G, np.eye(G.shape[1])])
+    near = lsq_linear(rows, np.append(weight * needed, np.zeros(G.shape[1])), limits, method="bvls").x
+    room = 1e-9 * (largest - least)
+    free = (near > least + room) & (near < largest - room)
+    u = np.where(near <= least + room, least, np.where(near >= largest - room, largest, 0.0))
+    u[free] = np.linalg.lstsq(G[:, free], needed - G[:, ~free] @ u[~free], rcond=None)[0]
+    return np.asarray(np.clip(u, least, largest))

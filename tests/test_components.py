@@ -1,0 +1,118 @@
+"""Mechanisms that share nothing: each runs as it does alone, whatever stands beside it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import pin_nonideal as pn
+from pin_nonideal.runs.components import components
+
+SAME = 1e-12  # rounding of interpolants at the ends of steps
+COULOMB: dict[str, Any] = {"coulomb": 0.1}
+LOADED: dict[str, Any] = {"mu": 0.1, "radius": 0.05}
+
+
+def pendulums(which: list[int], law: dict[str, Any], **said: Any) -> tuple[pn.Scene, np.ndarray]:
+    """Double pendulums side by side, their joints by turns; the k-th is the same in any company."""
+    model, tips, q = pin.Model(), {}, {}
+    shapes = np.random.default_rng(3).uniform(0.3, 0.6, (50, 2))
+    angles = np.random.default_rng(4).uniform(0.0, 2.0, (50, 2))
+    for level in range(2):
+        for k in which:
+            length = shapes[k, level]
+            place = pin.SE3(np.eye(3), np.array([0.0, k, 0.0] if level == 0 else [0.0, 0.0, -shapes[k, 0]]))
+            joint = model.addJoint(tips.get(k, 0), pin.JointModelRY(), place, f"joint{level} of {k}")
+            lever = pin.SE3(np.eye(3), np.array([0.0, 0.0, -length]))
+            model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.05), lever)
+            model.addFrame(pin.Frame(f"end{level} of {k}", joint, 0, lever, pin.FrameType.OP_FRAME))
+            tips[k] = joint
+            q[joint] = angles[k, level]
+    laws = [pn.JointFriction(name, **law) for name in list(model.names)[1:]]
+    return pn.Scene(model, laws=laws, **said), np.array([q[joint] for joint in sorted(q)])
+
+
+@pytest.mark.parametrize("law", [COULOMB, LOADED], ids=["coulomb", "loaded"])
+def test_each_runs_as_it_does_alone(law: dict[str, Any]) -> None:
+    which = list(range(7))
+    scene, q = pendulums(which, law)
+    whole = pn.simulate(scene, 2.0, q=q, output_dt=0.1)
+    events, steps = [], 0
+    for k in which:
+        alone, q_alone = pendulums([k], law)
+        one = pn.simulate(alone, 2.0, q=q_alone, output_dt=0.1)
+        mine = [
+            scene.model.joints[scene.model.getJointId(f"joint{level} of {k}")].idx_v for level in range(2)
+        ]
+        on = np.searchsorted(whole.t, one.t)
+        assert (whole.t[on] == one.t).all()
+        assert np.abs(whole.q[on][:, mine] - one.q).max() < SAME
+        assert np.abs(whole.v[on][:, mine] - one.v).max() < SAME
+        assert (whole.modes[on][:, mine] == one.modes).all()
+        events += [(event.time, event.kind, event.element) for event in one.events]
+        steps += one.stats.steps
+    assert [(event.time, event.kind, event.element) for event in whole.events] == sorted(events)
+    assert whole.stats.steps == steps  # and not the steps of all at the events of all
+
+
+def test_what_is_recorded_moves_nothing() -> None:
+    scene, q = pendulums([0, 1, 2], LOADED)
+    plain = pn.simulate(scene, 1.0, q=q, output_dt=0.05)
+    full = pn.simulate(
+        scene, 1.0, q=q, output_dt=0.05, record=("forces", "energy", "reactions", "dense", "a")
+    )
+    assert (plain.t == full.t).all()
+    assert np.abs(plain.q - full.q).max() < SAME
+    assert np.abs(plain.v - full.v).max() < SAME
+    assert (plain.modes == full.modes).all()
+    assert np.abs(full.energy["balance"]).max() < 1e-7
+    later = full.at(np.linspace(0.0, 1.0, 37))
+    step = np.abs(later.t[:, None] - plain.t).argmin(axis=1)
+    hit = np.abs(later.t - plain.t[step]) < 1e-12
+    assert hit.sum() >= 2
+    assert np.abs(later.q[hit] - plain.q[step[hit]]).max() < 1e-9
+
+
+def test_rollout_gives_the_bits_of_simulate() -> None:
+    scene, q = pendulums([0, 1, 2, 3], LOADED)
+    starts = q + np.linspace(0.0, 0.3, 5)[:, None]
+    runs = pn.rollout(scene, starts, np.zeros_like(starts), 0.7, threads=2)
+    for start, run in zip(starts, runs, strict=True):
+        alone = pn.simulate(scene, 0.7, q=start)
+        assert (run.t == alone.t).all()
+        assert (run.q == alone.q).all()
+        assert (run.v == alone.v).all()
+
+
+@pytest.mark.parametrize(
+    ("said", "groups"),
+    [
+        ({}, [[0], [1], [2]]),
+        ({"forces": [pn.SpringDamper("end1 of 0", "end0 of 2", stiffness=5.0)]}, [[0, 2], [1]]),
+        ({"constraints": [pn.JointCoupling("joint0 of 1", "joint0 of 2", ratio=1.0)]}, [[0], [1, 2]]),
+        ({"forces": [pn.UserForce(lambda t, q, v: np.zeros(6))]}, []),
+        ({"actuation": lambda t, q, v: np.zeros(6)}, []),
+        ({"actuation": pn.HoldPosition(kp=1.0, kd=0.1)}, [[0], [1], [2]]),
+    ],
+)
+def test_what_acts_on_both_makes_one_of_two(said: dict[str, Any], groups: list[list[int]]) -> None:
+    scene, _ = pendulums([0, 1, 2], COULOMB, **said)
+    names = [list(part.scene.model.names)[1:] for part in components(scene)]
+    assert sorted(sorted({int(name[-1]) for name in own}) for own in names) == groups
+
+
+def test_loops_stay_closed() -> None:
+    """A row in each: the end of the second link keeps below the first joint."""
+    which = [0, 1, 2]
+    rods = [pn.PointAnchor(f"end1 of {k}", axes="x") for k in which]
+    law = {"coulomb": 0.05}
+    scene, q = pendulums(which, law, constraints=rods)
+    v = np.array([2.0, 3.0, 4.0, -1.0, 0.5, 0.0])
+    run = pn.simulate(scene, 2.0, q=np.zeros_like(q), v=v, record="energy")
+    assert len(components(scene)) == 3
+    assert run.violation.max() < 1e-12
+    assert run.violation_rate.max() < 1e-11
+    assert np.abs(run.energy["balance"]).max() < 1e-7

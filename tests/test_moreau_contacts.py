@@ -1,0 +1,156 @@
+"""Time stepping with contacts that open: order, rest without creep, bounces, penetration, ledger."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import pin_nonideal as pn
+
+from .mechanisms import GRAVITY, body, empty, frame, point_mass
+from .same_run import assert_same_run
+
+
+def box(mu, angle=0.0, restitution=0.0):
+    """A box of 0.4 x 0.2 x 0.2 m on a slope of this angle."""
+    model = empty((GRAVITY * np.sin(angle), 0.0, -GRAVITY * np.cos(angle)))
+    joint = body(model, 0, pin.JointModelFreeFlyer(), "box", 2.0, inertia=np.diag([0.013, 0.033, 0.033]))
+    frame(model, "middle", joint)
+    corners = pn.box_contacts("middle", (0.4, 0.2, 0.2), mu=mu, restitution=restitution)
+    return pn.Scene(model, contacts=corners)
+
+
+ON_PLANE = [0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]
+
+
+def test_a_sliding_box_has_order_one():
+    """x = v t - mu g t^2 / 2 up to its stop, and rest after; the error falls as the step."""
+    stop = 1.0 / (2.0 * 0.5 * GRAVITY)
+    errors = []
+    steps = np.array([7e-3, 3.5e-3, 1.75e-3, 0.875e-3]) / np.pi
+    for dt in steps:
+        run = pn.simulate(box(0.5), 0.5, q=ON_PLANE, v=[1.0, 0, 0, 0, 0, 0], method="moreau", dt=dt)
+        errors.append(abs(run.q[-1, 0] - stop))
+        assert np.abs(run.v[-1]).max() == 0.0
+    assert max(errors / steps) < 1.0  # [m/s]: a step's own change of the motion
+
+
+def test_landings_are_of_order_one():
+    """A ball that bounces, beside its parabolas: the mean of many heights, as landings fall anywhere."""
+    contact = pn.PointContact("mass", restitution=0.7)
+    scene = pn.Scene(point_mass("Z"), contacts=[contact])
+    steps, errors = 4e-3 / 2.0 ** np.arange(6), []
+    heights = np.linspace(0.8, 1.2, 40)
+    for dt in steps:
+        missed = []
+        for height in heights:
+            run = pn.simulate(scene, 1.5, q=[height], method="moreau", dt=dt)
+            missed.append(abs(run.q[-1, 0] - bounced(height, 0.7, 1.5)))
+        errors.append(np.mean(missed))
+    order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert 0.9 < order < 1.1, errors
+
+
+def bounced(height, restitution, duration):
+    """Height after this time of a ball that was dropped."""
+    speed = np.sqrt(2.0 * GRAVITY * height)
+    left = duration - speed / GRAVITY
+    while left > 0.0:
+        speed *= restitution
+        flight = 2.0 * speed / GRAVITY
+        if left < flight:
+            return speed * left - 0.5 * GRAVITY * left**2
+        left -= flight
+    return height - 0.5 * GRAVITY * duration**2
+
+
+def test_a_tumbling_drop_converges_with_order_one():
+    """A box that lands on one corner, e = 0, beside the event-driven run."""
+    scene = box(0.6)
+    turned = pin.Quaternion(pin.rpy.rpyToMatrix(0.3, 0.5, 0.2)).coeffs()
+    q = np.concatenate([[0.0, 0.0, 0.35], turned])
+    exact = pn.simulate(scene, 0.2, q=q, rtol=1e-10, atol=1e-10)
+    steps = 4e-3 / 2.0 ** np.arange(5)
+    errors = []
+    for dt in steps:
+        run = pn.simulate(scene, 0.2, q=q, method="moreau", dt=dt)
+        errors.append(np.abs(run.q[-1] - exact.q[-1]).max())
+    order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert 0.8 < order < 1.3, errors
+
+
+@pytest.mark.parametrize(("slope", "rests"), [(0.5 - 1e-9, True), (0.5 + 1e-6, False)])
+def test_a_box_on_a_slope_rests_or_slides(slope, rests):
+    run = pn.simulate(box(0.5, np.arctan(slope)), 2.0, q=ON_PLANE, method="moreau", dt=1e-3)
+    moved = np.abs(run.q[-1] - ON_PLANE).max()
+    if rests:
+        assert np.abs(run.v).max() < 1e-14
+        assert moved < 1e-12
+    else:
+        assert moved > 1e-7
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_a_ball_bounces_and_rests(restitution):
+    contact = pn.PointContact("mass", restitution=restitution)
+    scene = pn.Scene(point_mass("Z"), contacts=[contact], q0=[1.0])
+    run = pn.simulate(scene, 4.0, method="moreau", dt=1e-3, record="energy")
+    fall = np.sqrt(2.0 / GRAVITY)
+    landed = run.t[1:][np.argmax(np.diff(run.v[:, 0]) > 0.0)]
+    assert landed == pytest.approx(fall, abs=2e-3)
+    assert run.q.min() >= -1e-3 * np.sqrt(2.0 * GRAVITY)  # one step's approach
+    height = run.q[run.t > landed + 1e-6, 0].max()
+    assert height == pytest.approx(restitution**2, abs=0.02)
+    assert abs(run.q[-1, 0]) < 1e-9
+    assert run.v[-1, 0] == 0.0
+    assert run.energy["impacts"][-1] < 0.0
+    assert np.abs(run.energy["balance"]).max() < 1e-9
+    assert max(run.stats.signorini, run.stats.coulomb, run.stats.dissipation) < 1e-10
+
+
+def test_a_resumed_run_is_bitwise_the_same(kept, tmp_path):
+    scene = box(0.6)
+    q = np.concatenate([[0.0, 0.0, 0.35], pin.Quaternion(pin.rpy.rpyToMatrix(0.3, 0.5, 0.2)).coeffs()])
+    path, options = tmp_path / "run", {"q": q, "method": "moreau", "dt": 2e-3, "record": ("energy", "forces")}
+    whole = pn.simulate(scene, 0.6, **options)
+    assert_same_run(whole, pn.simulate(scene, 0.6, checkpoint=path, checkpoint_interval=0.0, **options))
+    states = list(kept)
+    for k in np.linspace(0, len(states) - 1, 8).astype(int):
+        path.write_bytes(states[k])
+        assert_same_run(whole, pn.resume(path, scene, checkpoint_interval=1e9))
+
+
+@pytest.mark.parametrize("count", [20, pytest.param(1000, marks=pytest.mark.stress)])
+def test_random_bodies_dropped(count):
+    """1 to 8 points of a body fall on a plane: no NaN, no hang, penetration within one step's approach."""
+    rng = np.random.default_rng(0)
+    deepest, failed = 0.0, []
+    for k in range(count):
+        model = empty()
+        inertia = np.diag(rng.uniform(0.2, 1.0, 3)) * 0.05
+        mass = float(10.0 ** rng.uniform(-2, 2))
+        joint = body(model, 0, pin.JointModelFreeFlyer(), "base", mass, inertia=mass * inertia)
+        frame(model, "middle", joint)
+        places = rng.uniform(-0.2, 0.2, (int(rng.integers(1, 9)), 3))
+        mus, restitutions = rng.uniform(0, 1.2, len(places)), rng.uniform(0, 0.8, len(places))
+        contacts = [
+            pn.PointContact("middle", mu, offset=tuple(p), restitution=e, name=f"c{i}")
+            for i, (p, mu, e) in enumerate(zip(places, mus, restitutions, strict=True))
+        ]
+        turn = pin.Quaternion(pin.exp3(rng.standard_normal(3))).coeffs()
+        q, v = np.concatenate([[0.0, 0.0, 0.5], turn]), rng.standard_normal(6)
+        dt = 2e-3
+        try:
+            run = pn.simulate(pn.Scene(model, contacts=contacts), 1.0, q=q, v=v, method="moreau", dt=dt)
+        except pn.RunError as error:
+            failed.append((k, str(error)))
+            continue
+        assert np.isfinite(run.q).all()
+        R = [pin.XYZQUATToSE3(x) for x in run.q]
+        depths = np.array([[-(M * p)[2] for p in places] for M in R])
+        fastest = np.abs(run.v[:, :3]).max() + 0.4 * np.abs(run.v[:, 3:]).max()
+        deepest = max(deepest, depths.max() / (fastest * dt))
+    print(f"{count} bodies: deepest penetration {deepest:.2f} of one step's approach; failed: {failed}")
+    assert failed == []
+    assert deepest <= 1.0

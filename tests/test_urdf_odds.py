@@ -1,0 +1,210 @@
+"""URDF files as the world writes them: broken paths of meshes, words of other tools, what is told of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import pin_nonideal as pn
+
+from .refusals import refuses
+from .small_robots import ARM, folder, joint, link, robot
+
+CORNERS = "vertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0"
+STL = f"solid a\nfacet normal 0 0 1\nouter loop\n{CORNERS}\nendloop\nendfacet\nendsolid a\n"
+
+
+def shown(filename):
+    return f'<visual><geometry><mesh filename="{filename}"/></geometry></visual>'
+
+
+def write_meshes(folder, *names):
+    for name in names:
+        path = folder / "meshes" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(STL)
+
+
+def load_with(home, filename):
+    (home / "urdf").mkdir(parents=True, exist_ok=True)
+    (home / "urdf" / "arm.urdf").write_text(
+        robot(*ARM, link("x", inside=shown(filename)), joint("j", "base", "x"))
+    )
+    return pn.load(home / "urdf" / "arm.urdf")
+
+
+BROKEN = (
+    "package://visual/link.stl",
+    "package:///visual/link.stl",
+    "package://another_name/meshes/visual/link.stl",
+    "file:///home/someone/ws/arm/meshes/visual/link.stl",
+    "C:\\Users\\someone\\arm\\meshes\\visual\\link.stl",
+    "../../meshes/arm/visual/link.stl",
+)
+
+
+@pytest.mark.parametrize("filename", BROKEN)
+def test_a_mesh_of_a_broken_path_is_found_by_its_ending(tmp_path, filename):
+    write_meshes(tmp_path / "arm", "v2/visual/link.stl", "v2/collision/link.stl")
+    scene = load_with(tmp_path / "arm", filename)
+    found = tmp_path / "arm" / "meshes" / "v2" / "visual" / "link.stl"
+    assert [g.meshPath for g in scene.visual_model.geometryObjects] == [str(found)]
+    (note,) = (note for note in scene.notes if "mesh" in note)
+    assert note.startswith(
+        f'paths of meshes "{filename}" lead nowhere; they are the only ones beneath a folder'
+    )
+    assert note.endswith(f'"meshes" that end so, such as "{found}"')
+
+
+@pytest.mark.parametrize(
+    "names", [("a/visual/link.stl", "b/visual/link.stl"), ("a/link.stl", "b/link.stl"), ("other.stl",)]
+)
+def test_a_mesh_whose_ending_is_not_the_only_one_is_missing(tmp_path, names):
+    write_meshes(tmp_path / "arm", *names)
+    scene = load_with(tmp_path / "arm", "package://visual/link.stl")
+    assert scene.visual_model.ngeoms == 0
+    assert 'mesh "package://visual/link.stl" was not found; its shape is left out' in scene.notes
+
+
+def test_a_whole_path_is_never_told(tmp_path):
+    write_meshes(tmp_path / "arm", "link.stl", "old/link.stl")
+    scene = load_with(tmp_path / "arm", "package://arm/meshes/link.stl")
+    (item,) = scene.visual_model.geometryObjects
+    assert Path(item.meshPath) == tmp_path / "arm" / "meshes" / "link.stl"
+    assert not any("mesh" in note for note in scene.notes)
+
+
+def test_a_mesh_of_a_broken_path_is_looked_for_in_its_own_package_first(tmp_path):
+    write_meshes(tmp_path / "arm", "link.stl")
+    write_meshes(tmp_path / "hand", "deep/link.stl")
+    (item,) = load_with(tmp_path / "arm", "package://hand/link.stl").visual_model.geometryObjects
+    assert Path(item.meshPath) == tmp_path / "hand" / "meshes" / "deep" / "link.stl"
+
+
+def test_a_mesh_that_comes_later_is_found(tmp_path):
+    write_meshes(tmp_path / "arm", "other.stl")
+    assert load_with(tmp_path / "arm", "package://visual/link.stl").visual_model.ngeoms == 0
+    write_meshes(tmp_path / "arm", "visual/link.stl")
+    assert load_with(tmp_path / "arm", "package://visual/link.stl").visual_model.ngeoms == 1
+
+
+def test_the_world_need_not_be_declared(tmp_path):
+    parts = [link("base"), joint("mount", "world", "base", kind="fixed", xyz="0 0 2"), *ARM[1:]]
+    scene = pn.load(folder(tmp_path, urdf=robot(*parts)))
+    assert 'link "world", on which joints hang, is not declared; it is added without inertia' in scene.notes
+    assert scene.model.jointPlacements[1].translation[2] == 2.0
+    with refuses('no link "wrld", the parent of joint "mount"'):
+        pn.load(folder(tmp_path, urdf=robot(*parts).replace('"world"', '"wrld"')))
+
+
+def test_what_stands_beside_a_shape_is_told(tmp_path):
+    inside = '<collision><geometry><box size="1 1 1"/><origin xyz="0 0 1"/></geometry></collision>'
+    scene = pn.load(folder(tmp_path, urdf=robot(*ARM, link("x", inside=inside), joint("j", "base", "x"))))
+    assert 'elements beside the shape of a <geometry> are not read: <origin> in link "x"' in scene.notes
+    assert scene.collision_model.ngeoms == 1
+    two = inside.replace("</geometry>", '<sphere radius="1"/></geometry>')
+    with refuses(
+        "<geometry> must hold one of box, cylinder, capsule, sphere, mesh; got <box>, <origin>, <sp"
+    ):
+        pn.load(folder(tmp_path, urdf=robot(*ARM, link("x", inside=two), joint("j", "base", "x"))))
+
+
+UNREAD = {
+    "a word misspelt": (
+        joint("j", "base", "x").replace("origin xyz", "origin xzy"),
+        "attributes that URDF does not have are not read: xzy in <origin>",
+    ),
+    "a spring of another tool": (
+        joint("j", "base", "x", inside='<traits spring_k="3"/>'),
+        "elements that play no part here are not read: <traits> in <joint>",
+    ),
+    "stiffness in dynamics": (
+        joint("j", "base", "x", inside='<dynamics damping="1" spring_stiffness="3"/>'),
+        "attributes that URDF does not have are not read: spring_stiffness in <dynamics>",
+    ),
+    "a controller and a calibration": (
+        joint("j", "base", "x", inside='<safety_controller k_velocity="1"/><calibration rising="0.1"/>'),
+        "elements that play no part here are not read: <safety_controller> in <joint>, <calibration> in "
+        "<joint>",
+    ),
+    "two origins": (
+        joint("j", "base", "x", inside='<origin xyz="1 2 3"/>'),
+        'of repeated elements the first counts: <origin> in joint "j"',
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "note"), UNREAD.values(), ids=UNREAD)
+def test_words_that_play_no_part_are_told(tmp_path, text, note):
+    scene = pn.load(folder(tmp_path, urdf=robot(*ARM, link("x"), text)))
+    assert note in scene.notes
+
+
+def test_bounds_and_reductions_that_play_no_part_are_told(tmp_path):
+    geared = (
+        '<transmission name="drive"><joint name="elbow"/><actuator name="motor"><mechanicalReduction>50'
+        "</mechanicalReduction></actuator></transmission>"
+    )
+    scene = pn.load(folder(tmp_path, urdf=robot(*ARM, geared)))
+    bounds = (
+        "bounds of the effort of 2 joints (scene.model.upperEffortLimit) and the velocity of 2 joints "
+        "(scene.model.upperVelocityLimit) are not enforced"
+    )
+    assert bounds in scene.notes
+    assert 'reductions of transmissions "drive" are not used: torques are those at the joints' in scene.notes
+    np.testing.assert_array_equal(scene.model.upperEffortLimit, [1.0, 1.0])
+
+
+QUATERNION = 'quat_xyzw="0 0 3 3"'
+
+
+def test_a_quaternion_turns_whatever_version_the_file_states(tmp_path):
+    turned = joint("j", "base", "x").replace('<origin xyz="0 0 0"', f"<origin {QUATERNION}")
+    for version in ("", ' version="1.0"', ' version="1.2"'):
+        text = robot(*ARM, link("x"), turned).replace('<robot name="arm"', f'<robot name="arm"{version}')
+        model = pn.load(folder(tmp_path, urdf=text)).model
+        turn = model.jointPlacements[model.getJointId("j")].rotation
+        np.testing.assert_allclose(turn, pin.rpy.rpyToMatrix(0, 0, np.pi / 2), atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("new", "message"),
+    [
+        (f'{QUATERNION} rpy="0 0 1"', "<origin> must have one of rpy and quat_xyzw; got both"),
+        ('quat_xyzw="0 0 0 0"', "quat_xyzw must have a length; got 0 0 0 0"),
+        ('quat_xyzw="0 0 1"', "quat_xyzw must hold 4 numbers"),
+    ],
+)
+def test_quaternions_that_turn_nothing_are_refused(tmp_path, new, message):
+    turned = joint("j", "base", "x").replace('<origin xyz="0 0 0"', f"<origin {new}")
+    with refuses(message):
+        pn.load(folder(tmp_path, urdf=robot(*ARM, link("x"), turned)))
+
+
+def test_capsules_are_shapes_whatever_version_the_file_states(tmp_path):
+    origin = '<origin quat_xyzw="0 3 0 3" xyz="0 0 1"/>'
+    inside = f'<collision>{origin}<geometry><capsule radius="0.1" length="0.4"/></geometry></collision>'
+    text = robot(*ARM, f'<link name="x">{inside}</link>', joint("j", "base", "x"))
+    scene = pn.load(folder(tmp_path, urdf=text), density=1000.0)
+    (item,) = scene.collision_model.geometryObjects
+    assert isinstance(item.geometry, coal.Capsule)
+    inertia = scene.model.inertias[scene.model.getJointId("j")]
+    assert inertia.mass == pytest.approx(1000.0 * np.pi * (0.01 * 0.4 + 4.0 / 3.0 * 0.001), rel=1e-12)
+    assert np.argmin(np.diag(inertia.inertia)) == 0  # its long axis is turned onto x
+
+
+@pytest.mark.parametrize("name", ["ARM.URDF", "Arm.Urdf"])
+def test_endings_count_in_any_case(tmp_path, name):
+    (tmp_path / name).write_text(robot(*ARM))
+    assert pn.load(tmp_path / name).model.nv == 2
+
+
+@pytest.mark.parametrize("name", ["arm.URDF", "arm.urdf.xacro", "arm.xml"])
+def test_a_folder_without_a_robot_urdf_names_the_files_that_can_be_loaded(tmp_path, name):
+    (tmp_path / name).write_text(robot(*ARM))
+    with refuses(f'must hold a robot.urdf; there is none; load "{tmp_path / name}" by its path'):
+        pn.load(tmp_path)
