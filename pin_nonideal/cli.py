@@ -10,6 +10,7 @@ import argparse
 import os
 import runpy
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -233,7 +234,9 @@ def _resume(options: argparse.Namespace) -> int:
 def _finished(run: Callable[[], Trajectory], options: argparse.Namespace, writers: list[Writer]) -> int:
     """Runs, prints and writes; what a run had computed when it stopped is written all the same."""
     try:
-        done = run()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # the run's notes say the same, and are printed
+            done = run()
     except RunError as error:
         if error.trajectory is not None:
             _told(error.trajectory, options, writers)

@@ -67,8 +67,8 @@ class Stats:
         dissipation: that of maximum dissipation.
         limited_by_rounding: accepted steps whose error was the rounding of the accelerations, beyond the
             tolerances: shorter steps would not have made it less.
-        rounding: largest rounding of an acceleration, as part of the largest one, where it was measured (now
-            and then in runs of more than 8 adaptive steps of the core), else 0.
+        rounding: largest rounding of an acceleration, as part of the largest one, where it was measured (in
+            runs of more than 20,000 adaptive steps of the core), else 0.
     """
 
     steps: int = 0

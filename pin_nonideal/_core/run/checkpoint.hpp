@@ -27,7 +27,7 @@ struct Progress {
     bool several = false;               // the laws allow other motions too, which was told
     long stiff_steps = 0, quiet_steps = 0;  // near the border of stability, and since then away from it
     VecX rounding;          // of the rates as measured last, raised to what tolerances must allow
-    long next_look = 7;     // at that: number of the step
+    long next_look = 0;     // at that: number of the step
     int turning_steps = 0;  // in a row that were stiff while slip turned; negative: not to be counted yet
 };
 

@@ -11,12 +11,10 @@ namespace pn {
 
 namespace {
 
-// Rounding is measured after this many steps first and twice as many each time, but at most so many apart: four evaluations
-// among hundreds.
-constexpr long first_look = 8, most_apart = 64;
-// What is measured is a bound, and most runs are far better than it: only those that take so many steps, as noise that asks
-// for ever shorter ones makes them, are held to it.
-constexpr long many_steps = 2000;
+// Only runs that take so many steps, as noise that asks for ever shorter ones makes them, are held to their rounding: what
+// is measured is a bound that most runs are far better than. It is measured so many steps apart: seven evaluations among
+// hundreds.
+constexpr long many_steps = 20000, apart = 64;
 // A measurement is a sample: the rounding of another step may be so many times it, and is taken for half of what it was
 // before at least.
 constexpr double sample_factor = 3.0, lasting_part = 0.5;
@@ -24,6 +22,7 @@ constexpr double sample_factor = 3.0, lasting_part = 0.5;
 constexpr unsigned long long multiplier = 6364136223846793005ULL, increment = 1442695040888963407ULL;
 constexpr double most_spacings = 16.0;
 constexpr int samples = 3;
+const double second_difference = std::sqrt(6.0);  // deviation of its rounding, over that of a rate
 
 }  // namespace
 
@@ -37,28 +36,33 @@ RoundingFloor::RoundingFloor(System& system, Stepper& stepper, ErrorNorm& norm, 
     raised_ = sample_factor * std::sqrt(sum) / StepControl::aim(method);
 }
 
-// What changes of the last digits of the state make of its rates: every rounding on the way is another then, and the rates
-// differ by what the scene makes of them.
+// What changes of the last digits of the state make of its rates: every rounding on the way is another then. Opposite
+// changes make opposite differences but for rounding, whose second difference has the variance 1 + 1 + 4.
 void RoundingFloor::measure() {
     const double at = stepper_.t0 + stepper_.h, epsilon = std::numeric_limits<double>::epsilon();
     const RunState kept = system_.w.state;
     const int n = system_.nq + system_.nv;
     const double size = system_.velocity(stepper_.end_rate()).cwiseAbs().maxCoeff();
     unsigned long long draw = 1;
+    change_.resize(n), rate_.resize(stepper_.y1.size());
     progress_.rounding *= lasting_part;
     for (int sample = 0; sample < samples; ++sample) {
-        probe_ = stepper_.y1;
         for (int k = 0; k < n; ++k) {
             draw = multiplier * draw + increment;
             const double part = static_cast<double>(static_cast<long long>(draw)) * 0x1p-63;
-            probe_[k] *= 1.0 + most_spacings * epsilon * part;  // what rests goes on resting
+            change_[k] = most_spacings * epsilon * part * stepper_.y1[k];  // what rests goes on resting
         }
-        system_.normalize(probe_);
-        noise_ = stepper_.end_rate();
-        system_.derivative(at, probe_, noise_);
-        system_.w.state = kept;
-        noise_ -= stepper_.end_rate();
-        if (out_.steps >= many_steps) norm_.raise(progress_.rounding, raised_ * noise_, stepper_.y1);
+        noise_ = -2.0 * stepper_.end_rate();
+        for (const double side : {1.0, -1.0}) {
+            probe_ = stepper_.y1;
+            probe_.head(n) += side * change_;
+            system_.normalize(probe_);
+            system_.derivative(at, probe_, rate_);
+            system_.w.state = kept;
+            noise_ += rate_;
+        }
+        noise_ /= second_difference;
+        norm_.raise(progress_.rounding, raised_ * noise_, stepper_.y1);
         if (size > 0.0)
             out_.rounding = std::max(out_.rounding, system_.velocity(noise_).cwiseAbs().maxCoeff() / size);
     }
@@ -69,8 +73,8 @@ void RoundingFloor::measure() {
 }
 
 void RoundingFloor::look() {
-    if (raised_ == 0.0 || stepper_.collocates() || out_.steps < progress_.next_look) return;
-    progress_.next_look = out_.steps + std::clamp(out_.steps, first_look, most_apart);
+    if (raised_ == 0.0 || stepper_.collocates() || out_.steps < std::max(many_steps, progress_.next_look)) return;
+    progress_.next_look = out_.steps + apart;
     measure();
 }
 

@@ -11,7 +11,7 @@ public:
     RoundingFloor(System& system, Stepper& stepper, ErrorNorm& norm, Progress& progress, Recording& out);
 
     // After a step that the error control accepts, with the workspace evaluated at its end, and left so: measures the
-    // rounding of the rates now and then. The norm takes it for part of the tolerance, as much as lets rounding alone make
+    // rounding of the rates now and then in runs of many steps. The norm takes it for part of the tolerance, as much as lets rounding alone make
     // the next step no shorter: noise, which would ask for shorter steps for ever, asks for none.
     void look();
 
@@ -24,7 +24,7 @@ private:
     Progress& progress_;
     Recording& out_;
     double raised_ = 0.0;  // of the rounding of a rate, over the step, what its tolerance is raised to
-    VecX probe_, noise_;
+    VecX change_, probe_, rate_, noise_;
 };
 
 }  // namespace pn
