@@ -20,6 +20,14 @@ ROUNDING = 1e-9
 EPS = float(np.finfo(float).eps)
 
 
+@pytest.fixture(autouse=True, scope="module")
+def _no_log():
+    """MuJoCo writes what it warns of to a file in the working directory, unless somebody hears it."""
+    mujoco.set_mju_user_warning(lambda text: None)
+    yield
+    mujoco.set_mju_user_warning(None)
+
+
 def same(ours, theirs, scale=1.0):
     np.testing.assert_allclose(
         ours, theirs, rtol=0, atol=ROUNDING * (1.0 + scale * np.abs(theirs).max(initial=0))
