@@ -24,6 +24,8 @@ constexpr int fixed_point_limit = 30, newton_limit = 30;
 constexpr double safe_growth = 0.5;
 constexpr int kept_steps = 4;
 constexpr int most_pieces = 30;  // of the loads that contacts share, one solution each
+constexpr double least_part = 0x1p-10;  // of the way to a solution of another piece
+constexpr double least_gain = 0.1;      // of the error that a step to the solution takes away if all is one piece
 
 struct Implicit : Unknowns {
     using Unknowns::Unknowns;
@@ -51,18 +53,22 @@ struct Implicit : Unknowns {
         return true;
     }
 
-    // Piece after piece of the loads, until a solution lies in its own.
+    // Piece after piece of the loads, until a solution lies in its own. One that lies in another piece is gone to as far as
+    // that makes the equation better met: else two pieces might send to one another for ever.
     void solve_pieces(VecX& y) {
         VecX g(n);
         const VecX start = y;
         try {
+            image(y, g);
+            double error = (g - y).norm();
             for (int turn = 0; turn < most_pieces; ++turn) {
-                image(y, g);
+                const VecX from = y;
                 {
                     const HeldPiece piece(p, w);
                     solve_bearings(y);
                 }
                 if (is_motion(y)) return;
+                if (!approach(from, error, y, g)) break;
             }
         } catch (const Failure& failure) {
             if (failure.kind != Failure::Kind::paradox || failure.solutions == Failure::Solutions::several) throw;
@@ -72,6 +78,20 @@ struct Implicit : Unknowns {
         }
         decide_over_pieces(*this, start, y, Failure(Failure::Kind::not_converged, t, elements()));
         image(y, g);
+    }
+
+    // Back from y towards `from` until the error there is less than before; false where it nowhere is.
+    bool approach(const VecX& from, double& error, VecX& y, VecX& g) {
+        const VecX way = y - from;
+        for (double part = 1.0; part >= least_part; part *= 0.5) {
+            y = from + part * way;
+            image(y, g);
+            const double there = (g - y).norm();
+            if (!(there < (1.0 - least_gain * part) * error)) continue;
+            error = there;
+            return true;
+        }
+        return false;
     }
 
     // The equation as arrays, its solution near y, and whether that is the only one.

@@ -234,7 +234,7 @@ bool leads_elsewhere(Unknowns& u, const VecX& y, VecX& start, double size) {
             start += (MatX::Identity(u.n, u.n) - J).partialPivLu().solve(residual);
         }
     } catch (const Failure& failure) {
-        if (failure.kind != Failure::Kind::not_finite) throw;
+        if (failure.kind != Failure::Kind::not_finite && failure.kind != Failure::Kind::not_converged) throw;
     }
     return false;
 }

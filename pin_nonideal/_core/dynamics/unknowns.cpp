@@ -40,8 +40,11 @@ void Unknowns::image(const VecX& y, VecX& g) {
     set(y);
     motion();
     ++w.counters.iterations;
-    // A stage that has run away is no case for the laws, a user's above all.
-    if (!std::isfinite(w.now.a.squaredNorm())) throw Failure(Failure::Kind::not_finite, t);
+    // A stage that has run away is no case for the laws, a user's above all; and unknowns that have are no motion.
+    if (!std::isfinite(w.now.a.squaredNorm())) {
+        const bool given = std::isfinite(w.now.F.squaredNorm() + w.now.base_C.squaredNorm());
+        throw Failure(given ? Failure::Kind::not_converged : Failure::Kind::not_finite, t, elements());
+    }
     const int nv = p.mechanism.nv;
     int k = 0;
     each([&](size_t e) {
