@@ -11,8 +11,8 @@ public:
     RoundingFloor(System& system, Stepper& stepper, ErrorNorm& norm, Progress& progress, Recording& out);
 
     // After a step that the error control accepts, with the workspace evaluated at its end, and left so: measures the
-    // rounding of the rates now and then in runs of many steps. The norm takes it for part of the tolerance, as much as lets rounding alone make
-    // the next step no shorter: noise, which would ask for shorter steps for ever, asks for none.
+    // rounding of the rates now and then in runs of many steps. The norm takes it for part of the tolerance, as much as
+    // lets rounding alone make the next step no shorter: noise, which would ask for shorter steps for ever, asks for none.
     void look();
 
 private:
