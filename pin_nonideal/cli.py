@@ -133,8 +133,11 @@ def _parser() -> argparse.ArgumentParser:
     resume.set_defaults(command=_resume)
 
     replay = commands.add_parser("replay", help="write the page of a saved run")
-    replay.add_argument("run", type=Path, metavar="RUN.npz", help="file of `run --save`")
+    replay.add_argument(
+        "run", type=Path, metavar="RUN.npz", help="file of `run --save`, or folder of `sweep`"
+    )
     replay.add_argument("page", type=Path, nargs="?", metavar="PAGE.html", help="default: the run's name")
+    replay.add_argument("--run", type=int, dest="number", metavar="K", help="which run of a sweep")
     replay.add_argument("--robot", metavar="NAME_OR_PATH", help="of a run that does not know it")
     replay.set_defaults(command=replay_file)
 

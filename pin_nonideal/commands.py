@@ -17,6 +17,7 @@ from .replaying import replay
 from .scene import Scene
 from .statics.equilibrium import equilibrium
 from .sweep_points import sweep_grid, sweep_samples
+from .sweep_store import Sweep
 from .sweeping import sweep
 from .trajectory import Trajectory
 from .types import Table
@@ -73,16 +74,30 @@ def replay_file(options: argparse.Namespace) -> int:
     """Writes the replay of a saved run.
 
     Args:
-        options: run and page, paths; robot, whose scene it is, or None.
+        options: run and page, paths; number of the run where that is a sweep's folder; robot, whose scene it
+            is, or None.
+
+    Raises:
+        InputError: there is a number and no folder, or a folder and no number, or no robot.
     """
     scene = "source" if options.robot is None else load(options.robot)
-    run = Trajectory.load(options.run, scene=scene)
+    path, number = Path(options.run), options.number
+    if path.is_dir() != (number is not None):
+        kind = "a" if path.is_dir() else "no"
+        raise InputError(f'--run K says which run of a sweep\'s folder; "{path}" is {kind} folder')
+    if number is None:
+        run, page = Trajectory.load(path, scene=scene), path.with_suffix(".html")
+    else:
+        kept = Sweep(path)
+        if not 0 <= number < len(kept):
+            raise InputError(f"--run must be at least 0 and below {len(kept)}; got {number}")
+        run, page = kept.load(number, scene), path.with_name(f"{path.resolve().name}.{number}.html")
     if run.scene is None:
         because = f": {run.notes[-1]}" if run.notes else ""
         raise InputError(
-            f'"{options.run}" does not know a robot that `load` finds{because}; name it: --robot NAME_OR_PATH'
+            f'"{path}" does not know a robot that `load` finds{because}; name it: --robot NAME_OR_PATH'
         )
-    page = options.page or Path(options.run).with_suffix(".html")
+    page = options.page or page
     replay(run, page)
     print(f"wrote {page}")
     return 0

@@ -1,11 +1,13 @@
-"""Runs of a sweep in a folder: an npz a run, and an index of what became of each."""
+"""Runs of a sweep in a folder: files that hold them, and an index of what became of each."""
 
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +15,13 @@ import numpy as np
 
 from .errors import InputError, LoadingError, OutputError, RunError
 from .files import file_path
+from .scene import Scene
+from .sweep_packs import SUFFIX, archive_of, runs_in
 from .trajectory import Trajectory
+from .trajectory_file import read_from
 from .types import Table
 
-FORMAT = 1
-IN_A_FOLDER = 1000
+FORMAT = 2
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
 
@@ -42,16 +46,36 @@ class Sweep(Sequence[Trajectory]):
         try:
             with (self.folder / "index.jsonl").open(encoding="utf-8") as lines:
                 self._header = json.loads(next(lines))
+                if self._header["format"] != FORMAT:
+                    raise ValueError(f"format {self._header['format']} instead of {FORMAT}")
                 self.records: list[Table | None] = [None] * int(self._header["runs"])
+                self._places: list[tuple[str, int, int] | None] = [None] * len(self.records)
                 for line in lines:
                     if line.endswith("\n"):  # not cut off by a kill
-                        record = json.loads(line)
-                        self.records[record.pop("run")] = record
+                        self._take(json.loads(line))
+            self._unlisted = list(self._found())
         except (OSError, ValueError, LookupError, TypeError, StopIteration) as error:
             raise LoadingError(
                 f'"{self.folder}" holds no sweep: {type(error).__name__}: {error}; it must be a folder that '
                 "sweep(..., store=folder) made"
             ) from error
+
+    def _take(self, record: Table) -> None:
+        name, at, size = record.pop("at")
+        k = record.pop("run")
+        self.records[k], self._places[k] = record, (str(name), int(at), int(size))
+
+    def _found(self) -> Iterator[Table]:
+        """Runs that were done before a kill and did not come into the index."""
+        ends: dict[str, int] = {}
+        for place in self._places:
+            if place is not None:
+                ends[place[0]] = max(ends.get(place[0], 0), place[1] + place[2])
+        for entry in sorted(os.scandir(self.folder), key=lambda each: each.name):
+            if entry.name.endswith(SUFFIX) and entry.stat().st_size > ends.get(entry.name, 0):
+                for record in runs_in(Path(entry.path), ends.get(entry.name, 0)):
+                    self._take(dict(record))
+                    yield record
 
     def __len__(self) -> int:
         return len(self.records)
@@ -59,8 +83,31 @@ class Sweep(Sequence[Trajectory]):
     def __getitem__(self, k: Any) -> Any:
         if isinstance(k, slice):
             return [self[i] for i in range(*k.indices(len(self)))]
+        return self.load(k, scene=None)
+
+    def load(self, k: int, scene: Scene | str | None = "source") -> Trajectory:
+        """One run, with its scene where that can be had.
+
+        Args:
+            k: number of the run.
+            scene: as in `Trajectory.load`.
+
+        Raises:
+            InputError: the scene is not the one of the run.
+            LoadingError: the run is missing, failed before its first sample, or its file is damaged.
+        """
         k = range(len(self))[k]
-        return Trajectory.load(run_file(self.folder, k), scene=None)
+        record, place = self.records[k], self._places[k]
+        if record is None or place is None:
+            raise LoadingError(f"run {k} of the {self} is not done; the same call of sweep does it")
+        if place[2] == 0:
+            raise LoadingError(f"run {k} of the {self} has no samples; it failed: {record['error']}")
+        path = self.folder / place[0]
+        try:
+            content = archive_of(self.folder, place)
+        except OSError as error:
+            raise LoadingError(f'cannot read run {k} from "{path}": {error.strerror or error}') from error
+        return Trajectory._made(*read_from(io.BytesIO(content), path), path, scene)
 
     def __iter__(self) -> Iterator[Trajectory]:
         return (self[k] for k in range(len(self)))
@@ -101,16 +148,6 @@ class Sweep(Sequence[Trajectory]):
         return table
 
 
-def run_file(folder: Path, k: int) -> Path:
-    """Where a run lies.
-
-    Args:
-        folder: of the sweep.
-        k: number of the run.
-    """
-    return folder / f"{k // IN_A_FOLDER:04d}" / f"{k:07d}.npz"
-
-
 def opened_store(folder: Path, digest: str, runs: int) -> list[int]:
     """Begins a sweep in a folder, or goes on with it; the runs that are missing.
 
@@ -131,6 +168,7 @@ def opened_store(folder: Path, digest: str, runs: int) -> list[int]:
                 f'sweep: store "{folder}" holds another sweep: its parameters, duration or options differ; '
                 "name another folder"
             )
+        note(folder, held._unlisted)
         return held.missing
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -211,9 +249,24 @@ def digest_of(make: Any, parameters: Sequence[Mapping[str, Any]], duration: floa
         duration: of each [s].
         options: of `simulate`.
     """
-    name = getattr(make, "__qualname__", repr(type(make)))
-    said = [name, [dict(p) for p in parameters], duration, sorted((k, repr(x)) for k, x in options.items())]
-    return hashlib.sha256(json.dumps(said, default=repr).encode()).hexdigest()
+    said = [_said(make), [dict(p) for p in parameters], duration, sorted(options.items())]
+    return hashlib.sha256(json.dumps(said, default=_said).encode()).hexdigest()
+
+
+def _said(value: Any) -> Any:
+    """What decides a value that JSON does not know: the same in every process."""
+    if isinstance(value, partial):
+        return [_said(value.func), value.args, value.keywords]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    if hasattr(value, "__qualname__"):
+        return f"{value.__module__}.{value.__qualname__}"
+    if " at 0x" not in (told := repr(value)):
+        return told
+    try:  # an address tells nothing in another process
+        return [type(value).__qualname__, json.dumps(vars(value), default=_said)]
+    except (TypeError, ValueError, RecursionError):
+        return type(value).__qualname__
 
 
 def failed_run(error: RunError) -> Trajectory | None:

@@ -23,9 +23,10 @@ from .errors import (
 from .files import file_path
 from .scene import Scene
 from .simulation import simulate
-from .sweep_store import Sweep, digest_of, failed_run, note, opened_store, record_of, run_file
+from .sweep_packs import Pack
+from .sweep_store import Sweep, digest_of, failed_run, note, opened_store, record_of
 from .trajectory import Trajectory
-from .trajectory_file import write_quickly
+from .trajectory_file import to_bytes
 from .types import Table
 
 MOST_JOBS = 100_000  # also of negative numbers: -n leaves n - 1 processors free
@@ -51,7 +52,7 @@ def sweep(
     ("threading", "dask", "ray").  For many states of one scene use `rollout`, which needs no processes.
     `sweep_grid` and `sweep_samples` make parameters.
 
-    With `store` every run is a file as soon as it is done, and the memory that a sweep takes does not grow
+    With `store` every run is in a file as soon as it is done, and the memory that a sweep takes does not grow
     with its trajectories.  The same call on the same folder goes on after a kill with what is missing.
 
     Args:
@@ -61,7 +62,7 @@ def sweep(
         jobs: number of parallel jobs; joblib's choice when None, all processors when -1, all but one when -2.
         store: folder for the runs, new or of this very sweep; None keeps them in memory.
         failures: "raise" stops at the first run that fails; "keep" goes on, and the error stands in its place
-            (its `trajectory` has the samples before), in a store beside the run's file.
+            (its `trajectory` has the samples before), in a store beside those samples.
         measure: run -> numbers by name, taken where the run is; they go into the index of a store.
         show: progress bar on standard error; None shows it on a terminal only.
         options: passed to `simulate`.
@@ -147,31 +148,38 @@ class _Work:
 
     def __call__(self, runs: list[tuple[int, Table]]) -> list[tuple[int, Any]]:
         """Numbers of the runs with their trajectories, their records in the store, or what stopped them."""
-        return [(k, self._one(k, entry)) for k, entry in runs]
+        if self.folder is None:
+            return [(k, self._bare(k, entry)) for k, entry in runs]
+        with Pack(self.folder, runs[0][0]) as pack:
+            return [(k, self._kept(k, entry, pack)) for k, entry in runs]
+
+    def _bare(self, k: int, entry: Table) -> Any:
+        """The trajectory of a run without its scene, or what stopped it."""
+        run, stopped = self._one(k, entry)
+        return stopped or replace(run, scene=None)
+
+    def _kept(self, k: int, entry: Table, pack: Pack) -> Any:
+        """The record of a run that stands in the store, or what stopped it where that stops all."""
+        run, stopped = self._one(k, entry)
+        if stopped is not None and not self.keep:
+            return stopped
+        more = self._measured(run) if self.measure is not None and stopped is None else {}
+        error = None if stopped is None else f"{type(stopped).__name__}: {stopped}"
+        return pack.add(record_of(k, entry, run, error, more), b"" if run is None else to_bytes(run))
 
     def _one(self, k: int, entry: Table) -> Any:
-        run: Trajectory | None = None
-        stopped: PinNonidealError | None = None
+        """A run, and what stopped it."""
         try:
-            if self.folder is not None and (path := run_file(self.folder, k)).exists():
-                run = Trajectory.load(path, scene=None)  # done before a kill, and not yet in the index
-                return self._record(k, entry, run, run.failure)
-            run = replace(simulate(self._scene(entry), self.duration, **self.options), scene=None)
+            return simulate(self._scene(entry), self.duration, **self.options), None
         except (RunInterrupted, OutputError):
             raise
         except PinNonidealError as error:
-            stopped = error
+            run = None
             if isinstance(error, RunError):
                 error.index = k
                 run = failed_run(error)
-                run = error.trajectory = None if run is None else replace(run, scene=None)
-        if self.folder is None or (stopped is not None and not self.keep):
-            return stopped or run
-        if run is not None:
-            write_quickly(run, run_file(self.folder, k))
-        return self._record(
-            k, entry, run, None if stopped is None else f"{type(stopped).__name__}: {stopped}"
-        )
+                error.trajectory = None if run is None else replace(run, scene=None)
+            return run, error
 
     def _scene(self, entry: Table) -> Any:
         try:
@@ -188,9 +196,3 @@ class _Work:
         if not isinstance(found, Mapping):
             raise UserFunctionError(f"sweep: measure must return numbers by name; got {found!r}")
         return {str(name): number(f'sweep: measure: "{name}"', x) for name, x in found.items()}
-
-    def _record(self, k: int, entry: Table, run: Trajectory | None, error: str | None) -> Table:
-        more: Table = {}
-        if self.measure is not None and run is not None and error is None:
-            more = self._measured(run)
-        return record_of(k, entry, run, error, more)

@@ -386,9 +386,15 @@ class Trajectory:
             InputError: `path` is no name of a file, or the scene is not the one of the run.
             LoadingError: the file is missing, truncated, or no trajectory.
         """
-        from .trajectory_file import fits, read, scene_again
+        from .trajectory_file import read
 
-        fields, origin = read(path)
+        return cls._made(*read(path), path, scene)
+
+    @classmethod
+    def _made(cls, fields: Table, origin: Any, path: Any, scene: Scene | str | None) -> Trajectory:
+        """The trajectory of what a file holds, with a scene as `load` is asked for one."""
+        from .trajectory_file import fits, scene_again
+
         run = cls(**fields)
         if scene == "source":
             return dataclasses.replace(run, scene=scene_again(origin, run.joints, run.rows, run.notes))

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from .dense import DenseOutput
-from .errors import LoadingError, OutputError, PinNonidealError
-from .files import PART, file_path, mode_of, whole_file
+from .errors import LoadingError, PinNonidealError
+from .files import file_path, mode_of, whole_file
 from .loading import load_again
+from .npz import npz_bytes
 from .records import LEDGER, Event, Stats, UserEventRecord
 from .scene import Scene
 from .states.configurations import JointPlace
@@ -63,25 +64,15 @@ def write(run: Any, path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def write_quickly(run: Any, target: Path) -> None:
-    """Writes one of very many files: not compressed, and not waited for until it is on the disk.
+def to_bytes(run: Any) -> bytes:
+    """What `write` writes, not compressed, for one of very many runs.
 
     Args:
         run: the Trajectory.
-        target: the file, in a folder that is made where it is missing.
-
-    Raises:
-        OutputError: the file cannot be written.
     """
-    part = target.with_suffix(PART)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("wb") as stream:
-            np.savez(stream, **_arrays(run))
-        part.replace(target)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise OutputError(f'cannot write the trajectory to "{target}": {error.strerror or error}') from error
+    arrays = _arrays(run)
+    arrays["header"] = np.array(str(arrays["header"]).encode())  # JSON in ASCII, a quarter of the room
+    return npz_bytes(arrays)
 
 
 def _arrays(run: Any) -> Table:
@@ -124,10 +115,23 @@ def read(path: str | os.PathLike[str]) -> tuple[Table, Table | None]:
         LoadingError: the file is missing, truncated, or no trajectory.
     """
     source = file_path("Trajectory.load: path", path)
+    return read_from(source, source)
+
+
+def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
+    """The same of an open file.
+
+    Args:
+        stream: the file, or its name.
+        source: its name, for messages.
+
+    Raises:
+        LoadingError: it is truncated, or no trajectory.
+    """
     try:
-        with np.load(source, allow_pickle=False) as file:
+        with np.load(stream, allow_pickle=False) as file:
             arrays = {key: file[key] for key in file.files}
-        header = json.loads(str(arrays.pop("header")))
+        header = json.loads(arrays.pop("header").item())
         if header.get("format") != FORMAT:
             raise LoadingError(f'"{source}" must have format {FORMAT}; it has {header.get("format")}')
         missing = [key for key in REQUIRED if key not in arrays]

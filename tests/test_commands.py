@@ -110,6 +110,14 @@ def test_a_sweep_from_a_file(tmp_path, capsys):
     for k, N in enumerate((1, 2, 3)):
         alone = pn.simulate(pn.load("n_four_bar", N=N), 0.05, output_dt=0.05)
         np.testing.assert_array_equal(kept[k].q, alone.q)
+    runs = str(tmp_path / "runs")
+    assert main(["replay", runs, "--run", "2"]) == 0
+    page = tmp_path / "runs.2.html"
+    assert capsys.readouterr().out == f"wrote {page}\n"
+    assert page.stat().st_size > 10_000
+    assert "--run must be at least 0 and below 3; got 3" in fails(capsys, ["replay", runs, "--run", "3"])
+    assert "--run K says which run of a sweep's folder" in fails(capsys, ["replay", runs])
+    assert 'ladders.yaml" is no folder' in fails(capsys, ["replay", str(path), "--run", "0"])
     path.write_text(SWEEP.replace("0.05\n", "0.07\n", 1))
     assert "holds another sweep" in fails(capsys, ["sweep", str(path)])
 

@@ -26,9 +26,9 @@ formats: xml shapes model_edit inertia urdf_checks urdf_words tidy density meshe
 example_robots robot_yaml starts assembly rounding
 mjcf: compile motion tree tendons forces transmissions actuators equality fields told shapes reader
 loading
-records outcome dense trajectory_file trajectory_columns trajectory
+records outcome dense npz trajectory_file trajectory_columns trajectory
 runs: options asked progress results checkpoint components scipy_methods resume
-simulation run_arrays batches sweep_points sweep_store sweeping
+simulation run_arrays batches sweep_points sweep_packs sweep_store sweeping
 statics: forces equilibrium rest inverse_dynamics
 page: looks figure_styles geometry bare packing tracks motion between touched view guides forces given bands \
 signals relations elements choices payload window

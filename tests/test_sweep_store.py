@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import signal
@@ -17,6 +18,8 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
+from pin_nonideal import sweeping
+from pin_nonideal.sweep_packs import runs_in
 
 from .refusals import refuses
 from .same_run import assert_same_run
@@ -76,23 +79,34 @@ def test_the_summary_is_that_of_the_runs(tmp_path):
     assert {"violation", "wall_s", "evaluations", "t_end"} <= set(told)
 
 
+def packs(store):
+    """Contents of the files that hold runs."""
+    return {path: path.read_bytes() for path in store.glob("*.runs")}
+
+
 def test_what_is_missing_is_done_and_what_is_there_is_not_done_again(tmp_path):
+    """Of the files only the index, or only what follows a run, may be lost or cut off."""
     store = tmp_path / "runs"
-    kept = pn.sweep(pendulum, GRID, 0.1, jobs=1, store=store)
+    kept = pn.sweep(pendulum, GRID, 0.1, jobs=1, store=store, measure=amplitude)
     index = store / "index.jsonl"
     lines = index.read_text().splitlines(keepends=True)
     index.write_text("".join(lines[:3]) + lines[3][:10])  # as a kill leaves it
-    (store / "0000" / "0000005.npz").unlink()
-    before = {path: path.stat().st_mtime_ns for path in store.rglob("*.npz")}
-    assert pn.Sweep(store).missing == [2, 3, 4, 5]
-    again = pn.sweep(pendulum, GRID, 0.1, jobs=1, store=store)
+    (last,) = (path for path in packs(store) if path.name.startswith("0000005"))
+    last.write_bytes(last.read_bytes()[:-1])
+    before = packs(store)
+    assert pn.Sweep(store).missing == [5]
+    assert pn.Sweep(store).records[:5] == kept.records[:5]
+    with refuses("run 5 of the sweep in", pn.LoadingError):
+        pn.Sweep(store)[5]
+    again = pn.sweep(pendulum, GRID, 0.1, jobs=1, store=store, measure=amplitude)
     assert again.missing == []
-    assert {path: path.stat().st_mtime_ns for path in before} == before
+    assert {path: content for path, content in packs(store).items() if path in before} == before
     assert_are_their_runs(again, GRID)
-    assert [r["parameters"] for r in again.records] == [r["parameters"] for r in kept.records]
+    assert [r["amplitude"] for r in again.records] == [r["amplitude"] for r in kept.records]
 
 
-def test_a_kill_loses_nothing_that_was_done(tmp_path):
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_kill_loses_nothing_that_was_done(tmp_path, jobs):
     """A process is killed in the middle; the same call goes on with what is missing."""
     store = tmp_path / "runs"
     code = f"""
@@ -101,22 +115,49 @@ def test_a_kill_loses_nothing_that_was_done(tmp_path):
     import pin_nonideal as pn
     from tests.test_sweep_store import pendulum
     parameters = pn.sweep_grid(mass=[1.0 + 0.1 * k for k in range(200)])
-    pn.sweep(pendulum, parameters, 2.0, jobs=1, store={str(store)!r})
+    pn.sweep(pendulum, parameters, 20.0, jobs={jobs}, store={str(store)!r})
     """
-    process = subprocess.Popen([sys.executable, "-c", textwrap.dedent(code)])
+    process = subprocess.Popen([sys.executable, "-c", textwrap.dedent(code)], start_new_session=True)
     deadline = time.monotonic() + 120
-    while len(list(store.rglob("*.npz"))) < 5 and process.poll() is None and time.monotonic() < deadline:
+    while sum(b.count(b"header.npy") // 2 for b in packs(store).values()) < 5 and time.monotonic() < deadline:
+        assert process.poll() is None
         time.sleep(0.01)
-    os.kill(process.pid, signal.SIGKILL)
+    os.killpg(process.pid, signal.SIGKILL)
     process.wait()
-    done = {path: path.stat().st_mtime_ns for path in store.rglob("*.npz")}
-    assert len(done) >= 5
+    begun = packs(store)
+    left = pn.Sweep(store).missing
+    assert 0 < len(left) <= 195
     parameters = pn.sweep_grid(mass=[1.0 + 0.1 * k for k in range(200)])
-    kept = pn.sweep(pendulum, parameters, 2.0, jobs=1, store=store)
-    assert {path: path.stat().st_mtime_ns for path in done} == done
+    kept = pn.sweep(pendulum, parameters, 20.0, jobs=jobs, store=store)
     assert kept.missing == []
+    after = packs(store)
+    assert {path: after[path] for path in begun} == begun
+    assert sum(len(list(runs_in(path, 0))) for path in after) == 200  # none of them twice
     for k in (0, 4, 199):
-        assert_same_run(kept[k], pn.simulate(pendulum(**parameters[k]), 2.0))
+        assert_same_run(kept[k], pn.simulate(pendulum(**parameters[k]), 20.0))
+
+
+def test_a_run_knows_its_robot(tmp_path):
+    """What `load` made is loaded again; a run is an archive as `save` writes it."""
+    points = [{"name": "four_bar"}, {"name": "slider_crank"}]
+    kept = pn.sweep(pn.load, points, 0.1, jobs=1, store=tmp_path / "runs", record="forces")
+    run = kept.load(1)
+    assert run.scene.name == "slider_crank"
+    assert kept[1].scene is None
+    saved = pn.Trajectory.load(run.save(tmp_path / "run.npz"))
+    assert_same_run(saved, pn.simulate(pn.load("slider_crank"), 0.1, record="forces"))
+    with refuses('Trajectory.load: the scene "four_bar" is not the one of the run', pn.InputError):
+        kept.load(1, pn.load("four_bar"))
+    with pytest.raises(IndexError):
+        kept[2]
+
+
+def test_a_store_of_another_form_is_refused(tmp_path):
+    pn.sweep(pendulum, GRID[:1], 0.1, jobs=1, store=tmp_path)
+    index = tmp_path / "index.jsonl"
+    index.write_text(index.read_text().replace('"format": 2', '"format": 1'))
+    with refuses("holds no sweep: ValueError: format 1 instead of 2", pn.LoadingError):
+        pn.sweep(pendulum, GRID[:1], 0.1, jobs=1, store=tmp_path)
 
 
 @pytest.mark.parametrize("stored", [False, True])
@@ -131,6 +172,8 @@ def test_failures_are_results(tmp_path, stored):
         assert "UserFunctionError: actuation raised ValueError: broke" in runs.failures[1]
         assert 0.0 < runs[1].t[-1] < 0.1
         assert runs[1].failure is not None
+        with refuses("has no samples; it failed: InputError: ", pn.LoadingError):
+            runs[2]
     else:
         assert isinstance(runs[1], pn.UserFunctionError)
         assert runs[1].index == 1
@@ -169,24 +212,43 @@ def test_what_a_store_refuses(tmp_path):
         pn.sweep(pendulum, GRID, 0.1, measure=3)
 
 
+class Damped:
+    """Makes pendulums with a damping of its own."""
+
+    def __init__(self, damping):
+        self.damping = damping
+
+    def __call__(self, **parameters):
+        return pendulum(damping=self.damping, **parameters)
+
+
+def test_makers_are_told_apart_by_what_they_hold(tmp_path):
+    for name, maker in (("object", Damped), ("partial", lambda x: functools.partial(pendulum, damping=x))):
+        store, points = tmp_path / name, [{"mass": 1.0}]
+        pn.sweep(maker(0.1), points, 0.1, jobs=1, store=store, atol=np.full(2, 1e-9))
+        pn.sweep(maker(0.1), points, 0.1, jobs=1, store=store, atol=np.full(2, 1e-9))
+        with refuses("holds another sweep", pn.InputError):
+            pn.sweep(maker(0.2), points, 0.1, jobs=1, store=store, atol=np.full(2, 1e-9))
+
+
 def test_a_full_disk_is_named(tmp_path, monkeypatch):
-    """What was done before stays."""
+    """What was done before stays; the run that was cut off is done again."""
+    resource = pytest.importorskip("resource")
     store = tmp_path / "runs"
-    written = []
-    plain = np.savez
-
-    def savez(stream, **arrays):
-        written.append(1)
-        if len(written) > 2:
-            raise OSError(28, "No space left on device")
-        plain(stream, **arrays)
-
-    monkeypatch.setattr(np, "savez", savez)
-    with refuses("cannot write the trajectory to", pn.OutputError):
-        pn.sweep(pendulum, GRID, 0.1, jobs=1, store=store)
-    monkeypatch.setattr(np, "savez", plain)
-    assert len(list(store.rglob("*.npz"))) == 2
-    assert pn.sweep(pendulum, GRID, 0.1, jobs=1, store=store).missing == []
+    whole = pn.sweep(pendulum, GRID, 0.1, jobs=1, store=tmp_path / "whole")
+    size = max(len(content) for content in packs(whole.folder).values())
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    monkeypatch.setattr(sweeping, "SHARES", 1)  # several runs in one file
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(2.5 * size), limits[1]))
+    try:
+        with refuses("cannot write the run to", pn.OutputError):
+            pn.sweep(pendulum, GRID, 0.1, jobs=1, store=store)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert pn.Sweep(store).missing == [2, 3, 4, 5]
+    kept = pn.sweep(pendulum, GRID, 0.1, jobs=1, store=store)
+    assert kept.missing == []
+    assert_are_their_runs(kept, GRID)
 
 
 class Stubborn:
@@ -203,11 +265,21 @@ def test_what_cannot_be_sent_is_named():
 
 # --- Clusters ----------------------------------------------------------------------------------------------
 
+THOUSAND = pn.sweep_grid(mass=np.linspace(1.0, 2.0, 200), damping=[0.05, 0.06, 0.07, 0.08, 0.09])
+
+
+@pytest.mark.slow
+def test_processes_carry_a_sweep(tmp_path):
+    runs = pn.sweep(pendulum, THOUSAND, 0.1, jobs=2)
+    kept = pn.sweep(pendulum, THOUSAND, 0.1, jobs=2, store=tmp_path / "runs")
+    assert_are_their_runs(runs, THOUSAND)
+    assert_are_their_runs(kept, THOUSAND)
+
 
 @pytest.mark.slow
 def test_dask_carries_a_sweep(tmp_path):
     distributed = pytest.importorskip("distributed")
-    parameters = pn.sweep_grid(mass=np.linspace(1.0, 2.0, 20), damping=[0.05, 0.1])
+    parameters = THOUSAND
     client = distributed.Client(n_workers=2, threads_per_worker=1, dashboard_address=None)
     with client, joblib.parallel_config(backend="dask"):
         runs = pn.sweep(pendulum, parameters, 0.1, jobs=-1)
@@ -222,7 +294,7 @@ def test_ray_carries_a_sweep(tmp_path):
     from ray.util.joblib import register_ray
 
     register_ray()
-    parameters = pn.sweep_grid(mass=np.linspace(1.0, 2.0, 20), damping=[0.05, 0.1])
+    parameters = THOUSAND
     ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
     try:
         with joblib.parallel_config(backend="ray"):
