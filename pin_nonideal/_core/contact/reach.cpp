@@ -97,9 +97,27 @@ double Reach::bound(const Workspace& w, int gap) const {
     return of(w, std::get<LimitRow>(kind));
 }
 
-bool Reach::knows(const Program& p, int gap) {
-    return !std::holds_alternative<UserGapRow>(p.blocks[p.gaps[gap].block].kind);
+// Points at the ends of what belongs to a contact move no faster than this; a plane that turns reaches everywhere.
+double Reach::speed(const ContactRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return b.spin > 0.0 ? HUGE_VAL : a.velocity + b.velocity;
 }
+
+double Reach::speed(const CapsulesRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.velocity + kind.half1 * a.spin + b.velocity + kind.half2 * b.spin;
+}
+
+double Reach::speed(const BoxRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.velocity + b.velocity + kind.half.norm() * b.spin;
+}
+
+double Reach::travel(int gap) const {
+    return h_ * std::visit([&](const auto& kind) { return speed(kind); }, p.blocks[p.gaps[gap].block].kind);
+}
+
+bool Reach::knows(const Program& p, int gap) { return !p.is_users(gap); }
 
 // Points that pass by each other at a distance d with the speed u move apart with u^2 / d; that others become the nearest
 // takes off some. What belongs to the contact reaches so far from its frames.

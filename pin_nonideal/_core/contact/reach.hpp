@@ -2,6 +2,8 @@
 // the joints and on their accelerations. With it no touch is leapt over, however long the step.
 #pragma once
 
+#include <cmath>
+
 #include "dynamics/workspace.hpp"
 
 namespace pn {
@@ -19,6 +21,8 @@ public:
     static bool knows(const Program& p, int gap);
     // And below this while the gap is open.
     double rise(const Workspace& w, int gap) const;
+    // By how much the gap may change over the step at most; infinite where that is not known.
+    double travel(int gap) const;
 
 private:
     struct Bound {  // on a body's origin and on its turning
@@ -30,6 +34,11 @@ private:
     double of(const Workspace& w, const CapsulesRow& kind) const;
     double of(const Workspace& w, const BoxRow& kind) const;
     double of(const Workspace& w, const LimitRow& kind) const;
+    double speed(const ContactRow& kind) const;
+    double speed(const CapsulesRow& kind) const;
+    double speed(const BoxRow& kind) const;
+    double speed(const LimitRow& kind) const { return speed_[p.mechanism.joints[kind.joint].iv]; }
+    template <class K> double speed(const K&) const { return HUGE_VAL; }
     double rise(double reach1, double reach2, const Frame& frame1, const Frame& frame2, double radius) const;
 
     const Program& p;

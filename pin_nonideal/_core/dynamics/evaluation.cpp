@@ -41,8 +41,7 @@ void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q,
 // Residuals and A, Eq. (3); and the users' own b.
 static void place_rows(const Program& p, Workspace& w, double t, const VecX& v) {
     const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
-    for (size_t i = 0; i < p.blocks.size(); ++i) {
-        if (w.now.idle[i]) continue;
+    for (int i : w.now.awake) {
         const Block& block = p.blocks[i];
         RowValues& values = w.now.values[i];
         evaluate(block.kind, state, Part::place, values);
@@ -55,8 +54,7 @@ static void place_rows(const Program& p, Workspace& w, double t, const VecX& v) 
 // Rates and b, Eq. (3).
 static void move_rows(const Program& p, Workspace& w, double t, const VecX& v) {
     const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
-    for (size_t i = 0; i < p.blocks.size(); ++i) {
-        if (w.now.idle[i]) continue;
+    for (int i : w.now.awake) {
         const Block& block = p.blocks[i];
         RowValues& values = w.now.values[i];
         evaluate(block.kind, state, Part::motion, values);
@@ -169,12 +167,25 @@ void evaluate_gap(const Program& p, Workspace& w, double t, const VecX& v, int g
     values.has_A = values.constant_A;
 }
 
+void measure_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) {
+    if (p.is_users(gap)) return evaluate_gap(p, w, t, v, gap);
+    const int i = p.gaps[gap].block;
+    evaluate(p.blocks[i].kind, State{p.mechanism, w.now.terms, t, w.now.terms.q, v}, Part::residual, w.now.values[i]);
+}
+
+void follow_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) {
+    measure_gap(p, w, t, v, gap);
+    if (p.is_users(gap)) return;
+    const int i = p.gaps[gap].block;
+    evaluate(p.blocks[i].kind, State{p.mechanism, w.now.terms, t, w.now.terms.q, v}, Part::motion, w.now.values[i]);
+}
+
 // A contact violates where its gap is negative; that of an open one is looked at here only.
 static void gap_violations(const Program& p, Workspace& w, double t, const VecX& v, double& position,
                            double& velocity) {
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
         const RowValues& values = w.now.values[p.gaps[i].block];
-        if (!w.state.closed[i]) evaluate_gap(p, w, t, v, i);
+        if (!w.state.closed[i]) measure_gap(p, w, t, v, i);
         else velocity = std::max(velocity, std::abs(values.rate[0]));
         position = std::max(position, -values.residual[0]);
     }

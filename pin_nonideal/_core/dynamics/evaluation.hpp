@@ -21,7 +21,10 @@ void update_kinematics(const Program& p, Workspace& w, double t, const VecX& q, 
 void evaluate_rows(const Program& p, Workspace& w, double t, const VecX& v);
 void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 
-// Residual, rate, drift and A of the row of a gap, open or closed, for bodies in motion.
+// The row of a gap, open or closed: its residual, for bodies that are placed; its rate and drift too, for bodies in motion;
+// and A. A function of the user's gives them all at once.
+void measure_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
+void follow_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
 void evaluate_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
 
 // Largest residual and rate over all rows of all descriptions at the state last evaluated; of contacts that may open

@@ -74,6 +74,9 @@ struct Program {
     // Those of all rows of constraints and contacts, as users number them.
     VecX user_multipliers(const VecX& lam) const;
 
+    // Whether a function of the user's measures a gap.
+    bool is_users(int gap) const { return std::holds_alternative<UserGapRow>(blocks[gaps[gap].block].kind); }
+
     // A law, with places for its states.
     void add(Law law);
     // Numbers the kept rows, finds supports and lays out the storage; once, before the program is shared.

@@ -134,7 +134,7 @@ void add_slip_force(const Program& p, Workspace& w, int e, VecX& C) {
 }
 
 void add_slip_forces(const Program& p, Workspace& w, bool loaded, VecX& C) {
-    for (size_t e = 0; e < p.frictions.size(); ++e)
+    for (int e : w.now.slipping)
         if ((p.frictions[e].reaction != Reaction::none) == loaded) add_slip_force(p, w, e, C);
 }
 

@@ -20,8 +20,8 @@ struct Unknowns {
     // Calls the first for each slipping element, then the second for each law, in the order of the unknowns.
     template <class OnElement, class OnLaw>
     void each(const OnElement& on_element, const OnLaw& on_law) const {
-        for (size_t e = 0; e < p.frictions.size(); ++e)
-            if (p.frictions[e].reaction == Reaction::total && slips(w.state.mode[e])) on_element(e);
+        for (int e : w.now.slipping)
+            if (p.frictions[e].reaction == Reaction::total) on_element(static_cast<size_t>(e));
         each_law<UserLaw>(p.laws, [&](const UserLaw& law) { if (law.reaction == Reaction::total) on_law(law); });
     }
     std::vector<int> elements() const;

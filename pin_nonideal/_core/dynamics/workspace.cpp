@@ -30,6 +30,9 @@ static void size(const Program& p, Evaluation& now) {
     now.values.resize(p.blocks.size());
     for (size_t i = 0; i < p.blocks.size(); ++i) now.values[i].resize(p.blocks[i].kind, nv);
     now.idle.assign(p.blocks.size(), 0);
+    now.awake.reserve(p.blocks.size());
+    now.loaded.reserve(elements);
+    now.slipping.reserve(elements);
     now.A.assign(p.entries, 0.0);
     now.B.assign(p.entries, 0.0);
     for (VecX* x : {&now.b, &now.lam, &now.closing_lam, &now.reactions.lam}) *x = VecX::Zero(p.layout.rows);
@@ -77,10 +80,20 @@ void select_rows(const Program& p, Workspace& w) {
         for (int e : gap.elements) w.now.idle[p.frictions[e].block] = open;
         if (open) std::fill_n(w.now.rows.required.begin() + block.row, block.kept.size(), char(0));
     }
+    w.now.awake.clear();
+    for (size_t i = 0; i < p.blocks.size(); ++i)
+        if (!w.now.idle[i]) w.now.awake.push_back(static_cast<int>(i));
+    w.now.loaded.clear();
+    w.now.slipping.clear();
     std::fill(w.now.terms.locked.begin(), w.now.terms.locked.end(), char(0));
     for (size_t e = 0; e < p.frictions.size(); ++e) {
         const Block& block = p.blocks[p.frictions[e].block];
-        if (w.state.mode[e] != sticking) continue;
+        if (w.state.mode[e] == unloaded) continue;
+        w.now.loaded.push_back(static_cast<int>(e));
+        if (w.state.mode[e] != sticking) {
+            w.now.slipping.push_back(static_cast<int>(e));
+            continue;
+        }
         if (block.dof >= 0)
             for (int k = 0; k < block.total; ++k) w.now.terms.locked[block.dof + k] = 1;
         else
@@ -106,10 +119,16 @@ void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes) {
 void set_closed(const Program& p, Workspace& w, const std::vector<char>& closed) {
     std::vector<Mode> modes = w.state.mode;
     for (size_t i = 0; i < closed.size(); ++i) {
-        const Block& block = p.blocks[p.gaps[i].block];
-        if (!closed[i]) w.now.lam.segment(block.row, block.kept.size()).setZero();
         if (closed[i] == w.state.closed[i]) continue;
         for (int e : p.gaps[i].elements) modes[e] = unloaded;
+    }
+    set_contacts(p, w, closed, modes);
+}
+
+void set_contacts(const Program& p, Workspace& w, const std::vector<char>& closed, const std::vector<Mode>& modes) {
+    for (size_t i = 0; i < closed.size(); ++i) {
+        const Block& block = p.blocks[p.gaps[i].block];
+        if (!closed[i]) w.now.lam.segment(block.row, block.kept.size()).setZero();
     }
     w.state.closed = closed;
     set_modes(p, w, modes);

@@ -63,6 +63,8 @@ struct Evaluation {
     Terms terms;
     std::vector<RowValues> values;  // of each block
     std::vector<char> idle;  // blocks of open contacts, which are no rows and are not evaluated
+    std::vector<int> awake;              // the other blocks
+    std::vector<int> loaded, slipping;   // elements that rub, at rest or not; those that slip
     std::vector<double> A, B;
     RowSystem rows, ideal_rows;  // ideal: of the constraints without what sticks; IdealMotion swaps them in
     VecX b, lam;  // by kept row
@@ -128,6 +130,8 @@ void select_rows(const Program& p, Workspace& w);
 void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes);
 // The same for contacts: friction of those that open ends, that of those that close has no mode yet.
 void set_closed(const Program& p, Workspace& w, const std::vector<char>& closed);
+// Both at once.
+void set_contacts(const Program& p, Workspace& w, const std::vector<char>& closed, const std::vector<Mode>& modes);
 // Whether an element rubs at a contact that is open.
 inline bool is_open(const Program& p, const Workspace& w, int element) {
     const int gap = p.frictions[element].gap;

@@ -33,8 +33,8 @@ static void fields(Archive& a, Progress& x) {
            bridged_end, slip_at_start, pulls, gaps, impact_energy, several, stiff_steps, quiet_steps, rounding, next_look,
            turning_steps] = x;
     a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, bridged_time, bridged_end,
-      slip_at_start, pulls, gaps.width, gaps.rate, gaps.separation, impact_energy, several, stiff_steps, quiet_steps,
-      rounding, next_look, turning_steps);
+      slip_at_start, pulls, gaps.width, gaps.rate, gaps.separation, gaps.sure, gaps.travel, gaps.stale, impact_energy,
+      several, stiff_steps, quiet_steps, rounding, next_look, turning_steps);
     a.list(recent_events);
 }
 

@@ -39,7 +39,7 @@ constexpr double least_later = 1e-11, further_part = 10.0;
 }  // namespace
 
 EventLocator::EventLocator(System& system, Stepper& stepper, const std::vector<double>& slip_at_start,
-                           const std::vector<char>& pulls, const GapState& gaps_at_start)
+                           const std::vector<char>& pulls, GapState& gaps_at_start)
     : system_(system), stepper_(stepper), p(system.p), w(system.w), slip_at_start_(slip_at_start),
       search_(system, stepper, pulls, gaps_at_start) {}
 

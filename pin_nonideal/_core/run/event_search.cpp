@@ -43,7 +43,7 @@ constexpr double confirmed_width = 1e-4;
 }  // namespace
 
 EventSearch::EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls,
-                         const GapState& gaps_at_start)
+                         GapState& gaps_at_start)
     : system_(system), stepper_(stepper), p(system.p), w(system.w), pulls_(pulls),
       gaps_(system, stepper, gaps_at_start), probe_(VecX::Zero(system.ny)),
       probe_rate_(probe_) {}

@@ -16,11 +16,13 @@ namespace {
 constexpr double between_stages = 2.0;
 // A gap that hovers about its plane is not followed further than so many looks: it has closed.
 constexpr int most_looks = 4000;
+// Bodies are allowed this many times their travel, for what projections add.
+constexpr double travel_factor = 2.0;
 constexpr double rate_rounding = 1e-12;  // part of the rates of a gap that moves evenly
 
 }  // namespace
 
-GapSearch::GapSearch(System& system, Stepper& stepper, const GapState& at_start)
+GapSearch::GapSearch(System& system, Stepper& stepper, GapState& at_start)
     : system_(system), stepper_(stepper), p(system.p), w(system.w), start_(at_start), reach_(system.p),
       end_(p.gaps.size()), bends_(p.gaps.size()), speed_(VecX::Zero(system.nv)),
       acceleration_(speed_), probe_(VecX::Zero(system.ny)) {}
@@ -49,17 +51,45 @@ GapSearch::Bends GapSearch::bends(int gap) const {
     return {most, most};
 }
 
+bool GapSearch::stays_far(int gap) {
+    const double travel = travel_factor * reach_.travel(gap);
+    if (!(travel < start_.sure[gap])) return false;
+    start_.travel[gap] = travel;
+    return true;
+}
+
+// Of gaps that were not looked at in the steps before.
+void GapSearch::look_at_starts(const std::vector<int>& gaps) {
+    system_.read(stepper_.y0);
+    kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
+    for (int gap : gaps) {
+        follow_gap(p, w, stepper_.t0, system_.v, gap);
+        start_.look(p, w, gap);
+    }
+    system_.read(stepper_.y1);
+    kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
+}
+
 std::vector<int> GapSearch::doubtful() {
     std::vector<int> list;
     const int n = static_cast<int>(p.gaps.size());
     rounding_ = gap_rounding * scene_size(p, w);
-    bool bounded = false;
     system_.read(stepper_.y1);
+    near_.clear();
+    unseen_.clear();
+    bool bounded = false;
     for (int i = 0; i < n; ++i) {
+        start_.travel[i] = 0.0;
         if (w.state.closed[i] || is_bare(p, i)) continue;
         if (!bounded) bound_rates();
         bounded = true;
-        evaluate_gap(p, w, stepper_.t0 + stepper_.h, system_.v, i);
+        if (stays_far(i)) continue;
+        near_.push_back(i);
+        if (start_.stale[i]) unseen_.push_back(i);
+    }
+    if (!unseen_.empty()) look_at_starts(unseen_);
+    for (int i : near_) {
+        follow_gap(p, w, stepper_.t0 + stepper_.h, system_.v, i);
         end_[i] = look_here(i, 1.0);
         bends_[i] = bends(i);
         if (!stays_open(look_at_start(i), end_[i], bends_[i].below)) list.push_back(i);
@@ -102,7 +132,7 @@ GapSearch::Look GapSearch::look(int gap, double part) {
     stepper_.interpolate(part, probe_);
     system_.read(probe_);
     kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
-    evaluate_gap(p, w, stepper_.t0 + part * stepper_.h, system_.v, gap);
+    follow_gap(p, w, stepper_.t0 + part * stepper_.h, system_.v, gap);
     return look_here(gap, part);
 }
 
@@ -142,13 +172,24 @@ std::optional<GapSearch::Touch> GapSearch::first_touch(int gap) {
     return search(gap, look_at_start(gap), end_[gap], bends_[gap]);
 }
 
+void GapState::look(const Program& p, const Workspace& w, int gap) {
+    width[gap] = sure[gap] = gap_width(p, w, gap);
+    rate[gap] = gap_rate(p, w, gap);
+    stale[gap] = 0;
+    if (Separation::has(p, gap)) separation[gap] = Separation::of(p, w, gap);
+}
+
 void look_at_gaps(System& system, double t, GapState& out) {
     for (int i = 0; i < static_cast<int>(system.p.gaps.size()); ++i) {
         if (is_bare(system.p, i)) continue;
-        evaluate_gap(system.p, system.w, t, system.v, i);
-        out.width[i] = gap_width(system.p, system.w, i);
-        out.rate[i] = gap_rate(system.p, system.w, i);
-        if (Separation::has(system.p, i)) out.separation[i] = Separation::of(system.p, system.w, i);
+        if (out.travel[i] > 0.0) {
+            out.sure[i] -= out.travel[i];
+            out.travel[i] = 0.0;
+            out.stale[i] = 1;
+            continue;
+        }
+        follow_gap(system.p, system.w, t, system.v, i);
+        out.look(system.p, system.w, i);
     }
 }
 

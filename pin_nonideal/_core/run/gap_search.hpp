@@ -12,17 +12,24 @@
 
 namespace pn {
 
-// Widths and rates of all gaps at one instant, and how the round bodies among them face each other.
+// Widths and rates of all gaps at one instant, and how the round bodies among them face each other. A gap that is wide
+// beside what its bodies can travel is not looked at, step after step, as long as it is sure to be open.
 struct GapState {
     std::vector<double> width, rate;
     std::vector<Separation> separation;
+    std::vector<double> sure;    // width that is left of the one looked at last, whatever moved since
+    std::vector<double> travel;  // over the step at hand, of gaps that are not looked at; else zero
+    std::vector<char> stale;     // whether width, rate and separation are of an earlier instant
 
-    explicit GapState(size_t gaps = 0) : width(gaps, 0.0), rate(gaps, 0.0), separation(gaps) {}
+    explicit GapState(size_t gaps = 0)
+        : width(gaps, 0.0), rate(gaps, 0.0), separation(gaps), sure(gaps, 0.0), travel(gaps, 0.0), stale(gaps, 0) {}
+    // Of the gap that the workspace is evaluated for.
+    void look(const Program& p, const Workspace& w, int gap);
 };
 
 class GapSearch {
 public:
-    GapSearch(System& system, Stepper& stepper, const GapState& at_start);
+    GapSearch(System& system, Stepper& stepper, GapState& at_start);
 
     // Gaps that may close in the step; the workspace must be evaluated at its end, and stays so.
     std::vector<int> doubtful();
@@ -45,22 +52,26 @@ private:
     std::optional<Touch> search(int gap, const Look& a, const Look& b, const Bends& bends);
     Touch between(int gap, const Look& a, const Look& b);
     void bound_rates();
+    bool stays_far(int gap);
+    void look_at_starts(const std::vector<int>& gaps);
     Bends bends(int gap) const;
 
     System& system_;
     Stepper& stepper_;
     const Program& p;
     Workspace& w;
-    const GapState& start_;
+    GapState& start_;
     Reach reach_;
     std::vector<Look> end_;
     std::vector<Bends> bends_;
+    std::vector<int> near_, unseen_;
     VecX speed_, acceleration_, probe_;
     double rounding_ = 0.0;
     int looks_ = 0;
 };
 
-// Widths and rates of all gaps at the state that the workspace is evaluated at.
+// Widths and rates of the gaps at the state that the workspace is evaluated at, but for those that stayed far in the step
+// before.
 void look_at_gaps(System& system, double t, GapState& out);
 
 }  // namespace pn

@@ -31,6 +31,7 @@ MoreauContacts::MoreauContacts(System& system)
       v0_(VecX::Zero(system.nv)), v1_(v0_), a_free_(v0_),
       power_(VecX::Zero(system.nw)), zero_(VecX::Zero(p.layout.rows)), force_(v0_) {
     if (system.ng == 0) return;
+    for (int i = 0; i < system.ng; ++i) users_ |= p.is_users(i);
     const int most = p.layout.rows;
     unit_ = lam_ = lam_free_ = zero_;
     w0_ = f_ = VecX::Zero(most);
@@ -57,8 +58,7 @@ void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, dou
     solve(middle);
     end_velocity();
     if (system_.energy) book_work(y, moved_energy, impact_energy);
-    set_closed(p, w, closed_);
-    set_modes(p, w, modes_);
+    set_contacts(p, w, closed_, modes_);
     if (system_.nz > 0) y.segment(system_.nq + system_.nv, system_.nz) += h * w.now.dz;
     force_ = 0.5 * h * v1_;
     retract(m, q_mid_.data(), force_.data(), y.data());
@@ -67,10 +67,11 @@ void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, dou
 
 // Contacts whose gap is closed at the step's middle, and those that were closed: their loads tell whether they stay so.
 void MoreauContacts::find_active(double t) {
-    update_kinematics(p, w, t, q_mid_, v0_);
+    if (users_) update_kinematics(p, w, t, q_mid_, v0_);
+    else place_bodies(p.mechanism, w.now.terms, q_mid_);
     for (int i = 0; i < system_.ng; ++i) {
         if (is_bare(p, i)) continue;
-        evaluate_gap(p, w, t, v0_, i);
+        measure_gap(p, w, t, v0_, i);
         active_[i] = w.state.closed[i] || gap_width(p, w, i) <= 0.0;
     }
 }
@@ -78,12 +79,15 @@ void MoreauContacts::find_active(double t) {
 // The motion without contacts and dry friction, constraints met at the step's end: half of what rows change by
 // themselves is still to come at its middle.
 void MoreauContacts::solve_free(double t) {
-    set_closed(p, w, active_);
-    set_modes(p, w, unloaded_);
-    for (const Gap& gap : p.gaps)
-        for (size_t k = 0; k < p.blocks[gap.block].kept.size(); ++k)
-            w.now.rows.required[p.blocks[gap.block].row + k] = 0;
-    w.now.rows.use_required(p.blocks);
+    set_contacts(p, w, active_, unloaded_);
+    bool any = false;
+    for (int i = 0; i < system_.ng; ++i) {
+        if (!active_[i]) continue;
+        any = true;
+        const Block& block = p.blocks[p.gaps[i].block];
+        std::fill_n(w.now.rows.required.begin() + block.row, block.kept.size(), char(0));
+    }
+    if (any) w.now.rows.use_required(p.blocks);
     begin_step(p, w, t, q_mid_, v0_);
     unit_ = w.now.b;
     for (int i = 0; i < p.first_gap; ++i) {

@@ -44,6 +44,7 @@ private:
     const Program& p;
     Workspace& w;
     double h_ = 0.0;
+    bool users_ = false;  // gaps that functions of the user's measure
     std::vector<char> active_, closed_;
     std::vector<Mode> modes_, unloaded_;
     std::vector<Row> rows_;

@@ -300,7 +300,10 @@ bool Simulation::locate_event(const Proposal& proposal) {
     }
     ++out.rejected;
     h = shortened * proposal.size;
-    if (system.ne > 0) w.state = before_step;
+    if (system.ne > 0) {
+        set_contacts(p, w, before_step.closed, before_step.mode);
+        w.state = before_step;
+    }
     system.read(y);
     begin_step(p, w, t, system.q, system.v);
     return false;

@@ -61,9 +61,9 @@ void System::write_rate(double t, VecX& dy) {
 }
 
 void System::watch(double t, VecX& dy) {
-    for (int e = 0; e < ne; ++e) {
+    dy.segment(ns, 2 * ne).setZero();
+    for (int e : w.now.loaded) {
         double *of_element = dy.data() + ns + 2 * e, &share = of_element[0], &rate = of_element[1];
-        share = rate = 0.0;
         if (slips(w.state.mode[e])) {
             const auto [speed, change] = slip_toward_rest(p, w, e);
             share = speed;
