@@ -35,6 +35,7 @@ STEPS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)  # [s]
 LEVELS = (1e-2, 1e-4, 1e-6, 1e-8)
 STEP = 1e-3  # of time stepping, where one step is timed [s]
 OPEN = (4, 16)  # contacts that stay open
+LEAST_STEPS = 1000  # of time stepping in a batch
 FALLS = (1, 2, 4, 8)  # contacts that strike at once
 
 
@@ -253,12 +254,13 @@ def curve(case: Case, rivals: bool, quick: bool, say: Callable[[str], None]) -> 
 
 
 def steps_of(scene: pn.Scene, h: float, **start: Any) -> timing.Batch:
-    """Steps of time stepping, the call's own cost beside."""
+    """Steps of time stepping, so many at least that the start of a run counts little."""
 
     def batch(count: int) -> float:
+        steps = max(count, LEAST_STEPS)
         begin = timing.clock()
-        pn.simulate(scene, count * h, method="moreau", dt=h, output_dt=count * h, **start)
-        return (timing.clock() - begin) / count
+        pn.simulate(scene, steps * h, method="moreau", dt=h, output_dt=steps * h, **start)
+        return (timing.clock() - begin) / steps
 
     return batch
 

@@ -146,9 +146,13 @@ void keep_moving(const Program& p, Workspace& w, double t, const VecX& q, const 
     if (tolerance >= most_unheld) choose(rank_tolerance_sticking);
 }
 
-void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
+void begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     configure(p, w, t, q, v);
     configure_step(p, w);
+}
+
+void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
+    begin_rows(p, w, t, q, v);
     project(p, w, t, q, v);
 }
 

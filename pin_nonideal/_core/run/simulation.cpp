@@ -460,7 +460,7 @@ void Simulation::step_in_time(double stop, double dt) {
     t = end;
     system.read(y);
     // Factors of the new modes: what sticks must not move as the rest is projected.
-    begin_step(p, w, t, system.q, system.v);
+    begin_rows(p, w, t, system.q, system.v);
     system.project_and_evaluate(t, y, rate);
     output.configured_now();
     remember_directions(system, slip_at_start);
