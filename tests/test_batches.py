@@ -183,7 +183,19 @@ REFUSED = {
     "no field": ({"rub": {"nu": [0.1] * N}}, '"rub": no field "nu"; nearest: "mu"'),
     "one number": ({"rub": {"mu": 0.1}}, '"rub": mu must be 3 values, one a run; got 0.1'),
     "too few": ({"rub": {"mu": [0.1]}}, '"rub": mu must be 3 values, one a run; got [0.1]'),
-    "negative": ({"rub": {"mu": [0.1, -1.0, 0.1]}}, 'JointFriction "rub": mu must not be negative; got -1'),
+    "negative": (
+        {"rub": {"mu": [0.1, -1.0, 0.1]}},
+        'run 1: JointFriction "rub": mu must not be negative; got -1',
+    ),
+    "negative mass": ({"b": {"mass": [1.0, 1.0, -1.0]}}, "run 2 has a mass of -1 kg"),
+    "no inertia": (
+        {"b": {"inertia": [[1.0, *[0.0] * 3, 1, 0, 1, 0, 0, 1], [1.0, *[0.0] * 3, 1, 0, 1, 0, 0, -1]] * 2}},
+        "inertia must have shape (3, 10); got shape (4, 10)",
+    ),
+    "negative inertia": (
+        {"b": {"inertia": [[1.0, *[0.0] * 3, 1, 0, 1, 0, 0, z] for z in (1, -1, 1)]}},
+        "run 1 has a mass of 1 kg and a least moment of -1 kg m^2",
+    ),
     "ceases": (
         {"rub": {"viscous": [0.0, 0.1, 0.1]}},
         "is more than other numbers: something would begin or cease to act; keep zeros zero",

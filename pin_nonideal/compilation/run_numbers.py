@@ -133,17 +133,27 @@ def _body(compiled: CompiledScene, name: str, given: Mapping[str, Any], n: int) 
     own = compiled.model.inertias[joint]
     if "mass" in given:
         mass = array(f"{who}: mass", given["mass"], (n,))
-        bodies = [pin.Inertia(m, own.lever, own.inertia * (m / own.mass)) for m in mass] if own.mass else []
     else:
         dynamic = array(f"{who}: inertia", given["inertia"], (n, 10))
         mass = dynamic[:, 0]
-        bodies = [pin.Inertia.FromDynamicParameters(p) for p in dynamic] if (mass > 0.0).all() else []
+    if own.mass == 0.0 and "mass" in given:
+        raise InputError(f'{who}: the body has no mass, whose inertia would go with it; give "inertia"')
+    heavy = mass > 0.0  # of others Pinocchio makes no inertia
+    if not heavy.all():
+        bodies = []
+    elif "mass" in given:
+        bodies = [pin.Inertia(m, own.lever, own.inertia * (m / own.mass)) for m in mass]
+    else:
+        bodies = [pin.Inertia.FromDynamicParameters(p) for p in dynamic]
     turns = np.array([body.inertia for body in bodies]).reshape(-1, 3, 3)
     moments = np.linalg.eigvalsh(turns)
-    if not bodies or not (mass > 0.0).all() or (moments[:, 0] < -ROUNDING * moments[:, 2]).any():
+    good = heavy if not bodies else moments[:, 0] >= -ROUNDING * moments[:, 2]
+    if not good.all():
+        k = int(np.argmin(good))
+        least = f" and a least moment of {moments[k, 0]:g} kg m^2" if bodies else ""
         raise InputError(
             f"{who}: masses must be positive, and so moments of inertia about the center of mass; "
-            f"the least mass is {mass.min(initial=own.mass):g} kg"
+            f"run {k} has a mass of {mass[k]:g} kg{least}"
         )
     return {
         ("body", joint, "mass"): mass,
@@ -184,7 +194,10 @@ def _descriptions(name: str, described: Any, given: Any, n: int) -> Iterator[Any
     plain = {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in given.items()}
     for k in range(n):
         one: Any = described
-        yield replace(one, **{key: values[k] for key, values in plain.items()})
+        try:
+            yield replace(one, **{key: values[k] for key, values in plain.items()})
+        except InputError as error:
+            raise InputError(f"rollout: parameters: run {k}: {error}") from None
 
 
 class _Recorder:
