@@ -101,16 +101,17 @@ def _packed(value: Any, what: str, scene: str) -> Any:
         return value
     except Exception as error:  # pickle raises whatever the object's own methods raise
         reason = f"{type(error).__name__}: {error}"
+    advice = "define its functions in a module"
     try:
         import cloudpickle
 
         return Packed(cloudpickle.dumps(value))
+    except ImportError:
+        advice += ", or pip install cloudpickle"
     except Exception as error:
         reason = f"{reason}; {type(error).__name__}: {error}"
-    raise InputError(
-        f'scene "{scene}" cannot be pickled: {what} cannot ({reason}); define its functions in a module, or '
-        "pip install cloudpickle"
-    )
+        advice += ", and leave out of them what cannot travel"
+    raise InputError(f'scene "{scene}" cannot be pickled: {what} cannot ({reason}); {advice}')
 
 
 def _unpacked(value: Any) -> Any:

@@ -90,6 +90,8 @@ def sweep(
     keep = choice("sweep: failures", failures, ("raise", "keep")) == "keep"
     if measure is not None:
         function("sweep: measure", measure, "(run) -> numbers by name")
+        if store is None:
+            raise InputError("sweep: measure writes into the index of a store; name one, or measure the runs")
     options.setdefault("progress", False)
     folder = None if store is None else file_path("sweep: store", store)
     numbers = list(range(len(table)))
@@ -132,9 +134,22 @@ def _carried(
     except (pickle.PicklingError, TypeError, AttributeError) as error:
         if "pickle" not in str(error):
             raise
-        raise InputError(
-            f"sweep: make, measure and parameters must be such that another process can have them; {error}"
-        ) from error
+        raise InputError(f"sweep: {_unsendable(work, runs)}") from error
+
+
+def _unsendable(work: _Work, runs: list[Any]) -> str:
+    """Says what of a sweep another process cannot have, and why."""
+    try:
+        import cloudpickle
+    except ImportError:  # joblib before 1.6 brings its own
+        from joblib.externals import cloudpickle
+    parts = [("make", work.make), ("measure", work.measure), *work.options.items()]
+    for name, value in [*parts, *((f"parameters[{k}]", entry) for k, entry in runs)]:
+        try:
+            cloudpickle.dumps(value)
+        except Exception as error:  # whatever the object's own methods raise
+            return f"{name} must be such that another process can have it; {type(error).__name__}: {error}"
+    return "what a run leaves must be such that another process can have it; give it a store"
 
 
 class _Work:
@@ -183,13 +198,16 @@ class _Work:
 
     def _scene(self, entry: Table) -> Any:
         try:
-            return self.make(**entry)
+            scene = self.make(**entry)
         except PinNonidealError:
             raise
         except Exception as error:
             raise UserFunctionError(
                 f"sweep: make raised {type(error).__name__}: {error}; it was called with {entry!r}"
             ) from error
+        if not isinstance(scene, Scene):
+            raise UserFunctionError(f"sweep: make must return a Scene; got {scene!r} for {entry!r}")
+        return scene
 
     def _measured(self, run: Trajectory) -> Table:
         found = named(self.measure, "sweep: measure")(run)

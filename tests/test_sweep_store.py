@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 from pathlib import Path
 
@@ -206,6 +207,12 @@ def test_what_a_store_refuses(tmp_path):
         pn.sweep(pendulum, [{1: 2}], 0.1)
     with refuses("sweep: make raised TypeError: ", pn.UserFunctionError):
         pn.sweep(len, GRID, 0.1, jobs=1)
+    with refuses(
+        "sweep: make must return a Scene; got 1.0 for {'mass': 1.0, 'damping': 0.05}", pn.UserFunctionError
+    ):
+        pn.sweep(lambda mass, damping: mass, GRID, 0.1, jobs=1)
+    with refuses("sweep: measure writes into the index of a store; name one", pn.InputError):
+        pn.sweep(pendulum, GRID, 0.1, measure=amplitude)
     with refuses("sweep: measure must return numbers by name; got 3", pn.UserFunctionError):
         pn.sweep(pendulum, GRID, 0.1, jobs=1, store=tmp_path / "three", measure=lambda run: 3)
     with refuses("sweep: measure must be a function (run) -> numbers by name; got 3", pn.InputError):
@@ -257,10 +264,14 @@ class Stubborn:
 
 
 def test_what_cannot_be_sent_is_named():
-    with refuses(
-        "sweep: make, measure and parameters must be such that another process can have them", pn.InputError
-    ):
-        pn.sweep(pendulum, [{"mass": Stubborn()}, {"mass": Stubborn()}], 0.1, jobs=2)
+    lock = threading.Lock()
+    reason = "must be such that another process can have it; TypeError: cannot pickle"
+    with refuses(f"sweep: parameters[1] {reason}", pn.InputError):
+        pn.sweep(pendulum, [{"mass": 1.0}, {"mass": Stubborn()}], 0.1, jobs=2)
+    with refuses(f"sweep: make {reason}", pn.InputError):
+        pn.sweep(lambda mass: pendulum(mass, lock), [{"mass": 1.0}] * 2, 0.1, jobs=2)
+    with refuses(f"sweep: callback {reason}", pn.InputError):
+        pn.sweep(pendulum, [{"mass": 1.0}] * 2, 0.1, jobs=2, callback=lambda t, q, v: bool(lock))
 
 
 # --- Clusters ----------------------------------------------------------------------------------------------
