@@ -9,7 +9,8 @@ namespace pn {
 void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 // The part of it that needs no forces: configures, and decides which rows are independent.
 void begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// An evaluation that decides them too, where the workspace is configured, after v was brought to A v + phi_t = 0; returns whether v moved.
+// An evaluation that decides them too, where the workspace is configured, after v was brought to A v + phi_t = 0; returns
+// whether v moved.
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v);
 // Where modes have changed and rows just chosen would stop what moves: those that elements which stick hold by hardly any
 // of their forces count as dependent from here on. The workspace must be evaluated at (q, v), and is so after.

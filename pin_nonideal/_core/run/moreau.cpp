@@ -46,17 +46,20 @@ void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
     y.segment(system_.nq, system_.nv) = v1_;
 }
 
-// The motion without friction of the elements, constraints met at the end of the step: half of what rows change by
-// themselves in a step is still to come at its middle.
+void meet_at_end(const Program& p, const Evaluation& now, double h, VecX& b) {
+    for (int i = 0; i < p.first_gap; ++i) {
+        const Block& block = p.blocks[i];
+        for (size_t k = 0; k < block.kept.size(); ++k)
+            b[block.row + k] = 0.5 * b[block.row + k] - now.values[i].rate[block.kept[k]] / h;
+    }
+}
+
+// The motion without friction of the elements, constraints met at the end of the step.
 void Moreau::solve_without_friction(double t) {
     set_modes(p, w, std::vector<Mode>(system_.ne, unloaded));
     begin_step(p, w, t, q_mid_, v0_);
     VecX b = w.now.b;
-    for (int i = 0; i < p.constraints; ++i) {
-        const Block& block = p.blocks[i];
-        for (size_t k = 0; k < block.kept.size(); ++k)
-            b[block.row + k] = 0.5 * b[block.row + k] - w.now.values[i].rate[block.kept[k]] / h_;
-    }
+    meet_at_end(p, w.now, h_, b);
     a_free_ = w.now.a;
     lam_free_ = w.now.lam;
     solve_motion(p, w, p.has_laws(), b, a_free_, lam_free_);

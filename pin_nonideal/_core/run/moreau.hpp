@@ -10,6 +10,10 @@
 
 namespace pn {
 
+// Right-hand sides b by which constraints are met at the end of a step of length h, in whose middle they are evaluated:
+// half of what their rows change by themselves is still to come.
+void meet_at_end(const Program& p, const Evaluation& now, double h, VecX& b);
+
 class Moreau {
 public:
     explicit Moreau(System& system);

@@ -11,6 +11,7 @@
 #include "dynamics/slip.hpp"
 #include "dynamics/solution.hpp"
 #include "dynamics/step_start.hpp"
+#include "run/moreau.hpp"
 #include "tree/factor.hpp"
 #include "tree/liegroup.hpp"
 
@@ -76,8 +77,7 @@ void MoreauContacts::find_active(double t) {
     }
 }
 
-// The motion without contacts and dry friction, constraints met at the step's end: half of what rows change by
-// themselves is still to come at its middle.
+// The motion without contacts and dry friction, constraints met at the step's end.
 void MoreauContacts::solve_free(double t) {
     set_contacts(p, w, active_, unloaded_);
     bool any = false;
@@ -90,11 +90,7 @@ void MoreauContacts::solve_free(double t) {
     if (any) w.now.rows.use_required(p.blocks);
     begin_step(p, w, t, q_mid_, v0_);
     unit_ = w.now.b;
-    for (int i = 0; i < p.first_gap; ++i) {
-        const Block& block = p.blocks[i];
-        for (size_t k = 0; k < block.kept.size(); ++k)
-            unit_[block.row + k] = 0.5 * unit_[block.row + k] - w.now.values[i].rate[block.kept[k]] / h_;
-    }
+    meet_at_end(p, w.now, h_, unit_);
     a_free_ = w.now.a;
     lam_free_ = w.now.lam;
     solve_motion(p, w, p.has_laws(), unit_, a_free_, lam_free_);
