@@ -8,7 +8,7 @@ import re
 import stat
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -66,6 +66,7 @@ def whole_file(path: Path, what: str) -> Iterator[IO[bytes]]:
             yield stream
             stream.flush()
             os.fsync(stream.fileno())  # on the disk before it bears its name
+        _keep_owner(target, temporary)
         os.chmod(temporary, mode)
         os.replace(temporary, target)
     except BaseException as error:
@@ -96,6 +97,14 @@ def mode_of(path: Path, what: str) -> int:
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
         raise OutputError(f'cannot write {what} to "{path}": it is a device or a pipe; name a file')
     return stat.S_IMODE(mode)
+
+
+def _keep_owner(target: Path, temporary: str) -> None:
+    """The file that is there keeps its owner and group, as far as this process may give files away."""
+    if hasattr(os, "chown"):
+        with suppress(OSError):
+            there = target.stat()
+            os.chown(temporary, there.st_uid, there.st_gid)
 
 
 def _part(target: Path, process: int) -> str:

@@ -22,6 +22,7 @@ from .formats.robot_yaml import MODEL_KEYS, check_keys, optional_string, read_ya
 from .formats.rounding import relaxed
 from .formats.starts import Start
 from .formats.urdf import RobotFile, read_urdf
+from .formats.xml import listed
 from .scene import Scene, loaded
 from .types import Table
 
@@ -109,12 +110,14 @@ def load(
 def _use_limits(arguments: Table, used: bool) -> None:
     """Stops of the joints whose positions the model bounds, or a note that there are some."""
     model = arguments["model"]
-    bounded = [
-        str(model.names[i])
-        for i, joint in enumerate(model.joints)
-        if i and joint.nq == joint.nv == 1 and has_stops(model, joint.idx_q)
-    ]
+    single = [(i, j.idx_q) for i, j in enumerate(model.joints) if i and j.nq == j.nv == 1]
+    low, high = model.lowerPositionLimit, model.upperPositionLimit
+    bounded = [str(model.names[i]) for i, at in single if has_stops(model, at) and low[at] < high[at]]
+    empty = [str(model.names[i]) for i, at in single if low[at] >= high[at]]
     if used:
+        if empty:
+            note = f"joints without a range (their bounds are equal) get no stops: {listed(empty)}"
+            arguments["notes"] = (*arguments.get("notes", ()), note)
         stops = [JointLimit(name) for name in bounded]
         arguments["contacts"] = (*arguments.get("contacts", ()), *stops)
     elif bounded:

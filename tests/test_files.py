@@ -228,3 +228,12 @@ def test_info_lists_forces_actuation_and_limits(tmp_path):
         "  limits, which the motion may pass: turn",
     ):
         assert line in said
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="only root gives files away")
+def test_the_owner_stays(tmp_path):
+    there = tmp_path / "run.npz"
+    there.write_bytes(b"")
+    os.chown(there, 1234, 1234)
+    write(there, b"x")
+    assert (there.stat().st_uid, there.stat().st_gid, there.read_bytes()) == (1234, 1234, b"x")

@@ -381,3 +381,66 @@ def test_mass_of_meshes_is_mujocos(tmp_path):
     inertia = scene.model.inertias[1]
     assert inertia.mass == pytest.approx(1000.0 / 6.0, rel=1e-6)
     np.testing.assert_allclose(inertia.lever, [0.25, 0.25, 0.25], rtol=1e-6)
+
+
+def test_the_mass_of_a_body_that_does_not_move_may_be_missing(tmp_path):
+    head = '<asset><mesh name="hull" file="hull.stl"/></asset>'
+    bodies = '<body name="table"><geom type="mesh" mesh="hull"/></body>'
+    bodies += '<body name="a"><joint name="j"/><geom size="0.1" pos="1 0 0"/></body>'
+    scene = pn.load(write(tmp_path, bodies=bodies, head=head))
+    assert 'mesh "hull.stl" was not found; its shape is left out' in scene.notes
+    with refuses('body "table" has its mass from mesh "hull.stl", which was not found'):
+        pn.load(write(tmp_path, bodies=bodies, head=f'<compiler settotalmass="3"/>{head}'))
+
+
+def test_a_mesh_without_mass_that_cannot_be_read_is_left_out_of_the_shapes(tmp_path):
+    (tmp_path / "hull.stl").write_text("version https://git-lfs.github.com/spec/v1")
+    (tmp_path / "good.obj").write_text(TETRAHEDRON)
+    head = '<asset><mesh name="hull" file="hull.stl"/><mesh name="good" file="good.obj"/></asset>'
+    inertial = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+    bodies = f"""<body name="a"><joint name="j"/>{inertial}<geom type="mesh" mesh="hull"/>
+        <geom name="skin" type="mesh" mesh="good"/></body>"""
+    scene = pn.load(write(tmp_path, bodies=bodies, head=head))
+    assert [item.name for item in scene.visual_model.geometryObjects] == ["skin"]
+    assert 'mesh "hull.stl" cannot be read; its shape is left out' in scene.notes
+    with refuses("cannot be compiled by MuJoCo"):
+        pn.load(write(tmp_path, bodies=bodies.replace(inertial, ""), head=head))
+
+
+@pytest.mark.parametrize(
+    ("joint", "field"), [('range="nan 1"', "jnt_range"), ('damping="nan"', "dof_damping")]
+)
+def test_numbers_that_are_none_are_refused_without_a_log(tmp_path, monkeypatch, capfd, joint, field):
+    monkeypatch.chdir(tmp_path)
+    bodies = f'<body name="a"><joint name="j" {joint}/><geom size="0.1" pos="1 0 0"/></body>'
+    with refuses(f"must hold finite numbers; MuJoCo finds NaN in {field}"):
+        pn.load(write(tmp_path, bodies=bodies))
+    assert [path.suffix for path in tmp_path.iterdir()] == [".xml"]
+    assert capfd.readouterr().err == ""
+
+
+def test_only_pairs_that_mujoco_lets_collide_are_told(tmp_path):
+    inside = (
+        '<body name="b"><joint/><geom size="0.1"/><body name="c"><joint/><geom size="0.1"/></body></body>'
+    )
+    bodies = f'<body name="a"><joint name="j"/><geom size="0.1"/>{inside}</body>'
+    exclude = '<contact><exclude body1="a" body2="c"/></contact>'
+
+    def told(text, option=""):
+        path = write(tmp_path, bodies=bodies, head=option)
+        path.write_text(path.read_text().replace("</mujoco>", f"{text}</mujoco>"))
+        return [note.split(" are")[0] for note in pn.load(path).notes if "contacts between" in note]
+
+    assert told("") == ["contacts between geoms (1 pairs)"]
+    assert told(exclude) == []
+    everything = '<option><flag filterparent="disable"/></option>'
+    assert told("", everything) == ["contacts between geoms (3 pairs)"]
+
+
+@pytest.mark.parametrize("answer", [[1.0, 2.0, 3.0], None, [float("nan")]])
+def test_controls_that_do_not_fit_are_said_as_they_came(tmp_path, answer):
+    file = write(tmp_path, bodies='<body name="a"><joint name="j"/><geom size="0.1" pos="1 0 0"/></body>')
+    file.write_text(file.read_text().replace("</mujoco>", '<actuator><motor joint="j"/></actuator></mujoco>'))
+    scene = pn.load(file, ctrl=lambda t, q, v: answer)
+    with refuses(f"ctrl must return 1 finite numbers; got {answer!r}", pn.UserFunctionError):
+        scene.solve(*scene.initial_state())

@@ -24,7 +24,7 @@ run_numbers description report
 scene_geometry scene_tables scene_steps scene_copy scene
 formats: xml shapes model_edit inertia urdf_checks urdf_words tidy density meshes expansion urdf generators \
 example_robots robot_yaml starts assembly rounding
-mjcf: compile motion tree tendons forces transmissions actuators equality fields told shapes reader
+mjcf: fields compile motion tree tendons forces transmissions actuators equality shapes told reader
 loading
 records outcome dense npz trajectory_file trajectory_columns trajectory
 runs: options asked progress results checkpoint components scipy_methods resume

@@ -57,3 +57,30 @@ def test_a_gap_beyond_the_tolerance_is_an_open_loop(tmp_path):
     scene = pn.load(parallelogram(tmp_path / "wide.xml", 1e-4), assembly_tolerance=1e-3)
     assert any("within the tolerance of the assembly (0.001)" in note for note in scene.notes)
     scene.initial_state()
+
+
+def test_welds_that_depend_on_others_but_for_rounding_are_told(tmp_path):
+    """A weld has no description of a part of it: its rows stay, and the note says what they may do."""
+    file = parallelogram(tmp_path / "welded.xml", ROUNDED)
+    bearings = "".join(
+        f'<body name="bearing{i}" pos="{i} 0 0"><joint name="bearing{i}" axis="0 1 0"/><geom size="0.01"/>'
+        f'<site name="on{i}"/></body>'
+        for i in (1, 2)
+    )
+    text = file.read_text().replace('<site name="hole1"', f'{bearings}<site name="hole1"')
+    for i in (1, 2):
+        text = text.replace(f'<connect name="pin{i}" site1="hole', f'<weld name="pin{i}" site1="on')
+    file.write_text(text)
+    (note,) = [note for note in pn.load(file).notes if "rounding of their frames" in note]
+    assert "and stay: what is rounded decides how these loops move" in note
+
+
+def test_loops_that_depend_on_each_other_beyond_the_tolerance_are_told(tmp_path):
+    """Cranks of nearly equal length lock what should move."""
+    file = parallelogram(tmp_path / "long.xml")
+    text = file.read_text().replace('name="tip2" pos="0.1 0.0 1"', 'name="tip2" pos="0.10003 0 1"')
+    file.write_text(text.replace('name="hole2" pos="2 0 0"', 'name="hole2" pos="2.00003 0 0"'))
+    (note,) = [note for note in pn.load(file).notes if "beyond the tolerance of the assembly" in note]
+    assert "they may lock what should move; load(..., assembly_tolerance=0.0001)" in note
+    scene = pn.load(file, assembly_tolerance=1e-4)
+    assert scene.solve(*scene.initial_state()).rank == 3

@@ -342,7 +342,7 @@ COSMETIC = {
     ),
     "color of two numbers": (
         link("x") + '<material name="dim"><color rgba="0.5 0.5"/></material>',
-        'colors that are not four numbers are left out, of materials "dim"',
+        'colors that are not four numbers from 0 to 1 are left out, of materials "dim"',
     ),
     "shape of size zero": (
         link("x", inside=shape("box", 'size="0 0 0"')),

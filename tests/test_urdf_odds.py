@@ -208,3 +208,39 @@ def test_a_folder_without_a_robot_urdf_names_the_files_that_can_be_loaded(tmp_pa
     (tmp_path / name).write_text(robot(*ARM))
     with refuses(f'must hold a robot.urdf; there is none; load "{tmp_path / name}" by its path'):
         pn.load(tmp_path)
+
+
+def test_materials_that_are_defined_twice_and_colors_that_are_none_are_told(tmp_path, capfd):
+    red, loud = (f'<material name="m"><color rgba="{c}"/></material>' for c in ("1 0 0 1", "255 0 0 1"))
+    shape = '<visual><geometry><box size="1 1 1"/></geometry>{}</visual>'
+    file = tmp_path / "arm.urdf"
+    file.write_text(
+        robot(red, red, *ARM, link("x", inside=shape.format('<material name="m"/>')), joint("j", "base", "x"))
+    )
+    scene = pn.load(file)
+    assert 'of materials defined twice the first counts: "m"' in scene.notes
+    assert scene.visual_model.ngeoms == 1
+    file.write_text(robot(*ARM, link("x", inside=shape.format(loud)), joint("j", "base", "x")))
+    scene = pn.load(file)
+    assert 'colors that are not four numbers from 0 to 1 are left out, of materials "m"' in scene.notes
+    assert scene.visual_model.ngeoms == 1
+    assert capfd.readouterr().err == ""
+
+
+def test_a_mesh_without_a_file_is_a_shape_without_size(tmp_path):
+    assert 'shapes of size zero are left out, in links "x"' in load_with(tmp_path, "").notes
+
+
+def test_a_transmission_of_no_joint_is_told(tmp_path):
+    file = tmp_path / "arm.urdf"
+    file.write_text(robot(*ARM, '<transmission name="t"><joint name="jaw"/></transmission>'))
+    assert 'transmissions drive joints that do not exist: "jaw"' in pn.load(file).notes
+
+
+def test_joints_without_a_range_get_no_stops(tmp_path):
+    file = tmp_path / "arm.urdf"
+    text = robot(*ARM, link("x"), joint("j", "base", "x"))
+    file.write_text(text.replace('lower="-3" upper="3"', ""))
+    scene = pn.load(file, limits=True)
+    assert scene.contacts == ()
+    assert 'joints without a range (their bounds are equal) get no stops: "j"' in "\n".join(scene.notes)

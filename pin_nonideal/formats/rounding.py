@@ -21,11 +21,14 @@ from pin_nonideal.states.projection import nearest_closure
 from pin_nonideal.states.rows import rows_at
 from pin_nonideal.types import Array, Model
 
+from .xml import listed
+
 # Singular values of A, its rows at unit length, that are zero to rounding; those between this and the
 # assembly's tolerance are rounded frames.
 ROUNDING = 1e-11
 MOST_ROWS = 200  # whose rank is decided on a dense matrix
 PROBES = 3  # closed configurations at which the rank is looked at: one may be singular
+TOLD = 1e-4  # singular values up to this, beyond the tolerance, are told: links of nearly equal length
 REACH = 0.2  # of the probes [m or rad]
 
 
@@ -61,25 +64,35 @@ def relaxed(scene: Scene, tolerance: float) -> Relaxed | None:
         or program.rows > MOST_ROWS
     ):
         return None
-    kept, q, gap = _independent_rows(scene, program, tolerance)
+    kept, q, gap, nearly = _independent_rows(scene, program, tolerance)
     if kept is None:
-        return None
-    left, gone, first = [], [], 0
+        return Relaxed(list(scene.constraints), scene.q0, nearly) if nearly else None
+    left, gone, whole, first = [], [], [], 0
+    vanishing = np.linalg.norm(_unit_rows(scene.model, program.runner(), q), axis=1) <= tolerance
     for name, c, rows in zip(names, scene.constraints, program.constraints, strict=True):
-        mine = kept[first : first + rows.count]
+        mine, none = (flags[first : first + rows.count] for flags in (kept, vanishing))
         first += rows.count
         remaining = c if mine.all() else _part(c, mine)
         if remaining is not None:
             left.append(remaining)
         if not mine.all() and remaining is not c:
             gone.append(f"{name}[{', '.join(map(str, np.flatnonzero(~mine)))}]")
+        elif not (mine | none).all():
+            whole.append(name)
+    if not gone and whole:
+        note = (
+            f"rows of {listed(whole)} depend on others but for the rounding of their frames, and stay: what "
+            "is rounded decides how these loops move, which may be not at all; close some of them at a point "
+            "(<connect>, PointAnchor)"
+        )
+        return Relaxed(list(scene.constraints), scene.q0, note)
     if not gone:
         return None
     note = (
         f"loops close to {gap:.1e} m or rad, within the tolerance of the assembly ({tolerance:g}): rows "
         f"{', '.join(gone)} depend on others and are left out"
     )
-    return Relaxed(left, q, note)
+    return Relaxed(left, q, "; ".join(filter(None, (note, nearly))))
 
 
 def _part(c: Any, kept: NDArray[np.bool_]) -> Any:
@@ -96,17 +109,19 @@ def _part(c: Any, kept: NDArray[np.bool_]) -> Any:
 
 def _independent_rows(
     scene: Scene, program: core.Program, tolerance: float
-) -> tuple[NDArray[np.bool_] | None, Array, float]:
-    """Which rows are independent, the configuration with the smallest gaps, and the largest gap there.
+) -> tuple[NDArray[np.bool_] | None, Array, float, str]:
+    """Which rows are independent, the configuration with the smallest gaps, the largest gap there, a note.
 
+    The note tells of rows that depend on others nearly, though not to the tolerance, wherever loops close.
     There are none to name where the loops close and no row depends on others by rounded frames alone.
     """
     model, runner = scene.model, program.runner()
     q, gap = nearest_closure(model, program, runner, scene.q0, tolerance)
     if gap > tolerance:
-        return None, q, gap
+        return None, q, gap, ""
     generator = np.random.default_rng(5)
-    independent, rank, rounded = _independent(model, runner, q, tolerance)
+    independent, rank, rounded, least = _independent(model, runner, q, tolerance)
+    nearest = [least]
     for _ in range(PROBES):
         free = _null_space(model, runner, q, tolerance)
         if not free.shape[1]:
@@ -116,9 +131,17 @@ def _independent_rows(
         if apart <= tolerance:
             found = _independent(model, runner, probe, tolerance)
             rounded = rounded or found[2]
+            nearest.append(found[3])
             if found[1] > rank:
                 independent, rank = found[:2]
-    return (independent if rounded or gap > CLOSURE_TOLERANCE else None), q, gap
+    nearly, apart = "", max(nearest)
+    if apart <= TOLD:
+        nearly = (
+            f"rows of the loops depend on others to {apart:.1e} m or rad, beyond the tolerance of the "
+            f"assembly ({tolerance:g}): they may lock what should move; "
+            f"load(..., assembly_tolerance={TOLD:g}) leaves such rows out"
+        )
+    return (independent if rounded or gap > CLOSURE_TOLERANCE else None), q, gap, nearly
 
 
 def _unit_rows(model: Model, runner: core.Runner, q: Array) -> Array:
@@ -130,17 +153,21 @@ def _unit_rows(model: Model, runner: core.Runner, q: Array) -> Array:
 
 def _independent(
     model: Model, runner: core.Runner, q: Array, tolerance: float
-) -> tuple[NDArray[np.bool_], int, bool]:
-    """Which rows are independent, longest remainders first; how many; and whether rounding counts more."""
+) -> tuple[NDArray[np.bool_], int, bool, float]:
+    """Which rows are independent, longest remainders first, and how many; whether rounding counts more.
+
+    The last is the smallest singular value beyond the tolerance.
+    """
     rest = _unit_rows(model, runner, q)
     values = np.linalg.svd(rest, compute_uv=False) if rest.size else np.zeros(0)
     rounded = bool(((values > ROUNDING) & (values <= tolerance)).any())
+    least = float(values[values > tolerance].min(initial=np.inf))
     kept = np.zeros(len(rest), dtype=bool)
     while True:
         length = np.linalg.norm(rest, axis=1)
         best = int(np.argmax(length)) if len(rest) else 0
         if not len(rest) or length[best] <= tolerance:
-            return kept, int(kept.sum()), rounded
+            return kept, int(kept.sum()), rounded, least
         kept[best] = True
         direction = rest[best] / length[best]
         rest = rest - np.outer(rest @ direction, direction)

@@ -102,11 +102,16 @@ def _colors(root: ElementTree.Element) -> list[str]:
             except ValueError:
                 values = []
             if len(values) == 3:
-                color.set("rgba", " ".join(map(repr, [*values, 1.0])))
-            elif len(values) != 4 or not np.isfinite(values).all():
+                values.append(1.0)
+                color.set("rgba", " ".join(map(repr, values)))
+            if len(values) != 4 or not all(0.0 <= value <= 1.0 for value in values):
                 material.remove(color)
                 bad.append(str(material.get("name")))
-    return [f"colors that are not four numbers are left out, of materials {listed(bad)}"] if bad else []
+    return (
+        [f"colors that are not four numbers from 0 to 1 are left out, of materials {listed(bad)}"]
+        if bad
+        else []
+    )
 
 
 def _undefined_materials(root: ElementTree.Element) -> list[str]:
@@ -121,7 +126,15 @@ def _undefined_materials(root: ElementTree.Element) -> list[str]:
                     lost.append(str(material.get("name")))
     for material in [m for m in root.findall("material") if not len(m)]:
         root.remove(material)
-    return [f"materials that are not defined are left out: {listed(lost)}"] if lost else []
+    notes = [f"materials that are not defined are left out: {listed(lost)}"] if lost else []
+    named: set[str | None] = set()
+    twice = []
+    for material in root.findall("material"):
+        if material.get("name") in named:
+            root.remove(material)
+            twice.append(str(material.get("name")))
+        named.add(material.get("name"))
+    return notes + ([f"of materials defined twice the first counts: {listed(twice)}"] if twice else [])
 
 
 def _sizeless(shape: ElementTree.Element) -> bool:
@@ -130,6 +143,8 @@ def _sizeless(shape: ElementTree.Element) -> bool:
     if geometry is None or not len(geometry):
         return True
     inner = geometry[0]
+    if inner.tag == "mesh" and inner.get("filename") == "":
+        return True
     keys = [key for key in SHAPES.get(inner.tag, ()) if key != "scale"]
     try:
         sizes = [float(x) for key in keys for x in (inner.get(key) or "nan").split()]

@@ -213,6 +213,10 @@ def _unused(root: ElementTree.Element) -> list[str]:
         for e in t.iter("mechanicalReduction")
         if (e.text or "").strip() not in ("", "1", "1.0")
     ]
+    joints = {j.get("name") for j in root.findall("joint")}
+    strange = [str(j.get("name")) for j in root.findall("transmission/joint") if j.get("name") not in joints]
+    if strange:
+        notes.append(f"transmissions drive joints that do not exist: {listed(strange)}")
     if geared:
         notes.append(
             f"reductions of transmissions {listed(geared)} are not used: torques are those at the joints"

@@ -118,7 +118,15 @@ class Actuators:
     def _inputs(self, t: float, q: Array, v: Array) -> Array:
         """What enters each actuator: its control, or the activation that follows from it."""
         m = self._m
-        ctrl = np.array(self.ctrl(t, q, v) if callable(self.ctrl) else self.ctrl, dtype=float).reshape(m.nu)
+        ctrl = self.ctrl
+        if callable(ctrl):
+            given = ctrl(t, q, v)
+            try:
+                ctrl = np.array(given, dtype=float).reshape(m.nu)
+            except (TypeError, ValueError):
+                ctrl = np.full(m.nu, np.nan)
+            if not np.isfinite(ctrl).all():
+                raise InputError(f"ctrl must return {m.nu} finite numbers; got {given!r}")
         if self._clamp:
             low, high = m.actuator_ctrlrange.T
             ctrl = np.where(m.actuator_ctrllimited, np.clip(ctrl, low, high), ctrl)

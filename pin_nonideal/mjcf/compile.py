@@ -5,12 +5,17 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from pin_nonideal.errors import LoadingError
 from pin_nonideal.formats.xml import read_text
+
+from .fields import CARRIED, CARRIED_OPTIONS
 
 OLDEST = 4  # version of MuJoCo whose compiled models are known field by field
 PLACEHOLDER = 1e-3  # radius of the sphere that stands for a shape that is not read [m]
@@ -65,21 +70,55 @@ def compile_mjcf(path: Path, *, meshes: bool = False) -> Compiled:
     """
     mujoco = mujoco_module(path)
     _require_root(path)
+    try:
+        compiled = _compile(mujoco, path, meshes, probe=False)
+    except LoadingError:
+        if not meshes:
+            raise
+        compiled = _compile(mujoco, path, meshes, probe=True)
+    _require_numbers(compiled.model, path)
+    return compiled
+
+
+def _compile(mujoco: Any, path: Path, meshes: bool, *, probe: bool) -> Compiled:
+    """Compiles a file; `probe` also leaves out the meshes without mass that MuJoCo cannot read."""
     notes: list[str] = []
-    with warnings.catch_warnings(record=True) as caught:
+    with warnings.catch_warnings(record=True) as caught, _heard(mujoco) as told:
         warnings.simplefilter("always")
         try:
             spec = mujoco.MjSpec.from_file(str(path))
         except ValueError as error:
             raise LoadingError(_parse_message(path, _one_line(error))) from None
-        absent, unread = _assets(mujoco, spec, path, meshes, notes)
+        absent, unread = _assets(mujoco, spec, path, meshes, probe, notes)
         try:
             model = spec.compile()
         except ValueError as error:
             raise LoadingError(f'"{path}" cannot be compiled by MuJoCo: {_one_line(error)}') from None
-    notes += [f"MuJoCo: {' '.join(str(one.message).split())}" for one in caught]
+    words = [" ".join(text.split()) for text in (*(str(one.message) for one in caught), *told)]
+    notes += [f"MuJoCo: {text}" for text in dict.fromkeys(words)]
     identities = [frozenset(int(g.id) for g in geoms) for geoms in (absent, unread)]
     return Compiled(model, identities[0], identities[1], notes)
+
+
+@contextmanager
+def _heard(mujoco: Any) -> Iterator[list[str]]:
+    """What MuJoCo warns of, which it prints and writes to a file in the working directory otherwise."""
+    told: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(told.append)
+    try:
+        yield told
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def _require_numbers(model: Any, path: Path) -> None:
+    """MuJoCo only warns of NaN, and would take a range of it for none."""
+    fields = {f"option {name}": getattr(model.opt, name) for name in CARRIED_OPTIONS.split()}
+    fields |= {name: getattr(model, name) for name in CARRIED.split() if name != "opt"}
+    bad = [name for name, values in fields.items() if np.isnan(np.asarray(values, dtype=float)).any()]
+    if bad:
+        raise LoadingError(f'"{path}" must hold finite numbers; MuJoCo finds NaN in {", ".join(bad)}')
 
 
 def _require_root(path: Path) -> None:
@@ -105,7 +144,7 @@ def _one_line(error: Exception) -> str:
 
 
 def _assets(
-    mujoco: Any, spec: Any, path: Path, meshes: bool, notes: list[str]
+    mujoco: Any, spec: Any, path: Path, meshes: bool, probe: bool, notes: list[str]
 ) -> tuple[list[Any], list[Any]]:
     """Takes away textures, skins, and shapes that are missing or that only a replay needs.
 
@@ -118,7 +157,9 @@ def _assets(
     _strip(spec, notes)
     assets = [*spec.meshes, *spec.hfields]
     homes = [Path(spec.modelfiledir or "."), *_homes(path)]
-    found = {_shape(asset): _is_there(spec, asset, homes) for asset in assets}
+    places = {_shape(asset): _place(spec, asset, homes) for asset in assets if asset.file}
+    lost = {shape for shape, place in places.items() if place is None}
+    broken = {_shape(a) for a in assets if probe and not _is_readable(mujoco, a, places.get(_shape(a)))}
     files = {_shape(asset): asset.file for asset in assets}
     absent, unread = [], []
     wrapping = _wrapping(mujoco, spec)
@@ -126,14 +167,13 @@ def _assets(
         shape = geom.meshname or geom.hfieldname
         if not shape:
             continue
-        there = found.get(shape, True)  # a shape that is no asset is for MuJoCo to refuse
-        if _carries_mass(mujoco, geom) or geom.name in wrapping:
-            if not there:
+        if _carries_mass(mujoco, spec, geom) or geom.name in wrapping:
+            if shape in lost:  # one that is no asset, or that is broken, is for MuJoCo to refuse
                 raise LoadingError(
                     f'"{path}": body "{geom.parent.name}" has its mass from mesh "{files[shape]}", which was '
                     "not found; put the mesh there or give the body an <inertial>"
                 )
-        elif not there:
+        elif shape in lost | broken:
             absent.append(geom)
         elif not meshes:
             unread.append(geom)
@@ -142,8 +182,9 @@ def _assets(
         geom.meshname = geom.hfieldname = ""
         geom.plugin.active, geom.mass = False, 0.0
     _drop_unused(spec)
-    lost = [files[shape] for shape, there in found.items() if not there]
-    notes += [f'mesh "{file}" was not found; its shape is left out' for file in lost]
+    for shape in (s for s in files if s in lost | broken):
+        what = "was not found" if shape in lost else "cannot be read"
+        notes.append(f'mesh "{files[shape]}" {what}; its shape is left out')
     return absent, unread
 
 
@@ -163,13 +204,31 @@ def _shape(asset: Any) -> str:
     return str(asset.name or Path(asset.file).stem)
 
 
-def _is_there(spec: Any, asset: Any, homes: Sequence[Path]) -> bool:
-    """Whether the file of a mesh or a height field exists, where it has one."""
-    if not asset.file:
+def _is_readable(mujoco: Any, asset: Any, place: Path | None) -> bool:
+    """Whether MuJoCo can compile a mesh or a height field by itself; what has no file is for it to refuse."""
+    if place is None:
         return True
+    probe = mujoco.MjSpec()
+    geom = probe.worldbody.add_geom()
+    if hasattr(asset, "nrow"):  # a height field
+        probe.add_hfield(name="probe", file=str(place), size=asset.size)
+        geom.type, geom.hfieldname = mujoco.mjtGeom.mjGEOM_HFIELD, "probe"
+    else:
+        probe.add_mesh(name="probe", file=str(place), scale=asset.scale, inertia=asset.inertia)
+        geom.type, geom.meshname = mujoco.mjtGeom.mjGEOM_MESH, "probe"
+    try:
+        probe.compile()
+    except ValueError:
+        return False
+    return True
+
+
+def _place(spec: Any, asset: Any, homes: Sequence[Path]) -> Path | None:
+    """Where the file of a mesh or a height field lies, None where it is nowhere."""
     name = Path(asset.file).name if spec.strippath else asset.file
     folders = [asset.compiler.meshdir or "", spec.meshdir or "", ""]
-    return any((home / folder / name).is_file() for home in homes for folder in folders)
+    places = (home / folder / name for home in homes for folder in folders)
+    return next((place.resolve() for place in places if place.is_file()), None)
 
 
 def _homes(path: Path) -> list[Path]:
@@ -199,9 +258,20 @@ def _wrapping(mujoco: Any, spec: Any) -> set[str]:
     return {w.target.name for w in wraps if w.target is not None}
 
 
-def _carries_mass(mujoco: Any, geom: Any) -> bool:
-    """Whether MuJoCo takes a body's mass from this geom."""
+def _moves(body: Any) -> bool:
+    """Whether a joint moves a body."""
+    while body is not None:
+        if body.joints:
+            return True
+        body = body.parent
+    return False
+
+
+def _carries_mass(mujoco: Any, spec: Any, geom: Any) -> bool:
+    """Whether MuJoCo takes the mass of a body that moves from this geom, or a share of the mass of all."""
     compiler, body = geom.compiler, geom.parent
+    if not _moves(body) and spec.compiler.settotalmass <= 0.0:
+        return False
     rule = mujoco.mjtInertiaFromGeom
     if compiler.inertiafromgeom == rule.mjINERTIAFROMGEOM_FALSE or body.name == "world":
         return False

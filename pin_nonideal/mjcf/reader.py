@@ -52,9 +52,10 @@ def read_mjcf(path: Path, *, allow: Collection[str] = (), ctrl: Control = None) 
     told = Told(f'"{path}"', allow, notes)
     robot, tree = translate(mujoco, compiled, path.stem, told)
     told.require()
-    again = cache(partial(_with_meshes, path))
-    drawn, solid = (cache(partial(_shapes, again, absent, visual=kind)) for kind in (True, False))
-    robot.visual, robot.collision = Shapes(drawn), Shapes(solid)
+    later: list[str] = []
+    again = cache(partial(_with_meshes, path, later))
+    drawn, solid = (cache(partial(_shapes, mujoco, again, absent, visual=kind)) for kind in (True, False))
+    robot.visual, robot.collision = Shapes(drawn, later), Shapes(solid, later)
     if robot.actuation is not None:
         robot.actuation.set_control(ctrl)
     for key, name in enumerate(tree.key_names):
@@ -118,14 +119,15 @@ def _apply_key(actuators: Actuators | None, compiled: Any, key: int, ctrl: Contr
         actuators.set_control(compiled.key_ctrl[key] if ctrl is None else ctrl, compiled.key_act[key])
 
 
-def _with_meshes(path: Path) -> tuple[Tree, frozenset[int]]:
+def _with_meshes(path: Path, notes: list[str]) -> tuple[Tree, frozenset[int]]:
     """The file read anew, meshes included, which nothing but its shapes needs; and what was not found."""
     compiled = compile_mjcf(path, meshes=True)
+    notes += compiled.notes
     return build_tree(mujoco_module(path), compiled.model, path.stem), compiled.absent
 
 
 def _shapes(
-    again: Callable[[], tuple[Tree, frozenset[int]]], absent: frozenset[int], *, visual: bool
+    mujoco: Any, again: Callable[[], tuple[Tree, frozenset[int]]], absent: frozenset[int], *, visual: bool
 ) -> GeometryModel:
     tree, lost = again()
-    return read_shapes(tree, absent | lost, visual=visual)
+    return read_shapes(mujoco, tree, absent | lost, visual=visual)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,10 +29,11 @@ def geom_names(m: Any) -> list[str]:
     ]
 
 
-def read_shapes(tree: Tree, left_out: Collection[int], *, visual: bool) -> GeometryModel:
+def read_shapes(mujoco: Any, tree: Tree, left_out: Collection[int], *, visual: bool) -> GeometryModel:
     """The geoms that are drawn, or those that can collide.
 
     Args:
+        mujoco: the Python package.
         tree: the compiled model, meshes included, and its tree.
         left_out: geoms whose shape was not found.
         visual: those that MuJoCo's viewer shows; otherwise those that can collide, with their pairs.
@@ -54,7 +55,7 @@ def read_shapes(tree: Tree, left_out: Collection[int], *, visual: bool) -> Geome
         item.meshColor = color
         indices[g] = result.addGeometryObject(item)
     if not visual:
-        for one, two in _pairs(m, list(indices)):
+        for one, two in colliding_pairs(mujoco, m, list(indices)):
             result.addCollisionPair(pin.CollisionPair(indices[one], indices[two]))
     return result
 
@@ -111,21 +112,28 @@ def _height_field(m: Any, data: int, *, solid: bool) -> Any:
     )
 
 
-def _pairs(m: Any, geoms: list[int]) -> list[tuple[int, int]]:
-    """Pairs of geoms that MuJoCo lets collide: by their masks, not of one body or a body and its parent."""
+def colliding_pairs(mujoco: Any, m: Any, geoms: Sequence[int]) -> list[tuple[int, int]]:
+    """Pairs of geoms that MuJoCo lets collide: by their masks, not of one body or a body and its parent.
+
+    Args:
+        mujoco: the Python package.
+        m: mujoco.MjModel.
+        geoms: the geoms to choose from.
+    """
+    g = np.array(geoms, dtype=int)
     named = {frozenset(pair) for pair in zip(m.pair_geom1.tolist(), m.pair_geom2.tolist(), strict=True)}
-    barred = set(m.exclude_signature.tolist())
-    result = []
-    for k, one in enumerate(geoms):
-        for two in geoms[k + 1 :]:
-            masks = (
-                m.geom_contype[one] & m.geom_conaffinity[two] or m.geom_contype[two] & m.geom_conaffinity[one]
-            )
-            b1, b2 = sorted((int(m.geom_bodyid[one]), int(m.geom_bodyid[two])))
-            w1, w2 = int(m.body_weldid[b1]), int(m.body_weldid[b2])
-            p1, p2 = (int(m.body_weldid[m.body_parentid[w]]) for w in (w1, w2))
-            kin = w1 == w2 or (w1 and w2 and (p1 == w2 or p2 == w1))
-            free = masks and not kin and (b1 << 16) + b2 not in barred
-            if free or frozenset((one, two)) in named:
-                result.append((one, two))
-    return result
+    types, affinities, body = m.geom_contype[g], m.geom_conaffinity[g], m.geom_bodyid[g].astype(int)
+    weld = m.body_weldid[body]
+    parent = m.body_weldid[m.body_parentid[weld]]
+    masks = (types[:, None] & affinities[None, :]) | (affinities[:, None] & types[None, :])
+    kin = weld[:, None] == weld[None, :]
+    if not m.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT:
+        child = (parent[:, None] == weld[None, :]) & (weld[None, :] != 0)
+        kin |= child | child.T
+    signature = (np.minimum(body[:, None], body[None, :]) << 16) + np.maximum(body[:, None], body[None, :])
+    free = (masks != 0) & ~kin & ~np.isin(signature, m.exclude_signature)
+    index = {int(one): k for k, one in enumerate(g)}
+    for one, two in map(tuple, named):
+        if one in index and two in index:
+            free[index[one], index[two]] = free[index[two], index[one]] = True
+    return [(int(g[i]), int(g[k])) for i, k in np.argwhere(np.triu(free, 1))]

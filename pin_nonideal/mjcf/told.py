@@ -14,6 +14,7 @@ from .actuators import acts, carriable
 from .equality import TENDON, equality_name
 from .fields import known
 from .motion import Tendon
+from .shapes import colliding_pairs
 from .tendons import tendon_name
 from .transmissions import BODY
 from .transmissions import TENDON as BY_TENDON
@@ -150,12 +151,15 @@ def _tell_bodies(tree: Tree, told: Told) -> None:
         told.note(f"mocap bodies {listed(names)} are held where they start")
     elliptic = np.unique(m.geom_bodyid[m.geom_fluid[:, 0] > 0.0])
     if elliptic.size:
+        still = "for their bodies do not move"
+        if not (m.opt.density or m.opt.viscosity):
+            still = "for there is no density and no viscosity"
         what = f"fluid forces on ellipsoids of bodies {listed([tree.body_names[b] for b in elliptic])}"
         moving = any(tree.bodies[b][0] for b in elliptic)
         if moving and (m.opt.density or m.opt.viscosity):
             told.active("fluid", what)
         else:
-            told.note(f"{what} do not act, for there is no density and no viscosity")
+            told.note(f"{what} do not act, {still}")
     if m.nflex:
         soft = ~m.flex_rigid.astype(bool) & (m.flex_edgeequality == 0)
         stiff = (m.flex_edgestiffness != 0) | (m.flex_edgedamping != 0) | (m.flex_damping != 0)
@@ -189,23 +193,11 @@ def _tell_equalities(tree: Tree, tendons: list[Tendon | None], told: Told) -> No
         )
 
 
-def colliding_pairs(m: Any) -> int:
-    """How many pairs of geoms on different bodies MuJoCo lets collide.
-
-    Args:
-        m: mujoco.MjModel.
-    """
-    body, root = m.geom_bodyid, m.body_weldid[m.geom_bodyid]
-    touch = (m.geom_contype[:, None] & m.geom_conaffinity[None, :]) != 0
-    apart = (root[:, None] != root[None, :]) & (body[:, None] != body[None, :])
-    return int(np.count_nonzero(np.triu(touch | touch.T) & apart)) + int(m.npair)
-
-
 def _tell_contacts(mujoco: Any, tree: Tree, told: Told) -> None:
     m, off = tree.compiled, mujoco.mjtDisableBit
     if m.opt.disableflags & (off.mjDSBL_CONTACT | off.mjDSBL_CONSTRAINT):
         return
-    pairs = colliding_pairs(m)
+    pairs = len(colliding_pairs(mujoco, m, range(m.ngeom)))
     if pairs:
         extras = [
             word
@@ -222,9 +214,6 @@ def _tell_contacts(mujoco: Any, tree: Tree, told: Told) -> None:
 
 def _tell_limits(tree: Tree, told: Told) -> None:
     m = tree.compiled
-    limited = [tree.joint_name(j) for j in np.flatnonzero(m.jnt_limited).tolist()]
-    if limited:
-        told.note(f"ranges of joints play no part in the motion, they pass them: {listed(limited)}")
     balls = [tree.joint_name(j) for j in np.flatnonzero(m.jnt_limited).tolist() if m.jnt_type[j] == BALL]
     if balls:
         told.note(f"ranges of ball joints have no place in the model: {listed(balls)}")
