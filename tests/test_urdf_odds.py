@@ -244,3 +244,12 @@ def test_joints_without_a_range_get_no_stops(tmp_path):
     scene = pn.load(file, limits=True)
     assert scene.contacts == ()
     assert 'joints without a range (their bounds are equal) get no stops: "j"' in "\n".join(scene.notes)
+
+
+@pytest.mark.parametrize("density", [None, 1000.0])
+def test_a_mesh_that_is_missing_is_named_where_it_would_give_the_mass(tmp_path, density):
+    file = tmp_path / "arm.urdf"
+    bare = f'<link name="x">{shown("hull.stl")}</link>'
+    file.write_text(robot('<link name="base"/>', bare, joint("j", "base", "x")))
+    with refuses('the meshes of links "x", which state no inertia, were not found', pn.SingularMassError):
+        pn.load(file, density=density)

@@ -108,6 +108,7 @@ def read_urdf(
     root.set("name", name)
     notes = tidy(root)
     check_urdf(root, path, ("universe", "root_joint") if free_flyer else ("universe",))
+    shaped = without_inertia(root)
     notes += resolve_meshes(root, path, package_dirs)
     bare = without_inertia(root)
     if density is not None:
@@ -127,7 +128,13 @@ def read_urdf(
     robot = RobotFile(model, visual, collision, constraints=_mimics(root, path), motors=motors, notes=notes)
     robot.to_float = "load(..., free_flyer=True) gives the root link a floating base"
     robot.joint_order = tuple(j.get("name", "") for j in root.findall("joint"))
-    if bare and density is None:
+    lost = [link for link in shaped if link not in bare]
+    if lost and (density is not None or not bare):
+        robot.advice = (
+            f"the meshes of links {listed(lost)}, which state no inertia, were not found: put them there, or "
+            "name the folders of their packages with package_dirs"
+        )
+    elif bare and density is None:
         robot.advice = "load(..., density=1000.0) computes the inertia of such links from their shapes"
     return robot
 
