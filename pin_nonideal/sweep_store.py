@@ -168,7 +168,8 @@ def opened_store(folder: Path, digest: str, runs: int) -> list[int]:
                 f'sweep: store "{folder}" holds another sweep: its parameters, duration or options differ; '
                 "name another folder"
             )
-        note(folder, held._unlisted)
+        if held._unlisted:
+            note(folder, held._unlisted)
         return held.missing
     try:
         folder.mkdir(parents=True, exist_ok=True)
