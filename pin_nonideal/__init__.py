@@ -102,8 +102,8 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """All names, those that have not been imported yet among them."""
-    return sorted({*globals(), *_LATER})
+    """All public names, those that have not been imported yet among them."""
+    return sorted([*__all__, "__version__"])
 
 
 __all__ = [

@@ -45,6 +45,11 @@ def test_one_version() -> None:
     assert f"version: {pn.__version__}\n" in (root / "CITATION.cff").read_text(encoding="utf-8")
 
 
+def test_what_completion_shows() -> None:
+    assert set(dir(pn)) == {*pn.__all__, "__version__"}
+    assert all(hasattr(pn, name) for name in dir(pn))
+
+
 class TestCore:
     """Every way in which the compiled core can be missing or wrong."""
 
