@@ -102,7 +102,8 @@ def load(
     scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
     parts = relaxed(scene, assembly_tolerance)
     if parts is not None:
-        arguments.update(constraints=parts.constraints, q0=parts.q, notes=(*scene.notes, parts.note))
+        arguments.update(model=parts.model, constraints=parts.constraints, q0=parts.q)
+        arguments["notes"] = (*scene.notes, parts.note)
         scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
     return _with_origin(scene, _origin(text, given), found)
 

@@ -59,9 +59,9 @@ def test_a_gap_beyond_the_tolerance_is_an_open_loop(tmp_path):
     scene.initial_state()
 
 
-def test_welds_that_depend_on_others_but_for_rounding_are_told(tmp_path):
-    """A weld has no description of a part of it: its rows stay, and the note says what they may do."""
-    file = parallelogram(tmp_path / "welded.xml", ROUNDED)
+def welded(path, beside=0.0):
+    """The same parallelogram, whose pins are bearings that are welded."""
+    file = parallelogram(path, beside)
     bearings = "".join(
         f'<body name="bearing{i}" pos="{i} 0 0"><joint name="bearing{i}" axis="0 1 0"/><geom size="0.01"/>'
         f'<site name="on{i}"/></body>'
@@ -71,8 +71,21 @@ def test_welds_that_depend_on_others_but_for_rounding_are_told(tmp_path):
     for i in (1, 2):
         text = text.replace(f'<connect name="pin{i}" site1="hole', f'<weld name="pin{i}" site1="on')
     file.write_text(text)
-    (note,) = [note for note in pn.load(file).notes if "rounding of their frames" in note]
-    assert "and stay: what is rounded decides how these loops move" in note
+    return file
+
+
+def test_rows_of_welds_go_one_by_one(tmp_path):
+    exact, scene = (
+        pn.load(welded(tmp_path / name, beside)) for name, beside in (("e.xml", 0.0), ("r.xml", ROUNDED))
+    )
+    assert [type(c) for c in exact.constraints] == [pn.FrameAnchor, pn.FrameAnchor]
+    assert any("within the tolerance of the assembly" in note for note in scene.notes)
+    theirs, ours = exact.solve(*exact.initial_state()), scene.solve(*scene.initial_state())
+    assert ours.rank == theirs.rank == 5
+    np.testing.assert_allclose(ours.a, theirs.a, atol=TOLERANCE)
+    run, same = pn.simulate(scene, 2.0), pn.simulate(exact, 2.0)  # through large turns
+    assert np.abs(same.q[-1] - same.q[0]).max() > 1.0
+    np.testing.assert_allclose(run.q[-1], same.q[-1], atol=TOLERANCE)
 
 
 def test_loops_that_depend_on_each_other_beyond_the_tolerance_are_told(tmp_path):

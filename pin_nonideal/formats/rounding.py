@@ -21,8 +21,6 @@ from pin_nonideal.states.projection import nearest_closure
 from pin_nonideal.states.rows import rows_at
 from pin_nonideal.types import Array, Model
 
-from .xml import listed
-
 # Singular values of A, its rows at unit length, that are zero to rounding; those between this and the
 # assembly's tolerance are rounded frames.
 ROUNDING = 1e-11
@@ -36,14 +34,22 @@ class Relaxed(NamedTuple):
     """Constraints of a scene without the rows that depend on others to the tolerance of the assembly.
 
     Attributes:
+        model: of the scene, with frames for the points by which welds are held that lose rows.
         constraints: what remains of them.
         q: configuration with the smallest gaps, (nq,).
         note: what was left out.
     """
 
+    model: Model
     constraints: list[Any]
     q: Array
     note: str
+
+
+# A weld as points of its two frames that lie on each other, each row of which can go by itself: with the
+# origins O, and X and Y at a unit length along the axes x and y, place is held at O, turns about z and y by
+# X along y and z, and turns about x by Y along z.
+_Points = tuple[PointAnchor, ...]
 
 
 def relaxed(scene: Scene, tolerance: float) -> Relaxed | None:
@@ -53,46 +59,80 @@ def relaxed(scene: Scene, tolerance: float) -> Relaxed | None:
         scene: as the file states it.
         tolerance: to which lengths and angles of the loops are given [m or rad].
     """
+    constraints = list(scene.constraints)
     program = program_of(scene)
-    names = [c.name for c in program.constraints]
-    anchored = [isinstance(c, (PointAnchor, JointCoupling, FrameAnchor)) for c in scene.constraints]
     holonomic = all(holds for c in program.constraints for holds in c.holonomic)
+    looped = [isinstance(c, (PointAnchor, JointCoupling, FrameAnchor)) for c in constraints]
     if (
-        sum(anchored) < 2
+        sum(looped) < 2
         or not holonomic
-        or len(program.constraints) != len(anchored)
+        or len(program.constraints) != len(looped)
         or program.rows > MOST_ROWS
     ):
         return None
     kept, q, gap, nearly = _independent_rows(scene, program, tolerance)
     if kept is None:
-        return Relaxed(list(scene.constraints), scene.q0, nearly) if nearly else None
-    left, gone, whole, first = [], [], [], 0
-    vanishing = np.linalg.norm(_unit_rows(scene.model, program.runner(), q), axis=1) <= tolerance
-    for name, c, rows in zip(names, scene.constraints, program.constraints, strict=True):
-        mine, none = (flags[first : first + rows.count] for flags in (kept, vanishing))
-        first += rows.count
-        remaining = c if mine.all() else _part(c, mine)
-        if remaining is not None:
-            left.append(remaining)
-        if not mine.all() and remaining is not c:
-            gone.append(f"{name}[{', '.join(map(str, np.flatnonzero(~mine)))}]")
-        elif not (mine | none).all():
-            whole.append(name)
-    if not gone and whole:
-        note = (
-            f"rows of {listed(whole)} depend on others but for the rounding of their frames, and stay: what "
-            "is rounded decides how these loops move, which may be not at all; close some of them at a point "
-            "(<connect>, PointAnchor)"
-        )
-        return Relaxed(list(scene.constraints), scene.q0, note)
+        return Relaxed(scene.model, constraints, scene.q0, nearly) if nearly else None
+    model, welds = _by_points(scene.model, constraints, [c.name for c in program.constraints])
+    if welds:
+        split = [part for c in constraints for part in (welds.get(id(c), (c,)))]
+        scene = Scene(model, constraints=split, q0=scene.q0, assembly_tolerance=tolerance)
+        program = program_of(scene)
+        kept, q, gap, nearly = _independent_rows(scene, program, tolerance)
+        if kept is None:
+            return Relaxed(model, constraints, scene.q0, nearly) if nearly else None
+    left, gone = _remaining(constraints, welds, program, kept)
     if not gone:
         return None
     note = (
         f"loops close to {gap:.1e} m or rad, within the tolerance of the assembly ({tolerance:g}): rows "
         f"{', '.join(gone)} depend on others and are left out"
     )
-    return Relaxed(left, q, "; ".join(filter(None, (note, nearly))))
+    return Relaxed(model, left, q, "; ".join(filter(None, (note, nearly))))
+
+
+def _by_points(model: Model, constraints: list[Any], names: list[str]) -> tuple[Model, dict[int, _Points]]:
+    """The model with frames for the points of all welds between two frames, and these by the weld's id."""
+    welds: dict[int, _Points] = {}
+    model = model.copy()
+    for c, name in zip(constraints, names, strict=True):
+        if not isinstance(c, FrameAnchor) or c.frame2 is None:
+            continue
+        points = [PointAnchor(c.frame1, c.frame2, name=name)]
+        for axis, rows in (("x", "yz"), ("y", "z")):
+            offset = pin.SE3(np.eye(3), np.eye(3)["xyz".index(axis)])
+            ends = [f"{side} of {name}, {axis}" for side in (c.frame1, c.frame2)]
+            for side, end in zip((c.frame1, c.frame2), ends, strict=True):
+                frame = model.frames[model.getFrameId(side)]
+                place = frame.placement * offset
+                model.addFrame(pin.Frame(end, frame.parentJoint, place, pin.FrameType.OP_FRAME), False)
+            points.append(PointAnchor(ends[0], ends[1], axes=rows, name=f"{name}, {axis}"))
+        welds[id(c)] = tuple(points)
+    return model, welds
+
+
+def _remaining(
+    constraints: list[Any], welds: dict[int, _Points], program: core.Program, kept: NDArray[np.bool_]
+) -> tuple[list[Any], list[str]]:
+    """What remains of the constraints, and words for rows that do not; welds that lose none stay welds."""
+    left: list[Any] = []
+    gone: list[str] = []
+    described = iter(program.constraints)
+    first = 0
+    for c in constraints:
+        parts = welds.get(id(c), (c,))
+        remaining = []
+        for part in parts:
+            rows = next(described)
+            mine = kept[first : first + rows.count]
+            first += rows.count
+            stays = part if mine.all() else _part(part, mine)
+            if stays is not None:
+                remaining.append(stays)
+            if stays is not part:
+                gone.append(f"{rows.name}[{', '.join(map(str, np.flatnonzero(~mine)))}]")
+        left += [c] if remaining == list(parts) else remaining
+    return left, gone
 
 
 def _part(c: Any, kept: NDArray[np.bool_]) -> Any:
@@ -101,9 +141,6 @@ def _part(c: Any, kept: NDArray[np.bool_]) -> Any:
         return None
     if isinstance(c, PointAnchor):
         return replace(c, axes="".join(axis for axis, stays in zip(c.axes, kept, strict=True) if stays))
-    if isinstance(c, FrameAnchor) and not kept[3:].any():
-        axes = "".join(axis for axis, stays in zip("xyz", kept[:3], strict=True) if stays)
-        return PointAnchor(c.frame1, c.frame2, axes=axes, name=c.name)
     return c
 
 
