@@ -97,3 +97,35 @@ def test_loops_that_depend_on_each_other_beyond_the_tolerance_are_told(tmp_path)
     assert "they may lock what should move; load(..., assembly_tolerance=0.0001)" in note
     scene = pn.load(file, assembly_tolerance=1e-4)
     assert scene.solve(*scene.initial_state()).rank == 3
+
+
+def linkage(path, tilt=0.0):
+    """A four-bar whose crank and rocker are joined by a coupler that is welded to the rocker's bearing."""
+    path.write_text(
+        f"""<mujoco><worldbody><body euler="20 30 40">
+        <body name="crank"><joint name="crank" axis="0 0 1"/><geom type="capsule" fromto="0 0 0 0.3 0.2 0"
+        size="0.02"/><body name="coupler" pos="0.3 0.2 0"><joint name="swing" axis="0 0 1"/>
+        <geom type="capsule" fromto="0 0 0 0.9 0.2 0" size="0.02"/><site name="end" pos="0.9 0.2 0"/></body></body>
+        <body name="rocker" pos="1 0 0"><joint name="rocker" axis="{tilt} 0 1"/><geom type="capsule"
+        fromto="0 0 0 0.2 0.4 0" size="0.02"/><body name="bearing" pos="0.2 0.4 0"><joint name="bearing"
+        axis="0 {tilt} 1"/><geom size="0.02"/><site name="pin"/></body></body>
+        </body></worldbody><equality><weld name="pin" site1="end" site2="pin"/>
+        <weld name="again" site1="end" site2="pin"/></equality></mujoco>"""
+    )
+    return path
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-15, ROUNDED])
+def test_rows_out_of_the_plane_decide_nothing(tmp_path, tilt):
+    """They have no length, or that of rounding: at unit length they would point anywhere."""
+    scenes = [pn.load(linkage(tmp_path / f"{t}.xml", t), q0={"crank": 0.3}) for t in (0.0, tilt)]
+    flat, scene = scenes
+    assert not any("beyond the tolerance" in note for note in scene.notes)
+    if tilt < 1e-12:
+        assert [type(c) for c in scene.constraints] == [pn.FrameAnchor] * 2
+        assert not any("assembly" in note for note in scene.notes)
+    theirs, ours = (s.solve(*s.initial_state()) for s in scenes)
+    assert ours.rank == theirs.rank == 3
+    np.testing.assert_allclose(ours.a, theirs.a, atol=TOLERANCE)
+    run, same = (pn.simulate(s, 1.0) for s in (scene, flat))
+    np.testing.assert_allclose(run.q[-1], same.q[-1], atol=TOLERANCE)

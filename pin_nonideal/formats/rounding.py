@@ -21,8 +21,8 @@ from pin_nonideal.states.projection import nearest_closure
 from pin_nonideal.states.rows import rows_at
 from pin_nonideal.types import Array, Model
 
-# Singular values of A, its rows at unit length, that are zero to rounding; those between this and the
-# assembly's tolerance are rounded frames.
+# Rows of A, and singular values of its rows at unit length, that are zero to rounding; those between this and
+# the assembly's tolerance are rounded frames.
 ROUNDING = 1e-11
 MOST_ROWS = 200  # whose rank is decided on a dense matrix
 PROBES = 3  # closed configurations at which the rank is looked at: one may be singular
@@ -181,11 +181,18 @@ def _independent_rows(
     return (independent if rounded or gap > CLOSURE_TOLERANCE else None), q, gap, nearly
 
 
-def _unit_rows(model: Model, runner: core.Runner, q: Array) -> Array:
-    """A at q with rows of unit length, but for those that vanish beside the longest."""
+def _unit_rows(model: Model, runner: core.Runner, q: Array, tolerance: float) -> tuple[Array, bool]:
+    """A at q with rows of unit length, and whether rounding gives any its length.
+
+    Rows that are short to the tolerance beside the longest hold nothing, and are zero: out of the plane of a
+    planar linkage they would point anywhere.
+    """
     A = rows_at(runner, q, np.zeros(model.nv), 0.0)[0]
     length = np.linalg.norm(A, axis=1)
-    return np.asarray(A / np.maximum(length, ROUNDING * length.max(initial=1.0))[:, None])
+    longest = length.max(initial=0.0)
+    short = length <= tolerance * longest
+    A = np.where(short[:, None], 0.0, A / np.where(short, 1.0, length)[:, None])
+    return np.asarray(A), bool((short & (length > ROUNDING * longest)).any())
 
 
 def _independent(
@@ -195,9 +202,9 @@ def _independent(
 
     The last is the smallest singular value beyond the tolerance.
     """
-    rest = _unit_rows(model, runner, q)
+    rest, rounded = _unit_rows(model, runner, q, tolerance)
     values = np.linalg.svd(rest, compute_uv=False) if rest.size else np.zeros(0)
-    rounded = bool(((values > ROUNDING) & (values <= tolerance)).any())
+    rounded = rounded or bool(((values > ROUNDING) & (values <= tolerance)).any())
     least = float(values[values > tolerance].min(initial=np.inf))
     kept = np.zeros(len(rest), dtype=bool)
     while True:
@@ -213,5 +220,5 @@ def _independent(
 
 def _null_space(model: Model, runner: core.Runner, q: Array, tolerance: float) -> Array:
     """Directions of motion that the rows leave free, (nv, freedoms)."""
-    _, values, directions = np.linalg.svd(_unit_rows(model, runner, q))
+    _, values, directions = np.linalg.svd(_unit_rows(model, runner, q, tolerance)[0])
     return np.asarray(directions[int((values > tolerance).sum()) :].T)
