@@ -5,42 +5,31 @@ from __future__ import annotations
 import asyncio
 import base64
 import io
-import itertools
 import json
 import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Any
 
+from .browser import opened
 from .checks import count, number, positive
 from .errors import InputError, OutputError
 from .files import file_path, whole_file
 from .replaying import ReplayPage, replay
 from .trajectory import Trajectory
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
 ENDINGS = (".png", ".gif", ".webm", ".mp4")
-FLAGS = (
-    "--headless=new",
-    "--no-sandbox",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--hide-scrollbars",
-    "--mute-audio",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--remote-debugging-port=0",
-)
+CODECS = {
+    ".mp4": ["-c:v", "libx264", "-preset", "veryfast", "-movflags", "+faststart"],
+    ".webm": ["-c:v", "libvpx-vp9", "-deadline", "realtime", "-cpu-used", "6", "-crf", "30", "-b:v", "0"],
+}
+# Colors as players take them where a file says nothing: those of BT.709, of which black is 16 and white 235.
+COLORS = ["-vf", "scale=out_range=tv:out_color_matrix=bt709", "-pix_fmt", "yuv420p", "-color_range", "tv"]
+COLORS += ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"]
 LARGEST, MOST_PICTURES = 16384, 100_000  # pixels of a side that browsers draw; an hour at 25 a second
 LEAST_FPS = 0.01  # a GIF knows no longer picture
-READY = 60.0  # until the browser listens and the page is drawn [s]
+AT_ONCE = 8_000_000  # pixels of the pictures that the browser is asked for at once
 # Leaves the view alone on the page, as large as the window.
 ALONE = """(() => {
   const style = document.createElement("style");
@@ -65,7 +54,7 @@ def render(
 
     Args:
         run: what `simulate` returned.
-        path: file to write: .png, .gif, .webm, or .mp4, which takes ffmpeg.
+        path: file to write: .png, .gif, .webm or .mp4, the last two by ffmpeg.
         width: of the picture [pixels].
         height: of the picture [pixels].
         seconds: length of a video, in which the whole run is played [s].
@@ -92,9 +81,7 @@ def render(
         for what, x in (("width", width), ("height", height))
     ]
     seconds, fps = positive("render: seconds", seconds), positive("render: fps", fps)
-    encoder = shutil.which("ffmpeg")
-    if ending == ".mp4" and encoder is None:
-        raise OutputError("render: .mp4 needs ffmpeg, which is not on the path; write .webm or .gif instead")
+    encoder = _ffmpeg(ending) if ending in CODECS else ""
     start, length = float(run.t[0]), float(run.t[-1] - run.t[0])
     if fps < LEAST_FPS:
         raise InputError(f"render: fps must be at least {LEAST_FPS}; got {fps:g}")
@@ -107,140 +94,75 @@ def render(
     if ending == ".png":
         times = [start + 0.25 * length if time is None else number("render: time", time)]
     page: ReplayPage = replay(run, forces=forces)
-    kind = "image/png" if ending in (".png", ".gif") else "image/jpeg"
-    pictures = asyncio.run(_pictures(page.text, size, times, kind))
+    content = asyncio.run(_content(page.text, size, times, ending, fps, encoder))
     with whole_file(target, "the picture") as stream:
-        stream.write(_encoded(pictures, ending, fps, encoder))
+        stream.write(content)
     return target
 
 
-def _encoded(pictures: list[bytes], ending: str, fps: float, encoder: str | None) -> bytes:
-    """Pictures as one file."""
-    if ending == ".png":
-        return pictures[0]
-    if ending == ".gif":
-        from PIL import Image
-
-        frames = [
-            Image.open(io.BytesIO(one)).convert("P", palette=Image.Palette.ADAPTIVE) for one in pictures
-        ]
-        out = io.BytesIO()
-        frames[0].save(
-            out, "GIF", save_all=True, append_images=frames[1:], duration=1000.0 / fps, loop=0, optimize=True
-        )
-        return out.getvalue()
-    if encoder is None:
-        raise OutputError("render: .webm needs ffmpeg, which is not on the path; write .gif instead")
-    with tempfile.TemporaryDirectory() as folder:
-        out_file = Path(folder) / f"video{ending}"
-        command = [
-            encoder,
-            "-y",
-            "-loglevel",
-            "error",
-            "-f",
-            "image2pipe",
-            "-framerate",
-            f"{fps:g}",
-            "-i",
-            "-",
-        ]
-        command += ["-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", str(out_file)]
-        done = subprocess.run(command, input=b"".join(pictures), capture_output=True, check=False)
-        if done.returncode:
-            raise OutputError(f"render: ffmpeg failed: {done.stderr.decode(errors='replace').strip()[-300:]}")
-        return out_file.read_bytes()
-
-
-async def _pictures(text: str, size: list[int], times: list[float], kind: str) -> list[bytes]:
-    """The view at some times, encoded."""
+async def _content(
+    text: str, size: list[int], times: list[float], ending: str, fps: float, encoder: str
+) -> bytes:
+    """The file: the view of a page at some times."""
+    if ending in CODECS:
+        size = [x + x % 2 for x in size]  # both codecs halve the colors
+    kind = "image/png" if ending in (".png", ".gif") else "image/jpeg"
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "replay.html"
         page.write_text(text, encoding="utf-8")
-        async with _opened(Path(folder), page.as_uri() + "#paused", size) as ask:
+        async with opened(Path(folder), page.as_uri() + "#paused", size) as ask:
             await ask(ALONE)
             await ask("new Promise((done) => setTimeout(done, 200))")
             await ask("(replay.showForces(true), replay.resetView())")  # small pages begin without arrows
-            found = []
-            for moment in times:
-                picture = await ask(f"replay.picture({json.dumps(kind)}, {moment!r})")
-                found.append(base64.b64decode(picture))
-            return found
+            found = [
+                base64.b64decode(one)
+                for part in _parts(times, size)
+                for one in await ask(f"replay.pictures({json.dumps(kind)}, {json.dumps(part)})")
+            ]
+        if ending in CODECS:
+            return _video(found, Path(folder) / f"video{ending}", fps, encoder)
+    return found[0] if ending == ".png" else _gif(found, fps)
 
 
-@asynccontextmanager
-async def _opened(folder: Path, address: str, size: list[int]) -> AsyncIterator[Any]:
-    """A page in a browser without a window, as a function that evaluates expressions there."""
-    from tornado.websocket import websocket_connect
+def _parts(times: list[float], size: list[int]) -> list[list[float]]:
+    """Times of the pictures that are asked for together: the page shows nothing between them."""
+    together = max(1, AT_ONCE // (size[0] * size[1]))
+    return [times[k : k + together] for k in range(0, len(times), together)]
 
-    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if browser is None:
-        known = ", ".join(BROWSERS[:3])
-        raise OutputError(f"render needs a browser on the path: {known}; none is there")
-    profile = folder / "profile"
-    command = [
-        browser,
-        *FLAGS,
-        f"--window-size={size[0]},{size[1]}",
-        f"--user-data-dir={profile}",
-        "about:blank",
-    ]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    try:
-        port, door = await _listening(profile / "DevToolsActivePort", process)
-        socket = await websocket_connect(f"ws://127.0.0.1:{port}{door}", max_message_size=1 << 28)
-        numbers = itertools.count(1)
 
-        async def call(method: str, session: str | None = None, **values: Any) -> Any:
-            number = next(numbers)
-            message = {"id": number, "method": method, "params": values}
-            await socket.write_message(json.dumps(message | ({"sessionId": session} if session else {})))
-            while True:
-                answer = await asyncio.wait_for(socket.read_message(), READY)
-                if answer is None:
-                    raise OutputError("render: the browser closed its connection")
-                heard = json.loads(answer)
-                if heard.get("id") == number:
-                    return heard.get("result", {})
+def _gif(pictures: list[bytes], fps: float) -> bytes:
+    """Pictures as one that moves."""
+    from PIL import Image
 
-        target = (await call("Target.createTarget", url="about:blank"))["targetId"]
-        session = (await call("Target.attachToTarget", targetId=target, flatten=True))["sessionId"]
-        metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
-        await call("Emulation.setDeviceMetricsOverride", session, **metrics)
-        await call("Page.navigate", session, url=address)
+    frames = [Image.open(io.BytesIO(one)).convert("P", palette=Image.Palette.ADAPTIVE) for one in pictures]
+    out = io.BytesIO()
+    frames[0].save(
+        out, "GIF", save_all=True, append_images=frames[1:], duration=1000.0 / fps, loop=0, optimize=True
+    )
+    return out.getvalue()
 
-        async def ask(expression: str) -> Any:
-            values = {"expression": expression, "awaitPromise": True, "returnByValue": True}
-            answer = await call("Runtime.evaluate", session, **values)
-            if "exceptionDetails" in answer:
-                raise OutputError(f"render: {answer['exceptionDetails'].get('text')}: {expression[:60]}")
-            return answer.get("result", {}).get("value")
 
-        for _ in range(int(READY / 0.1)):
-            if await ask("Boolean(window.replayDone || window.replayError)"):
-                break
-            await asyncio.sleep(0.1)
-        failure = await ask("window.replayError || null")
-        if failure:
-            raise OutputError(f"render: the page cannot be shown: {failure}")
-        yield ask
-        await call("Browser.close")
-    finally:
+def _ffmpeg(ending: str) -> str:
+    """The ffmpeg on the path, or else that of imageio-ffmpeg."""
+    found = shutil.which("ffmpeg")
+    if found is None:
         try:
-            process.wait(5.0)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+            from imageio_ffmpeg import get_ffmpeg_exe
+
+            found = get_ffmpeg_exe()
+        except (ImportError, RuntimeError):
+            raise OutputError(
+                f"render: {ending} needs ffmpeg on the path, or pip install 'pin-nonideal[video]'; "
+                "or write .gif instead"
+            ) from None
+    return str(found)
 
 
-async def _listening(file: Path, process: subprocess.Popen[bytes]) -> tuple[int, str]:
-    """Port and path at which a browser that just started listens."""
-    for _ in range(int(READY / 0.05)):
-        if file.is_file():
-            lines = file.read_text(encoding="utf-8").split()
-            if len(lines) == 2:
-                return int(lines[0]), lines[1]
-        if process.poll() is not None:
-            break
-        await asyncio.sleep(0.05)
-    raise InputError("render: the browser did not start")
+def _video(pictures: list[bytes], path: Path, fps: float, encoder: str) -> bytes:
+    """Pictures as a video that ffmpeg encodes."""
+    read = ["-y", "-loglevel", "error", "-f", "image2pipe", "-framerate", f"{fps:g}", "-i", "-"]
+    command = [encoder, *read, *CODECS[path.suffix], *COLORS, str(path)]
+    done = subprocess.run(command, input=b"".join(pictures), capture_output=True, check=False)
+    if done.returncode:
+        raise OutputError(f"render: ffmpeg failed: {done.stderr.decode(errors='replace').strip()[-300:]}")
+    return path.read_bytes()

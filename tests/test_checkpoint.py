@@ -18,6 +18,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, LoadingError, OutputError, RunInterrupted
+from pin_nonideal.loading import robot_folders
 from pin_nonideal.runs import checkpoint
 from pin_nonideal.runs.options import run_options
 
@@ -165,7 +166,7 @@ def test_an_interrupted_run_loses_nothing(tmp_path):
 
 
 def test_files_and_parameters_are_found_from_any_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(Path(pn.loading.robot_folders()["four_bar"]).parent)
+    monkeypatch.chdir(Path(robot_folders()["four_bar"]).parent)
     scene = pn.load("./four_bar/robot.urdf", free_flyer=True, package_dirs=".")
     path = tmp_path / "run"
     alone = pn.simulate(scene, 0.1, checkpoint=path)

@@ -14,6 +14,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.core import core
+from pin_nonideal.loading import robots
 from pin_nonideal.page.looks import EVENTS, FORCES, MARKS, MODES
 
 from .paper_examples import example
@@ -203,7 +204,7 @@ def test_a_robot_stays_in_view(opened: Any, name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name, _ in pn.loading.robots() if name not in IN_VIEW])
+@pytest.mark.parametrize("name", [name for name, _ in robots() if name not in IN_VIEW])
 def test_every_robot_stays_in_view(opened: Any, name: str) -> None:
     stays_in_view(opened(pn.simulate(pn.load(name), 1.0)), name)
 
@@ -383,3 +384,32 @@ def test_on_a_phone_names_of_modes_and_bands_are_whole(opened: Any) -> None:
         c.font = "11px " + getComputedStyle(document.documentElement).fontFamily;
         return c.measureText("panda_joint7").width; }"""
     )
+
+
+def test_on_a_short_screen_curves_are_seen_and_the_heading_is_beside_the_robot(opened: Any) -> None:
+    scene = pn.load("four_bar")
+    runs = [pn.simulate(scene, 1.0, output_dt=0.01, record=("forces", "energy")) for _ in range(2)]
+    page = opened(runs)
+    page.page.set_viewport_size({"width": 900, "height": 500})
+    page.run("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    curves = page.page.locator("#plots canvas").first.bounding_box()
+    assert curves["y"] + curves["height"] <= 501
+    heading = page.page.locator("#heading").bounding_box()
+    tops = [
+        page.run("t => { replay.seek(t); return replay.box()[1]; }", float(t)) for t in np.linspace(0, 1, 11)
+    ]
+    assert min(tops) >= heading["y"] + heading["height"]
+
+
+def test_numbers_do_not_cover_each_other(opened: Any) -> None:
+    page = opened(pn.simulate(pn.load("four_bar"), 1.0, output_dt=0.01, record=("forces", "energy")))
+    for time in (0.2, 0.5, 0.8):
+        page.run("t => replay.seek(t)", time)
+        boxes = page.run("""() => [...document.querySelectorAll("#labels span")]
+          .filter((span) => span.style.visibility !== "hidden" && span.textContent)
+          .map((span) => span.getBoundingClientRect())
+          .map(({ left, top, right, bottom }) => [left, top, right, bottom])""")
+        assert len(boxes) >= 4, time
+        for i, (left, top, right, bottom) in enumerate(boxes):
+            for other in boxes[:i]:
+                assert left >= other[2] or right <= other[0] or top >= other[3] or bottom <= other[1]

@@ -32,7 +32,7 @@ simulation run_arrays batches sweep_points sweep_packs sweep_store sweeping
 statics: forces equilibrium rest inverse_dynamics
 page: looks figure_styles geometry bare packing tracks motion between touched view guides forces given bands \
 signals relations elements choices payload window
-replaying plotting rendering commands pin_nonideal cli
+replaying plotting browser rendering commands pin_nonideal cli
 """
 
 # Headers and sources of the core in the same way, a header together with its source.

@@ -105,7 +105,8 @@ def linkage(path, tilt=0.0):
         f"""<mujoco><worldbody><body euler="20 30 40">
         <body name="crank"><joint name="crank" axis="0 0 1"/><geom type="capsule" fromto="0 0 0 0.3 0.2 0"
         size="0.02"/><body name="coupler" pos="0.3 0.2 0"><joint name="swing" axis="0 0 1"/>
-        <geom type="capsule" fromto="0 0 0 0.9 0.2 0" size="0.02"/><site name="end" pos="0.9 0.2 0"/></body></body>
+        <geom type="capsule" fromto="0 0 0 0.9 0.2 0" size="0.02"/>
+        <site name="end" pos="0.9 0.2 0"/></body></body>
         <body name="rocker" pos="1 0 0"><joint name="rocker" axis="{tilt} 0 1"/><geom type="capsule"
         fromto="0 0 0 0.2 0.4 0" size="0.02"/><body name="bearing" pos="0.2 0.4 0"><joint name="bearing"
         axis="0 {tilt} 1"/><geom size="0.02"/><site name="pin"/></body></body>

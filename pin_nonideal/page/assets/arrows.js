@@ -96,23 +96,23 @@ class Arrows {
     arrow.tip.copy(from).addScaledVector(arrow.along, 7 * small);
   }
 
-  /** Numbers beyond the tips, the larger ones first; one that would cover another is left out. */
+  /** Numbers beyond the tips, or beside or before them where those are covered, the larger ones first; one without room is left out. */
   placeLabels(onScreen) {
     const drawn = this.items.filter((arrow) => arrow.drawn).sort((a, b) => b.share - a.share), taken = [];
-    const tips = drawn.map((arrow) => onScreen(arrow.tip)).filter(Boolean);
+    const ends = drawn.map((arrow) => [onScreen(arrow.place), onScreen(arrow.tip)]), spots = ends.flat().filter(Boolean);
     for (const span of this.spans) span.style.visibility = "hidden";
-    drawn.forEach((arrow) => {
-      const tip = onScreen(arrow.tip), base = onScreen(arrow.tip.clone().sub(arrow.along.clone().multiplyScalar(1e-2 * (arrow.tip.distanceTo(arrow.place) || 1))));
+    drawn.forEach((arrow, i) => {
+      const tip = ends[i][1], base = onScreen(arrow.tip.clone().sub(arrow.along.clone().multiplyScalar(1e-2 * (arrow.tip.distanceTo(arrow.place) || 1))));
       if (!tip || !base || taken.length >= this.spans.length) return;
       const way = Math.hypot(tip[0] - base[0], tip[1] - base[1]) || 1, dx = (tip[0] - base[0]) / way, dy = (tip[1] - base[1]) / way;
       const text = `${steady(arrow.value)} ${arrow.unit}`, half = 3.3 * text.length + 4;
-      const x = tip[0] + dx * (half + 8), y = tip[1] + dy * 16;
-      if (taken.some(([a, b, w]) => Math.abs(x - a) < half + w && Math.abs(y - b) < 17)) return;
-      if (tips.some(([a, b]) => Math.abs(x - a) < half && Math.abs(y - b) < 9)) return;
-      const span = this.spans[taken.length];
+      const free = ([x, y]) => !taken.some(([a, b, w]) => Math.abs(x - a) < half + w && Math.abs(y - b) < 17) && !spots.some(([a, b]) => Math.abs(x - a) < half && Math.abs(y - b) < 12);
+      const found = [[dx, dy], [dy, -dx], [-dy, dx], [-dx, -dy]].map(([u, v]) => [tip[0] + u * (half + 8), tip[1] + v * 18]).find(free);
+      if (!found) return;
+      const span = this.spans[taken.length], [x, y] = found;
       taken.push([x, y, half]);
       span.textContent = text;
-      span.place = [x, y];
+      span.place = found;
       span.style.cssText = `color: ${this.run.looks.forces[arrow.kind]}; transform: translate(${x}px, ${y}px) translate(-50%, -50%)`;
     });
   }

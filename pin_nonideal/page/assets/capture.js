@@ -14,12 +14,8 @@ class Capture {
     stage.dirty = true;
     stage.render(); // what WebGL has drawn lasts until the end of this task
     if (into.width !== canvas.width || into.height !== canvas.height) { into.width = canvas.width; into.height = canvas.height; }
+    c.putImageData(this.pixels(into), 0, 0);
     c.setTransform(ratio, 0, 0, ratio, 0, 0);
-    const sky = c.createLinearGradient(0, 0, 0, canvas.clientHeight);
-    [0, 0.45, 1].forEach((at, i) => sky.addColorStop(at, ink(`sky${i}`)));
-    c.fillStyle = sky;
-    c.fillRect(0, 0, canvas.clientWidth, canvas.clientHeight);
-    c.drawImage(canvas, 0, 0, canvas.clientWidth, canvas.clientHeight);
     c.textBaseline = "middle"; c.textAlign = "center"; c.font = "600 11px system-ui, sans-serif";
     for (const span of stage.arrows.spans.filter((item) => item.style.visibility !== "hidden" && item.textContent)) {
       const [x, y] = span.place, wide = c.measureText(span.textContent).width + 8;
@@ -29,6 +25,40 @@ class Capture {
     c.fillStyle = ink("ink"); c.textAlign = "left"; c.font = "600 14px system-ui, sans-serif";
     c.fillText(`${run.title}  ${this.player.time.toFixed(digitsFor(this.player.end - this.player.start))} s`, 12, 18);
     return into;
+  }
+
+  /** What WebGL has drawn, read back at once, over the background: a 2D canvas takes ten times as long to fetch it. */
+  pixels({ width, height }) {
+    const gl = this.player.stage.renderer.getContext();
+    if (!this.image || this.image.width !== width || this.image.height !== height) {
+      this.image = new ImageData(width, height);
+      this.drawnBytes = new Uint8Array(4 * width * height);
+    }
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, this.drawnBytes);
+    const sky = this.sky(height), [to, from, rows] = [this.image.data, this.drawnBytes, sky].map(({ buffer }) => new Uint32Array(buffer));
+    for (let y = 0, i = 0; y < height; y++) {
+      for (let k = (height - 1 - y) * width, end = k + width; k < end; k++, i++) {
+        const word = from[k], left = 255 - (word >>> 24);
+        if (left === 0) to[i] = word;
+        else if (left === 255) to[i] = rows[y];
+        else for (let part = 0; part < 4; part++) this.image.data[4 * i + part] = from8(this.drawnBytes[4 * k + part], sky[4 * y + part], left);
+      }
+    }
+    return this.image;
+  }
+
+  /** The background, a pixel wide. */
+  sky(height) {
+    const colors = [0, 1, 2].map((i) => ink(`sky${i}`)), key = [height, ...colors].join();
+    if (this.skyOf !== key) {
+      const column = document.createElement("canvas"), c = column.getContext("2d", { willReadFrequently: true }), shade = c.createLinearGradient(0, 0, 0, height);
+      Object.assign(column, { width: 1, height });
+      [0, 0.45, 1].forEach((at, i) => shade.addColorStop(at, colors[i]));
+      c.fillStyle = shade;
+      c.fillRect(0, 0, 1, height);
+      Object.assign(this, { skyOf: key, skyColumn: c.getImageData(0, 0, 1, height).data });
+    }
+    return this.skyColumn;
   }
 
   /** The same, on one canvas for all. */
@@ -70,9 +100,11 @@ class Capture {
   }
 }
 
-/** A blob as base64 text. */
-async function base64(blob) {
-  const bytes = new Uint8Array(await blob.arrayBuffer());
+/** A part of a color over another one, of which `left` of 255 is seen. */
+function from8(over, under, left) { return over + (under * left) / 255; }
+
+/** Bytes as base64 text. */
+function base64(bytes) {
   let text = "";
   for (let i = 0; i < bytes.length; i += 32768) text += String.fromCharCode(...bytes.subarray(i, i + 32768));
   return btoa(text);

@@ -245,12 +245,13 @@ class Player {
   }
 
   resize() {
-    const box = element("forces"), { clientWidth: width, clientHeight: height } = element("stage"), narrow = width < 640;
+    const box = element("forces"), { clientWidth: width, clientHeight: height } = element("stage"), narrow = width < 640, folded = box.classList.contains("off");
     // The view is framed between what lies over it: the heading, the buttons, and beside the table of forces where there is room.
-    const above = element("heading").offsetHeight + 14, below = element("tools").offsetHeight + 12;
+    const taken = (card, side, room) => (card[side] ? card[side] + room : 0);
+    const below = taken(element("tools"), "offsetHeight", 12) + (narrow && folded ? taken(box, "offsetHeight", 6) : 0);
     this.stage.covered = {
-      right: box.hidden || box.classList.contains("off") || narrow ? 0 : Math.min((box.offsetWidth + 12) / Math.max(width, 1), 0.4),
-      top: Math.min(above / Math.max(height, 1), 0.25), bottom: Math.min(below / Math.max(height, 1), 0.2),
+      right: folded || narrow ? 0 : Math.min(taken(box, "offsetWidth", 12) / Math.max(width, 1), 0.4),
+      top: Math.min(taken(element("heading"), "offsetHeight", 14) / Math.max(height, 1), 0.35), bottom: Math.min(below / Math.max(height, 1), 0.3),
     };
     this.stage.resize();
     this.resizePlots();

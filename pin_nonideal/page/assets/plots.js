@@ -1,5 +1,14 @@
 // Plots on canvas: one axis each, a cursor at the shown time, a reading at the pointer.
 
+const DASHES = [[5, 3], [2, 2], [8, 3, 2, 3], [10, 4], [3, 5], [8, 2, 2, 2, 2, 2], [1, 3]]; // of the second run and those after it
+
+/** A dashed line as a background; a whole one without dashes. */
+function stroke(dash, color) {
+  let at = 0;
+  const stops = dash.map((length, i) => `${i % 2 ? "transparent" : color} ${at}px ${(at += length)}px`);
+  return dash.length ? `repeating-linear-gradient(90deg, ${stops.join(", ")})` : color;
+}
+
 class Plot {
   /** seek(t) and hover(t or null) tell the page what the pointer does. */
   constructor(plot, span, parent, colors, seek, hover) {
@@ -7,8 +16,9 @@ class Plot {
     const first = this.curves.filter((curve) => !curve.run);
     this.curves.forEach((curve, i) => {
       curve.base = curve.run ? first.find((own) => own.label === curve.of) : null;
-      const color = curve.base ? colors[(curve.run + first.indexOf(curve.base)) % colors.length] : colors[i % colors.length];
-      Object.assign(curve, { color, shown: true, t: curve.t || plot.t, dash: curve.run ? [5, 3] : [], plain: curve.values });
+      // A plot of one curve tells runs apart by colors, one of several by dashes.
+      const color = !curve.base ? colors[i % colors.length] : first.length > 1 ? curve.base.color : colors[curve.run % colors.length];
+      Object.assign(curve, { color, shown: true, t: curve.t || plot.t, dash: curve.run ? DASHES[(curve.run - 1) % DASHES.length] : [], plain: curve.values });
     });
     this.box = document.createElement("div");
     const heading = document.createElement("h2"), unit = document.createElement("span");
@@ -87,7 +97,10 @@ class Plot {
   resize() {
     if (!this.canvas.clientWidth) return;
     this.scale();
-    for (const curve of this.curves) curve.button.style.setProperty("--swatch", onPaper(curve.color));
+    for (const curve of this.curves) {
+      curve.button.style.setProperty("--swatch", onPaper(curve.color));
+      curve.button.style.setProperty("--stroke", stroke(curve.dash, "var(--swatch)"));
+    }
     const { context: c, width, height } = fitCanvas(this.canvas), { axis } = this;
     Object.assign(this, { context: c, width, height, top: 6, bottom: height - 18 });
     Object.assign(axis, { left: 52, right: width - 8 });
