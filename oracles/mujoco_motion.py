@@ -15,8 +15,7 @@ OFF = mujoco.mjtDisableBit
 CONNECT, WELD, JOINT, TENDON = range(
     4
 )  # of MuJoCo's mjtEq; those after are of flexes, which no scene carries
-ROUNDING = 1e-13
-RANK = 1e-6  # singular values of the rows below this part of the largest are none: frames are rounded to 1e-8
+RANK = 1e-6  # rows and singular values below this part of the largest are none: frames are rounded to 1e-8
 
 
 class Instant(NamedTuple):
@@ -138,9 +137,8 @@ def kkt(M, force, A, b):
         return free
     B = np.linalg.solve(L, A.T).T
     scale = np.linalg.norm(B, axis=1)
-    scale[np.linalg.norm(A, axis=1) < ROUNDING * np.linalg.norm(A)] = (
-        np.inf
-    )  # rows that vanish: of a plane loop
+    length = np.linalg.norm(A, axis=1)
+    scale[length < RANK * length.max(initial=0.0)] = np.inf  # rows that vanish: of a plane loop
     x = np.linalg.pinv(B / scale[:, None], rcond=RANK) @ ((b - A @ free) / scale)
     return free + np.linalg.solve(L.T, x)
 
