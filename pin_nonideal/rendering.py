@@ -93,20 +93,22 @@ def render(
     times = [start + length * k / (frames - 1) for k in range(frames)]
     if ending == ".png":
         times = [start + 0.25 * length if time is None else number("render: time", time)]
+    if ending in CODECS:
+        size = [x + x % 2 for x in size]  # both codecs halve the colors
     page: ReplayPage = replay(run, forces=forces)
-    content = asyncio.run(_content(page.text, size, times, ending, fps, encoder))
+    kind = "image/png" if ending in (".png", ".gif") else "image/jpeg"
+    pictures = asyncio.run(_pictures(page.text, size, times, kind))
+    if ending in CODECS:
+        content = _video(pictures, ending, fps, encoder)
+    else:
+        content = pictures[0] if ending == ".png" else _gif(pictures, fps)
     with whole_file(target, "the picture") as stream:
         stream.write(content)
     return target
 
 
-async def _content(
-    text: str, size: list[int], times: list[float], ending: str, fps: float, encoder: str
-) -> bytes:
-    """The file: the view of a page at some times."""
-    if ending in CODECS:
-        size = [x + x % 2 for x in size]  # both codecs halve the colors
-    kind = "image/png" if ending in (".png", ".gif") else "image/jpeg"
+async def _pictures(text: str, size: list[int], times: list[float], kind: str) -> list[bytes]:
+    """The view of a page at some times, as files of that kind."""
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "replay.html"
         page.write_text(text, encoding="utf-8")
@@ -114,14 +116,11 @@ async def _content(
             await ask(ALONE)
             await ask("new Promise((done) => setTimeout(done, 200))")
             await ask("(replay.showForces(true), replay.resetView())")  # small pages begin without arrows
-            found = [
+            return [
                 base64.b64decode(one)
                 for part in _parts(times, size)
                 for one in await ask(f"replay.pictures({json.dumps(kind)}, {json.dumps(part)})")
             ]
-        if ending in CODECS:
-            return _video(found, Path(folder) / f"video{ending}", fps, encoder)
-    return found[0] if ending == ".png" else _gif(found, fps)
 
 
 def _parts(times: list[float], size: list[int]) -> list[list[float]]:
@@ -158,11 +157,13 @@ def _ffmpeg(ending: str) -> str:
     return str(found)
 
 
-def _video(pictures: list[bytes], path: Path, fps: float, encoder: str) -> bytes:
+def _video(pictures: list[bytes], ending: str, fps: float, encoder: str) -> bytes:
     """Pictures as a video that ffmpeg encodes."""
-    read = ["-y", "-loglevel", "error", "-f", "image2pipe", "-framerate", f"{fps:g}", "-i", "-"]
-    command = [encoder, *read, *CODECS[path.suffix], *COLORS, str(path)]
-    done = subprocess.run(command, input=b"".join(pictures), capture_output=True, check=False)
-    if done.returncode:
-        raise OutputError(f"render: ffmpeg failed: {done.stderr.decode(errors='replace').strip()[-300:]}")
-    return path.read_bytes()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"video{ending}"
+        read = ["-y", "-loglevel", "error", "-f", "image2pipe", "-framerate", f"{fps:g}", "-i", "-"]
+        command = [encoder, *read, *CODECS[ending], *COLORS, str(path)]
+        done = subprocess.run(command, input=b"".join(pictures), capture_output=True, check=False)
+        if done.returncode:
+            raise OutputError(f"render: ffmpeg failed: {done.stderr.decode(errors='replace').strip()[-300:]}")
+        return path.read_bytes()
