@@ -17,6 +17,10 @@ from scipy.spatial.transform import Rotation
 GRAVITY = 9.81
 FIRST_SPEED = 1e-9  # of slip, along the direction in which it begins
 DISTANCE = 1e-11  # of the search for forces within the limits
+AT_LIMIT = 1e-5  # part of a limit by which a foot holds that does not slip
+BEGINS = (
+    1e-3  # part of a limit by which a foot holds that begins to slip: limits are tried beside the true ones
+)
 NOISE = 1e-10  # part of the loads that a dense solution leaves
 SETTINGS = {"method": "Radau", "rtol": 1e-9, "atol": 1e-13}
 
@@ -99,19 +103,47 @@ class Plate:
         turning = moment[2] + (feet[:, 0] * friction[:, 1] - feet[:, 1] * friction[:, 0]).sum()
         return np.array([*(force[:2] + friction.sum(axis=0)) / self.mass, turning / self.inertia]), loads
 
-    def sharings(self, t, angle, directions, mu):
-        """All loads of kept feet that slip in these directions, and rub where they pull as well."""
+    def sharings(self, t, angle, spin, directions, mu):
+        """All loads of kept feet that slip in these directions, and rub where they pull as well.
+
+        A foot whose direction is not a number is held: what it is given turns the plate about it.  One that
+        all of its limit holds begins to slip against its friction.
+        """
+        found = self._sharings(t, angle, spin, directions, mu)
+        for loads, friction in found:
+            limits, size = mu * np.abs(loads), np.linalg.norm(friction, axis=1)
+            begins = np.isnan(directions).any(axis=1) & (np.abs(size - limits) <= BEGINS * limits)
+            if begins.any():
+                directions = np.where(begins[:, None], -friction / size[:, None], directions)
+                return self.sharings(t, angle, spin, directions, mu)
+        return [loads for loads, _ in found]
+
+    def _sharings(self, t, angle, spin, directions, mu):
+        """Loads and friction where some feet slip and the others are held."""
         feet, force, moment = self.given(t, angle)
-        unit = np.eye(len(feet))
-        none = self.loads(feet, force, moment, 0.0 * directions)
-        answer = np.array(
-            [self.loads(feet, force, moment, -mu * directions * e[:, None]) - none for e in unit]
-        ).T
+        unit = np.nan_to_num(directions)
+        held = np.flatnonzero(np.isnan(directions).any(axis=1))
+        slips = np.flatnonzero(~np.isnan(directions).any(axis=1))
+        n = len(slips)
+
+        def lack(x, signs):
+            friction = np.zeros((len(feet), 2))
+            friction[slips] = -mu * x[:n, None] * unit[slips]
+            friction[held] = x[n:].reshape(-1, 2)
+            loads = self.loads(feet, force, moment, friction)
+            along = (force[:2] + friction.sum(axis=0)) / self.mass
+            turning = moment[2] + (feet[:, 0] * friction[:, 1] - feet[:, 1] * friction[:, 0]).sum()
+            about = turning / self.inertia * np.column_stack([-feet[:, 1], feet[:, 0]])
+            of_feet = along + about - spin**2 * feet[:, :2]
+            return np.concatenate([loads[slips] - signs * x[:n], of_feet[held].ravel()]), loads, friction
+
         found = []
-        for signs in product((1.0, -1.0), repeat=len(feet)):
-            sizes = np.linalg.solve(np.diag(signs) - answer, none)
-            if sizes.min() >= 0.0:
-                found.append(sizes * signs)
+        for signs in product((1.0, -1.0), repeat=n):
+            first = lack(np.zeros(n + 2 * len(held)), signs)[0]
+            J = np.array([lack(e, signs)[0] - first for e in np.eye(len(first))]).T
+            x = np.linalg.solve(J, -first)
+            if x[:n].min() >= 0.0:
+                found.append(lack(x, signs)[1:])
         return found
 
     def slip(self, angle, v):
@@ -131,7 +163,8 @@ class Plate:
         def margins(x):
             f = size * x[:-1].reshape(n, 2)
             limits = self.mu * self.loads(feet, force, moment, f)
-            return ((limits * (1.0 + x[-1])) ** 2 - (f**2).sum(axis=1)) / size**2
+            part = 1.0 + x[-1]
+            return (part * abs(part) * limits**2 - (f**2).sum(axis=1)) / size**2
 
         start = np.append(-np.linalg.pinv(balance) @ given / size, 1.0)
         found = minimize(
@@ -150,6 +183,13 @@ class Plate:
     def give_way(self, latest):
         """The instant at which no forces within the limits hold the plate any more."""
         return brentq(lambda t: self.excess(t)[0], 0.0, latest, xtol=1e-12)
+
+    def onset(self, start):
+        """Directions in which feet begin to slip when the plate gives way; not a number where one holds."""
+        friction = self.excess(start)[1]
+        size = np.linalg.norm(friction, axis=1)
+        at_limit = size > (1.0 - AT_LIMIT) * self.mu * np.abs(self.loads(*self.given(start, 0.0), friction))
+        return np.where(at_limit[:, None], -friction / size[:, None], np.nan)
 
     def run(self, start, duration, **settings):
         """State (x, y, angle and their rates) a time after it gave way."""

@@ -15,10 +15,11 @@ from .measure import at_most, ledger
 
 long = pytest.mark.stress
 
-LATEST = 20.0  # loads grow until then [s]
+LATEST = 200.0  # loads grow until then [s]
 GIVES_WAY = 1e-6  # [s]: the optimum is found by a program of its own, to 1e-9 of the limits
 WITHIN = 1e-4  # part of mu: a run ends where another motion comes in from infinite loads, before it is there
 STEPS = {"stance": 2000, "balls": 3000}
+HELD = 1e-9  # part of the largest slip below which a foot is held
 BALANCE = 1e-6
 
 
@@ -39,12 +40,17 @@ def stance(seed, unilateral):
     return plate(feet, mu, wrench, at, unilateral=unilateral)
 
 
-def sharings(oracle, run, more):
+def sharings(oracle, run, instant, more):
     """Loads with which the plate can go on at the end of the run, were friction larger by a part."""
     state = planar_state(run)
     slip = oracle.slip(state[2], state[3:])
-    directions = slip / np.linalg.norm(slip, axis=1)[:, None]
-    return oracle.sharings(run.t[-1], state[2], directions, (1.0 + more) * oracle.mu)
+    speed = np.linalg.norm(slip, axis=1)
+    if speed.max() > 0.0:
+        slips = speed > HELD * speed.max()
+        directions = np.where(slips[:, None], slip / speed[:, None], np.nan)
+    else:
+        directions = oracle.onset(instant)
+    return oracle.sharings(run.t[-1], state[2], state[5], directions, (1.0 + more) * oracle.mu)
 
 
 @pytest.mark.parametrize("seeds", [range(10), pytest.param(range(10, 1010), marks=long)])
@@ -59,8 +65,8 @@ def test_stances_give_way_in_time_and_in_few_steps(seeds):
             pn.FrictionParadoxError
         ) as stopped:  # a foot that is kept though it pulls may leave none, or several
             run = stopped.trajectory
-            assert len(sharings(oracle, run, WITHIN)) != 1
-        first = next(event.time for event in run.events if event.kind == "slip")
+            assert len(sharings(oracle, run, instant, WITHIN)) != 1
+        first = next((event.time for event in run.events if event.kind == "slip"), run.t[-1])
         late.append(abs(first - instant))
         steps.append(run.stats.steps)
         evaluations.append(run.stats.evaluations)
