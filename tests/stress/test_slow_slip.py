@@ -87,6 +87,18 @@ def test_feet_that_cannot_pull_give_way_in_time(seed):
     at_most("energy balance", ledger(run), BALANCE)
 
 
+@pytest.mark.parametrize("seed", [463, 484])
+def test_feet_rest_as_long_as_any_forces_hold_them(seed):
+    """Feet that are relieved while all rest: some could slip long before they must."""
+    scene, oracle = stance(seed, unilateral=True)
+    instant = oracle.give_way(LATEST)
+    run = pn.simulate(scene, instant - GIVES_WAY)
+    assert not any(event.kind == "slip" for event in run.events)
+    assert np.abs(run.v).max() == 0.0
+    assert any(event.kind == "several" for event in run.events)
+    assert not run.stats.steps > STEPS["stance"]
+
+
 @pytest.mark.parametrize("links", [2, 6, pytest.param(20, marks=long)])
 def test_chains_of_ball_joints(links):
     start = time.perf_counter()

@@ -99,6 +99,21 @@ struct Search {
         return false;
     }
 
+    // Whether forces within their limits hold all that rests, where those of the turns let it slip, in any piece of the
+    // loads that contacts share.
+    bool rests(RestProblem& problem, VecX& x) {
+        const auto begin = problem.equation.elements.begin();
+        const auto may_stick = [](const RestElement& e) { return e.may_stick; };  // the constraints drive the others
+        if (!std::all_of(begin, begin + list.size(), may_stick)) return false;
+        x = problem.equation.holding_forces();
+        for (int turn = 0; turn < most_pieces; ++turn) {
+            const bool holds = hold_at_rest(problem.equation, x);
+            if (!problem.has_pieces() || problem.is_motion(x)) return holds;
+            problem.enter_piece(x);
+        }
+        return false;
+    }
+
     // What rested goes on resting: of several motions the one in which all that sticks in any other sticks, and more.
     bool choose(const RestProblem& problem, const std::vector<VecX>& motions, VecX& x) {
         const RestEquation& equation = problem.equation;
@@ -229,7 +244,7 @@ struct Search {
         } catch (const Failure& failure) {  // loads that no motion has, under forces on the way
             if (failure.kind != Failure::Kind::paradox) throw;
         }
-        if (p.needs_reactions && look_further(found, found && !released_early(modes))) return;
+        if (p.needs_reactions && look_further(found, modes)) return;
         if (!found) throw Failure(Failure::Kind::not_converged, t, list);
         apply(modes, false);
     }
@@ -244,12 +259,29 @@ struct Search {
 
     // Where loads may leave several motions or none, or where turns found none to be trusted. Returns whether it knows
     // better.
-    bool look_further(bool found, bool trusted) {
+    bool look_further(bool found, const std::vector<Mode>& turned) {
+        const bool trusted = found && !released_early(turned);
+        const bool slid = !found || std::any_of(list.begin(), list.end(), [&](int e) { return turned[e] != sticking; });
         unload(true);
         RestProblem problem(p, w, t, q, v, list, slipping);
         RestEquation& equation = problem.equation;
-        if (trusted && (contraction(equation) < 1.0 || !is_searched(equation))) return false;
-        VecX x = VecX::Zero(equation.n);
+        if (trusted && contraction(equation) < 1.0) return false;
+        VecX x;
+        // A search of all would have it; where all hold, that is the motion in which most sticks.
+        const bool all_known = is_searched(equation) && !problem.has_pieces();
+        if (slid && !all_known && equation.loaded()) {
+            if (rests(problem, x)) {
+                w.now.several = trusted;
+                w.now.several_element = list.front();
+                std::vector<Mode> modes = question.modes;
+                for (int e : list) modes[e] = sticking;
+                settle(equation, x, modes);
+                return true;
+            }
+            if (problem.has_pieces()) problem.enter_piece(VecX::Zero(equation.n));
+        }
+        if (trusted && !is_searched(equation)) return false;
+        x = VecX::Zero(equation.n);
         bool solved = find_in_pieces(problem, x), one_limit = true;
         if (!solved && release(problem, equation, std::vector<Mode>(p.frictions.size(), slip_plus))) {
             one_limit = false;  // some stick by one limit and slip by another: the search had not all of these motions

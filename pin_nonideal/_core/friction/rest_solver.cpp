@@ -14,6 +14,8 @@ namespace {
 constexpr double solved = 1e-13;          // largest error of the equation, as part of each element's forces
 constexpr double rounding = 1e-10;        // the same where no step makes it smaller any more
 constexpr double good_contraction = 0.5;  // of limits and forces in turn; slower ones go to Newton's method
+constexpr double within = 1e-13;          // part of the largest force by which one that holds may pass its limit
+constexpr double least_gain = 1e-3;       // of a step towards forces that hold, part of what they lack
 constexpr int most_turns = 40, most_newton = 40, most_halvings = 12;
 constexpr double enough = 1e-4;           // part of the decrease that a Newton step promises
 constexpr double first_stretch = 0.25, least_stretch = 1e-4;  // of the path
@@ -107,7 +109,76 @@ bool follow_path(const RestEquation& equation, VecX& x) {
     return true;
 }
 
+double largest_force_in_play(const RestEquation& equation, const VecX& x, const VecX& limits) {
+    double size = 0.0;
+    for (size_t i = 0; i < equation.elements.size(); ++i) size = std::max(size, equation.force_in_play(i, x, limits));
+    return size;
+}
+
+// What forces x lack to hold all that rests: accelerations that are left, as the forces they ask for, and what is beyond
+// a limit; and the derivative.
+void lack_of_rest(const RestEquation& equation, const VecX& x, VecX& lack, MatX& J) {
+    VecX alpha, limits;
+    MatX dalpha, dlimits;
+    equation.respond(x, alpha, limits);
+    equation.differentiate(x, dalpha, dlimits);
+    const int n = equation.n, count = static_cast<int>(equation.elements.size());
+    const double no_limit = solved * largest_force_in_play(equation, x, limits);
+    lack.setZero(2 * n);
+    J.setZero(2 * n, n);
+    for (int i = 0; i < count; ++i) {
+        const RestElement& e = equation.elements[i];
+        const auto force = x.segment(e.row, e.dim);
+        if (!e.may_stick) {
+            lack.segment(e.row, e.dim) = force + limits[i] * e.direction;
+            J.middleRows(e.row, e.dim) = e.direction * dlimits.row(i);
+            J.block(e.row, e.row, e.dim, e.dim).diagonal().array() += 1.0;
+            continue;
+        }
+        lack.segment(e.row, e.dim) = e.rho * alpha.segment(e.row, e.dim);
+        J.middleRows(e.row, e.dim) = e.rho * dalpha.middleRows(e.row, e.dim);
+        const double size = force.norm();
+        if (limits[i] <= no_limit) {  // |x| has a kink there, x has none
+            lack.segment(n + e.row, e.dim) = force;
+            J.block(n + e.row, e.row, e.dim, e.dim).setIdentity();
+        } else if (size > limits[i]) {
+            lack[n + e.row] = size - limits[i];
+            J.row(n + e.row) = -dlimits.row(i);
+            J.row(n + e.row).segment(e.row, e.dim) += force.transpose() / size;
+        }
+    }
+}
+
 }  // namespace
+
+// Gauss and Newton's method; where limits are linear in the forces, as those of contacts, the lack is convex.
+bool hold_at_rest(const RestEquation& equation, VecX& x) {
+    VecX lack, there, ahead;
+    MatX J, J_there;
+    lack_of_rest(equation, x, lack, J);
+    for (int it = 0; it < most_newton; ++it) {
+        VecX alpha, limits;
+        equation.respond(x, alpha, limits);
+        if (lack.cwiseAbs().maxCoeff() <= within * largest_force_in_play(equation, x, limits)) return true;
+        Eigen::CompleteOrthogonalDecomposition<MatX> cod(J.rows(), J.cols());
+        cod.setThreshold(rank_threshold);
+        cod.compute(J);
+        const VecX step = cod.solve(lack);
+        const double now = lack.norm();
+        double length = 1.0;
+        bool gains = false;
+        for (int halving = 0; halving < most_halvings && !gains; ++halving, length *= 0.5) {
+            ahead = x - length * step;
+            lack_of_rest(equation, ahead, there, J_there);
+            gains = there.norm() < (1.0 - least_gain * length) * now;
+        }
+        if (!gains) return false;
+        x = ahead;
+        lack = there;
+        J = J_there;
+    }
+    return false;
+}
 
 bool refine_rest(const RestEquation& equation, VecX& x) {
     double error = equation.error(x);
