@@ -99,6 +99,26 @@ def test_feet_rest_as_long_as_any_forces_hold_them(seed):
     assert not run.stats.steps > STEPS["stance"]
 
 
+@pytest.mark.parametrize("seeds", [[330, 484, 533], pytest.param(range(300, 1300), marks=long)])
+def test_feet_that_cannot_pull_slide_on(seeds):
+    """One that passes by the center of rotation sticks again where its share allows it, and nowhere else."""
+    steps = []
+    for seed in seeds:
+        scene, oracle = stance(seed, unilateral=True)
+        steps.append(pn.simulate(scene, oracle.give_way(LATEST) + 1.0).stats.steps)
+    at_most("steps", max(steps), STEPS["stance"])
+
+
+@pytest.mark.parametrize("seed", [12, 15, 375])
+def test_a_motion_in_which_a_foot_would_not_hold_is_none(seed):
+    """Loads under which some feet slip otherwise, but those that stick are asked for more than they hold."""
+    scene, oracle = stance(seed, unilateral=False)
+    instant = oracle.give_way(LATEST)
+    run = pn.simulate(scene, instant + 1.0)
+    first = next(event.time for event in run.events if event.kind == "slip")
+    at_most("the instant of giving way [s]", abs(first - instant), GIVES_WAY)
+
+
 @pytest.mark.parametrize("links", [2, 6, pytest.param(20, marks=long)])
 def test_chains_of_ball_joints(links):
     start = time.perf_counter()

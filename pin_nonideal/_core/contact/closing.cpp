@@ -133,9 +133,23 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
         if (search.failure) throw *search.failure;
         throw Failure(Failure::Kind::not_converged, t);
     };
+    // What slides loads others by shares of its own law, which friction at rest follows and cones do not.
+    const auto decides_alone = [&](const Choice& closed) {
+        try {
+            close(closed, nullptr);
+            return true;
+        } catch (const Failure& failure) {
+            if (failure.kind != Failure::Kind::not_converged && failure.kind != Failure::Kind::paradox) throw;
+        }
+        set_closed(p, w, before.closed);
+        set_modes(p, w, before.mode);
+        w.state = before;
+        return false;
+    };
     const bool many = std::count(question.rest.begin(), question.rest.end(), char(1)) >= may_share;
     if (many && question.breaking.empty()) {
         const std::optional<RestingMotion> answer = together();
+        if (answer && answer->shared && answer->drags && decides_alone(answer->closed)) return;
         if (answer && answer->shared) return close(answer->closed, &*answer);
     }
     try {

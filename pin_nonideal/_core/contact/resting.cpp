@@ -213,13 +213,14 @@ std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, doub
     if (gaps.empty() || !fits(p)) return std::nullopt;
     const RunState before = w.state;
     RestingMotion out{std::vector<char>(p.gaps.size(), 0), std::vector<Mode>(p.frictions.size(), unloaded),
-                      std::vector<Vec3>(p.frictions.size(), Vec3::Zero()), false};
+                      std::vector<Vec3>(p.frictions.size(), Vec3::Zero())};
     bool found = false;
     try {
         release_contacts(p, w, t, q, v, question.rest);
         RestingProblem problem(p, w, v, gaps, question, before);
         found = problem.solve(out.shared);
         if (found) problem.read(out);
+        out.drags = std::count(problem.slides.begin(), problem.slides.end(), char(1)) > 0;
     } catch (const Failure& failure) {  // what other rows say is found again, and told, by those who ask for the motion
         if (failure.kind == Failure::Kind::interrupted) throw;
     }

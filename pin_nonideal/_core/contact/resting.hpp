@@ -14,6 +14,7 @@ struct RestingMotion {
     std::vector<Mode> modes;      // of all elements
     std::vector<Vec3> direction;  // of the slip of those that begin to slip
     bool shared = false;          // contacts share their load in several ways
+    bool drags = false;           // some slide already
 
     // The modes of elements at rest, with the directions in which they begin to slip.
     void answer(const Program& p, Workspace& w, ModeQuestion& question) const;

@@ -1,6 +1,7 @@
 #include "dynamics/reactions.hpp"
 
 #include <algorithm>
+#include <bitset>
 
 #include "constraints/redundancy.hpp"
 #include "dynamics/law_forces.hpp"
@@ -61,6 +62,8 @@ static void sweep_tree(const Mechanism& m, const Evaluation& now, Reactions& r) 
 
 // Part of a unit vector of multipliers that exert no force below which a contact takes no part in it.
 static constexpr double takes_part = 1e-9;
+// Contacts that share a load, of which all pieces are looked through.
+static constexpr size_t most_sharing = 6;
 
 // Where the least-norm split among redundant rows has a contact pull, the least-norm one in which none does, if there is;
 // else one with the least pulls.
@@ -102,6 +105,21 @@ static void press_all(const Program& p, Workspace& w, Reactions& r) {
         double& load = r.lam[p.blocks[p.gaps[gaps[k]].block].row];
         if (found.met) load = found.held[k] ? 0.0 : std::max(load, 0.0);
     }
+}
+
+std::vector<std::vector<char>> load_pieces(const Program& p, const Workspace& w) {
+    std::vector<int> sharing;
+    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i)
+        if (w.state.closed[i] && !p.blocks[p.gaps[i].block].kept.empty()) sharing.push_back(i);
+    std::vector<std::vector<char>> pieces;
+    if (sharing.size() > most_sharing) return pieces;
+    const size_t free = dependent_rows(w.now.rows).size();
+    for (unsigned piece = 0; piece < 1u << sharing.size(); ++piece) {
+        if (std::bitset<most_sharing>(piece).count() > free) continue;  // so many are never zero together but by chance
+        std::vector<char>& unloaded = pieces.emplace_back(p.gaps.size(), 0);
+        for (size_t k = 0; k < sharing.size(); ++k) unloaded[sharing[k]] = piece >> k & 1;
+    }
+    return pieces;
 }
 
 const Reactions& reactions(const Program& p, Workspace& w) {

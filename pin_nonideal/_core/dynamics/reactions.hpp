@@ -12,6 +12,10 @@ const Reactions& reactions(const Program& p, Workspace& w);
 // Whether contacts that may open share a load: which of them carry nothing depends on the motion then.
 inline bool shares_pressing(const Program& p, const Workspace& w) { return !p.gaps.empty() && w.now.rows.redundant; }
 
+// All pieces of the loads of contacts that share them: by contact, whether it carries nothing. None where they would be too
+// many.
+std::vector<std::vector<char>> load_pieces(const Program& p, const Workspace& w);
+
 // As long as it lives, the contacts that carry nothing in the motion at hand go on to carry nothing: loads are linear in
 // the motion, one piece of what they are.
 class HeldPiece {

@@ -1,10 +1,8 @@
 #include "dynamics/uniqueness.hpp"
 
 #include <algorithm>
-#include <bitset>
 #include <cmath>
 
-#include "constraints/redundancy.hpp"
 #include "dynamics/reaction_roots.hpp"
 #include "dynamics/reactions.hpp"
 
@@ -15,10 +13,10 @@ namespace {
 constexpr double difference = 1e-7;      // part of the unknowns' size: square root of the rounding, with a margin
 constexpr double least_size = 1e-300;    // of unknowns that are all zero
 constexpr int newton_limit = 30;
-constexpr int most_sharing = 6;          // contacts that share a load, of which all pieces are looked through
 constexpr int most_mixed = 6;            // laws whose mixtures of branches are all looked at; else one by one
 constexpr double same_solution = 1e-9;   // relative residual at which a point is a solution
 constexpr double other_solution = 1e-6;  // relative distance beyond which it is another one
+constexpr double at_limit = 1e-9;        // part of its limit by which a force that holds may miss it
 
 using Solutions = Failure::Solutions;
 
@@ -65,6 +63,18 @@ std::vector<VecX> motions_of(Unknowns& u, const std::vector<VecX>& roots) {
     return list;
 }
 
+// Whether all that sticks holds in the motion of a solution: where something gives way, it is none of these modes.
+bool holds(Unknowns& u, const VecX& y) {
+    const FreeLoads free(u.w);
+    u.set(y);
+    u.motion();
+    for (int e = 0; e < static_cast<int>(u.p.frictions.size()); ++e)
+        if (u.w.state.mode[e] == sticking && !(friction_force(u.p, u.w, e).norm() <=
+                                               static_limit(u.p, u.w, e, u.t, u.q, u.v) * (1.0 + at_limit)))
+            return false;
+    return true;
+}
+
 // Whether all unknowns are limits of contacts that may open: pressing, they have but one branch.
 bool only_opening(const Unknowns& u) {
     const std::vector<int> list = u.elements();
@@ -79,32 +89,22 @@ bool pulls(const Unknowns& u, const VecX& y) {
     return false;
 }
 
-// Contacts that share a load with others, of those that may open.
-std::vector<int> sharing_gaps(const Unknowns& u) {
-    std::vector<int> list;
-    for (int i = 0; i < static_cast<int>(u.p.gaps.size()); ++i)
-        if (u.w.state.closed[i] && !u.p.blocks[u.p.gaps[i].block].kept.empty()) list.push_back(i);
-    return list;
-}
-
 }  // namespace
 
 void decide_over_pieces(Unknowns& u, const VecX& start, VecX& y, const Failure& failure) {
-    const std::vector<int> gaps = sharing_gaps(u);
-    const int count = static_cast<int>(gaps.size());
-    if (count > most_sharing) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
-    const size_t free = dependent_rows(u.w.now.rows).size();
+    const std::vector<std::vector<char>> pieces = load_pieces(u.p, u.w);
+    if (pieces.empty()) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
     std::vector<VecX> found;
     ReactionEquation equation;
     bool complete = true;
-    for (unsigned piece = 0; piece < 1u << count; ++piece) {
-        if (std::bitset<most_sharing>(piece).count() > free) continue;  // so many are never zero together but by chance
-        std::vector<char> unloaded(u.p.gaps.size(), 0);
-        for (int k = 0; k < count; ++k) unloaded[gaps[k]] = piece >> k & 1;
+    for (const std::vector<char>& unloaded : pieces) {
         const HeldPiece held(u.w, unloaded);
         u.equation(y, equation);
         if (!equation.finite()) throw Failure(Failure::Kind::not_finite, u.t);
-        ReactionRoots roots = all_roots(equation);
+        ReactionRoots roots;
+        VecX linear = y;
+        if (!only_opening(u)) roots = all_roots(equation);
+        else if (ReactionNewton().solve(equation, linear)) roots.y.push_back(linear);
         complete &= roots.complete && !roots.at_edge;
         for (const VecX& root : roots.y)
             if (u.is_motion(root) && determinant_at(equation, root) > least_determinant_told) found.push_back(root);
@@ -157,6 +157,10 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
         if (roots.complete && !in_pieces) state.unique = Uniqueness::shown;
         return;
     }
+    // Two motions are shown by two in which all that sticks holds; `start` may be beyond an event that is still to be found.
+    const auto hold = std::count_if(found.begin(), found.end(), [&](const VecX& root) { return holds(u, root); });
+    const bool shown = found.size() == 1 || hold > 1;
+    if (!shown && determinant_at(equation, y) > least_determinant_told) return;
     state.unique = Uniqueness::several;
     VecX::Index most = 0;
     (found.back() - y).cwiseQuotient((found.back() + y).cwiseMax(least_size)).cwiseAbs().maxCoeff(&most);

@@ -5,6 +5,7 @@
 
 #include "dynamics/evaluation.hpp"
 #include "dynamics/implicit.hpp"
+#include "dynamics/reactions.hpp"
 #include "dynamics/slip.hpp"
 #include "dynamics/solution.hpp"
 #include "dynamics/step_start.hpp"
@@ -89,12 +90,18 @@ struct Search {
         return true;
     }
 
-    // The same in piece after piece of the loads that contacts share, until the motion lies in its own.
+    // The same in piece after piece of the loads that contacts share, until the motion lies in its own; where that leads to
+    // none, in all of them.
     bool find_in_pieces(RestProblem& problem, VecX& x) {
-        for (int turn = 0; turn < most_pieces; ++turn) {
-            if (!find(problem, x)) return false;
+        for (int turn = 0; turn < most_pieces && find(problem, x); ++turn) {
             if (!problem.has_pieces() || problem.is_motion(x)) return true;
             problem.enter_piece(x);
+        }
+        if (!problem.has_pieces()) return false;
+        for (const std::vector<char>& unloaded : load_pieces(p, w)) {
+            problem.enter_piece(unloaded);
+            x.setZero();
+            if (find(problem, x) && problem.is_motion(x)) return true;
         }
         return false;
     }

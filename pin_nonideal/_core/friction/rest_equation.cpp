@@ -61,7 +61,9 @@ void RestEquation::respond(const VecX& x, VecX& alpha, VecX& limits) const {
         for (size_t i = 0; i < elements.size(); ++i) {
             const RestElement& e = elements[i];
             limits[i] = e.constant;
-            for (int k = e.vector; k < e.vector + e.vectors; ++k) limits[i] += vectors.segment<3>(3 * k).norm();
+            if (e.directed) limits[i] += std::max(vectors[3 * e.vector], 0.0);
+            for (int k = e.vector; !e.directed && k < e.vector + e.vectors; ++k)
+                limits[i] += vectors.segment<3>(3 * k).norm();
         }
     }
     for (size_t i = 0; i < elements.size(); ++i) limits[i] *= elements[i].factor;
@@ -89,7 +91,8 @@ void RestEquation::differentiate(const VecX& x, MatX& dalpha, MatX& dlimits) con
     const VecX vectors = still + loads * x;
     for (int i = 0; i < count; ++i) {
         const RestElement& e = elements[i];
-        for (int k = e.vector; k < e.vector + e.vectors; ++k) {
+        if (e.directed && vectors[3 * e.vector] > 0.0) dlimits.row(i) += loads.row(3 * e.vector);
+        for (int k = e.vector; !e.directed && k < e.vector + e.vectors; ++k) {
             const Eigen::Vector3d vector = vectors.segment<3>(3 * k);
             const double length = vector.norm();
             if (length > 0.0) dlimits.row(i) += vector.transpose() / length * loads.middleRows<3>(3 * k);

@@ -20,6 +20,7 @@ struct RestElement {
     double factor = 1.0;      // static over kinetic limit, or 1 once it has begun to slip
     double rho = 1.0;         // of the equation: the force that an acceleration asks for
     int vector = 0, vectors = 0;  // its load: rows of `loads`, three a vector
+    bool directed = false;        // the first component alone, of which nothing below zero is a load
 };
 
 struct RestEquation {

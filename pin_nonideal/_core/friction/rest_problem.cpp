@@ -52,6 +52,7 @@ void RestProblem::describe(size_t i, bool resting) {
     RestElement e;
     e.dim = f.dim;
     if (i > 0) e.row = equation.elements.back().row + equation.elements.back().dim;
+    e.directed = f.gap >= 0 && f.load == Friction::Load::multiplier && shares_pressing(p, w);
     e.constant = f.reaction == Reaction::total ? f.constant : w.now.load[problem_.elements[i]];
     const double response = equation.W.diagonal().segment(e.row, e.dim).sum();
     const VecX alpha = equation.alpha0.segment(e.row, e.dim);
@@ -132,6 +133,11 @@ bool RestProblem::is_motion(const VecX& x) {
 
 void RestProblem::enter_piece(const VecX& x) {
     move(x);
+    collect_loads();
+}
+
+void RestProblem::enter_piece(const std::vector<char>& unloaded) {
+    const HeldPiece piece(w, unloaded);
     collect_loads();
 }
 

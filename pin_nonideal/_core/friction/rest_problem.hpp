@@ -27,6 +27,7 @@ public:
     // piece of the equation, which can be made that of its own.
     bool is_motion(const VecX& x);
     void enter_piece(const VecX& x);
+    void enter_piece(const std::vector<char>& unloaded);
     // Of the i-th element: the factor of its limit while it holds and once it has begun to slip.
     double holding_factor(size_t i) const;
     double sliding_factor(size_t i) const;

@@ -145,11 +145,16 @@ std::optional<double> EventLocator::release_rate(double t, const VecX& y, const 
     asked = {modes, {}, {}};
     for (int e = 0; e < system_.ne; ++e)
         if (!is_open(p, w, e) && at_rest(p, w, e, system_.v)) asked.at_rest.push_back(e);
-    resolve_modes(p, w, t, system_.q, system_.v, asked);
     double rate = 0.0;
-    for (int e : asked.at_rest)
-        if (modes[e] == sticking && w.state.mode[e] != sticking)
-            rate = std::max(rate, std::abs(slip_rate_along_mode(p, w, e)));
+    try {
+        resolve_modes(p, w, t, system_.q, system_.v, asked);
+        for (int e : asked.at_rest)
+            if (modes[e] == sticking && w.state.mode[e] != sticking)
+                rate = std::max(rate, std::abs(slip_rate_along_mode(p, w, e)));
+    } catch (const Failure& failure) {  // they do not stick; the contacts that may open decide with them what they do
+        if (p.gaps.empty() || failure.kind != Failure::Kind::not_converged) throw;
+        rate = HUGE_VAL;
+    }
     const double noise = no_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     set_modes(p, w, modes);
     begin_step(p, w, t, system_.q, system_.v);
@@ -204,7 +209,7 @@ double EventLocator::release_part(double rate, const std::vector<Mode>& modes, M
         system_.read(y);
         update_kinematics(p, w, t, system_.q, system_.v);
         const std::optional<double> there = release_rate(t, y, modes, asked);
-        falls = there && *there < least_fall * rate;
+        falls = there && rate < HUGE_VAL && *there < least_fall * rate;
         if (there) {
             beyond = std::exchange(high, next);
             rate_beyond = std::exchange(rate, *there);
