@@ -166,18 +166,22 @@ class Plate:
             part = 1.0 + x[-1]
             return (part * abs(part) * limits**2 - (f**2).sum(axis=1)) / size**2
 
-        start = np.append(-np.linalg.pinv(balance) @ given / size, 1.0)
-        found = minimize(
-            lambda x: x[-1],
-            start,
-            jac=lambda x: np.eye(len(x))[-1],
-            constraints=[
-                {"type": "eq", "fun": lambda x: (balance @ x[:-1]) * 1.0 + given / size},
-                {"type": "ineq", "fun": margins},
-            ],
-            method="SLSQP",
-            options={"ftol": DISTANCE, "maxiter": 500},
-        )
+        def search(slack):
+            return minimize(
+                lambda x: x[-1],
+                np.append(-np.linalg.pinv(balance) @ given / size, slack),
+                jac=lambda x: np.eye(len(x))[-1],
+                constraints=[
+                    {"type": "eq", "fun": lambda x: (balance @ x[:-1]) * 1.0 + given / size},
+                    {"type": "ineq", "fun": margins},
+                ],
+                method="SLSQP",
+                options={"ftol": DISTANCE, "maxiter": 500},
+            )
+
+        found = search(1.0)
+        if found.x[-1] > 1.0:  # worse than where it began, or that was no start
+            found = min(found, search(2.0 * found.x[-1]), key=lambda one: one.x[-1])
         return found.x[-1], size * found.x[:-1].reshape(n, 2)
 
     def give_way(self, latest):
