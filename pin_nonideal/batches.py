@@ -14,7 +14,7 @@ from .compilation.run_numbers import RunNumbers, run_numbers
 from .core import core
 from .errors import InputError, PinNonidealError, RunError, RunInterrupted
 from .run_arrays import RunArrays, run_arrays
-from .runs.components import roll_apart, stepped_apart
+from .runs.apart import roll_apart, stepped_apart
 from .runs.options import SCIPY, RunOptions, run_options
 from .runs.results import finish
 from .scene import Scene

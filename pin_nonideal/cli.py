@@ -10,40 +10,31 @@ import argparse
 import os
 import runpy
 import sys
-import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import pin_nonideal as pn
 
+from .cli_runs import parameters, resume_run, run_robot
 from .commands import (
     completion,
     describe_robot,
-    events_told,
     named_values,
-    plain_value,
     replay_file,
     rest_robot,
     sweep_file,
 )
-from .errors import InputError, OutputError, PinNonidealError, RunError, RunInterrupted
-from .files import mode_of
+from .errors import InputError, PinNonidealError, RunInterrupted
 from .loading import robots
-from .plotting import picture_format
 from .rendering import render
 from .scene import SEVERAL
 from .trajectory import Trajectory
 from .types import Table
 
-Writer = tuple[Path, Callable[[Trajectory, Path], Path]]
-
 EXIT_ERROR = 2
 EXIT_UNREAD = 141  # 128 and the number of SIGPIPE, as shells show it
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
-
-# Samples when pictures are asked for: so many a second of simulated time, within these bounds over a run.
-PICTURE_RATE, PICTURE_SAMPLES = 60.0, (1200, 20_000)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -125,12 +116,12 @@ def _parser() -> argparse.ArgumentParser:
     _add_start(run)
     run.add_argument("--v0", **_start("velocity"))
     _add_writers(run)
-    run.set_defaults(command=_run)
+    run.set_defaults(command=run_robot)
 
     resume = commands.add_parser("resume", help="go on with a run from its checkpoint")
     resume.add_argument("file", type=Path, metavar="CHECKPOINT", help="file of `run --checkpoint`")
     _add_writers(resume)
-    resume.set_defaults(command=_resume)
+    resume.set_defaults(command=resume_run)
 
     replay = commands.add_parser("replay", help="write the page of a saved run")
     replay.add_argument(
@@ -221,113 +212,14 @@ def _add_writers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", action="store_true", help="print nothing but what was asked for")
 
 
-def _run(options: argparse.Namespace) -> int:
-    writers = _writers(options)
-    q, v = named_values(options.q0, "--q0"), named_values(options.v0, "--v0")
-    scene = pn.load(options.robot, **_parameters(options.settings))
-    settings = _simulation_settings(options)
-    return _finished(lambda: pn.simulate(scene, options.duration, q=q, v=v, **settings), options, writers)
-
-
-def _resume(options: argparse.Namespace) -> int:
-    writers = _writers(options)
-    return _finished(lambda: pn.resume(options.file), options, writers)
-
-
-def _finished(run: Callable[[], Trajectory], options: argparse.Namespace, writers: list[Writer]) -> int:
-    """Runs, prints and writes; what a run had computed when it stopped is written all the same."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # the run's notes say the same, and are printed
-            done = run()
-    except RunError as error:
-        if error.trajectory is not None:
-            _told(error.trajectory, options, writers)
-        raise
-    _told(done, options, writers)
-    return 0
-
-
-def _told(run: Trajectory, options: argparse.Namespace, writers: list[Writer]) -> None:
-    if not options.quiet:
-        print(run)
-    if options.events:
-        print(events_told(run))
-    for path, writer in writers:
-        written = writer(run, path)
-        if not options.quiet:
-            print(f"wrote {written}")
-
-
 def _equilibrium(options: argparse.Namespace) -> int:
-    scene = pn.load(options.robot, **_parameters(options.settings))
+    scene = pn.load(options.robot, **parameters(options.settings))
     return rest_robot(scene, named_values(options.q0, "--q0"), options.json)
 
 
 def _complete(options: argparse.Namespace) -> int:
     print(completion(_parser(), options.shell, [name for name, _ in robots()]))
     return 0
-
-
-def _simulation_settings(options: argparse.Namespace) -> Table:
-    """Keyword arguments of `simulate`: what was given on the command line, and the defaults of pictures."""
-    keys = ("method", "rtol", "atol", "dt", "output_dt", "several", "checkpoint")
-    given = {key: getattr(options, key) for key in keys}
-    settings = {key: value for key, value in given.items() if value is not None}
-    pictures = options.html is not None or options.plot is not None
-    if pictures and options.output_dt is None:
-        low, high = PICTURE_SAMPLES
-        count = min(max(PICTURE_RATE * abs(options.duration), low), high)
-        if options.duration > 0.0:
-            settings["output_dt"] = options.duration / count
-    if options.record is not None:
-        settings["record"] = tuple(name.strip() for name in options.record.split(",") if name.strip())
-    elif pictures:
-        settings["record"] = ("forces", "energy")
-    return settings
-
-
-def _writers(options: argparse.Namespace) -> list[Writer]:
-    """Files to write and what writes them; they are checked now, because a run may take long."""
-    if options.plot is not None:
-        picture_format(options.plot)
-    asked: list[tuple[Path | None, Callable[[Trajectory, Path], Path]]] = [
-        (options.save, lambda run, path: run.save(path)),
-        (options.html, _write_replay),
-        (options.plot, _write_figure),
-    ]
-    writers = [(path, writer) for path, writer in asked if path is not None]
-    for path, _ in writers:
-        folder = path.parent
-        if not folder.is_dir():
-            raise OutputError(f'cannot write "{path}": there is no folder "{folder}"; create it first')
-        if path.is_dir():
-            raise OutputError(f'cannot write "{path}": it is a folder; give the name of a file')
-        mode_of(path, "the output")
-        if not os.access(path if path.exists() else folder, os.W_OK):
-            raise OutputError(f'cannot write "{path}": no permission; choose another place')
-    return writers
-
-
-def _write_replay(run: Trajectory, path: Path) -> Path:
-    pn.replay(run, path)
-    return path
-
-
-def _write_figure(run: Trajectory, path: Path) -> Path:
-    pn.plot(run, path)
-    return path
-
-
-def _parameters(settings: Sequence[str]) -> Table:
-    """KEY=VALUE words as keyword arguments."""
-    parameters: Table = {}
-    for word in settings:
-        key, separator, text = word.partition("=")
-        if not separator or not key.isidentifier():
-            raise InputError(f'--set needs KEY=VALUE, for example --set N=40; got "{word}"')
-        parameters[key] = plain_value(text)
-    return parameters
 
 
 def _list(options: argparse.Namespace) -> int:
@@ -340,13 +232,13 @@ def _list(options: argparse.Namespace) -> int:
 
 
 def _info(options: argparse.Namespace) -> int:
-    return describe_robot(pn.load(options.robot, **_parameters(options.settings)), options.json)
+    return describe_robot(pn.load(options.robot, **parameters(options.settings)), options.json)
 
 
 def _render(options: argparse.Namespace) -> int:
     run = Trajectory.load(options.run)
     if run.scene is None:
-        scene = pn.load(options.robot or run.name, **_parameters(options.settings))
+        scene = pn.load(options.robot or run.name, **parameters(options.settings))
         run = replace(run, scene=scene)
     try:
         width, height = (int(x) for x in options.size.split("x"))

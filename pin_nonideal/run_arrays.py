@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .compilation.run_numbers import RunNumbers
 from .core import core
 from .errors import LoopClosureError, PinNonidealError, RunInterrupted, UserFunctionError
-from .runs.components import roll_apart, stepped_apart
+from .runs.apart import roll_apart, stepped_apart
 from .runs.options import RunOptions
 from .runs.results import LEFT
 from .scene import Scene

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from .checks import choice
 from .compilation.failures import stiff_hint
 from .errors import InputError
+from .runs.apart import run_apart, run_together, stepped_apart
 from .runs.asked import Asked, asked_callback, asked_events
-from .runs.components import run_apart, run_together, stepped_apart
 from .runs.options import SCIPY, kept_options
 from .runs.progress import progress_bar
 from .runs.results import finish

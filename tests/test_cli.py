@@ -14,7 +14,8 @@ from typing import Any
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.cli import EXIT_ERROR, EXIT_INTERRUPTED, _parameters, main
+from pin_nonideal.cli import EXIT_ERROR, EXIT_INTERRUPTED, main
+from pin_nonideal.cli_runs import parameters
 
 # A short piece of motion: the command is tested here, the motion elsewhere.
 SHORT = ["--duration", "0.05"]
@@ -81,7 +82,7 @@ class TestRun:
 
 
 def test_values_of_settings() -> None:
-    assert _parameters(["N=3", "length=1e-3", "closed=true", "open=false", "shape=a=b", "empty="]) == {
+    assert parameters(["N=3", "length=1e-3", "closed=true", "open=false", "shape=a=b", "empty="]) == {
         "N": 3,
         "length": 1e-3,
         "closed": True,

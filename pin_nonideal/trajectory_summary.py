@@ -1,0 +1,40 @@
+"""A run in a few lines: its length, counters, energies and events, as `print` shows it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+def summary(run: Any) -> str:
+    """The lines.
+
+    Args:
+        run: the Trajectory.
+    """
+    s = run.stats
+    span = f"{run.t[0]:g} to {run.t[-1]:g} s" if len(run.t) else "empty"
+    lines = [
+        f"{run.name or 'trajectory'}: {span}, {len(run.t)} samples",
+        f"  steps {s.steps} ({s.rejected} rejected), evaluations {s.evaluations}, "
+        f"projections {s.projections}, reaction passes {s.iterations}",
+        f"  violation {run.violation.max(initial=0.0):.1e}, rate {run.violation_rate.max(initial=0.0):.1e}",
+    ]
+    if s.limited_by_rounding:
+        lines.append(
+            f"  limited by rounding: {s.limited_by_rounding} of {s.steps} steps; accelerations are known "
+            f"to {s.rounding:.0e} of the largest"
+        )
+    if run.energy is not None and len(run.t):
+        shown = ", ".join(f"{k} {x[-1]:.6g}" for k, x in run.energy.items() if k != "balance")
+        lines.append(f"  energy [J]: {shown}; balance {np.abs(run.energy['balance']).max():.1e}")
+    if run.events:
+        kinds = sorted({e.kind for e in run.events})
+        counts = ", ".join(f"{sum(e.kind == k for e in run.events)} {k}" for k in kinds)
+        lines.append(f"  events: {counts}")
+    lines.append(f"  wall time {s.wall_s:.3g} s")
+    lines += [f"  note: {note}" for note in run.notes]
+    if run.failure:
+        lines.append(f"  stopped early: {run.failure}")
+    return "\n".join(lines)
