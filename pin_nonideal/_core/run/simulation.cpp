@@ -4,10 +4,9 @@
 #include <cmath>
 
 #include "dynamics/evaluation.hpp"
-#include "dynamics/power.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/step_start.hpp"
-#include "run/bouncing.hpp"
+#include "run/events.hpp"
 
 namespace pn {
 
@@ -34,30 +33,8 @@ constexpr double least_progress = 1e-10;
 // Progress is told after so many steps.
 constexpr long steps_a_tick = 16;
 
-// Chatter: this many events within its time make the run go on by time stepping for a while, in so many steps. Where it
-// goes on right after, the while is made longer by this factor, up to the longest [s].
-constexpr int chatter_events = 60;
-constexpr int chatter_steps = 50;
-constexpr double chatter_growth = 2.0, longest_chatter = 1e-2;
-
-// Of the step: where directions of slip relax faster, stability holds the explicit methods short (at 3 to 6); it is
-// believed after some steps in a row, and asked again some steps after it turned out otherwise.
-constexpr double stiff = 2.5;
-constexpr int stiff_in_a_row = 6, patience = 20;
 // Where directions are not found in a step of this length [s], the method asked for has to find a way.
 constexpr double shortest_sought = 1e-9;
-
-// Part of the works of an impact that rounding may make a gain of.
-constexpr double gain_rounding = 1e-12;
-
-// Part of a step of time stepping that is not worth one of its own.
-constexpr double least_part = 1e-9;
-// Number of whole lengths in a time that should be a multiple of them; their quotient may miss it by so much of itself
-// and of one.
-constexpr double quotient_rounding = 1e-14, count_rounding = 1e-9;
-double whole_lengths(double time, double length) {
-    return std::floor(time / length * (1.0 + quotient_rounding) + count_rounding);
-}
 
 }  // namespace
 
@@ -65,11 +42,14 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
     : p(program), w(workspace), options(run_options), out(recording), t_end(options.end()),
       system(program, workspace, options.record.energy), norm(system, options.rtol, options.atol, rounding),
       stepper(options.method, system, norm), control(options.method, options.rtol),
-      stiffness(system, stepper, *this, run_options),
+      choice(system, stepper, *this, run_options), stiffness(system, stepper, *this, run_options),
       floor(system, stepper, norm, *this, recording),
-      locator(system, stepper, slip_at_start, pulls, gaps), moreau(system), moreau_contacts(system),
+      locator(system, stepper, slip_at_start, pulls, gaps),
       output(system, stepper, *this, run_options, recording), notices(system, stepper, *this, recording),
-      user_events(run_options.events, system, stepper) {
+      user_events(run_options.events, system, stepper), torques(system, *this, run_options, output),
+      landing(system, *this, run_options, output, recording),
+      time_stepping(system, *this, run_options, torques, output, notices, user_events, recording),
+      clusters(system, *this, run_options, stiffness, time_stepping, recording) {
     y = rate = configured_y = VecX::Zero(system.ny);
     // Time stepping finds its motion in velocities; of accelerations, which are recorded only, the nearest do.
     const bool in_time = options.method.scheme == Method::Scheme::moreau;
@@ -88,13 +68,13 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
     output.begin();
     w.state.has_held = false;
     w.state.warm = false;
-    sample_control();
+    torques.sample();
     if (system.ng > 0) {
         set_closed(p, w, std::vector<char>(p.gaps.size(), 0));
-        strike(true);
+        landing.strike(true);
     }
     switch_modes(system, t, y, rate, std::nullopt);
-    remember_gaps();
+    landing.remember_gaps();
     output.now();
     notices.pulls(std::nullopt);
     notices.several(false);
@@ -112,7 +92,7 @@ void Simulation::run() {
     const bool in_time = options.method.scheme == Method::Scheme::moreau;
     while (!done() && between_steps()) {
         if (in_time) {
-            step_in_time(t_end, options.dt);
+            time_stepping.step(options.dt, t_end, t_end);
             continue;
         }
         Proposal proposal = propose();
@@ -143,20 +123,7 @@ bool Simulation::between_steps() {
         throw Failure(Failure::Kind::steps, t, {}, static_cast<double>(out.steps));
     if (options.max_wall > 0.0 && std::chrono::duration<double>(Clock::now() - begun).count() > options.max_wall)
         throw Failure(Failure::Kind::wall, t, {}, options.max_wall);
-    return !options.callback || ask_callback();
-}
-
-bool Simulation::ask_callback() {
-    system.read(y);
-    const Options::Told told = options.callback(t, system.q, system.v, w.scratch.work);
-    if (told != Options::Told::torque) return told == Options::Told::go_on;
-    w.now.has_override = true;
-    w.now.override_torque = w.scratch.work;
-    // The torque jumps here: the derivative is taken anew.
-    begin_step(p, w, t, system.q, system.v);
-    system.rate_of_evaluation(t, y, rate);
-    output.configured_now();
-    return true;
+    return !options.callback || torques.ask_callback();
 }
 
 void Simulation::save() {
@@ -168,36 +135,10 @@ void Simulation::restore(const std::string& state) { from_bytes(state, system, *
 
 // --- Propose --------------------------------------------------------------------------------------------------------
 
-void Simulation::sample_control() {
-    const auto* sampled = std::get_if<SampledTorque>(&p.actuation);
-    if (!sampled || w.now.has_override) return;
-    if (w.state.has_held && t < options.t0 + next_period * sampled->period) return;
-    system.read(y);
-    sampled->function(t, system.q, system.v, w.state.held_torque);
-    w.state.has_held = true;
-    next_period = static_cast<long>(whole_lengths(t - options.t0, sampled->period)) + 1;
-    // The torque jumps here: the derivative is taken anew.
-    begin_step(p, w, t, system.q, system.v);
-    system.rate_of_evaluation(t, y, rate);
-    output.configured_now();
-}
-
-// Where actuation jumps or bends next.
-double Simulation::next_stop() const {
-    double stop = t_end;
-    if (const auto* sampled = std::get_if<SampledTorque>(&p.actuation))
-        stop = std::min(stop, options.t0 + next_period * sampled->period);
-    if (const auto* table = std::get_if<TorqueTable>(&p.actuation)) {
-        const auto next = std::upper_bound(table->times.begin(), table->times.end(), t);
-        if (next != table->times.end()) stop = std::min(stop, *next);
-    }
-    return stop;
-}
-
 Simulation::Proposal Simulation::propose() {
-    sample_control();
+    torques.sample();
     const bool adaptive = options.method.adaptive();
-    double stop = next_stop();
+    double stop = torques.next_stop(t_end);
     if (!adaptive)  // the fixed grid, whatever events cut out of it
         stop = std::min(stop, options.t0 + (whole_lengths(t - options.t0, options.dt) + 1.0) * options.dt);
     const double remaining = stop - t;
@@ -264,7 +205,7 @@ std::optional<double> Simulation::try_step(double size) {
     system.project_and_evaluate(t + size, stepper.y1, stepper.end_rate());
     stepper.learn();
     if (needs_end) error = stepper.error();
-    turns_stiffly = options.method.adaptive() && turning(system) && stepper.stiffness() > stiff;
+    choice.look();
     return error;
 }
 
@@ -309,10 +250,6 @@ bool Simulation::locate_event(const Proposal& proposal) {
     return false;
 }
 
-void Simulation::tell_user_events() {
-    for (int k : user_events.found()) out.events.push_back({t, Event::Kind::user, k});
-}
-
 // --- Accept ---------------------------------------------------------------------------------------------------------
 
 void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent>& event) {
@@ -324,116 +261,41 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     y = stepper.y1;
     rate = stepper.end_rate();
     output.configured_now();
-    remember_gaps();
+    landing.remember_gaps();
     output.keep_step();
-    tell_user_events();
+    user_events.tell(t, out.events);
     if (!event || !event->changes_modes()) notices.pulls(event);
     output.inside_step(notices.several(true));
     stepper.end_directions();
-    choose_stepper();
+    choice.choose();
     if (!event) return;
     if (event->changes_modes()) change_modes(*event);
     notices.several(false);
     if (event->kind != FoundEvent::Kind::reversal) return;
-    recent_events.push_back(t);
+    clusters.count();
     bridge_cluster(event->index);
 }
 
-// By collocation as long as directions relax fast beside the next step; by the method asked for until its stability has
-// held the steps short several times in a row.
-void Simulation::choose_stepper() {
-    stepper.forget();
-    bool& seeks = w.state.seeks_directions;
-    const double next = options.method.adaptive() ? h : options.dt;
-    if (stepper.collocates()) {
-        seeks = turning(system) && (stepper.h == 0.0 || stepper.stiffness() * next > stiff * stepper.h);
-        turning_steps = seeks ? 0 : -patience;
-    } else if (turning_steps < 0) {
-        ++turning_steps;
-    } else {
-        turning_steps = turns_stiffly ? turning_steps + 1 : 0;
-        seeks |= turning_steps == stiff_in_a_row;
-    }
-}
-
-void Simulation::remember_gaps() {
-    if (system.ng == 0) return;
-    system.read(y);
-    look_at_gaps(system, t, gaps);
-}
-
-bool Simulation::strike(bool starts) {
-    if (system.ng == 0 || !contacts_strike(system, t, y, starts)) return false;
-    output.before_jump();
-    const Strike found = strike_contacts(system, t, y, starts);
-    for (const Event& event : found.events) out.events.push_back(event);
-    impact_energy += found.work;
-    if (system.energy && p.moves_in_time) system.work(y)[constraint_power] += found.work_of_constraints;
-    else moved_energy += found.work_of_constraints;
-    double size = 0.0;
-    for (const Event& event : found.events) size += std::abs(event.energy_change);
-    if (!options.strict || !(found.work > gain_rounding * size)) return true;
-    std::vector<int> blocks;
-    for (const Event& event : found.events) blocks.push_back(event.element);
-    throw Failure(Failure::Kind::impact_energy, t, blocks, found.work);
+// Where events come too thick they are bridged, and the run goes on with modes of its new state.
+void Simulation::bridge_cluster(int element) {
+    if (!clusters.bridge(element, t_end)) return;
+    switch_modes(system, t, y, rate, std::nullopt);
+    landing.remember_gaps();
+    output.configured_now();
 }
 
 void Simulation::change_modes(const FoundEvent& event) {
     const Modes before = w.state.mode;
-    const bool struck = event.kind == FoundEvent::Kind::touch && strike(false);
+    const bool struck = event.kind == FoundEvent::Kind::touch && landing.strike(false);
     for (const Event& change : switch_modes(system, t, y, rate, event)) {
         out.events.push_back(change);
-        if (!struck) recent_events.push_back(t);
+        if (!struck) clusters.count();
     }
-    remember_gaps();
-    if (struck) return end_bouncing();
-    if (std::equal(before.begin(), before.end(), w.state.mode.begin())) recent_events.push_back(t);
+    landing.remember_gaps();
+    if (struck) return landing.end_bouncing(torques.next_stop(t_end));
+    if (std::equal(before.begin(), before.end(), w.state.mode.begin())) clusters.count();
     output.configured_now();
     bridge_cluster(event.of_gap() ? 0 : event.index);
-}
-
-// What bounces too low to be integrated comes to rest.
-void Simulation::end_bouncing() {
-    output.now();
-    output.configured_now();
-    const double stop = options.output_dt > 0.0 ? std::min(next_stop(), output.next()) : next_stop();
-    VecX y_end = y, rate_end = rate;
-    const RunState state = w.state;
-    const std::optional<Rest> rest = bounce_to_rest(system, t, stop, y_end, rate_end);
-    if (!rest) {
-        set_closed(p, w, state.closed);
-        w.state = state;
-        select_rows(p, w);
-        system.read(y);
-        return begin_step(p, w, t, system.q, system.v);
-    }
-    t = rest->time;
-    y = y_end;
-    rate = rate_end;
-    impact_energy += rest->work;
-    for (const Event& event : rest->events) out.events.push_back(event);
-    output.configured_now();
-    remember_gaps();
-}
-
-// Events that come too thick are bridged by time stepping, which needs none.
-void Simulation::bridge_cluster(int element) {
-    if (recent_events.size() > chatter_events) recent_events.erase(recent_events.begin());
-    if (recent_events.size() < chatter_events || t - recent_events.front() > chatter_time) return;
-    const bool again = bridged_time > 0.0 && recent_events.front() - bridged_end < bridged_time;
-    recent_events.clear();
-    bridged_time = again ? std::min(chatter_growth * bridged_time, longest_chatter) : chatter_time;
-    const double dt = bridged_time / chatter_steps;
-    if (!options.method.outside()) stiffness.require_time_steps(dt);
-    out.events.push_back({t, Event::Kind::chatter, element});
-    if (options.method.outside()) return;  // whose steps go on without a look at events
-    const double stop = std::min(t_end, t + bridged_time);
-    w.state.seeks_directions = false;
-    while (t < stop) step_in_time(stop, dt);
-    bridged_end = t;
-    switch_modes(system, t, y, rate, std::nullopt);
-    remember_gaps();
-    output.configured_now();
 }
 
 // --- Record ---------------------------------------------------------------------------------------------------------
@@ -441,38 +303,6 @@ void Simulation::bridge_cluster(int element) {
 void Simulation::record(const std::optional<FoundEvent>& event) {
     if (event && event->changes_modes()) output.now();
     else output.end_step(!user_events.found().empty());
-}
-
-// --- Time stepping --------------------------------------------------------------------------------------------------
-
-void Simulation::step_in_time(double stop, double dt) {
-    sample_control();
-    double end = std::min({t + dt, stop, next_stop()});
-    if (options.output_dt > 0.0) end = std::min(end, std::max(output.next(), std::nextafter(t, stop)));
-    if (stop - end < least_part * dt) end = stop;
-    const Modes before = w.state.mode;
-    const std::vector<char> closed = w.state.closed;
-    const double from = t;
-    const VecX y_from = options.record.dense ? y : VecX();
-    if (system.ng > 0) moreau_contacts.step(t, end - t, y, moved_energy, impact_energy);
-    else moreau.step(t, end - t, y, moved_energy);
-    ++out.steps;
-    t = end;
-    system.read(y);
-    // Factors of the new modes: what sticks must not move as the rest is projected.
-    begin_rows(p, w, t, system.q, system.v);
-    system.project_and_evaluate(t, y, rate);
-    output.configured_now();
-    remember_directions(system, slip_at_start);
-    moved_energy += system.moved_energy;
-    for (const Event& change : changes_since(system, t, closed, before)) out.events.push_back(change);
-    notices.pulls(std::nullopt);
-    notices.several(false);
-    output.keep_time_step(from, y_from);
-    user_events.look_at_end(t, y);
-    tell_user_events();
-    if (!user_events.found().empty()) output.now();
-    output.end_time_step();
 }
 
 // --- Runs -----------------------------------------------------------------------------------------------------------

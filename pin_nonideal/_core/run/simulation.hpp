@@ -4,16 +4,12 @@
 #include <optional>
 #include <string>
 
-#include "run/checkpoint.hpp"
+#include "run/clusters.hpp"
 #include "run/event_location.hpp"
-#include "run/moreau.hpp"
-#include "run/moreau_contacts.hpp"
-#include "run/notices.hpp"
-#include "run/output.hpp"
+#include "run/landing.hpp"
 #include "run/rounding.hpp"
 #include "run/step_control.hpp"
-#include "run/stiffness.hpp"
-#include "run/user_events.hpp"
+#include "run/stepper_choice.hpp"
 
 namespace pn {
 
@@ -22,8 +18,6 @@ void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, co
 // Goes on in a new workspace from the state that `save` was given, with the same options; throws std::invalid_argument
 // when the state does not fit.
 void resume(const Program& p, Workspace& w, const std::string& state, const Options& options, Recording& out);
-
-constexpr double chatter_time = 1e-4;  // for which events that come too thick are stepped over [s]
 
 class Simulation : protected Progress {
 public:
@@ -57,21 +51,10 @@ protected:
     bool done() const { return t >= t_end || user_events.ends_run(); }
     // Whether the run goes on.
     bool between_steps();
-    bool ask_callback();
-    void tell_user_events();
     void save();
-    void sample_control();
-    double next_stop() const;
 
-    void choose_stepper();
     void change_modes(const FoundEvent& event);
-    // An impact of contacts that touch and approach each other; whether there was one.
-    bool strike(bool starts);
-    void end_bouncing();
-    void remember_gaps();
     void bridge_cluster(int element);
-    // One step of time stepping, not beyond `stop`.
-    void step_in_time(double stop, double dt);
 
     const Program& p;
     Workspace& w;
@@ -82,15 +65,17 @@ protected:
     ErrorNorm norm;
     Stepper stepper;
     StepControl control;
+    StepperChoice choice;
     StiffnessGuard stiffness;
     RoundingFloor floor;
     EventLocator locator;
-    Moreau moreau;
-    MoreauContacts moreau_contacts;
     Output output;
     Notices notices;
     UserEvents user_events;
-    bool turns_stiffly = false;  // the step just taken
+    Torques torques;
+    Landing landing;
+    TimeStepping time_stepping;
+    Clusters clusters;
     long ticks = 0;
     Clock::time_point next_save;
     const Clock::time_point begun = Clock::now();

@@ -1,7 +1,5 @@
 #include "run/stepped_run.hpp"
 
-#include "dynamics/step_start.hpp"
-
 namespace pn {
 
 void SteppedRun::begin(const VecX& q0, const VecX& v0, double period) {
@@ -9,20 +7,11 @@ void SteppedRun::begin(const VecX& q0, const VecX& v0, double period) {
     stepper.forget();
     event.reset();
     opened.reset();
-    turns_stiffly = false;
+    choice.forget();
     out.steps = 0;  // a run of its own: what watches over runs that get nowhere counts anew
     periods_ = 0;
     t_end = options.t0 + period;
     start(q0, v0);
-}
-
-void SteppedRun::set_torque(const VecX& torque) {
-    w.now.has_override = true;
-    w.now.override_torque = torque;
-    system.read(y);
-    begin_step(p, w, t, system.q, system.v);
-    system.rate_of_evaluation(t, y, rate);
-    output.configured_now();
 }
 
 void SteppedRun::advance(double period) {

@@ -13,7 +13,7 @@ public:
     // From a state on, at the time that the options say, for a first period; nothing is left of what was before.
     void begin(const VecX& q0, const VecX& v0, double period);
     // Torques in place of the actuation's from here on; the derivative is taken anew.
-    void set_torque(const VecX& torque);
+    void set_torque(const VecX& torque) { torques.set(torque); }
     // To the end of the next period.
     void advance(double period);
 

@@ -87,7 +87,11 @@ void UserEvents::step_onto(int k, double part) {
     }
 }
 
-void UserEvents::tell(int k) {
+void UserEvents::tell(double t, std::vector<Event>& events) const {
+    for (int k : found_) events.push_back({t, Event::Kind::user, k});
+}
+
+void UserEvents::count(int k) {
     const int after = asked_[k].direction;
     side_[k] = static_cast<signed char>(after != 0 ? after : -side_[k]);
     found_.push_back(k);
@@ -100,7 +104,7 @@ void UserEvents::take_signs() {
     for (int k = 0; k < static_cast<int>(asked_.size()); ++k) {
         const signed char here = sign(value(k, stepper_.t0 + stepper_.h, stepper_.y1));
         if (here == 0 || here == side_[k] || std::count(found_.begin(), found_.end(), k) > 0) continue;
-        if (side_[k] != 0 && counts(k)) tell(k);
+        if (side_[k] != 0 && counts(k)) count(k);
         else side_[k] = here;
     }
 }
@@ -120,7 +124,7 @@ bool UserEvents::locate(bool ends_at_event) {
     }
     side_ = side;
     const bool at_end = ends_at_event && part > 1.0 - same_part;
-    if (first >= 0) tell(first);
+    if (first >= 0) count(first);
     if (first >= 0 && !at_end) {
         step_onto(first, part);
     } else {
@@ -138,7 +142,7 @@ void UserEvents::look_at_end(double t, const VecX& y) {
     for (int k = 0; k < static_cast<int>(asked_.size()); ++k) {
         const signed char here = sign(value(k, t, y));
         if (here == 0 || here == side_[k]) continue;
-        if (side_[k] != 0 && counts(k)) tell(k);
+        if (side_[k] != 0 && counts(k)) count(k);
         else side_[k] = here;
     }
 }

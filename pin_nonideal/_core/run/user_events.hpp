@@ -26,6 +26,7 @@ public:
     void look_at_end(double t, const VecX& y);
     // Events at the end of the step.
     const std::vector<int>& found() const { return found_; }
+    void tell(double t, std::vector<Event>& events) const;
     // Whether one of them ends the run.
     bool ends_run() const { return ends_run_; }
 
@@ -38,7 +39,7 @@ private:
     void end_step_at(double size);
     void step_onto(int k, double part);
     void take_signs();
-    void tell(int k);
+    void count(int k);
 
     const std::vector<UserEvent>& asked_;
     System& system_;

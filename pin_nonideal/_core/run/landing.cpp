@@ -1,0 +1,67 @@
+#include "run/landing.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/power.hpp"
+#include "dynamics/step_start.hpp"
+#include "run/bouncing.hpp"
+
+namespace pn {
+
+namespace {
+
+// Part of the works of an impact that rounding may make a gain of.
+constexpr double gain_rounding = 1e-12;
+
+}  // namespace
+
+Landing::Landing(System& system, Progress& progress, const Options& options, Output& output, Recording& out)
+    : p(system.p), w(system.w), system_(system), now_(progress), options_(options), output_(output), out_(out) {}
+
+bool Landing::strike(bool starts) {
+    if (system_.ng == 0 || !contacts_strike(system_, now_.t, now_.y, starts)) return false;
+    output_.before_jump();
+    const Strike found = strike_contacts(system_, now_.t, now_.y, starts);
+    for (const Event& event : found.events) out_.events.push_back(event);
+    now_.impact_energy += found.work;
+    if (system_.energy && p.moves_in_time) system_.work(now_.y)[constraint_power] += found.work_of_constraints;
+    else now_.moved_energy += found.work_of_constraints;
+    double size = 0.0;
+    for (const Event& event : found.events) size += std::abs(event.energy_change);
+    if (!options_.strict || !(found.work > gain_rounding * size)) return true;
+    std::vector<int> blocks;
+    for (const Event& event : found.events) blocks.push_back(event.element);
+    throw Failure(Failure::Kind::impact_energy, now_.t, blocks, found.work);
+}
+
+void Landing::end_bouncing(double stop) {
+    output_.now();
+    output_.configured_now();
+    if (options_.output_dt > 0.0) stop = std::min(stop, output_.next());
+    VecX y_end = now_.y, rate_end = now_.rate;
+    const RunState state = w.state;
+    const std::optional<Rest> rest = bounce_to_rest(system_, now_.t, stop, y_end, rate_end);
+    if (!rest) {
+        set_closed(p, w, state.closed);
+        w.state = state;
+        select_rows(p, w);
+        system_.read(now_.y);
+        return begin_step(p, w, now_.t, system_.q, system_.v);
+    }
+    now_.t = rest->time;
+    now_.y = y_end;
+    now_.rate = rate_end;
+    now_.impact_energy += rest->work;
+    for (const Event& event : rest->events) out_.events.push_back(event);
+    output_.configured_now();
+    remember_gaps();
+}
+
+void Landing::remember_gaps() {
+    if (system_.ng == 0) return;
+    system_.read(now_.y);
+    look_at_gaps(system_, now_.t, now_.gaps);
+}
+
+}  // namespace pn

@@ -1,0 +1,30 @@
+// What a run does where contacts touch: they strike, what bounces too low to be integrated comes to rest, and the gaps
+// that are left open are looked at for the next step.
+#pragma once
+
+#include "run/output.hpp"
+
+namespace pn {
+
+class Landing {
+public:
+    Landing(System& system, Progress& progress, const Options& options, Output& output, Recording& out);
+
+    // An impact of contacts that touch and approach each other; whether there was one.
+    bool strike(bool starts);
+    // The end of bouncing behind a strike, not beyond `stop` nor the next sample; where there is none the state stays.
+    void end_bouncing(double stop);
+    // Widths and rates of the gaps at the state now, from which the next step starts.
+    void remember_gaps();
+
+private:
+    const Program& p;
+    Workspace& w;
+    System& system_;
+    Progress& now_;
+    const Options& options_;
+    Output& output_;
+    Recording& out_;
+};
+
+}  // namespace pn

@@ -1,0 +1,59 @@
+#include "run/time_stepping.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/step_start.hpp"
+#include "run/events.hpp"
+
+namespace pn {
+
+namespace {
+
+// Part of a step that is not worth one of its own.
+constexpr double least_part = 1e-9;
+
+}  // namespace
+
+TimeStepping::TimeStepping(System& system, Progress& progress, const Options& options, Torques& torques,
+                           Output& output, Notices& notices, UserEvents& user_events, Recording& out)
+    : p(system.p), w(system.w), system_(system), now_(progress), options_(options), torques_(torques),
+      output_(output), notices_(notices), user_events_(user_events), out_(out), moreau_(system),
+      moreau_contacts_(system) {}
+
+double TimeStepping::end_of_step(double size, double stop, double t_end) const {
+    double end = std::min({now_.t + size, stop, torques_.next_stop(t_end)});
+    if (options_.output_dt > 0.0) end = std::min(end, std::max(output_.next(), std::nextafter(now_.t, stop)));
+    return stop - end < least_part * size ? stop : end;
+}
+
+void TimeStepping::step(double size, double stop, double t_end) {
+    torques_.sample();
+    double& t = now_.t;
+    VecX& y = now_.y;
+    const double end = end_of_step(size, stop, t_end), from = t;
+    const Modes before = w.state.mode;
+    const std::vector<char> closed = w.state.closed;
+    const VecX y_from = options_.record.dense ? y : VecX();
+    if (system_.ng > 0) moreau_contacts_.step(t, end - t, y, now_.moved_energy, now_.impact_energy);
+    else moreau_.step(t, end - t, y, now_.moved_energy);
+    ++out_.steps;
+    t = end;
+    system_.read(y);
+    // Factors of the new modes: what sticks must not move as the rest is projected.
+    begin_rows(p, w, t, system_.q, system_.v);
+    system_.project_and_evaluate(t, y, now_.rate);
+    output_.configured_now();
+    remember_directions(system_, now_.slip_at_start);
+    now_.moved_energy += system_.moved_energy;
+    for (const Event& change : changes_since(system_, t, closed, before)) out_.events.push_back(change);
+    notices_.pulls(std::nullopt);
+    notices_.several(false);
+    output_.keep_time_step(from, y_from);
+    user_events_.look_at_end(t, y);
+    user_events_.tell(t, out_.events);
+    if (!user_events_.found().empty()) output_.now();
+    output_.end_time_step();
+}
+
+}  // namespace pn

@@ -1,0 +1,38 @@
+// A step of time stepping as a part of a run: it needs no events, ends where torques jump and samples are due, and is
+// recorded as any other.
+#pragma once
+
+#include "run/moreau.hpp"
+#include "run/moreau_contacts.hpp"
+#include "run/notices.hpp"
+#include "run/torques.hpp"
+#include "run/user_events.hpp"
+
+namespace pn {
+
+class TimeStepping {
+public:
+    TimeStepping(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
+                 Notices& notices, UserEvents& user_events, Recording& out);
+
+    // One step of this size, not beyond `stop` nor the end of the run.
+    void step(double size, double stop, double t_end);
+
+private:
+    double end_of_step(double size, double stop, double t_end) const;
+
+    const Program& p;
+    Workspace& w;
+    System& system_;
+    Progress& now_;
+    const Options& options_;
+    Torques& torques_;
+    Output& output_;
+    Notices& notices_;
+    UserEvents& user_events_;
+    Recording& out_;
+    Moreau moreau_;
+    MoreauContacts moreau_contacts_;
+};
+
+}  // namespace pn
