@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from .errors import InputError, LoadingError
-from .formats.robot_yaml import check_keys, plain_yaml
+from .formats.plain_yaml import plain_yaml
+from .formats.robot_yaml import check_keys
 from .loading import load
 from .replaying import replay
 from .scene import Scene

@@ -12,8 +12,9 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.checks import unit_axis
 from pin_nonideal.page.elements import elements_of
-from pin_nonideal.page.forces import arrows_of, marks_of
+from pin_nonideal.page.forces import arrows_of
 from pin_nonideal.page.looks import MODES
+from pin_nonideal.page.marks import marks_of
 from pin_nonideal.page.motion import sample
 
 from .replay_browser import Watched, headless_browser

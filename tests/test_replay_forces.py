@@ -19,7 +19,8 @@ from pin_nonideal.constraints import (
 )
 from pin_nonideal.contacts import PointContact
 from pin_nonideal.forces import SpringDamper
-from pin_nonideal.page.forces import arrows_of, marks_of
+from pin_nonideal.page.forces import arrows_of
+from pin_nonideal.page.marks import marks_of
 from pin_nonideal.page.motion import sample
 from pin_nonideal.timefunctions import constant
 

@@ -11,13 +11,12 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, UnknownNameError
 from pin_nonideal.page.bands import mode_bands
+from pin_nonideal.page.coordinates import positions, velocities
 from pin_nonideal.page.signals import (
     INTERVALS,
     MAX_CURVES,
     Plot,
     plots_of,
-    positions,
-    velocities,
 )
 
 from .replay_runs import four_bar, jointed, panda, run_of

@@ -13,9 +13,10 @@ import pin_nonideal as pn
 from pin_nonideal.page.bands import bands_of, gaps_of, opens
 from pin_nonideal.page.bare import sticks
 from pin_nonideal.page.between import between
-from pin_nonideal.page.forces import arrows_of, marks_of
+from pin_nonideal.page.forces import arrows_of
 from pin_nonideal.page.given import given_arrows
 from pin_nonideal.page.looks import CLOSED, OPEN
+from pin_nonideal.page.marks import marks_of
 from pin_nonideal.page.motion import sample
 from pin_nonideal.page.signals import plots_of
 from pin_nonideal.page.touched import planes_of, touched_of

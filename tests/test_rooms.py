@@ -23,7 +23,7 @@ compilation: failures callbacks names constraints contacts friction laws forces 
 run_numbers description report
 scene_states scene_geometry scene_tables scene_steps scene_copy scene
 formats: xml shapes model_edit inertia urdf_checks urdf_words tidy density meshes expansion urdf generators \
-example_robots robot_yaml starts tree_changes dissipation motors assembly rounding
+example_robots plain_yaml robot_yaml starts tree_changes dissipation motors assembly rounding
 mjcf: fields compile motion tree tendons forces transmissions actuators equality shapes told reader
 loading
 records outcome dense npz trajectory_file trajectory_columns trajectory_by_name \
@@ -31,8 +31,8 @@ trajectory_summary trajectory
 runs: options asked progress results checkpoint components joining apart scipy_methods resume
 simulation run_arrays batches sweep_points sweep_packs sweep_store sweeping
 statics: forces equilibrium rest inverse_dynamics
-page: looks figure_styles geometry bare packing tracks motion between touched view guides forces given bands \
-signals relations elements choices payload window
+page: looks figure_styles geometry bare packing tracks motion between touched view guides marks forces given \
+bands coordinates signals relations elements choices payload window
 replaying plotting browser rendering commands pin_nonideal cli_runs cli
 """
 

@@ -7,7 +7,6 @@ ever executed.
 from __future__ import annotations
 
 import dataclasses
-import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, get_args
@@ -18,7 +17,7 @@ from pin_nonideal.errors import InputError, LoadingError, nearest
 from pin_nonideal.geometry_contacts import GeometryContact
 from pin_nonideal.types import Table
 
-from .xml import read_text
+from .plain_yaml import plain_yaml
 
 COMMUNITY_KEYS = ("closed_loop", "type", "name_mot", "joint_name", "joint_type")
 OWN_KEYS = (
@@ -87,67 +86,6 @@ def _check_numbers(value: Any, where: str) -> None:
     kinds = {type(x) for x in value} if isinstance(value, list) else set()
     if bool in kinds and kinds & {int, float}:
         raise LoadingError(f"{where} must hold numbers; got {value!r}")
-
-
-def plain_yaml(path: Path) -> Any:
-    """What a YAML file holds: tables, lists, texts and numbers that are what they look like.
-
-    Args:
-        path: the file.
-
-    Raises:
-        LoadingError: it is truncated or malformed, or holds tags that name code, anchors, a key twice, or
-            octal or sexagesimal numbers.
-    """
-    import yaml
-
-    try:
-        return yaml.load(read_text(path), Loader=_loader())  # a SafeLoader: plain values only
-    except yaml.YAMLError as error:
-        raise LoadingError(f'"{path}" cannot be read as plain YAML: {_one_line(error)}') from None
-    except RecursionError:
-        raise LoadingError(f'"{path}" is nested too deeply; it must be a flat table') from None
-
-
-def _loader() -> Any:
-    """yaml.SafeLoader that also refuses repeated keys and anchors, and reads 1e-3 as a number."""
-    import yaml
-
-    class Loader(yaml.SafeLoader):
-        def compose_node(self, parent: Any, index: Any) -> Any:
-            event = self.peek_event()  # type: ignore[no-untyped-call]
-            if getattr(event, "anchor", None) is not None:
-                raise yaml.YAMLError(f"anchors and aliases are not read (line {event.start_mark.line + 1})")
-            return super().compose_node(parent, index)
-
-        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
-            seen = set()
-            for key, _ in node.value:
-                if not isinstance(key, yaml.ScalarNode):
-                    raise yaml.YAMLError(f"a key must be a word (line {key.start_mark.line + 1})")
-                if key.value in seen:
-                    raise yaml.YAMLError(f'key "{key.value}" appears twice (line {key.start_mark.line + 1})')
-                seen.add(key.value)
-            return super().construct_mapping(node, deep)
-
-        def construct_scalar(self, node: Any) -> Any:
-            surprising = re.fullmatch(
-                r"[-+]?(0[0-7_]+|[0-9][0-9_]*(:[0-5]?[0-9])+(\.[0-9_]*)?)", str(node.value)
-            )
-            if surprising and node.style is None and node.tag.endswith((":int", ":float")):
-                line = node.start_mark.line + 1
-                raise yaml.YAMLError(
-                    f"{node.value} is octal or sexagesimal in YAML (line {line}); write decimals, or a text"
-                )
-            return super().construct_scalar(node)
-
-    number = re.compile(r"^[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$")
-    Loader.add_implicit_resolver("tag:yaml.org,2002:float", number, list("-+.0123456789"))
-    return Loader
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
 
 
 def _kind(value: object) -> str:

@@ -11,8 +11,9 @@ import pinocchio as pin
 from pin_nonideal.types import Array, Table
 
 from .bands import opens
+from .coordinates import positions, velocities
 from .geometry import Visual, visuals_of
-from .signals import Plot, positions, velocities
+from .signals import Plot
 
 if TYPE_CHECKING:
     from pin_nonideal.scene import Scene

@@ -13,8 +13,8 @@ from pin_nonideal.states.placements import frame_on_joint
 from pin_nonideal.types import Array
 
 from .bands import bands_of
-from .forces import Mark, constraints_of
 from .geometry import joint_axis
+from .marks import Mark, constraints_of
 from .motion import Motion
 from .relations import friction_joints
 

@@ -1,4 +1,4 @@
-"""What the replay shows of constraints: marks where bodies meet, and arrows of the forces there.
+"""What the replay shows of the forces of constraint: arrows where bodies meet, and at joints.
 
 The arrow at an anchor is the reaction on the body of frame1, from the anchor's rows of `lam`, split by
 `lam_ideal` into its ideal and its nonideal part, its moment an arc beside it.  `F_nonideal` is drawn at the
@@ -9,7 +9,7 @@ joints, and so are the torques `tau` of the actuation; `F_ideal` is when no cons
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,11 +17,10 @@ import pinocchio as pin
 
 from pin_nonideal.checks import axis_triad, unit_axis
 from pin_nonideal.core import core
-from pin_nonideal.forces import SpringDamper
-from pin_nonideal.states.placements import frame_on_joint, joint_placements
 from pin_nonideal.types import Array
 
 from .geometry import joint_axis
+from .marks import Mark, Side, constraints_of, side_of, sides_of
 from .motion import Motion
 
 if TYPE_CHECKING:
@@ -32,29 +31,6 @@ if TYPE_CHECKING:
 # A force below this part of the largest one is rounding and gets no arrow; moments are measured by the
 # largest moment and by the largest force at the length of a link.
 SMALLEST = 1e-9
-
-
-@dataclass(frozen=True)
-class Mark:
-    """Two points that a constraint or a spring ties together.
-
-    Attributes:
-        name: name of the constraint, contact or force.
-        kind: "anchor", "rod", "spring" or "contact".
-        joint1: index of the joint that carries the first point, 0 for the world.
-        point1: the point in that joint's frame [m], (3,).
-        joint2: index of the joint that carries the second point.
-        point2: the second point [m], (3,).
-        axes: unit vectors in the second joint's frame along which the points must coincide, (k, 3).
-    """
-
-    name: str
-    kind: str
-    joint1: int
-    point1: Array
-    joint2: int
-    point2: Array
-    axes: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 @dataclass(frozen=True)
@@ -83,82 +59,6 @@ class Arrow:
         """Its largest size over the run [N or N m]."""
         sizes = self.values if self.values.ndim == 1 else np.linalg.norm(self.values, axis=1)
         return float(np.abs(sizes).max(initial=0.0))
-
-
-@dataclass(frozen=True)
-class _Side:
-    """One side of a constraint: a placement fixed to a joint."""
-
-    joint: int
-    placement: pin.SE3
-
-    @property
-    def point(self) -> Array:
-        return np.asarray(self.placement.translation)
-
-    def turned(self, motion: Motion, local: Array) -> Array:
-        """Vectors in the axes of this side as vectors in world axes, (n, 3)."""
-        turn = motion.rotation(self.joint) @ np.asarray(self.placement.rotation)
-        return np.asarray(np.einsum("nij,nj->ni", turn, local))
-
-
-def marks_of(scene: Scene) -> list[Mark]:
-    """Marks of all anchors, rods, contacts and springs of a scene."""
-    marks = []
-    for name, item, shown in constraints_of(scene):
-        if not hasattr(item, "frame") and hasattr(item, "lower"):
-            continue
-        if shown == core.Shown.contact:
-            side = _side(scene.model, item.frame)
-            point = side.point + np.asarray(side.placement.rotation) @ getattr(item, "offset", np.zeros(3))
-            marks.append(Mark(name, "contact", side.joint, point, side.joint, point))
-        elif shown in (core.Shown.anchor, core.Shown.rod):
-            marks.append(_tie(scene, name, shown.name, item))
-    springs = [item for item in scene.forces if isinstance(item, SpringDamper)]
-    return marks + [_tie(scene, item.name or f"spring {item.frame1}", "spring", item) for item in springs]
-
-
-def _tie(scene: Scene, name: str, kind: str, item: Any) -> Mark:
-    """The mark of what ties two frames."""
-    first, second = _sides(scene, item)
-    held = ["xyz".index(axis) for axis in getattr(item, "axes", "xyz")] if kind == "anchor" else []
-    axes = np.asarray(second.placement.rotation).T[held]
-    return Mark(name, kind, first.joint, first.point, second.joint, second.point, axes)
-
-
-def constraints_of(scene: Scene) -> list[tuple[str, Any, core.Shown]]:
-    """Constraints and contacts with the names of their rows, and what the core says is shown of them.
-
-    Args:
-        scene: the scene.
-    """
-    known = [c.shown for c in scene._compiled.program.constraints]
-    contacts: list[Any] = []
-    for item in scene.contacts:  # a stop of a joint has rows of its own at each of its ends
-        ends = [end for end in ("lower", "upper") if hasattr(item, end)]
-        own = [name for name in scene.constraint_slices if any(name.endswith(f" {end}") for end in ends)]
-        named = [name for name in own if name.rpartition(" ")[0] == (item.name or item.joint)] if ends else []
-        contacts += [item] * (len(named) or 1)
-    return list(zip(scene.constraint_slices, [*scene.constraints, *contacts], known, strict=False))
-
-
-def _side(model: pin.Model, frame: str) -> _Side:
-    return _Side(*frame_on_joint(model, frame))
-
-
-def _sides(scene: Scene, item: Any) -> tuple[_Side, _Side]:
-    """Both sides of what ties two frames."""
-    model = scene.model
-    if hasattr(item, "joint1_placement"):  # a constraint model of Pinocchio
-        return (
-            _Side(int(item.joint1_id), item.joint1_placement),
-            _Side(int(item.joint2_id), item.joint2_placement),
-        )
-    first = _side(model, item.frame1)
-    if item.frame2 is not None:
-        return first, _side(model, item.frame2)
-    here = joint_placements(model, scene.q0)[first.joint].act(first.point)
-    return first, _Side(0, pin.SE3(np.eye(3), here))
 
 
 def arrows_of(run: Trajectory, motion: Motion, marks: list[Mark], more: Sequence[Arrow] = ()) -> list[Arrow]:
@@ -218,11 +118,11 @@ def _reaction(
     if shown in (core.Shown.anchor, core.Shown.rod):
         return _between(scene, motion, name, kind, item, shown, lam)
     if shown in (core.Shown.rolling, core.Shown.contact):
-        body = _side(model, item.frame)
+        body = side_of(model, item.frame)
         force, place = _on_plane(model, motion, item, lam)
         return [Arrow(name, kind, "N", force, body.joint, place)]
     if shown == core.Shown.edge:
-        edge = _side(model, item.frame)
+        edge = side_of(model, item.frame)
         force = edge.turned(motion, lam[:, :1] * np.array(unit_axis("axis", item.axis)))
         return [Arrow(name, kind, "N", force, edge.joint, motion.point(edge.joint, edge.point))]
     if shown == core.Shown.drive:
@@ -236,7 +136,7 @@ def _reaction(
 
 def _touching(run: Trajectory, motion: Motion, name: str, item: Any) -> Arrow:
     """The force in a contact, friction included, from the recorded reactions."""
-    body = _side(run.scene.model, item.frame)
+    body = side_of(run.scene.model, item.frame)
     _, place = _on_plane(run.scene.model, motion, item, np.zeros((len(motion.times), 1)))
     return Arrow(name, "total", "N", motion.of(run.reaction(name, axes="world")[:, :3]), body.joint, place)
 
@@ -245,7 +145,7 @@ def _between(
     scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.Shown, lam: Array
 ) -> list[Arrow]:
     """Force on the first of two frames that are tied, and the moment where the tie takes one."""
-    first, second = _sides(scene, item)
+    first, second = sides_of(scene, item)
     origin = motion.point(first.joint, first.point)
     if shown == core.Shown.rod:
         force = lam[:, :1] * _unit(origin - motion.point(second.joint, second.point))
@@ -269,8 +169,8 @@ def _on_plane(model: pin.Model, motion: Motion, item: Any, lam: Array) -> tuple[
     local = lam[:, -1:] * normal
     if lam.shape[1] == 3:
         local = local + lam[:, :1] * t1 + lam[:, 1:2] * t2
-    body = _side(model, item.frame)
-    plane = _Side(0, pin.SE3.Identity()) if item.plane is None else _side(model, item.plane)
+    body = side_of(model, item.frame)
+    plane = Side(0, pin.SE3.Identity()) if item.plane is None else side_of(model, item.plane)
     up = plane.turned(motion, np.tile(normal, (len(lam), 1)))
     if getattr(item, "axis", None) is not None:  # a disk: its lowest point
         axis = body.turned(motion, np.tile(unit_axis("axis", item.axis), (len(lam), 1)))

@@ -13,7 +13,8 @@ from pin_nonideal.round_contacts import CapsuleContact, SphereContact, segments
 from pin_nonideal.states.placements import frame_on_joint
 from pin_nonideal.types import Array
 
-from .forces import Arrow, Mark, along, constraints_of
+from .forces import Arrow, along
+from .marks import Mark, constraints_of
 from .motion import Motion
 
 if TYPE_CHECKING:

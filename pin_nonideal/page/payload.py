@@ -15,11 +15,12 @@ from .bare import sticks
 from .between import between
 from .choices import collisions_of, inertia_box, signals_of
 from .elements import Element, elements_of
-from .forces import Arrow, arrows_of, marks_of
+from .forces import Arrow, arrows_of
 from .geometry import Visual, joint_axis, visuals_of
 from .given import given_arrows
 from .guides import Guide, guides_of
 from .looks import table
+from .marks import marks_of
 from .motion import Motion, sample
 from .packing import Payload, Shapes
 from .signals import Chosen, Plot, plots_of, usual_plots, wanted

@@ -10,7 +10,8 @@ import numpy as np
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.types import Array
 
-from .signals import MAX_CURVES, left_out, positions, velocities
+from .coordinates import positions, velocities
+from .signals import MAX_CURVES, left_out
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory import Trajectory

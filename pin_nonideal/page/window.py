@@ -9,8 +9,9 @@ import pinocchio as pin
 
 from pin_nonideal.types import Array
 
-from .forces import Arrow, arrows_of, marks_of
+from .forces import Arrow, arrows_of
 from .looks import FORCES
+from .marks import marks_of
 from .motion import Motion, sample
 from .view import link_length
 

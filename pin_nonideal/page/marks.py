@@ -1,0 +1,144 @@
+"""Marks where bodies meet: the places of anchors, rods, contacts and springs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.core import core
+from pin_nonideal.forces import SpringDamper
+from pin_nonideal.states.placements import frame_on_joint, joint_placements
+from pin_nonideal.types import Array
+
+from .motion import Motion
+
+if TYPE_CHECKING:
+    from pin_nonideal.scene import Scene
+
+
+@dataclass(frozen=True)
+class Mark:
+    """Two points that a constraint or a spring ties together.
+
+    Attributes:
+        name: name of the constraint, contact or force.
+        kind: "anchor", "rod", "spring" or "contact".
+        joint1: index of the joint that carries the first point, 0 for the world.
+        point1: the point in that joint's frame [m], (3,).
+        joint2: index of the joint that carries the second point.
+        point2: the second point [m], (3,).
+        axes: unit vectors in the second joint's frame along which the points must coincide, (k, 3).
+    """
+
+    name: str
+    kind: str
+    joint1: int
+    point1: Array
+    joint2: int
+    point2: Array
+    axes: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+
+@dataclass(frozen=True)
+class Side:
+    """One side of a constraint: a placement fixed to a joint.
+
+    Attributes:
+        joint: its index, 0 for the world.
+        placement: in the joint's frame.
+    """
+
+    joint: int
+    placement: pin.SE3
+
+    @property
+    def point(self) -> Array:
+        """Its origin in the joint's frame [m], (3,)."""
+        return np.asarray(self.placement.translation)
+
+    def turned(self, motion: Motion, local: Array) -> Array:
+        """Vectors in the axes of this side as vectors in world axes, (n, 3).
+
+        Args:
+            motion: the motion.
+            local: the vectors, (n, 3).
+        """
+        turn = motion.rotation(self.joint) @ np.asarray(self.placement.rotation)
+        return np.asarray(np.einsum("nij,nj->ni", turn, local))
+
+
+def marks_of(scene: Scene) -> list[Mark]:
+    """Marks of all anchors, rods, contacts and springs of a scene.
+
+    Args:
+        scene: the scene.
+    """
+    marks = []
+    for name, item, shown in constraints_of(scene):
+        if not hasattr(item, "frame") and hasattr(item, "lower"):
+            continue
+        if shown == core.Shown.contact:
+            side = side_of(scene.model, item.frame)
+            point = side.point + np.asarray(side.placement.rotation) @ getattr(item, "offset", np.zeros(3))
+            marks.append(Mark(name, "contact", side.joint, point, side.joint, point))
+        elif shown in (core.Shown.anchor, core.Shown.rod):
+            marks.append(_tie(scene, name, shown.name, item))
+    springs = [item for item in scene.forces if isinstance(item, SpringDamper)]
+    return marks + [_tie(scene, item.name or f"spring {item.frame1}", "spring", item) for item in springs]
+
+
+def _tie(scene: Scene, name: str, kind: str, item: Any) -> Mark:
+    """The mark of what ties two frames."""
+    first, second = sides_of(scene, item)
+    held = ["xyz".index(axis) for axis in getattr(item, "axes", "xyz")] if kind == "anchor" else []
+    axes = np.asarray(second.placement.rotation).T[held]
+    return Mark(name, kind, first.joint, first.point, second.joint, second.point, axes)
+
+
+def constraints_of(scene: Scene) -> list[tuple[str, Any, core.Shown]]:
+    """Constraints and contacts with the names of their rows, and what the core says is shown of them.
+
+    Args:
+        scene: the scene.
+    """
+    known = [c.shown for c in scene._compiled.program.constraints]
+    contacts: list[Any] = []
+    for item in scene.contacts:  # a stop of a joint has rows of its own at each of its ends
+        ends = [end for end in ("lower", "upper") if hasattr(item, end)]
+        own = [name for name in scene.constraint_slices if any(name.endswith(f" {end}") for end in ends)]
+        named = [name for name in own if name.rpartition(" ")[0] == (item.name or item.joint)] if ends else []
+        contacts += [item] * (len(named) or 1)
+    return list(zip(scene.constraint_slices, [*scene.constraints, *contacts], known, strict=False))
+
+
+def side_of(model: pin.Model, frame: str) -> Side:
+    """The side of a frame.
+
+    Args:
+        model: the model.
+        frame: name.
+    """
+    return Side(*frame_on_joint(model, frame))
+
+
+def sides_of(scene: Scene, item: Any) -> tuple[Side, Side]:
+    """Both sides of what ties two frames.
+
+    Args:
+        scene: the scene.
+        item: the constraint, contact or spring.
+    """
+    model = scene.model
+    if hasattr(item, "joint1_placement"):  # a constraint model of Pinocchio
+        return (
+            Side(int(item.joint1_id), item.joint1_placement),
+            Side(int(item.joint2_id), item.joint2_placement),
+        )
+    first = side_of(model, item.frame1)
+    if item.frame2 is not None:
+        return first, side_of(model, item.frame2)
+    here = joint_placements(model, scene.q0)[first.joint].act(first.point)
+    return first, Side(0, pin.SE3(np.eye(3), here))
