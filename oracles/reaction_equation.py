@@ -83,8 +83,11 @@ class Equation:
                 return None
         return None
 
-    def roots(self, rng):
-        """All solutions y, (k, n), and whether their number is in doubt by rounding or the scan's width."""
+    def roots(self, rng, others=()):
+        """All solutions y, (k, n), and whether their number is in doubt by rounding or the scan's width.
+
+        Newton's method starts from `others` too: solutions that someone claims.
+        """
         scale, points = self.scale(), SCAN[self.n]
         axis = (np.arange(points) + 0.31) / points
         grid = np.stack(np.meshgrid(*[axis / (1.0 - axis)] * self.n, indexing="ij"), axis=-1) * scale
@@ -100,6 +103,7 @@ class Equation:
             cells = cells[rng.choice(len(cells), MOST_CELLS, replace=False)]
         starts = [grid[tuple(cell)] for cell in cells]
         starts += [scale * 10.0 ** rng.uniform(-2.0, 3.0, self.n) for _ in range(STARTS)]
+        starts += [np.asarray(y, dtype=float) for y in others]
         found = []
         for start in starts:
             y = self.polished(start)

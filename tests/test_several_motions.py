@@ -30,20 +30,21 @@ INSTANT = 5e-8
 
 
 def told(scene, q, v):
-    """What `solve` says of the motion: how many there are, and their accelerations."""
+    """What `solve` says of the motion: how many there are, their accelerations, and limits of several."""
     try:
         s = scene.solve(q, v)
-        return {True: "one", None: "not shown"}[s.unique], [s.a]
+        return {True: "one", None: "not shown"}[s.unique], [s.a], []
     except pn.FrictionParadoxError as error:
         found = re.search("has (no solution|several solutions|no solution or several) at", str(error))[1]
-        return {"no solution": "none", "several solutions": "two"}.get(found, "edge"), error.solutions
+        kind = {"no solution": "none", "several solutions": "two"}.get(found, "edge")
+        return kind, error.solutions, error.limits
 
 
 def check_random(seed):
     rng = np.random.default_rng([13, seed])
     scene, q, v = random_scene(rng)
-    roots, doubtful = equation(scene, q, v).roots(rng)
-    found, motions = told(scene, q, v)
+    found, motions, limits = told(scene, q, v)
+    roots, doubtful = equation(scene, q, v).roots(rng, others=limits)
     if doubtful:
         return "doubtful"
     expected = [acceleration(scene, q, v, y) for y in roots]
