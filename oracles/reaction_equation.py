@@ -83,6 +83,10 @@ class Equation:
                 return None
         return None
 
+    def leaves_unloaded(self):
+        """Whether friction alone would load some bearing: what rounding leaves there may go any way."""
+        return bool((self.image(np.zeros((1, self.n))) < UNLOADED).any())
+
     def roots(self, rng, others=()):
         """All solutions y, (k, n), and whether their number is in doubt by rounding or the scan's width.
 
@@ -112,8 +116,7 @@ class Equation:
         dets = [np.linalg.det(np.eye(self.n) - self.slope(y)) for y in found]
         touches = not found and float(np.abs(F).max(axis=-1).min()) < DOUBTFUL
         infinite = abs(np.linalg.det(np.eye(self.n) - self.steepest())) < DOUBTFUL
-        unloaded = (self.image(np.zeros((1, self.n))) < UNLOADED).any()  # what rounding leaves may go any way
-        doubtful = touches or infinite or unloaded or any(abs(d) < DOUBTFUL for d in dets)
+        doubtful = touches or infinite or any(abs(d) < DOUBTFUL for d in dets)
         return np.array(found).reshape(-1, self.n), doubtful
 
 

@@ -22,8 +22,6 @@ from .random_loaded_joints import random_scene
 # The oracle's roots and the core's carry the rounding of one linear solution, magnified by 1/det(I - dg/dy),
 # which is 1e4 at most in cases that are not in doubt.
 SAME = 1e-7
-# Of a hundred: they are six in a thousand, where two solutions touch or one goes to infinity.
-MOST_DOUBTFUL = 8
 # Where the growth of g comes within 1e-8 of one the determinant is not told from zero; here it grows by 0.25
 # a second.
 INSTANT = 5e-8
@@ -44,7 +42,10 @@ def check_random(seed):
     rng = np.random.default_rng([13, seed])
     scene, q, v = random_scene(rng)
     found, motions, limits = told(scene, q, v)
-    roots, doubtful = equation(scene, q, v).roots(rng, others=limits)
+    equations = equation(scene, q, v)
+    if equations.leaves_unloaded():
+        return "unloaded"
+    roots, doubtful = equations.roots(rng, others=limits)
     if doubtful:
         return "doubtful"
     expected = [acceleration(scene, q, v, y) for y in roots]
@@ -64,7 +65,7 @@ def test_random_loaded_joints(seed):
 @pytest.mark.parametrize("seeds", list(pairwise(range(60, 10_161, 100))))
 def test_ten_thousand_loaded_joints(seeds):
     found = [check_random(seed) for seed in range(*seeds)]
-    assert found.count("doubtful") < MOST_DOUBTFUL
+    assert found.count("doubtful") < 3
     print({kind: found.count(kind) for kind in sorted(set(found))})
 
 
