@@ -21,6 +21,7 @@ WITHIN = 1e-4  # part of mu: a run ends where another motion comes in from infin
 STEPS = {"stance": 2000, "balls": 3000}
 HELD = 1e-9  # part of the largest slip below which a foot is held
 BALANCE = 1e-6
+SAME_TIME = 1e-9  # part of the time
 
 
 def stance(seed, unilateral):
@@ -53,9 +54,9 @@ def sharings(oracle, run, instant, more):
     return oracle.sharings(run.t[-1], state[2], state[5], directions, (1.0 + more) * oracle.mu)
 
 
-@pytest.mark.parametrize("seeds", [range(10), pytest.param(range(10, 1010), marks=long)])
+@pytest.mark.parametrize("seeds", [range(10), [1009], pytest.param(range(10, 1010), marks=long)])
 def test_stances_give_way_in_time_and_in_few_steps(seeds):
-    late, steps, evaluations = [], [], []
+    late, steps, evaluations, missing = [], [], [], [0.0]
     for seed in seeds:
         scene, oracle = stance(seed, unilateral=False)
         instant = oracle.give_way(LATEST)
@@ -65,6 +66,7 @@ def test_stances_give_way_in_time_and_in_few_steps(seeds):
             pn.FrictionParadoxError
         ) as stopped:  # a foot that is kept though it pulls may leave none, or several
             run = stopped.trajectory
+            missing.append(1.0 - run.t[-1] / stopped.time)
             assert len(sharings(oracle, run, instant, WITHIN)) != 1
         first = next((event.time for event in run.events if event.kind == "slip"), run.t[-1])
         late.append(abs(first - instant))
@@ -73,6 +75,7 @@ def test_stances_give_way_in_time_and_in_few_steps(seeds):
     print(f"evaluations: {np.median(evaluations):.0f} in the middle, {max(evaluations)} at most")
     at_most("the instant of giving way [s]", max(late), GIVES_WAY)
     at_most("steps", max(steps), STEPS["stance"])
+    at_most("part of the time before an error that is not shown", max(missing), SAME_TIME)
 
 
 @pytest.mark.parametrize("seed", [9, 12, 56])
@@ -99,7 +102,9 @@ def test_feet_rest_as_long_as_any_forces_hold_them(seed):
     assert not run.stats.steps > STEPS["stance"]
 
 
-@pytest.mark.parametrize("seeds", [[330, 484, 533], pytest.param(range(300, 1300), marks=long)])
+@pytest.mark.parametrize(
+    "seeds", [[330, 484, 533], [652, 756, 868], pytest.param(range(300, 1300), marks=long)]
+)
 def test_feet_that_cannot_pull_slide_on(seeds):
     """One that passes by the center of rotation sticks again where its share allows it, and nowhere else."""
     steps = []

@@ -16,6 +16,8 @@ constexpr int newton_limit = 30;
 constexpr int most_mixed = 6;            // laws whose mixtures of branches are all looked at; else one by one
 constexpr double same_solution = 1e-9;   // relative residual at which a point is a solution
 constexpr double other_solution = 1e-6;  // relative distance beyond which it is another one
+constexpr double near_motion = 1e-6;     // part of the unknowns by which the arrays of an equation may miss a motion
+constexpr int refinements = 3;           // of a solution that they miss
 constexpr double at_limit = 1e-9;        // part of its limit by which a force that holds may miss it
 
 using Solutions = Failure::Solutions;
@@ -54,12 +56,29 @@ void sort_by_distance(const ReactionEquation& equation, const VecX& start, std::
     std::sort(roots.begin(), roots.end(), [&](const VecX& y, const VecX& x) { return rank(y) < rank(x); });
 }
 
+// Takes out of a solution near a motion what rounding left in the arrays of the equation; false where none is near.
+bool refine(Unknowns& u, const ReactionEquation& equation, VecX& y) {
+    const FreeLoads free(u.w);
+    ReactionNewton newton;
+    VecX g(u.n);
+    for (int pass = 0; pass < refinements; ++pass) {
+        u.image(y, g);
+        const VecX miss = g - y;
+        if (!(miss.cwiseAbs().maxCoeff() <= near_motion * y.cwiseAbs().maxCoeff())) return false;
+        newton.factorize(equation, y);
+        y += newton.factor.solve(miss);
+    }
+    return true;
+}
+
 // Of the solutions of the equation those that are motions: its limits are lengths, and where a contact that may open
 // pulls, or takes more than the least load that it shares, there is none.
-std::vector<VecX> motions_of(Unknowns& u, const std::vector<VecX>& roots) {
+std::vector<VecX> motions_of(Unknowns& u, const ReactionEquation& equation, const std::vector<VecX>& roots) {
     std::vector<VecX> list;
-    for (const VecX& root : roots)
-        if (u.is_motion(root)) list.push_back(root);
+    for (const VecX& root : roots) {
+        VecX y = root;
+        if (u.is_motion(y) || (refine(u, equation, y) && u.is_motion(y))) list.push_back(y);
+    }
     return list;
 }
 
@@ -136,14 +155,15 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     std::vector<VecX>& found = roots.y;
     if (!found.empty() && !u.p.gaps.empty()) {
         sort_by_distance(equation, start, found);
-        const std::vector<VecX> motions = motions_of(u, found);
+        const std::vector<VecX> motions = motions_of(u, equation, found);
         if (motions.empty() && in_pieces) {  // the search goes on in the piece of the nearest one
             y = found.front();
             return;
         }
         if (!motions.empty()) found = motions;  // else a contact pulls, and is about to open
         // What comes in from infinite loads is then a motion in which some contact pulls, unless det(I - dg/dy) is zero.
-        if (only_opening(u) && determinant_at(equation, found.front()) > least_determinant_told) roots.at_edge = false;
+        // One of which det is negative answers a push by more: what opens goes on in some other way.
+        if (only_opening(u)) roots.at_edge = !(determinant_at(equation, found.front()) > least_determinant_told);
     }
     const double edge = std::min(1.0 - state.growth, 0.0);
     if (!roots.complete && solved && found.empty()) found.push_back(y);

@@ -30,10 +30,10 @@ static void fields(Archive& a, RunState& x) {
 
 static void fields(Archive& a, Progress& x) {
     auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, recent_events, bridged_time,
-           bridged_end, slip_at_start, pulls, gaps, impact_energy, several, stiff_steps, quiet_steps, rounding, next_look,
-           turning_steps] = x;
+           bridged_end, slip_at_start, pulls, gaps, left, impact_energy, several, stiff_steps, quiet_steps, rounding,
+           next_look, turning_steps] = x;
     a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, bridged_time, bridged_end,
-      slip_at_start, pulls, gaps.width, gaps.rate, gaps.separation, gaps.sure, gaps.travel, gaps.stale, impact_energy,
+      slip_at_start, pulls, gaps.width, gaps.rate, gaps.separation, gaps.sure, gaps.travel, gaps.stale, left, impact_energy,
       several, stiff_steps, quiet_steps, rounding, next_look, turning_steps);
     a.list(recent_events);
 }

@@ -1,6 +1,7 @@
 // A run between two steps as bytes, from which it goes on bit by bit as if it had never stopped.
 #pragma once
 
+#include <cmath>
 #include <string>
 
 #include "run/gap_search.hpp"
@@ -23,6 +24,7 @@ struct Progress {
     std::vector<double> slip_at_start;  // of the step, by element
     std::vector<char> pulls;            // by contact that is kept
     GapState gaps;                      // at the step's start
+    double left = -HUGE_VAL;           // when modes were left last that went no further
     double impact_energy = 0.0;         // of all impacts so far
     bool several = false;               // the laws allow other motions too, which was told
     long stiff_steps = 0, quiet_steps = 0;  // near the border of stability, and since then away from it

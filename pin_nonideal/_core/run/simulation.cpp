@@ -23,9 +23,6 @@ constexpr double whole_way = 1.0 - 1e-10, even_part = 0.5;
 constexpr double shortened = 0.3;
 // A step of fewer spacings of floating-point times than these leads nowhere.
 constexpr double least_spacings = 4.0;
-// Steps below this part of the time are short enough to tell what fails of its own.
-constexpr double tiny_step = 1e-10;
-
 // A run that has come less than this part of its way after so many steps never ends.
 constexpr long early_steps = 20000;
 constexpr double least_progress = 1e-10;
@@ -49,7 +46,8 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       user_events(run_options.events, system, stepper), torques(system, *this, run_options, output),
       landing(system, *this, run_options, output, recording),
       time_stepping(system, *this, run_options, torques, output, notices, user_events, recording),
-      clusters(system, *this, run_options, stiffness, time_stepping, recording) {
+      clusters(system, *this, run_options, stiffness, time_stepping, recording),
+      modes(system, *this, run_options, torques, output, landing, clusters, recording) {
     y = rate = configured_y = VecX::Zero(system.ny);
     // Time stepping finds its motion in velocities; of accelerations, which are recorded only, the nearest do.
     const bool in_time = options.method.scheme == Method::Scheme::moreau;
@@ -96,7 +94,14 @@ void Simulation::run() {
             continue;
         }
         Proposal proposal = propose();
-        while (!control_error(proposal, integrate(proposal)) || !locate_event(proposal)) proposal = propose();
+        try {
+            while (!control_error(proposal, integrate(proposal)) || !locate_event(proposal)) proposal = propose();
+        } catch (const Failure& failure) {
+            if (!modes.may_end(failure)) throw;
+            back_to_start();
+            if (!modes.leave()) throw;
+            continue;
+        }
         accept(proposal, event);
         record(event);
     }
@@ -174,7 +179,7 @@ std::optional<double> Simulation::integrate(const Proposal& proposal) {
     } catch (const Failure& failure) {
         // A stage may leave the domain where the step is too long; a shorter one decides whether it is the motion.
         // Where the motion runs away no step is short enough, and that is what is wrong.
-        const double tiny = tiny_step * std::max(1.0, std::abs(t));
+        const double tiny = tiny_step_at(t);
         const bool runs_away = tiny * system.velocity(rate).norm() > system.velocity(y).norm();
         if (!options.method.adaptive() || (proposal.size < tiny && !runs_away) ||
             failure.kind == Failure::Kind::interrupted)
@@ -236,18 +241,23 @@ bool Simulation::locate_event(const Proposal& proposal) {
         return true;
     } catch (const Failure& failure) {
         // The step taken again up to an event went where the whole one did not: it is too long.
-        const double tiny = tiny_step * std::max(1.0, std::abs(t));
+        const double tiny = tiny_step_at(t);
         if (!options.method.adaptive() || proposal.size < tiny || failure.kind == Failure::Kind::interrupted) throw;
     }
     ++out.rejected;
     h = shortened * proposal.size;
+    back_to_start();
+    return false;
+}
+
+// Modes, and what hangs on them, as the step began.
+void Simulation::back_to_start() {
     if (system.ne > 0) {
         set_contacts(p, w, before_step.closed, before_step.mode);
         w.state = before_step;
     }
     system.read(y);
     begin_step(p, w, t, system.q, system.v);
-    return false;
 }
 
 // --- Accept ---------------------------------------------------------------------------------------------------------
@@ -269,33 +279,11 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     stepper.end_directions();
     choice.choose();
     if (!event) return;
-    if (event->changes_modes()) change_modes(*event);
+    if (event->changes_modes()) modes.change(*event);
     notices.several(false);
     if (event->kind != FoundEvent::Kind::reversal) return;
     clusters.count();
-    bridge_cluster(event->index);
-}
-
-// Where events come too thick they are bridged, and the run goes on with modes of its new state.
-void Simulation::bridge_cluster(int element) {
-    if (!clusters.bridge(element, t_end)) return;
-    switch_modes(system, t, y, rate, std::nullopt);
-    landing.remember_gaps();
-    output.configured_now();
-}
-
-void Simulation::change_modes(const FoundEvent& event) {
-    const Modes before = w.state.mode;
-    const bool struck = event.kind == FoundEvent::Kind::touch && landing.strike(false);
-    for (const Event& change : switch_modes(system, t, y, rate, event)) {
-        out.events.push_back(change);
-        if (!struck) clusters.count();
-    }
-    landing.remember_gaps();
-    if (struck) return landing.end_bouncing(torques.next_stop(t_end));
-    if (std::equal(before.begin(), before.end(), w.state.mode.begin())) clusters.count();
-    output.configured_now();
-    bridge_cluster(event.of_gap() ? 0 : event.index);
+    modes.bridge(event->index);
 }
 
 // --- Record ---------------------------------------------------------------------------------------------------------

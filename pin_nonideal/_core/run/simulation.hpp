@@ -4,9 +4,8 @@
 #include <optional>
 #include <string>
 
-#include "run/clusters.hpp"
 #include "run/event_location.hpp"
-#include "run/landing.hpp"
+#include "run/mode_changes.hpp"
 #include "run/rounding.hpp"
 #include "run/step_control.hpp"
 #include "run/stepper_choice.hpp"
@@ -45,6 +44,7 @@ protected:
     void record(const std::optional<FoundEvent>& event);
 
     void find_event();
+    void back_to_start();
 
     std::optional<double> try_step(double size);
 
@@ -52,9 +52,6 @@ protected:
     // Whether the run goes on.
     bool between_steps();
     void save();
-
-    void change_modes(const FoundEvent& event);
-    void bridge_cluster(int element);
 
     const Program& p;
     Workspace& w;
@@ -76,6 +73,7 @@ protected:
     Landing landing;
     TimeStepping time_stepping;
     Clusters clusters;
+    ModeChanges modes;
     long ticks = 0;
     Clock::time_point next_save;
     const Clock::time_point begun = Clock::now();

@@ -1,0 +1,81 @@
+#include "run/mode_changes.hpp"
+
+#include <algorithm>
+
+#include "dynamics/evaluation.hpp"
+#include "dynamics/step_start.hpp"
+
+namespace pn {
+
+// So many tiny steps lie at the least between two places at which modes are left that go no further.
+static constexpr double leaving_apart = 1e3;
+
+ModeChanges::ModeChanges(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
+                         Landing& landing, Clusters& clusters, Recording& out)
+    : p(system.p), w(system.w), system_(system), now_(progress), options_(options), torques_(torques), output_(output),
+      landing_(landing), clusters_(clusters), out_(out) {}
+
+void ModeChanges::change(const FoundEvent& event) {
+    const RunState before = w.state;
+    bool struck = false;
+    try {
+        struck = event.kind == FoundEvent::Kind::touch && landing_.strike(false);
+        for (const Event& found : switch_modes(system_, now_.t, now_.y, now_.rate, event)) {
+            out_.events.push_back(found);
+            if (!struck) clusters_.count();
+        }
+    } catch (const Failure&) {
+        if (!struck) keep_last(before);
+        throw;
+    }
+    landing_.remember_gaps();
+    if (struck) return landing_.end_bouncing(torques_.next_stop(options_.end()));
+    if (std::equal(before.mode.begin(), before.mode.end(), w.state.mode.begin())) clusters_.count();
+    output_.configured_now();
+    bridge(event.of_gap() ? 0 : event.index);
+}
+
+bool ModeChanges::may_end(const Failure& failure) const {
+    const bool of_modes = failure.kind == Failure::Kind::not_converged || failure.kind == Failure::Kind::paradox;
+    return of_modes && options_.method.adaptive() && system_.ng > 0 &&
+           now_.t >= now_.left + leaving_apart * tiny_step_at(now_.t);
+}
+
+bool ModeChanges::leave() {
+    const double t = now_.t, ahead = tiny_step_at(t);
+    const VecX y = now_.y;
+    try {
+        now_.y.noalias() += ahead * now_.rate;
+        now_.t += ahead;
+        change(FoundEvent{FoundEvent::Kind::lift, -1, now_.t});
+    } catch (const Failure&) {
+        now_.t = t;
+        now_.y = y;
+        return false;
+    }
+    now_.left = now_.t;
+    output_.now();
+    return true;
+}
+
+void ModeChanges::bridge(int element) {
+    if (!clusters_.bridge(element, options_.end())) return;
+    switch_modes(system_, now_.t, now_.y, now_.rate, std::nullopt);
+    landing_.remember_gaps();
+    output_.configured_now();
+}
+
+// What the motion was until no modes were found for what follows.
+void ModeChanges::keep_last(const RunState& before) {
+    set_contacts(p, w, before.closed, before.mode);
+    w.state = before;
+    system_.read(now_.y);
+    try {
+        begin_step(p, w, now_.t, system_.q, system_.v);
+        evaluate(p, w, now_.t, system_.q, system_.v);
+        output_.now();
+    } catch (const Failure&) {  // the sample before is the last: what failed first is what the user is told
+    }
+}
+
+}  // namespace pn

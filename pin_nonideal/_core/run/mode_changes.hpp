@@ -1,0 +1,44 @@
+// Events that change the modes of contacts and friction, and what is done where modes end without one.
+#pragma once
+
+#include "run/clusters.hpp"
+#include "run/events.hpp"
+#include "run/landing.hpp"
+#include "run/torques.hpp"
+
+namespace pn {
+
+// Steps below this part of the time are short enough to tell what fails of its own.
+constexpr double tiny_step = 1e-10;
+inline double tiny_step_at(double t) { return tiny_step * std::max(1.0, std::abs(t)); }
+
+class ModeChanges {
+public:
+    ModeChanges(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
+                Landing& landing, Clusters& clusters, Recording& out);
+
+    // Modes and state from the event on, which has been reached.
+    void change(const FoundEvent& event);
+    // Where no step is short enough the motion may end that these modes have, unless those found when it did last lead no
+    // further either. What comes next is asked as far beyond as the shortest step goes; false where nothing is found.
+    bool may_end(const Failure& failure) const;
+    bool leave();
+    // Where events come too thick they are bridged, and the run goes on with modes of its new state.
+    void bridge(int element);
+
+private:
+    void keep_last(const RunState& before);
+
+    const Program& p;
+    Workspace& w;
+    System& system_;
+    Progress& now_;
+    const Options& options_;
+    Torques& torques_;
+    Output& output_;
+    Landing& landing_;
+    Clusters& clusters_;
+    Recording& out_;
+};
+
+}  // namespace pn
