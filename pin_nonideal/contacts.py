@@ -25,10 +25,14 @@ from .constraints import Axis
 from .errors import InputError
 from .laws import static_ratio
 from .round_contacts import BoxContact, CapsuleContact, SphereContact
+from .solid_contacts import CylinderContact, EllipsoidContact, HullContact
 
 __all__ = [
     "BoxContact",
     "CapsuleContact",
+    "CylinderContact",
+    "EllipsoidContact",
+    "HullContact",
     "JointLimit",
     "PointContact",
     "SphereContact",
@@ -219,4 +223,14 @@ def box_contacts(
     return corners
 
 
-Contact = PointContact | JointLimit | SphereContact | CapsuleContact | BoxContact | UserContact
+Contact = (
+    PointContact
+    | JointLimit
+    | SphereContact
+    | CapsuleContact
+    | BoxContact
+    | EllipsoidContact
+    | HullContact
+    | CylinderContact
+    | UserContact
+)

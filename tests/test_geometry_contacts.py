@@ -101,13 +101,39 @@ class TestGeometry:
         scene = pn.Scene(model, contacts=[contact], collision_model=geometry)
         run = pn.simulate(scene, 0.5, q=[0, 0, 0.2, 0, 0, 0, 1])
         assert run.q[-1, 2] == pytest.approx(0.15, abs=1e-10)
-        model, geometry, contact = self.scene(mesh, None)
-        with pytest.raises(pn.InputError, match='"thing" is a mesh that need not be convex; make a convex'):
+        model, geometry, contact = self.scene(mesh, None, mu=0.4)
+        assert pn.Scene(model, contacts=[contact], collision_model=geometry).contacts == scene.contacts
+
+    @staticmethod
+    def mesh(points, triangles):
+        mesh = coal.BVHModelOBBRSS()
+        mesh.beginModel(len(triangles), 3 * len(triangles))
+        for corners in triangles:
+            mesh.addTriangle(*np.asarray(points, dtype=float)[list(corners)])
+        mesh.endModel()
+        return mesh
+
+    def test_a_mesh_that_is_not_convex_is_refused(self):
+        corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0.1, 0.1, 0.1]]
+        dent = [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 4), (2, 3, 4), (3, 1, 4)]
+        model, geometry, contact = self.scene(self.mesh(corners, dent), None)
+        with refuses(
+            'GeometryContact: geometry "thing" is a mesh that must be convex; its surface lies 0.1 m inside '
+            "its convex hull: split it into convex parts, or make a convex mesh of it",
+            pn.InputError,
+        ):
+            pn.Scene(model, contacts=[contact], collision_model=geometry)
+        model, geometry, contact = self.scene(self.mesh(corners, dent[:3]), None)
+        with pytest.raises(pn.InputError, match="is a mesh that must be closed"):
+            pn.Scene(model, contacts=[contact], collision_model=geometry)
+        flat = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
+        model, geometry, contact = self.scene(self.mesh(flat, [(0, 1, 2), (1, 2, 3)]), None)
+        with pytest.raises(pn.InputError, match='"thing" must span a solid: four that lie in no plane'):
             pn.Scene(model, contacts=[contact], collision_model=geometry)
 
     def test_what_does_not_touch_is_refused(self):
-        model, geometry, contact = self.scene(coal.Cylinder(0.1, 0.2), None)
-        with pytest.raises(pn.InputError, match='geometry "thing" is a Cylinder'):
+        model, geometry, contact = self.scene(coal.Plane(np.array([0.0, 0.0, 1.0]), 0.0), None)
+        with pytest.raises(pn.InputError, match='geometry "thing" is a Plane; spheres, capsules, boxes, cyl'):
             pn.Scene(model, contacts=[contact], collision_model=geometry)
         with pytest.raises(pn.InputError, match="needs the scene's collision_model"):
             pn.Scene(model, contacts=[contact])

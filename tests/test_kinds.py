@@ -66,9 +66,16 @@ class TestDescription:
 
 
 def structs() -> dict[str, str]:
-    """Name of the kind in each header, with the header's stem."""
-    found = {h.stem: re.findall(r"^struct (\w+Rows?) \{", h.read_text(), re.M) for h in HEADERS}
-    return {kinds[0]: stem for stem, kinds in found.items() if kinds}
+    """Name of the kind in each header, with the header's stem; of a template those that are made of it."""
+    found = {}
+    for header in HEADERS:
+        source = header.read_text()
+        kinds = re.findall(r"(?<!>\n)^struct (\w+Rows?) \{", source, re.M)
+        found |= dict.fromkeys(kinds[:1], header.stem)
+        found |= {
+            kind: kind[:-3].lower() for kind in re.findall(r"^using (\w+Row) = \w+<\w+>;", source, re.M)
+        }
+    return found
 
 
 @pytest.mark.parametrize("struct", structs())

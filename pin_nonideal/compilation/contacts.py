@@ -11,11 +11,12 @@ import numpy as np
 from pin_nonideal.contacts import BoxContact, Contact, JointLimit, PointContact, UserContact
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError
+from pin_nonideal.solid_contacts import CylinderContact, EllipsoidContact, HullContact
 from pin_nonideal.types import Model
 
 from .callbacks import checked
 from .constraints import user_rate, user_rows
-from .names import Resolution, words
+from .names import Resolution, turned, words
 
 # What Pinocchio gives joints without limits [rad or m].
 NO_LIMIT = np.finfo(float).max
@@ -73,15 +74,31 @@ def lower_gaps(c: Any, name: str, out: core.Builder, where: Resolution) -> list[
         block = out.add_user_gap(name, rows=rows, gap=gap, rate=user_rate(c, 1, who, rows, gap))
         out.let_open(restitution=c.restitution)
         return [block]
-    who, radius = words(c, name), c.radius1 + c.radius2
-    if isinstance(c, BoxContact):
-        f1, f2, half = where.box(c, who)
-        block = out.add_box(name, f1, f2, half=half, radius=radius)
+    who = words(c, name)
+    if isinstance(c, EllipsoidContact):
+        f1, f2, (_, _, normal) = where.contact(c, who)
+        axes = turned(f1, c.rpy)
+        block = out.add_ellipsoid(name, axes, f2, normal=normal, semiaxes=c.semiaxes)
+    elif isinstance(c, CylinderContact):
+        f1, f2, solid = where.cylinder(c, who)
+        block = out.add_revolved(name, f1, f2, solid=solid, radius=c.radius1)
     else:
-        f1, f2, half1, half2 = where.capsules(c, who)
-        block = out.add_capsules(name, f1, f2, half1=half1, half2=half2, radius=radius)
+        block = _round_gap(c, name, out, where)
     out.let_open(restitution=c.restitution)
     return [block]
+
+
+def _round_gap(c: Any, name: str, out: core.Builder, where: Resolution) -> int:
+    """Adds the row of what has a radius on both sides."""
+    who, radius = words(c, name), c.radius1 + c.radius2
+    if isinstance(c, HullContact):
+        f1, f2, hull = where.hull(c, who)
+        return out.add_hull(name, f1, f2, solid=hull, radius=radius)
+    if isinstance(c, BoxContact):
+        f1, f2, half = where.box(c, who)
+        return out.add_box(name, f1, f2, half=half, radius=radius)
+    f1, f2, half1, half2 = where.capsules(c, who)
+    return out.add_capsules(name, f1, f2, half1=half1, half2=half2, radius=radius)
 
 
 def _on_plane(c: PointContact, name: str, out: core.Builder, where: Resolution) -> int:

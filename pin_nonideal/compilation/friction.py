@@ -8,15 +8,16 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.constraints import HingeAnchor, JointCoupling, PointAnchor, Rolling
-from pin_nonideal.contacts import PointContact, UserContact
+from pin_nonideal.contacts import Contact, UserContact
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.laws import JointFriction
-from pin_nonideal.round_contacts import BoxContact, CapsuleContact, SphereContact
+from pin_nonideal.round_contacts import BoxContact
+from pin_nonideal.solid_contacts import CylinderContact, EllipsoidContact, HullContact
 
 from .callbacks import ReactionNames, checked, named
 from .constraints import frames_of
-from .names import Frame, Resolution, words
+from .names import Frame, Resolution, turned, words
 
 # Constraint models of Pinocchio that hold a point on a point.
 BALLS = ("PointAnchorConstraintModel", "RigidConstraintModel")
@@ -268,7 +269,7 @@ def _dry(law: JointFriction, name: str, out: core.Builder, index: int, place: Pl
 
 
 def lower_contact_friction(
-    c: PointContact | Rolling | SphereContact | CapsuleContact | BoxContact | UserContact,
+    c: Contact | Rolling,
     name: str,
     out: core.Builder,
     around: Surroundings,
@@ -301,8 +302,14 @@ def lower_contact_friction(
 
 
 def _round_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[tuple[str, int, float]]:
-    """Name, directions and coefficient of what rubs between spheres, capsules and boxes."""
+    """Name, directions and coefficient of what rubs between spheres, capsules, boxes and other solids."""
     who = words(c, name)
+    if isinstance(c, HullContact):
+        f1, f2, hull = where.hull(c, who)
+        return [(name, out.add_hull_slip(name, f1, f2, solid=hull, radius1=c.radius1), c.mu)]
+    if isinstance(c, CylinderContact):
+        f1, f2, solid = where.cylinder(c, who)
+        return [(name, out.add_revolved_slip(name, f1, f2, solid=solid, radius1=c.radius1), c.mu)]
     if isinstance(c, BoxContact):
         f1, f2, half = where.box(c, who)
         return [(name, out.add_box_slip(name, f1, f2, half=half, radius1=c.radius1), c.mu)]
@@ -325,6 +332,9 @@ def _user_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[
 def _flat_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[tuple[str, int, float]]:
     """The same on a plane."""
     f1, f2, (t1, t2, n) = where.contact(c, words(c, name))
+    if isinstance(c, EllipsoidContact):
+        body, along = turned(f1, c.rpy), {"tangent1": t1, "tangent2": t2, "normal": n}
+        return [(name, out.add_ellipsoid_slip(name, body, f2, semiaxes=c.semiaxes, **along), c.mu)]
     level, sliding = _turned(f2, np.column_stack([t1, t2, n])), getattr(c, "mu", 0.0)
     rubs = []
     if sliding:

@@ -14,6 +14,7 @@ from pin_nonideal.contacts import PointContact
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.round_contacts import BoxContact, CapsuleContact, SphereContact, segments
+from pin_nonideal.solid_contacts import CylinderContact, EllipsoidContact, HullContact, core_hull
 from pin_nonideal.states.placements import frame_index, frame_on_joint, joint_placements
 from pin_nonideal.types import Array, Model, Placement
 
@@ -105,7 +106,7 @@ class Resolution:
         return (x, y, z)
 
     def contact(
-        self, c: PointContact | Rolling, who: str
+        self, c: PointContact | EllipsoidContact | Rolling, who: str
     ) -> tuple[Frame, Frame, tuple[Vector3, Vector3, Vector3]]:
         """Frame, plane, and right-handed directions (along, along, normal) in the axes of the plane."""
         plane, axes = self.plane(c.plane, who), axis_triad(unit_axis(who, c.normal))
@@ -131,10 +132,22 @@ class Resolution:
 
     def box(self, c: BoxContact, who: str) -> tuple[Frame, Frame, list[float]]:
         """Frames in the middle of the sphere and of the box, and half the box without its rounding [m]."""
-        first, (joint, R, p) = self._two_bodies(c, who)
-        turned = np.reshape(R, (3, 3)) @ pin.rpy.rpyToMatrix(*c.rpy)
-        second = (joint, turned.ravel().tolist(), moved((joint, R, p), c.xyz)[2])
-        return moved(first, c.offset), second, [0.5 * edge - c.radius2 for edge in c.size]
+        first, second = self._two_bodies(c, who)
+        half = [0.5 * edge - c.radius2 for edge in c.size]
+        return moved(first, c.offset), turned(moved(second, c.xyz), c.rpy), half
+
+    def hull(
+        self, c: HullContact, who: str
+    ) -> tuple[Frame, Frame, tuple[list[float], list[float], list[int]]]:
+        """Frames in the middle of the sphere and of the hull, and its corners, planes and edges."""
+        first, second = self._two_bodies(c, who)
+        return moved(first, c.offset), second, core_hull(c)
+
+    def cylinder(self, c: CylinderContact, who: str) -> tuple[Frame, Frame, tuple[float, float, float]]:
+        """Frames in the middle of the sphere and of the axis, half the length and the radii of both faces."""
+        first, second = self._two_bodies(c, who)
+        above = c.below if c.above is None else c.above
+        return moved(first, c.offset), turned(moved(second, c.xyz), c.rpy), (0.5 * c.length, c.below, above)
 
     def _two_bodies(self, c: Any, who: str) -> list[Frame]:
         ends = [self.frame(c.frame1, who), self.frame(c.frame2, who)]
@@ -175,6 +188,17 @@ def moved(frame: Frame, by: Any) -> Frame:
     """
     joint, R, p = frame
     return (joint, R, (np.array(p) + np.reshape(R, (3, 3)) @ np.array(by)).tolist()) if np.any(by) else frame
+
+
+def turned(frame: Frame, rpy: Any) -> Frame:
+    """A frame with other axes at the same place.
+
+    Args:
+        frame: the frame.
+        rpy: roll, pitch and yaw of the axes against its own [rad], (3,).
+    """
+    joint, R, p = frame
+    return joint, (np.reshape(R, (3, 3)) @ pin.rpy.rpyToMatrix(*rpy)).ravel().tolist(), p
 
 
 def unique_names(descriptions: Sequence[object], taken: set[str]) -> list[str]:

@@ -173,6 +173,23 @@ int main() {
         check("box", pn::BoxRow{f, f, {half, 0.4, 0.1}, 0.1}, 0, 1);
         check("box slip", pn::BoxSlipRows{{}, f, f, {half, 0.4, 0.1}, 0.1}, 0, 0);
     }
+    for (const double least : {0.0, 0.05, 0.3}) {
+        check("ellipsoid", pn::EllipsoidRow{f, f, z, {0.3, 0.4, least}}, 0, 1);
+        check("ellipsoid slip", pn::EllipsoidSlipRows{{}, f, f, {0.3, 0.4, least}, x, y, z}, 0, 0);
+    }
+    // A corner with its three faces, and the face across it.
+    const double third = 1.0 / std::sqrt(3.0);
+    for (const double edge : {0.1, 0.6, 2.0}) {
+        const pn::Hull corner({pn::Vec3::Zero(), edge * x, edge * y, edge * z},
+                              {-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, third, third, third, edge * third},
+                              {0, 1, 1, 2, 0, 2, 0, 2, 0, 3, 0, 1, 1, 2, 2, 3, 2, 3, 0, 3, 3, 1, 1, 3});
+        check("hull", pn::HullRow{f, f, corner, 0.1}, 0, 1);
+        check("hull slip", pn::HullSlipRows{{}, f, f, corner, 0.1}, 0, 0);
+        for (const pn::Revolved& solid : {pn::Revolved(edge, 0.4, 0.4), pn::Revolved(edge, 0.4, 0.0)}) {
+            check("revolved", pn::RevolvedRow{f, f, solid, 0.1}, 0, 1);
+            check("revolved slip", pn::RevolvedSlipRows{{}, f, f, solid, 0.1}, 0, 0);
+        }
+    }
     for (const double half1 : {0.0, 0.3, 1.5})
         for (const double half2 : {0.0, 0.4, 2.0}) {
             check("capsules", pn::CapsulesRow{f, f, half1, half2, 0.1}, 0, 1);

@@ -19,7 +19,8 @@ from pin_nonideal.errors import PinNonidealError
 from .fuzzing import few_and_many, for_all, junk, result_or_named_error
 
 DESCRIPTIONS = [
-    pn.BoxContact, pn.CapsuleContact, pn.Distance, pn.Drag, pn.FrameAnchor, pn.GeometryContact,
+    pn.BoxContact, pn.CapsuleContact, pn.CylinderContact, pn.Distance, pn.Drag, pn.EllipsoidContact,
+    pn.FrameAnchor, pn.GeometryContact, pn.HullContact,
     pn.HingeAnchor, pn.HoldPosition, pn.JointCoupling, pn.JointFriction, pn.JointLimit, pn.JointSpring,
     pn.KnifeEdge, pn.LuGre, pn.PointAnchor, pn.PointContact, pn.PrescribedMotion, pn.Rolling,
     pn.SampledControl, pn.SigmoidFriction, pn.SphereContact, pn.SpringDamper, pn.Table,
@@ -33,7 +34,8 @@ PLACES = {
                     "PrescribedMotion", "Rolling", "UserConstraint"),
     "laws": ("Drag", "JointFriction", "LuGre", "SigmoidFriction", "UserFriction", "UserLaw"),
     "contacts": ("GeometryContact", "JointLimit", "PointContact", "SphereContact",
-                 "BoxContact", "CapsuleContact", "UserContact", "box_contacts"),
+                 "BoxContact", "CapsuleContact", "CylinderContact", "EllipsoidContact", "HullContact",
+                 "UserContact", "box_contacts"),
     "forces": ("JointSpring", "SpringDamper", "UserForce", "Wrench"),
 }  # fmt: skip
 
@@ -83,6 +85,7 @@ GOOD = {
     "radius1": [1e-3], "radius2": [1e-3],
     "segment1": [((0.0, 0.0, 0.0), (0.0, 0.0, 0.1))], "segment2": [((0.0, 0.0, 0.0), (0.1, 0.0, 0.1))],
     "geometry1": ["ball"], "geometry2": ["ground"], "mu": [0.3], "restitution": [0.5], "lower": [-50.0],
+    "semiaxes": [(0.1, 0.1, 0.0)], "points": [np.vstack([np.zeros(3), 0.01 * np.eye(3)])], "below": [0.1],
 }  # fmt: skip
 ROW = {"function": [lambda *_: (np.zeros((1, 3)), [0.0])], "size": [1]}
 GAP = {
@@ -90,6 +93,7 @@ GAP = {
     "directions": [lambda t, q: [[0.0, 1.0, 0.0]]],
 }  # fmt: skip
 BOX = {"size": [[0.01, 0.02, 0.03]], "frame2": ["universe"]}
+CAN = {"length": [0.01], "below": [0.01], "frame2": ["universe"], "xyz": [(0.0, 0.0, -9.0)]}
 GOOD_TIMES = {
     "value": [0.1], "coefficients": [[1.0, 2.0]], "amplitude": [0.1], "frequency": [2.0],
     "times": [[0.0, 1.0, 2.0]], "values": [[0.0, 1.0, 0.5]],
@@ -101,6 +105,7 @@ GOOD_TIMES = {
 def test_descriptions(kind, scene, examples):
     """A description is refused when it is made, or by the scene, or by the run."""
     own = {pn.UserConstraint: ROW, pn.UserContact: GAP, pn.box_contacts: BOX, pn.BoxContact: BOX}
+    own[pn.CylinderContact] = CAN
     good = GOOD | own.get(kind, {})
 
     def check(data):

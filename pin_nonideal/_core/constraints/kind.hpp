@@ -20,6 +20,8 @@
 #include "constraints/kinds/coupling_slip.hpp"
 #include "constraints/kinds/distance.hpp"
 #include "constraints/kinds/dof_slip.hpp"
+#include "constraints/kinds/ellipsoid.hpp"
+#include "constraints/kinds/ellipsoid_slip.hpp"
 #include "constraints/kinds/frame.hpp"
 #include "constraints/kinds/hinge.hpp"
 #include "constraints/kinds/hinge_slip.hpp"
@@ -28,6 +30,8 @@
 #include "constraints/kinds/motion.hpp"
 #include "constraints/kinds/point.hpp"
 #include "constraints/kinds/rolling.hpp"
+#include "constraints/kinds/solid.hpp"
+#include "constraints/kinds/solid_slip.hpp"
 #include "constraints/kinds/turn_slip.hpp"
 #include "constraints/kinds/user.hpp"
 #include "constraints/kinds/user_gap.hpp"
@@ -38,7 +42,8 @@ namespace pn {
 using Kind = std::variant<PointRows, ContactRow, CapsulesRow, BoxRow, FrameRows, HingeRows, DistanceRows, KnifeRows,
                           RollingRows, CouplingRows, MotionRows, LimitRow, UserRows, UserGapRow, DofRows,
                           HingeSlipRows, TurnSlipRows, ContactSlipRows, CapsulesSlipRows, BoxSlipRows, CouplingSlipRow,
-                          UserSlipRows>;
+                          UserSlipRows, EllipsoidRow, EllipsoidSlipRows, HullRow, HullSlipRows, RevolvedRow,
+                          RevolvedSlipRows>;
 
 // Rows of one constraint before any is left out.
 struct RowValues {

@@ -60,17 +60,26 @@ Reach::Bound Reach::frame_bound(const Frame& frame) const {
             body.acceleration + (body.spin_rate + body.spin * body.spin) * apart, body.spin, body.spin_rate};
 }
 
-// g = n . (x1 - x2) - r, with n fixed in body 2.
-double Reach::of(const Workspace& w, const ContactRow& kind) const {
-    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
-    const double velocity = a.velocity + b.velocity;
+// g = n . (x1 - x2) - r, with n fixed in body 2, of a point of body 1 that far from its frame.
+double Reach::over_plane(const Workspace& w, const Frame& frame, const Frame& plane, double reach) const {
+    const Bound a = frame_bound(frame), b = frame_bound(plane);
+    const double velocity = a.velocity + reach * a.spin + b.velocity;
     double turning = 0.0;
     if (b.spin > 0.0 || b.spin_rate > 0.0) {
-        const Pose one(p.mechanism, w.now.terms, kind.frame1), two(p.mechanism, w.now.terms, kind.frame2);
-        const double apart = (one.x - two.x).norm() + h_ * velocity;
+        const Pose one(p.mechanism, w.now.terms, frame), two(p.mechanism, w.now.terms, plane);
+        const double apart = (one.x - two.x).norm() + reach + h_ * velocity;
         turning = 2.0 * b.spin * velocity + (b.spin_rate + b.spin * b.spin) * apart;
     }
-    return a.acceleration + b.acceleration + turning;
+    return a.acceleration + reach * (a.spin_rate + a.spin * a.spin) + b.acceleration + turning;
+}
+
+double Reach::of(const Workspace& w, const ContactRow& kind) const {
+    return over_plane(w, kind.frame1, kind.frame2, 0.0);
+}
+
+// Of each of its points, whichever is the lowest.
+double Reach::of(const Workspace& w, const EllipsoidRow& kind) const {
+    return over_plane(w, kind.frame1, kind.frame2, kind.reach());
 }
 
 // g = |c1 - c2| - r, least over both segments: points that stay on their bodies come near no faster than this.
@@ -85,6 +94,12 @@ double Reach::of(const Workspace&, const BoxRow& kind) const {
     return a.acceleration + b.acceleration + kind.half.norm() * (b.spin_rate + b.spin * b.spin);
 }
 
+template <class Solid>
+double Reach::of(const Workspace&, const SolidRow<Solid>& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.acceleration + b.acceleration + kind.solid.reach * (b.spin_rate + b.spin * b.spin);
+}
+
 double Reach::of(const Workspace&, const LimitRow& kind) const {
     return acceleration_[p.mechanism.joints[kind.joint].iv];
 }
@@ -94,6 +109,9 @@ double Reach::bound(const Workspace& w, int gap) const {
     if (const auto* contact = std::get_if<ContactRow>(&kind)) return of(w, *contact);
     if (const auto* capsules = std::get_if<CapsulesRow>(&kind)) return of(w, *capsules);
     if (const auto* box = std::get_if<BoxRow>(&kind)) return of(w, *box);
+    if (const auto* ellipsoid = std::get_if<EllipsoidRow>(&kind)) return of(w, *ellipsoid);
+    if (const auto* hull = std::get_if<HullRow>(&kind)) return of(w, *hull);
+    if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return of(w, *revolved);
     return of(w, std::get<LimitRow>(kind));
 }
 
@@ -101,6 +119,11 @@ double Reach::bound(const Workspace& w, int gap) const {
 double Reach::speed(const ContactRow& kind) const {
     const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
     return b.spin > 0.0 ? HUGE_VAL : a.velocity + b.velocity;
+}
+
+double Reach::speed(const EllipsoidRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return b.spin > 0.0 ? HUGE_VAL : a.velocity + kind.reach() * a.spin + b.velocity;
 }
 
 double Reach::speed(const CapsulesRow& kind) const {
@@ -111,6 +134,12 @@ double Reach::speed(const CapsulesRow& kind) const {
 double Reach::speed(const BoxRow& kind) const {
     const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
     return a.velocity + b.velocity + kind.half.norm() * b.spin;
+}
+
+template <class Solid>
+double Reach::speed(const SolidRow<Solid>& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.velocity + b.velocity + kind.solid.reach * b.spin;
 }
 
 double Reach::travel(int gap) const {
@@ -134,6 +163,10 @@ double Reach::rise(const Workspace& w, int gap) const {
         passing = rise(c->half1, c->half2, c->frame1, c->frame2, c->radius);
     else if (const auto* box = std::get_if<BoxRow>(&kind))
         passing = rise(0.0, box->half.norm(), box->frame1, box->frame2, box->radius);
+    else if (const auto* hull = std::get_if<HullRow>(&kind))
+        passing = rise(0.0, hull->solid.reach, hull->frame1, hull->frame2, hull->radius);
+    else if (const auto* revolved = std::get_if<RevolvedRow>(&kind))
+        passing = rise(0.0, revolved->solid.reach, revolved->frame1, revolved->frame2, revolved->radius);
     return bound(w, gap) + passing;
 }
 

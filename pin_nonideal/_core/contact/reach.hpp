@@ -31,12 +31,17 @@ private:
     Bound joint_bound(const Joint& joint) const;
     Bound frame_bound(const Frame& frame) const;
     double of(const Workspace& w, const ContactRow& kind) const;
+    double of(const Workspace& w, const EllipsoidRow& kind) const;
     double of(const Workspace& w, const CapsulesRow& kind) const;
     double of(const Workspace& w, const BoxRow& kind) const;
+    template <class Solid> double of(const Workspace& w, const SolidRow<Solid>& kind) const;
     double of(const Workspace& w, const LimitRow& kind) const;
+    double over_plane(const Workspace& w, const Frame& frame, const Frame& plane, double reach) const;
     double speed(const ContactRow& kind) const;
+    double speed(const EllipsoidRow& kind) const;
     double speed(const CapsulesRow& kind) const;
     double speed(const BoxRow& kind) const;
+    template <class Solid> double speed(const SolidRow<Solid>& kind) const;
     double speed(const LimitRow& kind) const { return speed_[p.mechanism.joints[kind.joint].iv]; }
     template <class K> double speed(const K&) const { return HUGE_VAL; }
     double rise(double reach1, double reach2, const Frame& frame1, const Frame& frame2, double radius) const;

@@ -10,24 +10,27 @@
 
 namespace pn {
 
-// Two segments, or a point and a box, at one instant.
+// Two segments, or a point and a box or another solid, at one instant.
 struct Separation {
     std::array<Vec3, 8> apart;  // from the ends or corners of the second to those of the first
-    int corners = 0;            // so many of them
+    int corners = 0;            // so many of them; of another solid none, but from its middle, and then its axes
     Vec3 normal;                // from the nearest point of the second to that of the first
     double radius = 0.0;        // of both together
 
     // Nothing where the gap is that of another kind.
     static bool has(const Program& p, int gap) {
         const Kind& kind = p.blocks[p.gaps[gap].block].kind;
-        return std::holds_alternative<CapsulesRow>(kind) || std::holds_alternative<BoxRow>(kind);
+        return std::holds_alternative<CapsulesRow>(kind) || std::holds_alternative<BoxRow>(kind) ||
+               std::holds_alternative<HullRow>(kind) || std::holds_alternative<RevolvedRow>(kind);
     }
     static Separation of(const Program& p, const Workspace& w, int gap) {
         const Kind& kind = p.blocks[p.gaps[gap].block].kind;
         const auto& [frame1, frame2] = frames(kind);
         const Sides<Pose> s{{p.mechanism, w.now.terms, *frame1}, {p.mechanism, w.now.terms, *frame2}, 0.0};
-        const auto* box = std::get_if<BoxRow>(&kind);
-        return box ? of(s, *box) : of(s, std::get<CapsulesRow>(kind));
+        if (const auto* box = std::get_if<BoxRow>(&kind)) return of(s, *box);
+        if (const auto* hull = std::get_if<HullRow>(&kind)) return of(s, *hull);
+        if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return of(s, *revolved);
+        return of(s, std::get<CapsulesRow>(kind));
     }
     static Separation of(const Sides<Pose>& s, const CapsulesRow& kind) {
         const NearestPoints<Sides<Pose>> nearest(s, kind.half1, kind.half2);
@@ -47,25 +50,47 @@ struct Separation {
         }
         return out;
     }
+    template <class Solid>
+    static Separation of(const Sides<Pose>& s, const SolidRow<Solid>& kind) {
+        Separation out{{}, 0, kind.nearest(s).n, kind.radius};
+        out.apart[0] = s.a.x - s.b.x;
+        for (int axis = 0; axis < 3; ++axis) out.apart[1 + axis] = s.b.R.col(axis);
+        return out;
+    }
     // Least distance of both from each other along a direction.
-    double along(const Vec3& direction) const {
+    double along(const Vec3& direction, const Kind& kind) const {
         double least = direction.dot(apart[0]);
         for (int k = 1; k < corners; ++k) least = std::min(least, direction.dot(apart[k]));
+        if (corners == 0) {
+            const Vec3 local(direction.dot(apart[1]), direction.dot(apart[2]), direction.dot(apart[3]));
+            const auto* hull = std::get_if<HullRow>(&kind);
+            least -= hull ? hull->solid.support(local) : std::get<RevolvedRow>(kind).solid.support(local);
+        }
         return least - radius;
     }
 };
 
+// What changes from one width to another in a time over which its rate changes by no more than twice `parabola` a unit of
+// it: it stays above the straight course less that parabola, and so does the least of several such widths.
+inline bool stays_above(double from, double to, double parabola, double least) {
+    const double slope = to - from - parabola;
+    if (!(from > least && to > least)) return false;
+    return std::abs(to - from) >= parabola || from - slope * slope / (4.0 * parabola) > least;
+}
+
 // Along one direction the distance of any two points stays above its straight course less the parabola that accelerations
 // up to `bound` may take off over `length` [s].
-inline bool stays_apart(const Separation& a, const Separation& b, double bound, double length, double least) {
+inline bool stays_apart(const Kind& kind, const Separation& a, const Separation& b, double bound, double length,
+                        double least) {
     const double parabola = 0.5 * bound * length * length;
-    for (const Vec3& direction : {a.normal, b.normal, Vec3((a.normal + b.normal).normalized())}) {
-        const double from = a.along(direction), to = b.along(direction), slope = to - from - parabola;
-        if (!(from > least && to > least)) continue;
-        if (std::abs(to - from) >= parabola) return true;
-        if (from - slope * slope / (4.0 * parabola) > least) return true;
-    }
+    for (const Vec3& direction : {a.normal, b.normal, Vec3((a.normal + b.normal).normalized())})
+        if (stays_above(a.along(direction, kind), b.along(direction, kind), parabola, least)) return true;
     return false;
+}
+
+// Whether the gap is that of one point after the other of a body over a plane, each of which stays above its own course.
+inline bool has_lowest_point(const Program& p, int gap) {
+    return std::holds_alternative<EllipsoidRow>(p.blocks[p.gaps[gap].block].kind);
 }
 
 template <class Bytes>

@@ -42,6 +42,22 @@ struct From<Vec3> {
     static Vec3 make(const Given& x) { return vec3(x); }
 };
 template <>
+struct From<Hull> {  // corners, planes and edges, one number after the other
+    using Given = std::tuple<std::vector<double>, std::vector<double>, std::vector<int>>;
+    static Hull make(const Given& x) {
+        const auto& [numbers, planes, edges] = x;
+        std::vector<Vec3> corners;
+        for (size_t k = 0; k + 2 < numbers.size(); k += 3)
+            corners.emplace_back(numbers[k], numbers[k + 1], numbers[k + 2]);
+        return Hull(corners, planes, edges);
+    }
+};
+template <>
+struct From<Revolved> {  // half the length, and the radii below and above
+    using Given = std::tuple<double, double, double>;
+    static Revolved make(const Given& x) { return std::make_from_tuple<Revolved>(x); }
+};
+template <>
 struct From<TimeFunction> {
     using Given = nb::object;
     static TimeFunction make(const Given& x) { return time_function(x); }

@@ -92,16 +92,20 @@ std::vector<int> GapSearch::doubtful() {
         follow_gap(p, w, stepper_.t0 + stepper_.h, system_.v, i);
         end_[i] = look_here(i, 1.0);
         bends_[i] = bends(i);
-        if (!stays_open(look_at_start(i), end_[i], bends_[i].below)) list.push_back(i);
+        if (!stays_open(i, look_at_start(i), end_[i], bends_[i].below)) list.push_back(i);
     }
     return list;
 }
 
 // The two parabolas of the bound through both ends lie below the gap; where the higher of them is least it stands.
-bool GapSearch::stays_open(const Look& a, const Look& b, double bound) const {
+bool GapSearch::stays_open(int gap, const Look& a, const Look& b, double bound) const {
     const double length = (b.part - a.part) * stepper_.h, least = -rounding_;
     if (!(a.width > least) || !(b.width > least)) return false;
-    if (a.separation) return stays_apart(*a.separation, *b.separation, bound, length, least);
+    if (a.separation) {
+        const Kind& kind = p.blocks[p.gaps[gap].block].kind;
+        return stays_apart(kind, *a.separation, *b.separation, bound, length, least);
+    }
+    if (has_lowest_point(p, gap)) return stays_above(a.width, b.width, 0.5 * bound * length * length, least);
     const double change = b.rate - a.rate + bound * length;  // negative: no bound at all
     if (change <= 0.0) return change >= -rate_rounding * (std::abs(a.rate) + std::abs(b.rate));
     const double meet = (a.width - b.width + b.rate * length + 0.5 * bound * length * length) / change;
@@ -145,7 +149,7 @@ GapSearch::Touch GapSearch::between(int gap, const Look& a, const Look& b) {
 
 std::optional<GapSearch::Touch> GapSearch::search(int gap, const Look& a, const Look& b, const Bends& bends) {
     const double bound = bends.below;
-    if (stays_open(a, b, bound)) return std::nullopt;
+    if (stays_open(gap, a, b, bound)) return std::nullopt;
     const double length = (b.part - a.part) * stepper_.h;
     // It goes on closing all the way.
     if (b.width < -rounding_ && a.rate + bends.above * length < 0.0) return between(gap, a, b);
@@ -154,7 +158,7 @@ std::optional<GapSearch::Touch> GapSearch::search(int gap, const Look& a, const 
         return std::nullopt;
     }
     // What leaves its plane is sure to be above it for half the time that the bound gives it.
-    if (a.width <= rounding_ && a.rate > 0.0 && !a.separation) {
+    if (a.width <= rounding_ && a.rate > 0.0 && !a.separation && !has_lowest_point(p, gap)) {
         const double sure = a.part + a.rate / (bound * stepper_.h);
         if (sure < 0.5 * (a.part + b.part) && sure > a.part) {
             const Look up = look(gap, sure);

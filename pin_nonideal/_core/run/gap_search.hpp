@@ -48,7 +48,7 @@ private:
     Look look(int gap, double part);
     Look look_here(int gap, double part) const;
     Look look_at_start(int gap) const;
-    bool stays_open(const Look& a, const Look& b, double bound) const;
+    bool stays_open(int gap, const Look& a, const Look& b, double bound) const;
     std::optional<Touch> search(int gap, const Look& a, const Look& b, const Bends& bends);
     Touch between(int gap, const Look& a, const Look& b);
     void bound_rates();

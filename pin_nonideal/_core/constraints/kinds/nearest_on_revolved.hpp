@@ -1,0 +1,96 @@
+// The point of a cylinder or cone that is nearest to the origin of frame 1. Its axis is z of frame 2, its middle the origin;
+// the radii of its faces may differ, and one be zero.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "constraints/geometry.hpp"
+
+namespace pn {
+
+template <class Sides>
+struct NearestOnRevolved;
+
+struct Revolved {
+    static constexpr const char *gap = "revolved", *slip = "revolved_slip";
+    template <class Sides>
+    using Nearest = NearestOnRevolved<Sides>;
+    double half = 0.0, below = 0.0, above = 0.0;  // half the length, and the radii of both faces
+    double reach = 0.0;                           // of the farther rim from the middle
+
+    Revolved() = default;
+    Revolved(double length_half, double radius_below, double radius_above)
+        : half(length_half), below(radius_below), above(radius_above),
+          reach(std::hypot(half, std::max(below, above))) {}
+    // Largest component of its points along a direction in its axes.
+    double support(const Vec3& direction) const {
+        const double across = std::hypot(direction[0], direction[1]);
+        return std::max(half * direction[2] + above * across, -half * direction[2] + below * across);
+    }
+};
+
+template <class Sides>
+struct NearestOnRevolved {
+    using Vec = typename Sides::Vec;
+    using Scalar = typename Sides::Scalar;
+    Vec axis, out;            // along the axis, and away from it toward the point
+    Vec n;                    // from the nearest point on the solid; inside, out of its nearest face
+    Scalar distance;          // less than zero inside
+    bool on_rim = false;      // that point is on a rim, or at the tip
+    Scalar turns = Scalar(0.0);  // of n about the axis, over the velocity of the point around it
+
+    PN_INLINE NearestOnRevolved(const Sides& s, const Revolved& solid)
+        : axis(s.b.R * Vec3::UnitZ()), out(s.b.R * Vec3::UnitX()), n(), distance(0.0) {
+        const double slope = std::hypot(2.0 * solid.half, solid.below - solid.above);
+        const double side_out = 2.0 * solid.half / slope, side_up = (solid.below - solid.above) / slope;
+        const Vec apart = s.a.x - s.b.x;
+        const Scalar z = axis.dot(apart);
+        const Vec across = apart - z * axis;
+        const Scalar r = across.norm();
+        if (r > 0.0) out = across / r;
+        const Scalar over = z - solid.half, under = -z - solid.half;
+        const Scalar beside = side_out * (r - solid.below) + side_up * (z + solid.half);
+        const Scalar along = side_out * (z + solid.half) - side_up * (r - solid.below);
+        const bool inside = !(over > 0.0) && !(under > 0.0) && !(beside > 0.0);
+        if (inside ? over >= under && over >= beside : over > 0.0 && r <= solid.above) {
+            distance = over;
+            n = axis;
+        } else if (inside ? under >= beside : under > 0.0 && r <= solid.below) {
+            distance = under;
+            n = -axis;
+        } else if (inside || (beside > 0.0 && along >= 0.0 && along <= slope)) {
+            distance = beside;
+            n = side_out * out + side_up * axis;
+            if (r > 0.0) turns = side_out / r;
+        } else {
+            find_rim(solid, r, z);
+        }
+    }
+
+    // How n turns against the solid as the point moves with u against it.
+    PN_INLINE Vec turning(const Vec& u) const {
+        const Vec around = u - out.dot(u) * out - axis.dot(u) * axis;
+        Vec sum = turns * around;
+        if (!on_rim) return sum;
+        const Vec free = u - around;
+        return sum + (free - n.dot(free) * n) / distance;
+    }
+
+private:
+    PN_INLINE void find_rim(const Revolved& solid, const Scalar& r, const Scalar& z) {
+        on_rim = true;
+        for (const double end : {solid.half, -solid.half}) {
+            const double radius = end > 0.0 ? solid.above : solid.below;
+            const Vec d = (r - radius) * out + (z - end) * axis;
+            const Scalar away = d.norm();
+            if (end < 0.0 && !(away < distance)) continue;
+            distance = away;
+            n = d / away;
+            turns = Scalar(1.0) / away;
+            if (radius > 0.0) turns = (1.0 - radius / r) / away;
+        }
+    }
+};
+
+}  // namespace pn

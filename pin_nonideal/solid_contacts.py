@@ -1,0 +1,207 @@
+"""Contacts of ellipsoids, disks, cylinders, cones and convex hulls: frozen descriptions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .checks import (
+    Vector3,
+    array,
+    fraction,
+    label,
+    nonnegative,
+    number,
+    optional_text,
+    positive,
+    text,
+    unit_axis,
+)
+from .constraints import Axis
+from .errors import InputError
+from .hulls import convex_hull
+from .laws import static_ratio
+
+__all__ = ["CylinderContact", "EllipsoidContact", "HullContact"]
+
+
+def _check(c: EllipsoidContact | HullContact | CylinderContact, *lengths: str) -> str:
+    """What all say: name, friction, and lengths that are not negative."""
+    optional_text(f"{type(c).__name__}: name", c.name)
+    who = label(c)
+    for key in (*lengths, "mu"):
+        object.__setattr__(c, key, nonnegative(f"{who}: {key}", getattr(c, key)))
+    object.__setattr__(c, "static_ratio", static_ratio(who, c.static_ratio))
+    object.__setattr__(c, "restitution", fraction(f"{who}: restitution", c.restitution))
+    return who
+
+
+def _check_frames(c: HullContact | CylinderContact, who: str) -> None:
+    text(f"{who}: frame1", c.frame1)
+    text(f"{who}: frame2", c.frame2)
+    if c.frame1 == c.frame2:
+        raise InputError(f'{who}: frame1 and frame2 must differ; both are "{c.frame1}"')
+
+
+def _check_vectors(c: Any, who: str, *keys: str) -> None:
+    for key in keys:
+        object.__setattr__(c, key, tuple(array(f"{who}: {key}", getattr(c, key), (3,)).tolist()))
+
+
+@dataclass(frozen=True)
+class EllipsoidContact:
+    """An ellipsoid, or a disk, touches a plane with its lowest point, with Coulomb friction there.
+
+    Gap: phi = n . (p - p_plane) - height - |D R^T n| [m], p the middle, R the axes and D the semiaxes; else
+    as that of a `PointContact` that may open.  One semiaxis may be zero: a disk, which touches with its rim
+    and rolls on it, as a coin or a wheel does.  One that lies on its face has no lowest point: points of the
+    face carry it, as a `GeometryContact` of a cylinder gives them.
+    Rows: 1 while it is closed.  lam: the normal force on the frame's body [N].
+
+    Args:
+        frame: name of a frame on the body.
+        semiaxes: half the lengths along the axes [m], (3,), at most one of them zero.
+        mu: kinetic coefficient of friction.
+        static_ratio: static over kinetic friction, at least 1.
+        plane: name of the frame whose origin the plane goes through (its body may move); None for the world's
+            origin.
+        normal: normal of the plane, in the axes of the plane's frame: "x", "y", "z" or three numbers.
+        offset: where the middle is, in the axes of the frame [m].
+        rpy: how the axes are turned against the frame, roll, pitch and yaw [rad].
+        height: of the plane over the origin of its frame, along the normal [m].
+        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        name: used in messages and results.
+    """
+
+    frame: str
+    semiaxes: Vector3
+    mu: float = 0.0
+    static_ratio: float = 1.0
+    plane: str | None = None
+    normal: Axis = "z"
+    offset: Vector3 = (0.0, 0.0, 0.0)
+    rpy: Vector3 = (0.0, 0.0, 0.0)
+    height: float = 0.0
+    restitution: float = 0.0
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        who = _check(self)
+        text(f"{who}: frame", self.frame)
+        optional_text(f"{who}: plane", self.plane)
+        if self.plane == self.frame:
+            raise InputError(f'{who}: frame and plane must differ; both are "{self.frame}"')
+        _check_vectors(self, who, "semiaxes", "offset", "rpy")
+        if not sorted(self.semiaxes)[1] > 0.0 <= min(self.semiaxes):
+            raise InputError(
+                f"{who}: two of the semiaxes must be positive, and none negative; got {list(self.semiaxes)}"
+            )
+        object.__setattr__(self, "height", number(f"{who}: height", self.height))
+        object.__setattr__(self, "normal", unit_axis(f"{who}: normal", self.normal))
+
+
+@dataclass(frozen=True)
+class HullContact:
+    """A sphere, or a point, touches the convex hull of points of another body, with Coulomb friction there.
+
+    Gap: the distance of the sphere's middle from the hull, less both radii [m]; else as `SphereContact`.
+    Rows: 1 while it is closed.  lam: the normal force on the body of frame1 [N], away from the hull.
+
+    Args:
+        frame1: name of a frame on the body of the sphere.
+        frame2: name of a frame on the body of the hull, or of the world.
+        points: in the axes of frame2 [m], (n, 3); those inside the hull of the others add nothing.
+        radius1: radius of the sphere [m]; 0 for a point.
+        radius2: radius around the hull [m], which rounds its edges and moves its faces outward.
+        offset: where the sphere's middle is, in the axes of frame1 [m].
+        mu: kinetic coefficient of friction.
+        static_ratio: static over kinetic friction, at least 1.
+        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        name: used in messages and results.
+    """
+
+    frame1: str
+    frame2: str
+    points: tuple[Vector3, ...]
+    radius1: float
+    radius2: float = 0.0
+    offset: Vector3 = (0.0, 0.0, 0.0)
+    mu: float = 0.0
+    static_ratio: float = 1.0
+    restitution: float = 0.0
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        who = _check(self, "radius1", "radius2")
+        _check_frames(self, who)
+        if self.radius1 + self.radius2 == 0.0:
+            raise InputError(f"{who}: one of radius1 and radius2 must be positive; a point has no normal")
+        _check_vectors(self, who, "offset")
+        points = array(f"{who}: points", self.points, (None, 3))
+        convex_hull(points, f"{who}: points")
+        object.__setattr__(self, "points", tuple(tuple(point) for point in points.tolist()))
+
+
+@dataclass(frozen=True)
+class CylinderContact:
+    """A sphere touches a cylinder or a cone of another body, with Coulomb friction there.
+
+    Gap: the distance of the sphere's middle from the solid, less its radius [m]; else as `SphereContact`.
+    Rows: 1 while it is closed.  lam: the normal force on the body of frame1 [N], away from the solid.
+
+    Args:
+        frame1: name of a frame on the body of the sphere.
+        frame2: name of a frame on the body of the solid, or of the world.
+        length: of the solid along its axis [m].
+        below: radius of the face at the lower end of the axis [m].
+        above: radius of that at the upper end [m]; `below` when None, and 0 for the tip of a cone.
+        radius1: radius of the sphere [m].
+        offset: where the sphere's middle is, in the axes of frame1 [m].
+        xyz: where the middle of the axis is, in the axes of frame2 [m].
+        rpy: how the solid, its axis along z, is turned against frame2, roll, pitch and yaw [rad].
+        mu: kinetic coefficient of friction.
+        static_ratio: static over kinetic friction, at least 1.
+        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        name: used in messages and results.
+    """
+
+    frame1: str
+    frame2: str
+    length: float
+    below: float
+    radius1: float
+    above: float | None = None
+    offset: Vector3 = (0.0, 0.0, 0.0)
+    xyz: Vector3 = (0.0, 0.0, 0.0)
+    rpy: Vector3 = (0.0, 0.0, 0.0)
+    mu: float = 0.0
+    static_ratio: float = 1.0
+    restitution: float = 0.0
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.above is None:
+            object.__setattr__(self, "above", self.below)
+        who = _check(self, "below", "above")
+        _check_frames(self, who)
+        for key in ("length", "radius1"):
+            object.__setattr__(self, key, positive(f"{who}: {key}", getattr(self, key)))
+        _check_vectors(self, who, "offset", "xyz", "rpy")
+        if self.below == self.above == 0.0:
+            raise InputError(f"{who}: one of below and above must be positive; a line is a CapsuleContact's")
+
+
+def core_hull(c: HullContact) -> tuple[list[float], list[float], list[int]]:
+    """The hull in the axes of frame2 as the core takes it, one number after the other.
+
+    Args:
+        c: the description.
+
+    Returns:
+        Corners; of each face its outward normal and its offset along it; of each edge the numbers of two
+        corners and of the two faces that meet there.
+    """
+    hull = convex_hull(np.array(c.points), label(c))
+    return hull.points.ravel().tolist(), hull.planes.ravel().tolist(), hull.edges.ravel().tolist()
