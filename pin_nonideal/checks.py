@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from .errors import InputError, nearest
 
+FEW = 100  # numbers that Python adds up faster than NumPy looks at them; their sum is finite as they are
+
 Vector3 = tuple[float, float, float]
 
 AXES: dict[str, Vector3] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -173,7 +175,9 @@ def floats(value: object, kinds: str = "fiu") -> tuple[NDArray[np.float64] | Non
         result = np.array(given, dtype=float) if given.dtype.kind in kinds else None
     except (TypeError, ValueError):  # rows of unequal length, or objects that are no numbers
         result = None
-    if result is None or np.count_nonzero(np.isfinite(result)) == result.size:  # faster than all()
+    if result is None or (result.size <= FEW and math.isfinite(sum(result.ravel().tolist()))):
+        return result, None
+    if np.count_nonzero(np.isfinite(result)) == result.size:  # faster than all()
         return result, None
     return result, tuple(np.argwhere(~np.isfinite(result))[0].tolist())
 

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from .compilation.scene import CompiledScene
 
 
+def _same_bytes(a: Array, b: Array) -> bool:
+    return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
+
+
 class States:
     """Configurations and velocities of a Scene."""
 
@@ -134,7 +138,7 @@ class States:
 
     def _moved(self, q: State, on: Array) -> list[str]:
         """What to tell of a configuration that was moved onto the constraints, see `Projection.notes`."""
-        if isinstance(q, np.ndarray) and np.array_equal(q, on):
+        if isinstance(q, np.ndarray) and (_same_bytes(q, on) or np.array_equal(q, on)):
             return []
         return self._compiled.projection.notes(self._configuration(q, "q"), on)
 

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from .checks import array
 from .dense import DenseOutput
 from .errors import InputError
+from .made_later import MadeLater
 from .records import Event, Sample, Stats, UserEventRecord
 from .scene import Scene
 from .scene_copy import packed, parts_of
@@ -26,7 +27,7 @@ from .types import Array, Table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(ByName):
+class Trajectory(MadeLater, ByName):
     """Samples of a run; what was not recorded is None.
 
     Attributes:
@@ -119,7 +120,7 @@ class Trajectory(ByName):
                 packed(parts_of(self.scene), self.scene.name)
         except InputError:
             return {**self.__dict__, "scene": None}
-        return self.__dict__
+        return vars(self)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Trajectory:
         fields = {key: copy.deepcopy(x, memo) for key, x in self.__dict__.items() if key != "scene"}
@@ -259,3 +260,9 @@ class Trajectory(ByName):
             name = scene.name if isinstance(scene, Scene) else scene
             raise InputError(f'Trajectory.load: the scene "{name}" is not the one of the run in "{path}"')
         return dataclasses.replace(run, scene=scene)
+
+
+# What `later` makes is not to be hidden by attributes of the class.
+for _field in dataclasses.fields(Trajectory):
+    if _field.default is not dataclasses.MISSING:
+        delattr(Trajectory, _field.name)

@@ -27,7 +27,7 @@ formats: xml shapes model_edit inertia urdf_checks urdf_words tidy density meshe
 example_robots plain_yaml robot_yaml starts tree_changes dissipation motors assembly rounding
 mjcf: fields compile motion tree tendons forces transmissions actuators equality shapes told reader
 loading
-records outcome dense npz trajectory_file trajectory_columns trajectory_by_name \
+made_later records outcome dense npz trajectory_file trajectory_columns trajectory_by_name \
 trajectory_summary trajectory
 runs: options asked progress results checkpoint components joining apart scipy_methods resume
 simulation run_arrays batches sweep_points sweep_packs sweep_store sweeping
@@ -55,8 +55,8 @@ run: archive method step outside_step step_control runge_kutta system semi_impli
 collocation stepper gap_search moreau moreau_contacts dense_output recorder inside_samples checkpoint \
 options output stiffness rounding event_search event_location events stepper_choice bouncing notices \
 user_events torques landing time_stepping clusters mode_changes simulation followed_run stepped_run
-python: arrays buffers failures callbacks builder constraints cleared runner options run_programs share_out \
-runs batch followed stepped program cones module
+python: arrays buffers failures callbacks builder constraints cleared kept_run options runner \
+run_programs share_out runs batch followed stepped program cones module
 """
 
 

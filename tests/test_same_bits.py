@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -70,3 +72,47 @@ def test_evaluations(seed):
     for key in ("a", "F_ideal", "F_nonideal", "lam", "modes"):
         np.testing.assert_array_equal(getattr(again, key), getattr(fresh, key), err_msg=key)
     np.testing.assert_array_equal(other.scene.acceleration(m.q, m.v, tau), fresh.a)
+
+
+@pytest.mark.parametrize("name", ["panda_friction", "four_bar", "belt_oscillator"])
+def test_short_runs_keep_nothing_of_each_other(name):
+    """Each has its own numbers, whatever ran or failed in the same place before, on threads too."""
+    scene, fresh = pn.load(name), pn.load(name)
+    short = {"method": "semi_implicit_euler", "dt": 1e-3, "progress": False}
+    q, v = scene.initial_state()
+    first = pn.simulate(scene, 0.005, q, v, **short)
+    expected = [np.array(x) for x in (first.t, first.q, first.v)]
+
+    def assert_expected(run):
+        for x, y in zip((run.t, run.q, run.v), expected, strict=True):
+            np.testing.assert_array_equal(x, y)
+
+    with pytest.raises(pn.StepSizeError):
+        pn.simulate(scene, 0.005, q, v, **short, max_steps=2)
+    pn.simulate(scene, 0.005, q, 0.5 * v, **short)
+    pn.simulate(scene, 0.005, q, v, **short, callback=lambda t, q, v: True)
+    assert_expected(first)
+    assert_expected(pn.simulate(fresh, 0.005, q, v, **short))
+    with ThreadPoolExecutor(2) as pool:
+        for run in pool.map(lambda _: pn.simulate(scene, 0.005, q, v, **short), range(50)):
+            assert_expected(run)
+
+
+def test_a_run_that_failed_leaves_a_clean_place():
+    """The next run with the same options is that of a new scene."""
+    calls = {"fails": True}
+
+    def push(t, q, v):
+        if calls["fails"] and t > 0.0025:
+            raise ValueError("no torque")
+        return -0.1 * v
+
+    def made():
+        robot = pn.load("four_bar")
+        return pn.Scene(robot.model, constraints=robot.constraints, actuation=push, q0=robot.q0)
+
+    scene, short = made(), {"method": "rk4", "dt": 1e-3}
+    with pytest.raises(pn.UserFunctionError, match="no torque"):
+        pn.simulate(scene, 0.005, **short)
+    calls["fails"] = False
+    assert_same_run(pn.simulate(scene, 0.005, **short), pn.simulate(made(), 0.005, **short))

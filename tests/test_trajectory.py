@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import dataclasses
 import io
 import json
 import os
@@ -44,6 +46,20 @@ def test_fields_that_were_not_asked_for_are_none():
     plain = pn.simulate(pn.load("four_bar"), 0.05)
     for key in ("a", "F_ideal", "F_nonideal", "lam", "lam_ideal", "energy", "power", "z"):
         assert getattr(plain, key) is None, key
+
+
+@pytest.mark.parametrize("look", [vars, copy.copy, lambda run: run.grid, lambda run: run.samples(0)])
+def test_fields_are_there_whoever_looks_first(look):
+    """A run makes its fields when they are asked for."""
+    scene = pn.load("belt_oscillator")
+    run, other = (pn.simulate(scene, 0.1, output_dt=0.01) for _ in range(2))
+    look(run)
+    names = {field.name for field in dataclasses.fields(pn.Trajectory)}
+    assert set(vars(run)) == set(vars(other)) == names
+    assert_same_run(run, other)
+    assert run.t is run.t
+    with pytest.raises(AttributeError, match="'Trajectory' object has no attribute 'speed'"):
+        _ = run.speed
 
 
 @pytest.mark.parametrize(

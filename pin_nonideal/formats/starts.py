@@ -131,5 +131,5 @@ def _asked(model: Model, start: Any, q0: NDArray[np.float64]) -> NDArray[np.floa
     """A configuration by name, or in numbers as they were written."""
     if isinstance(start, (str, Mapping)):
         return named_configuration(model, start, q0, "load: q0")
-    tell_order(model, start, "load: q0", model.nqs)
+    tell_order(model, start, "load: q0", "nqs")
     return with_unit_lengths(model, np.array(array("load: q0", start, (model.nq,))), "load: q0")

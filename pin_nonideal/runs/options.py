@@ -198,7 +198,7 @@ def kept_options(scene: Scene, *asked: Any) -> RunOptions:
         *asked: the other arguments of `run_options`, in order.
     """
     kept: dict[Any, RunOptions] = scene.__dict__.setdefault("_kept_options", {})
-    key = tuple((type(each), each) for each in asked)
+    key = (asked, tuple(map(type, asked)))  # True is no 1.0
     try:
         if key in kept:
             return kept[key]

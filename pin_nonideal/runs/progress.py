@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 from .options import RunOptions
 
+Tick = Callable[[float], None]
 
-@contextmanager
-def progress_bar(progress: bool | None, options: RunOptions) -> Iterator[Callable[[float], None] | None]:
+
+def progress_bar(progress: bool | None, options: RunOptions) -> AbstractContextManager[Tick | None]:
     """While a run lasts, a function that shows the time it has come to; None where no bar is wanted.
 
     Args:
         progress: True, False, or None for a terminal only.
         options: of the run.
     """
-    if not (sys.stderr.isatty() if progress is None else progress):
-        yield None
-        return
+    wanted = sys.stderr.isatty() if progress is None else progress
+    return _bar(options) if wanted else nullcontext()
+
+
+@contextmanager
+def _bar(options: RunOptions) -> Iterator[Tick]:
     from tqdm import tqdm
 
     bar_format = "{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -48,8 +49,7 @@ def finish(
         RunError: the run stopped early.
         OutputError: its first checkpoint could not be written.
     """
-    trajectory = _shaped(scene, outcome, options, wall)
-    trajectory.notes.extend(notes)
+    shaped = partial(_shaped, scene, outcome, options, wall, list(notes))
     # A time step may enter a contact, which the next one finds; a loop that opens ends the steps by itself.
     enters = options.method == "moreau" and bool(scene._compiled.opening_names)
     if (
@@ -57,11 +57,12 @@ def finish(
         and outcome.largest_violation > LEFT
         and (stopped is None or isinstance(stopped, core.CoreFailure))
     ):
-        raise _opened(scene, trajectory)
+        raise _opened(scene, shaped())
     if stopped is None:
-        return trajectory
+        return Trajectory.later(lambda: vars(shaped()))
     if isinstance(stopped, OutputError):
         raise stopped
+    trajectory = shaped()
     last = float(trajectory.t[-1]) if len(trajectory) else options.t0
     cause: BaseException | None = None
     if isinstance(stopped, core.CoreFailure):
@@ -79,7 +80,9 @@ def finish(
     raise error from cause
 
 
-def _shaped(scene: Scene, outcome: core.Outcome, options: RunOptions, wall: float) -> Trajectory:
+def _shaped(
+    scene: Scene, outcome: core.Outcome, options: RunOptions, wall: float, notes: list[str]
+) -> Trajectory:
     """The trajectory; without its events, where they are to be kept apart from the samples."""
     fields = outcome_fields(scene, outcome, options, wall)
     t, q, v = fields["t"], fields["q"], fields["v"]
@@ -90,7 +93,7 @@ def _shaped(scene: Scene, outcome: core.Outcome, options: RunOptions, wall: floa
         fields.setdefault("user_events", []).append(UserEventRecord(name, np.array(times), q[at], v[at]))
     if options.dense:
         fields["dense"] = dense_output(outcome, options, scene.model.nv, len(scene.element_names))
-    run = Trajectory(**fields, grid=grid)
+    run = Trajectory(**fields, grid=grid, notes=notes)
     if not options.separate:
         return run
     run = run.samples(grid)

@@ -85,7 +85,7 @@ def named_configuration(
             raise UnknownNameError(f'{what}: no reference configuration "{given}"{nearest(given, known)}')
         return np.array(model.referenceConfigurations[given])
     if not isinstance(given, Mapping):
-        tell_order(model, given, what, model.nqs)
+        tell_order(model, given, what, "nqs")
         return configuration(model, given, what, parts)
     q = np.array(base)
     for name, value in given.items():
@@ -113,7 +113,7 @@ def named_velocity(model: Model, given: State, base: Array, what: str) -> Array:
         UnknownNameError: there is no such joint or piece.
     """
     if not isinstance(given, Mapping):
-        tell_order(model, given, what, model.nvs)
+        tell_order(model, given, what, "nvs")
         return np.array(array(what, given, (model.nv,)))
     v = np.array(base)
     for name, value in given.items():

@@ -10,6 +10,7 @@ import sys
 import warnings
 import weakref
 from collections.abc import Sequence
+from typing import Literal
 
 from pin_nonideal.errors import JointOrderWarning
 from pin_nonideal.types import Model
@@ -57,16 +58,18 @@ def order_words(model: Model) -> str | None:
     )
 
 
-def tell_order(model: Model, given: object, what: str, sizes: Sequence[int]) -> None:
+def tell_order(model: Model, given: object, what: str, sizes: Literal["nqs", "nvs"]) -> None:
     """Warns where a list of the joints' values was perhaps written in the order of the file.
 
     Args:
         model: pinocchio.Model.
         given: values of all joints.
         what: words for messages.
-        sizes: how many values each joint has, the universe's first.
+        sizes: which of the model tell how many values each joint has.
     """
-    if not isinstance(given, (list, tuple)) or len(given) != sum(sizes) or file_order(model) is None:
+    if not isinstance(given, (list, tuple)):
+        return
+    if len(given) != sum(getattr(model, sizes)) or file_order(model) is None:
         return
     warnings.warn(
         f"{what}: {order_words(model)}; name the joints, such as {what.split(': ')[-1]}="

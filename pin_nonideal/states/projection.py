@@ -60,6 +60,9 @@ class ProjectionReport:
     nearest: bool = True
 
 
+UNMOVED = ProjectionReport()
+
+
 class Projection:
     """The projection onto the constraints of one scene.
 
@@ -96,7 +99,7 @@ class Projection:
             InconsistentConstraintsError: no velocity does.
         """
         if not self.program.rows:
-            return q, v, ProjectionReport()
+            return q, v, UNMOVED
         runner = self.program.runner()
         self._refuse_deep_starts(rows_at(runner, q, v, t)[2], t)
         on, v_on, before, after, rate = runner.project(q, v, t, self._reached())

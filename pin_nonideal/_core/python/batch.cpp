@@ -7,12 +7,11 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include "python/cleared.hpp"
 #include "python/failures.hpp"
+#include "python/kept_run.hpp"
 #include "python/options.hpp"
 #include "python/run_programs.hpp"
 #include "python/share_out.hpp"
-#include "run/stepped_run.hpp"
 
 using namespace nanobind::literals;
 
@@ -20,36 +19,54 @@ namespace pn {
 
 namespace {
 
-// What is kept of a run: times, configurations and velocities of its samples, one after the other.
+// What is kept of some runs in a row: times, configurations and velocities of their samples, one after the other, and by
+// run how many these are, the largest violation and the number of steps.
 struct Kept {
-    std::vector<double> t, q, v;
-    double violation = 0.0;
-    long steps = 0;
-    std::optional<Failure> failure;
-    std::exception_ptr error;
+    std::vector<double> t, q, v, samples, violation, steps;
+    struct Stop {
+        size_t run;
+        std::optional<Failure> failure;
+        std::exception_ptr error;
+    };
+    std::vector<Stop> stopped;
+
+    void add(size_t i, const Recording& run) {
+        t.insert(t.end(), run.t.begin(), run.t.end());
+        q.insert(q.end(), run.q.begin(), run.q.end());
+        v.insert(v.end(), run.v.begin(), run.v.end());
+        samples.push_back(static_cast<double>(run.t.size()));
+        double largest = 0.0;
+        for (const double gap : run.violation) largest = std::fmax(largest, gap);
+        violation.push_back(largest);
+        steps.push_back(static_cast<double>(run.steps));
+        if (run.failure || run.error) stopped.push_back({i, run.failure, run.error});
+    }
 };
 
-void keep(Recording& run, Kept& kept) {
-    kept.t.assign(run.t.begin(), run.t.end());
-    kept.q.assign(run.q.begin(), run.q.end());
-    kept.v.assign(run.v.begin(), run.v.end());
-    for (const double gap : run.violation) kept.violation = std::fmax(kept.violation, gap);
-    kept.steps = run.steps;
-    kept.failure = run.failure;
-    kept.error = run.error;
-}
-
 // Samples of all runs, by run and sample, n numbers each; not a number beyond the last of a run.
-Numbers padded(const std::vector<Kept>& runs, std::vector<double> Kept::* field, size_t samples, size_t n) {
-    std::vector<double> all(runs.size() * samples * n, NAN);
-    for (size_t i = 0; i < runs.size(); ++i) {
-        const std::vector<double>& own = runs[i].*field;
-        std::copy(own.begin(), own.end(), all.begin() + i * samples * n);
+Numbers padded(const std::vector<Kept>& all, std::vector<double> Kept::* field, size_t runs, size_t most, size_t n) {
+    std::vector<double> out;
+    out.reserve(runs * most * n);
+    for (const Kept& some : all) {
+        const double* from = (some.*field).data();
+        for (const double samples : some.samples) {
+            const size_t own = static_cast<size_t>(samples) * n;
+            out.insert(out.end(), from, from + own);
+            out.resize(out.size() + most * n - own, NAN);
+            from += own;
+        }
     }
-    return to_numpy(std::move(all));
+    return to_numpy(std::move(out));
 }
 
-nb::object what_stopped(const Kept& run) {
+// A number of each run.
+Numbers joined(const std::vector<Kept>& all, std::vector<double> Kept::* field) {
+    std::vector<double> out;
+    for (const Kept& some : all) out.insert(out.end(), (some.*field).begin(), (some.*field).end());
+    return to_numpy(std::move(out));
+}
+
+nb::object what_stopped(const Kept::Stop& run) {
     if (run.failure) return failure_object(*run.failure);
     try {
         std::rethrow_exception(run.error);
@@ -62,83 +79,62 @@ nb::object what_stopped(const Kept& run) {
 
 // One thread's room: a workspace with the state of a new one, and the run that works in it, used again and again.
 struct Room {
-    std::unique_ptr<SteppedRun> run;
     std::unique_ptr<Workspace> own;
     RunState first;
-    Recording out;
+    KeptRun run;
 
     void carry(const Program& p, const Options& options, bool anew, const VecX& q0, const VecX& v0) {
-        if (!run || anew) {
-            run.reset();
+        if (!own || anew) {
+            run.forget();
             own = std::make_unique<Workspace>(p);
             first = own->state;
-            run = std::make_unique<SteppedRun>(p, *own, options, out);
-        } else {
-            clear(p, *own, first);
         }
-        forget();
-        try {
-            run->begin(q0, v0, options.duration);
-            run->run();
-        } catch (const Failure& failure) {
-            out.failure = failure;
-        } catch (...) {
-            out.error = std::current_exception();
-        }
-        if (out.failure || out.error) run.reset();
-    }
-
-    void forget() {
-        for (std::vector<double>* samples : {&out.t, &out.q, &out.v, &out.violation, &out.violation_rate, &out.z})
-            samples->clear();
-        out.modes.clear();
-        out.closed.clear();
-        out.events.clear();
-        out.steps = out.rejected = out.limited = 0;
-        out.rounding = 0.0;
-        out.failure.reset();
-        out.error = nullptr;
+        run.carry(p, *own, first, options, q0, v0);
     }
 };
+
+// Threads draw some runs at a time, so many times each: neighbors in memory belong to one of them, and they end together.
+constexpr size_t draws = 32;
 
 std::vector<Kept> run_all(const Program& p, const Array2& q, const Array2& v, Options options, int threads,
                           const std::vector<NumberTuple>& names, const Array2& values) {
     const size_t count = q.shape(0);
     const int useful = useful_threads(count, threads);
+    const size_t parts = std::min(count, draws * static_cast<size_t>(useful));
     RunPrograms programs(p, names, values, useful);
-    std::vector<Kept> runs(count);
+    std::vector<Kept> kept(parts);
     std::vector<Room> rooms(useful);
     std::atomic<bool> stopped{false};
     options.tick = [&stopped](double t) {
         if (stopped) throw Failure(Failure::Kind::interrupted, t);
     };
     const auto q_all = map(q), v_all = map(v);
-    share_out(count, threads, stopped, [&](size_t i, int k) {
-        const Program& program = programs.of(i, k);
-        rooms[k].carry(program, options, !names.empty(), q_all.row(i), v_all.row(i));
-        keep(rooms[k].out, runs[i]);
+    share_out(parts, threads, stopped, [&](size_t part, int k) {
+        Kept mine;
+        for (size_t i = part * count / parts; i < (part + 1) * count / parts && !stopped; ++i) {
+            const Program& program = programs.of(i, k);
+            rooms[k].carry(program, options, !names.empty(), q_all.row(i), v_all.row(i));
+            mine.add(i, rooms[k].run.out);
+        }
+        kept[part] = std::move(mine);
     });
-    return runs;
+    return kept;
 }
 
 // t, q, v, then by run the number of samples, the largest violation and the number of steps, and what stopped which.
 nb::tuple rollout_arrays(const Program& p, const Array2& q, const Array2& v, const Options& options, int threads,
                          const std::vector<NumberTuple>& names, const Array2& values) {
-    const std::vector<Kept> runs = run_all(p, q, v, options, threads, names, values);
-    std::vector<double> samples, violation, steps;
+    const std::vector<Kept> all = run_all(p, q, v, options, threads, names, values);
     size_t most = 0;
     nb::list stopped;
-    for (size_t i = 0; i < runs.size(); ++i) {
-        most = std::max(most, runs[i].t.size());
-        samples.push_back(static_cast<double>(runs[i].t.size()));
-        violation.push_back(runs[i].violation);
-        steps.push_back(static_cast<double>(runs[i].steps));
-        if (runs[i].failure || runs[i].error) stopped.append(nb::make_tuple(i, what_stopped(runs[i])));
+    for (const Kept& some : all) {
+        for (const double samples : some.samples) most = std::max(most, static_cast<size_t>(samples));
+        for (const Kept::Stop& each : some.stopped) stopped.append(nb::make_tuple(each.run, what_stopped(each)));
     }
-    const size_t nq = p.mechanism.nq, nv = p.mechanism.nv;
-    return nb::make_tuple(padded(runs, &Kept::t, most, 1), padded(runs, &Kept::q, most, nq),
-                          padded(runs, &Kept::v, most, nv), to_numpy(std::move(samples)),
-                          to_numpy(std::move(violation)), to_numpy(std::move(steps)), stopped);
+    const size_t runs = q.shape(0), nq = p.mechanism.nq, nv = p.mechanism.nv;
+    return nb::make_tuple(padded(all, &Kept::t, runs, most, 1), padded(all, &Kept::q, runs, most, nq),
+                          padded(all, &Kept::v, runs, most, nv), joined(all, &Kept::samples),
+                          joined(all, &Kept::violation), joined(all, &Kept::steps), stopped);
 }
 
 }  // namespace

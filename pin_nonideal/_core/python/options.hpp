@@ -8,6 +8,12 @@
 
 namespace pn {
 
+inline bool any_object(PyObject*) { return true; }
+// Python's own, read later.
+class RunOptions : public nb::object {
+    NB_OBJECT_DEFAULT(RunOptions, nb::object, "pin_nonideal.runs.options.RunOptions", any_object)
+};
+
 // A function of the user t, q, v -> number, the direction in which it counts, and how many of it end the run.
 using OfInstant = nb::typed<nb::callable, double(double, Numbers, Numbers)>;
 using UserEventTuple = std::tuple<OfInstant, int, long>;

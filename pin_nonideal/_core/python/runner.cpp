@@ -15,6 +15,7 @@
 #include "friction/modes.hpp"
 #include "python/buffers.hpp"
 #include "python/cleared.hpp"
+#include "python/options.hpp"
 #include "tree/factor.hpp"
 #include "tree/liegroup.hpp"
 
@@ -196,24 +197,53 @@ std::tuple<Numbers, Numbers, double, double, double> Runner::project(const Array
     return {to_numpy(q), to_numpy(v), found.before, found.after, found.rate};
 }
 
-Outcome Runner::simulate(const Array& q_in, const Array& v_in, const Options& options) {
-    const VecX q0 = map(q_in), v0 = map(v_in);
-    clear(*p, *w, first);
-    Recording recording;
-    {
-        nb::gil_scoped_release release;
-        pn::simulate(*p, *w, q0, v0, options, recording);
+Options& Runner::read(const nb::object& run_options) {
+    if (!asked.is(run_options)) {
+        run_.forget();  // it works with the ones before
+        asked.reset();
+        options = nb::cast<Options>(run_options);
+        asked = run_options;
     }
-    return {w->counters, std::move(recording)};
+    return options;
 }
 
-Outcome Runner::resume(const nb::bytes& state, const Options& options) {
+// The run of short calls, of which very many are alike, is kept; what else is asked for leaves more behind than samples.
+static bool is_plain(const Options& o) {
+    return !o.method.adaptive() && !o.record.evaluates() && !o.record.dense && o.max_wall == 0.0 && o.events.empty() &&
+           !o.callback && !o.save;
+}
+
+Outcome Runner::simulate(const Array& q_in, const Array& v_in) {
+    const VecX q0 = map(q_in), v0 = map(v_in);
+    Outcome outcome;
+    {
+        nb::gil_scoped_release release;
+        if (is_plain(options)) {
+            run_.carry(*p, *w, first, options, q0, v0);
+            outcome.recording = std::exchange(run_.out, {});
+        } else {
+            run_.forget();
+            clear(*p, *w, first);
+            pn::simulate(*p, *w, q0, v0, options, outcome.recording);
+        }
+    }
+    outcome.counters = w->counters;
+    options.tick = nullptr;
+    options.hint = nullptr;
+    options.save = nullptr;
+    options.callback = nullptr;
+    options.events.clear();
+    return outcome;
+}
+
+Outcome Runner::resume(const nb::bytes& state, const Options& with) {
     const std::string bytes(static_cast<const char*>(state.data()), state.size());
     Recording recording;
+    run_.forget();  // it works in the workspace before
     w = std::make_unique<Workspace>(*p);
     {
         nb::gil_scoped_release release;
-        pn::resume(*p, *w, bytes, options, recording);
+        pn::resume(*p, *w, bytes, with, recording);
     }
     return {w->counters, std::move(recording)};
 }

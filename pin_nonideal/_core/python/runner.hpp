@@ -9,7 +9,7 @@
 
 #include "contact/resting.hpp"
 #include "python/arrays.hpp"
-#include "run/simulation.hpp"
+#include "python/kept_run.hpp"
 
 namespace pn {
 
@@ -37,7 +37,14 @@ struct Runner {
     RunState first;  // of a new workspace
     VecX q, v;
 
+    // What the last run was asked for, a RunOptions of Python, and as the core reads it; functions are those of one run.
+    nb::object asked;
+    Options options;
+
     explicit Runner(std::shared_ptr<const Program> program);
+
+    // The options of a run, which are read where they are not those of the last.
+    Options& read(const nb::object& run_options);
 
     // Writes the acceleration into `out`, an array of nv numbers; plain buffers, since this is called in tight loops.
     void acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle tau, nb::handle out);
@@ -58,10 +65,13 @@ struct Runner {
                                                                  double far);
     double time_evaluations(const Array& q_in, const Array& v_in, double t, int count);
 
-    Outcome simulate(const Array& q_in, const Array& v_in, const Options& options);
-    Outcome resume(const nb::bytes& state, const Options& options);
+    // With the options read last.
+    Outcome simulate(const Array& q_in, const Array& v_in);
+    Outcome resume(const nb::bytes& state, const Options& with);
 
 private:
+    KeptRun run_;  // of fixed steps, which records states
+
     // What does not fit is refused here and explained in Python.
     void set(const Array& q_in, const Array& v_in, const std::optional<Array>& tau);
     // Modes by velocity, and at rest by the complementarity problem; or the ones given.

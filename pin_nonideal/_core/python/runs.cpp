@@ -293,15 +293,16 @@ void bind_runs(nb::module_& m, nb::class_<Runner>& runner) {
     m.def("methods", [] { return methods(); });
     bind_outcome(m);
     runner
-        .def("simulate", [](Runner& r, const Array& q, const Array& v, Options options, const Tick& tick,
+        .def("simulate", [](Runner& r, const Array& q, const Array& v, const RunOptions& asked, const Tick& tick,
                             const Save& save, double save_interval, const std::vector<UserEventTuple>& events,
                             const Callback& callback, const Hint& hint) {
+            Options& options = r.read(asked);
             watch(options, tick);
             tell(options, hint);
             keep(options, save, save_interval);
             options.events = user_events(events);
             options.callback = user_callback(callback);
-            return r.simulate(q, v, options);
+            return r.simulate(q, v);
         }, "q"_a, "v"_a, "options"_a, "tick"_a = nb::none(), "save"_a = nb::none(), "save_interval"_a = 0.0,
            "events"_a = std::vector<UserEventTuple>(), "callback"_a = nb::none(), "hint"_a = nb::none())
         .def("resume", [](Runner& r, const nb::bytes& state, Options options, const Tick& tick, const Save& save,

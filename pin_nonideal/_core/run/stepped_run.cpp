@@ -5,6 +5,7 @@ namespace pn {
 void SteppedRun::begin(const VecX& q0, const VecX& v0, double period) {
     static_cast<Progress&>(*this) = at_first_;
     stepper.forget();
+    stiffness.forget();
     event.reset();
     opened.reset();
     choice.forget();

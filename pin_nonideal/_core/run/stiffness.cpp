@@ -34,8 +34,15 @@ constexpr double long_time = 3.0, many_radians = 2e4, part_of_period = 0.1;
 
 StiffnessGuard::StiffnessGuard(System& system, Stepper& stepper, Progress& progress, const Options& options)
     : system_(system), stepper_(stepper), progress_(progress), options_(options),
-      most_steps_(options.max_steps > 0 ? static_cast<double>(options.max_steps) : usual_steps),
-      next_look_ahead_(options.hint && options.max_steps == 0 ? first_look_ahead : never) {}
+      most_steps_(options.max_steps > 0 ? static_cast<double>(options.max_steps) : usual_steps) {
+    forget();
+}
+
+void StiffnessGuard::forget() {
+    begun_ = Clock::now();
+    steps_ = 0;
+    next_look_ahead_ = options_.hint && options_.max_steps == 0 ? first_look_ahead : never;
+}
 
 double StiffnessGuard::FastestMode::rate() const { return std::hypot(decay, frequency); }
 

@@ -16,6 +16,8 @@ public:
     // After a step that the error control accepts, with the workspace evaluated at its end, and left so. Throws a Failure
     // with the dof that is stiff, and its rate [1/s]. What will take long for a fast motion, but not for ever, is hinted at.
     void look();
+    // A run begins, at which the count of steps does.
+    void forget();
     // The same at once, unless what decays fastest lets time stepping take steps of this size.
     void require_time_steps(double size);
 
@@ -40,8 +42,8 @@ private:
     Progress& progress_;
     const Options& options_;
     const double most_steps_;
-    const Clock::time_point begun_ = Clock::now();
-    long steps_ = 0, next_look_ahead_;
+    Clock::time_point begun_;
+    long steps_, next_look_ahead_;
     VecX probe_, probe_rate_;
 };
 
