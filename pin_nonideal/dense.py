@@ -83,10 +83,9 @@ class DenseOutput:
         step = np.maximum(np.searchsorted(self.times[:, 0], t, side="right") - 1, 0)
         begin, end = self.times[step].T
         part = (t - begin) / (end - begin)
-        weights = barycentric(part, self.states.shape[1])
         moved_before = np.concatenate([[0.0], self.moved])[step]
         moved = moved_before + part * (self.moved[step] - moved_before)
-        states = np.einsum("kp,kps->ks", weights, self.states[step])
+        states = inside_steps(self.states, step, part)
         outcome = core.sample_inside(
             program,
             self.options,
@@ -100,26 +99,18 @@ class DenseOutput:
         return outcome_fields(scene, outcome, self.options, 0.0)
 
 
-def barycentric(part: Array, points: int) -> Array:
-    """Weights of the values at Chebyshev's points of the second kind on 0 to 1.
-
-    [Berrut, Trefethen, "Barycentric Lagrange interpolation", SIAM Review 46 (2004), eq. 4.2, 5.4]
+def inside_steps(states: Array, step: NDArray[np.int64], part: Array) -> Array:
+    """Values of the polynomials of steps, through the values at Chebyshev's points of the second kind.
 
     Args:
-        part: where the polynomial is taken, (k,).
-        points: how many there are.
+        states: at the points of each step, (n, points, size).
+        step: in which each value lies, (k,).
+        part: of the step, where it lies, (k,).
 
     Returns:
-        (k, points).
+        (k, size).
     """
-    place = 0.5 * (1.0 - np.cos(np.pi * np.arange(points) / (points - 1)))
-    own = np.where(np.arange(points) % 2 == 0, 1.0, -1.0)
-    own[[0, -1]] *= 0.5
-    apart = part[:, None] - place
-    hit = apart == 0.0
-    weights = own / np.where(hit, 1.0, apart)
-    weights = np.where(hit.any(axis=1, keepdims=True), hit, weights)
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+    return core.inside_steps(states, step, part).reshape(len(part), states.shape[2])
 
 
 def dense_output(outcome: core.Outcome, options: Any, nv: int, elements: int) -> DenseOutput:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from pin_nonideal.core import core
-from pin_nonideal.dense import DenseOutput, barycentric, dense_output
+from pin_nonideal.dense import DenseOutput, dense_output, inside_steps
 from pin_nonideal.scene import Scene
 from pin_nonideal.types import Array
 
@@ -83,22 +83,26 @@ def _motion(scene: Scene, parts: Sequence[Component], dense: Sequence[DenseOutpu
     nq, nv, ne = scene.model.nq, scene.model.nv, len(scene.element_names)
     work = dense[0].states.shape[2] - parts[0].q.size - parts[0].v.size if dense else 0
     columns = len(scene._compiled.program.power_names) if work else 0
-    states, modes = np.zeros((t.size, nq + nv + columns)), np.zeros((t.size, ne))
-    directions, moved = np.zeros((t.size, ne, 3)), np.zeros(t.size)
+    # A row for each coordinate, in which times stand one after the other, as each component fills them.
+    states, moved = np.zeros((nq + nv + columns, t.size)), np.zeros(t.size)
+    modes, directions = np.zeros((ne, t.size), dtype=np.int8), np.zeros((ne, 3, t.size))
     for part, one in zip(parts, dense, strict=True):
-        step = np.clip(np.searchsorted(one.times[:, 0], t, side="right") - 1, 0, len(one) - 1)
+        step = np.searchsorted(one.times[:, 0], t, side="right") - 1
+        np.minimum(np.maximum(step, 0, out=step), len(one) - 1, out=step)
         begin, end = one.times[step].T
         at = (t - begin) / (end - begin)
-        own = np.einsum("kp,kps->ks", barycentric(at, one.states.shape[1]), one.states[step])
+        own = inside_steps(one.states, step, at).T
         first, last = part.q.size, part.q.size + part.v.size
-        states[:, part.q], states[:, nq + part.v] = own[:, :first], own[:, first:last]
+        states[part.q], states[nq + part.v] = own[:first], own[first:last]
         if columns:
-            states[:, nq + nv + part.works] += own[:, last:]
-        modes[:, part.elements] = one.modes[step]
-        directions[:, part.elements] = one.directions[step].reshape(t.size, -1, 3)
+            states[nq + nv + part.works] += own[last:]
+        modes[part.elements] = one.modes[step].T
+        turns = one.directions.reshape(len(one), -1, 3)
+        if turns.any():
+            directions[part.elements] = turns[step].transpose(1, 2, 0)
         before = np.concatenate([[0.0], one.moved])[step]
         moved += before + at * (one.moved[step] - before)
-    return states, modes, directions.reshape(t.size, -1), moved
+    return states.T, modes.T, directions.reshape(3 * ne, t.size).T, moved
 
 
 def _samples(
@@ -117,8 +121,8 @@ def _samples(
     )
     evaluated = any(asked) or program.rows or nq != nv
     k, none = t.size if evaluated else 0, np.zeros((0, nv))
-    held = (modes[:k], directions[:k], none, moved[:k])
-    inside = core.sample_inside(program, options, t[:k], states[:k], *held)
+    y, held, turns = (np.ascontiguousarray(x[:k], dtype=float) for x in (states, modes, directions))
+    inside = core.sample_inside(program, options, t[:k], y, held, turns, none, moved[:k])
     samples = {name: getattr(inside, name) for name in dir(core.Outcome) if not name.startswith("_")}
     if evaluated:
         return samples
@@ -128,7 +132,7 @@ def _samples(
         "v": np.ascontiguousarray(states[:, nq : nq + nv]).ravel(),
         "violation": np.zeros(t.size),
         "violation_rate": np.zeros(t.size),
-        "modes": modes.astype(np.int8).ravel(),
+        "modes": modes.ravel(),
     }
 
 
@@ -145,7 +149,7 @@ def _join_dense(
     t = (stretches[:, :1] + inside * np.diff(stretches, axis=1)).ravel()
     states, modes, directions, _ = _motion(scene, parts, dense, t)
     joined.dense_times, joined.dense_states = stretches.ravel(), states.ravel()
-    joined.dense_modes = modes[::points].astype(np.int8).ravel()
+    joined.dense_modes = modes[::points].ravel()
     joined.dense_directions = directions[::points].ravel()
     joined.dense_torque = np.zeros(0)
     joined.dense_moved = _motion(scene, parts, dense, ends[1:])[3]

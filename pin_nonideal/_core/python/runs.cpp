@@ -22,6 +22,8 @@ namespace pn {
 
 namespace {
 
+using Array3 = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+using Indices = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Tick = Function<void(double)>;     // with the time
 using Save = Function<void(nb::bytes)>;  // with the state of a checkpoint
 using Hint = Function<void(double, int, double, bool)>;  // at steps that follow a fast motion
@@ -75,6 +77,15 @@ Outcome samples_inside(const Program& p, const Options& options, const Array& t,
     Recording out;
     sample_inside(p, w, inside, options.record, out);
     return {w.counters, std::move(out)};
+}
+
+// States at parts of the steps of an interpolant, by its values at the points of each step.
+Numbers inside_steps(const Array3& states, const Indices& step, const Array& part) {
+    const size_t size = states.shape(2);
+    const StepPolynomials steps(states.data(), static_cast<int>(states.shape(1)), static_cast<int>(size));
+    std::vector<double> out(part.shape(0) * size);
+    for (size_t k = 0; k < part.shape(0); ++k) steps.at(step(k), part(k), out.data() + k * size);
+    return to_numpy(std::move(out));
 }
 
 // What stopped a run: a failure of the core, what a function of the user raised, or None.
@@ -314,6 +325,7 @@ void bind_runs(nb::module_& m, nb::class_<Runner>& runner) {
     m.def("nearest_states", &nearest_states, "program"_a, "q"_a, "v"_a, "t"_a, "far"_a, "threads"_a,
           "names"_a, "values"_a);
     m.def("dense_points", [](const std::string& method) { return DenseRecorder::points(method_named(method)); }, "method"_a);
+    m.def("inside_steps", &inside_steps, "states"_a, "step"_a, "part"_a);
     m.def("sample_inside", &samples_inside, "program"_a, "options"_a, "t"_a, "y"_a, "modes"_a, "directions"_a, "torque"_a,
           "moved"_a);
     m.def("rollout", &rollout, "program"_a, "q"_a, "v"_a, "options"_a, "threads"_a,

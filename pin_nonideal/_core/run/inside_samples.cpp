@@ -1,9 +1,36 @@
 #include "run/inside_samples.hpp"
 
+#include <algorithm>
+
 #include "dynamics/projection.hpp"
 #include "dynamics/step_start.hpp"
 
 namespace pn {
+
+StepPolynomials::StepPolynomials(const double* states, int points, int size)
+    : states_(states), points_(points), size_(size) {
+    for (int k = 0; k < points; ++k) {
+        places_.push_back(DenseRecorder::part(k, points));
+        weights_.push_back((k % 2 == 0 ? 1.0 : -1.0) * (k == 0 || k == points - 1 ? 0.5 : 1.0));
+    }
+}
+
+void StepPolynomials::at(size_t step, double part, double* out) const {
+    const double* value = states_ + step * points_ * size_;
+    std::fill(out, out + size_, 0.0);
+    double weights = 0.0;
+    for (int k = 0; k < points_; ++k, value += size_) {
+        const double apart = part - places_[k];
+        if (apart == 0.0) {
+            std::copy(value, value + size_, out);
+            return;
+        }
+        const double weight = weights_[k] / apart;
+        for (int i = 0; i < size_; ++i) out[i] += weight * value[i];
+        weights += weight;
+    }
+    for (int i = 0; i < size_; ++i) out[i] /= weights;
+}
 
 static void hold(const Program& p, Workspace& w, const InsideStates& inside, size_t k) {
     if (k == 0 || !(inside.modes[k] == inside.modes[k - 1])) set_modes(p, w, inside.modes[k]);

@@ -7,6 +7,21 @@
 
 namespace pn {
 
+// The polynomials of steps: `points` states of `size` numbers a step.
+class StepPolynomials {
+public:
+    StepPolynomials(const double* states, int points, int size);
+
+    // The state at this part of a step. [Berrut, Trefethen, "Barycentric Lagrange interpolation", SIAM Review 46 (2004),
+    // eq. 4.2, 5.4]
+    void at(size_t step, double part, double* out) const;
+
+private:
+    const double* states_;
+    const int points_, size_;
+    std::vector<double> places_, weights_;  // of the points
+};
+
 // States inside steps, each with what its step held.
 struct InsideStates {
     std::vector<double> t, moved;
