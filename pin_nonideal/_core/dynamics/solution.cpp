@@ -26,16 +26,19 @@ static void row_residuals(const Program& p, const Evaluation& now, const std::ve
     }
 }
 
-// x, a force, becomes the acceleration under it and the constraints A a = b; lam are their multipliers.
-static void constrained_solve(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b, VecX& lam) {
+void solve_scaled(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b, VecX& lam) {
     Evaluation& now = w.now;
     solve_R(p.mechanism, now.terms, x, body);  // a_s' = R^-1 (F + C), Eq. (5)
-    if (!now.rows.blocks.empty()) {
-        row_residuals(p, now, now.B, x, b, w.scratch.r);
-        solve_rows(p.layout, now.rows, w.scratch.r, lam);  // J B^T (b - B a_s') = B^T lam, Eqs. (38), (39)
-        for (int i : now.rows.blocks) add_transpose(p.blocks[i], now.B, lam, x);  // scaled, Eq. (40)
-    }
-    solve_Rt(p.mechanism, now.terms, x);  // without rows a = M^-1 F, Eq. (1)
+    if (now.rows.blocks.empty()) return;
+    row_residuals(p, now, now.B, x, b, w.scratch.r);
+    solve_rows(p.layout, now.rows, w.scratch.r, lam);  // J B^T (b - B a_s') = B^T lam, Eqs. (38), (39)
+    for (int i : now.rows.blocks) add_transpose(p.blocks[i], now.B, lam, x);  // scaled, Eq. (40)
+}
+
+// x, a force, becomes the acceleration under it and the constraints A a = b; lam are their multipliers.
+static void constrained_solve(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b, VecX& lam) {
+    solve_scaled(p, w, x, body, b, lam);
+    solve_Rt(p.mechanism, w.now.terms, x);  // without rows a = M^-1 F, Eq. (1)
 }
 
 // What the forces and multipliers leave of M a: in w.scratch.scaled_free, and of the bodies of deep trees in body_residual.

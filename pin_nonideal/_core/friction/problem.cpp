@@ -27,23 +27,48 @@ static void each_unit_force(const Program& p, const Workspace& w, const std::vec
     }
 }
 
-FrictionProblem::FrictionProblem(const Program& p, Workspace& w, std::vector<int> list) : elements(std::move(list)) {
+FrictionProblem::FrictionProblem(const Program& p, const std::vector<int>& list) : elements(list) {
     for (int e : elements) {
         dims.push_back(p.frictions[e].dim);
         rows += dims.back();
     }
-    const int nv = p.mechanism.nv;
     W.resize(rows, rows);
-    response.resize(nv, rows);
+    response.resize(p.mechanism.nv, rows);
     multipliers.resize(p.layout.rows, rows);
+}
+
+FrictionProblem::FrictionProblem(const Program& p, Workspace& w, std::vector<int> list) : FrictionProblem(p, list) {
     const VecX no_drift = VecX::Zero(p.layout.rows);
-    VecX a(nv), lam = no_drift;
+    VecX a(p.mechanism.nv), lam = no_drift;
     each_unit_force(p, w, elements, [&](int column, const VecX& force) {
         solve_acceleration(p, w, force, no_drift, a, lam);
         response.col(column) = a;
         multipliers.col(column) = lam;
         W.col(column) = along(p, w, a);
     });
+}
+
+// Bodies whose pivots of M differ much take refined solutions.
+FrictionProblem FrictionProblem::of_step(const Program& p, Workspace& w, std::vector<int> list) {
+    if (w.now.rows.refine) return FrictionProblem(p, w, std::move(list));
+    FrictionProblem problem(p, list);
+    problem.scaled = true;
+    const VecX no_drift = VecX::Zero(p.layout.rows);
+    VecX a, lam = no_drift;
+    each_unit_force(p, w, problem.elements, [&](int column, const VecX& force) {
+        a = force;
+        solve_scaled(p, w, a, nullptr, no_drift, lam);
+        problem.response.col(column) = a;
+        problem.multipliers.col(column) = lam;
+    });
+    problem.W.noalias() = problem.response.transpose() * problem.response;
+    return problem;
+}
+
+VecX FrictionProblem::acceleration(const Program& p, Workspace& w, const VecX& f) const {
+    VecX a = response * f;
+    if (scaled) solve_Rt(p.mechanism, w.now.terms, a);
+    return a;
 }
 
 VecX FrictionProblem::along(const Program& p, Workspace& w, const VecX& x) const {

@@ -12,9 +12,14 @@ struct FrictionProblem {
     VecX alpha0;       // without any friction of these elements
     MatX W;            // alpha for a unit of each friction force
     MatX response, multipliers;  // a and lam for it
+    bool scaled = false;         // the response is a_s = R^T a
 
     // For the factors in the workspace, in which these elements do not stick; alpha0 is left to the caller.
     FrictionProblem(const Program& p, Workspace& w, std::vector<int> elements);
+    // The same at half the cost, where few forces are asked for their motion: W = X^T X by the scaled responses X.
+    static FrictionProblem of_step(const Program& p, Workspace& w, std::vector<int> elements);
+    // Acceleration by friction forces.
+    VecX acceleration(const Program& p, Workspace& w, const VecX& f) const;
 
     // Rows A x of the elements' directions.
     VecX along(const Program& p, Workspace& w, const VecX& x) const;
@@ -25,6 +30,9 @@ struct FrictionProblem {
     // W as theory has it: symmetric, and exactly zero for what the constraints alone decide, such as the friction of a
     // driven joint.
     void clean(const Program& p, Workspace& w);
+
+private:
+    FrictionProblem(const Program& p, const std::vector<int>& elements);
 };
 
 }  // namespace pn

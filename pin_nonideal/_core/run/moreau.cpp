@@ -67,7 +67,7 @@ void Moreau::solve_without_friction(double t) {
 
 // Slip velocities at the step's end over h take the place of slip accelerations.
 FrictionProblem Moreau::pose_problem() {
-    FrictionProblem problem(p, w, elements_);
+    FrictionProblem problem = FrictionProblem::of_step(p, w, elements_);
     problem.clean(p, w);
     problem.alpha0 = problem.along(p, w, a_free_);
     int at = 0;
@@ -80,7 +80,7 @@ FrictionProblem Moreau::pose_problem() {
 
 // The motion under the friction forces.
 void Moreau::apply_forces(const FrictionProblem& problem) {
-    w.now.a = a_free_ + problem.response * force_;
+    w.now.a = a_free_ + problem.acceleration(p, w, force_);
     w.now.lam = lam_free_ + problem.multipliers * force_;
     for (int e = 0, at = 0; e < system_.ne; ++e) {
         w.now.slip_force[e] = Vec3::Zero();
@@ -126,7 +126,7 @@ void Moreau::solve_friction(const FrictionProblem& problem, double t) {
 std::vector<Mode> Moreau::end_velocity(const FrictionProblem& problem) {
     const VecX alpha = problem.alpha0 + problem.W * force_;
     std::vector<Mode> modes(system_.ne);
-    v1_ = v0_ + h_ * (a_free_ + problem.response * force_);
+    v1_ = v0_ + h_ * (a_free_ + problem.acceleration(p, w, force_));
     for (int e = 0, at = 0; e < system_.ne; at += problem.dims[e], ++e) {
         const int dim = problem.dims[e];
         w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim) = force_.segment(at, dim);
