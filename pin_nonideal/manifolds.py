@@ -26,8 +26,8 @@ LEAST_ROUNDING = 1e-3
 # What carries a cylinder that stands on its face: so many points on this part of its radius.  The rim takes
 # over from the tilt at which it is as low as they are, 0.03 rad.
 FACE_POINTS, FACE_CIRCLE = 8, 0.97
-# Places of one pair beyond which it is refused: each costs a look in every step.
-MOST_PLACES = 4000
+# Places of one pair beyond which it is refused: rows of all of them take room by the square of their number.
+MOST_PLACES = 1000
 
 
 def manifold(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -67,3 +68,31 @@ def test_a_long_arm_comes_round():
     there = np.arcsin(-plane / 10.0)
     assert strikes[0] == pytest.approx(there, rel=INSTANT)
     np.testing.assert_allclose(np.diff(strikes), np.pi + 2.0 * there, rtol=INSTANT)
+
+
+def far_shapes(count):
+    """A ball over a floor, and so many other shapes around that it does not come near."""
+    model, geometry = empty((0.0, 0.0, -GRAVITY)), pin.GeometryModel()
+    ball = body(model, 0, pin.JointModelFreeFlyer(), "ball", 1.0, inertia=0.02 * np.eye(3))
+    shapes = [coal.Sphere(0.25), coal.Box(0.5, 0.4, 0.3), coal.Cylinder(0.2, 0.4), coal.Cone(0.2, 0.4)]
+    floor = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+    geometry.addGeometryObject(pin.GeometryObject("ball", ball, pin.SE3.Identity(), coal.Sphere(0.1)))
+    geometry.addGeometryObject(pin.GeometryObject("floor", 0, pin.SE3.Identity(), floor))
+    contacts = [pn.GeometryContact("ball", "floor", mu=0.5, restitution=0.6)]
+    for k in range(count):
+        at = pin.SE3(np.eye(3), np.array([3.0 + k % 20, float(k // 20), 0.3]))
+        geometry.addGeometryObject(pin.GeometryObject(f"far {k}", 0, at, shapes[k % len(shapes)]))
+        contacts.append(pn.GeometryContact("ball", f"far {k}", mu=0.5))
+    start = {"q0": [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], "v0": [0.3, 0.0, 0.0, 1.0, 2.0, 3.0]}
+    return pn.Scene(model, contacts=contacts, collision_model=geometry, **start)
+
+
+@pytest.mark.parametrize("count", [4, 40, 400])
+def test_pairs_that_are_far_change_no_bit(count):
+    """It bounces, slips, rolls and rests as if they were not there."""
+    alone, among = (pn.simulate(far_shapes(k), 3.0) for k in (0, count))
+    np.testing.assert_array_equal(alone.t, among.t)
+    np.testing.assert_array_equal(alone.q, among.q)
+    np.testing.assert_array_equal(alone.v, among.v)
+    assert [(e.time, e.kind) for e in alone.events] == [(e.time, e.kind) for e in among.events]
+    assert alone.stats.steps == among.stats.steps

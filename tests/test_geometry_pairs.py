@@ -36,7 +36,7 @@ def convex(points, scale=1.0):
     return mesh.convex
 
 
-def cloud(seed=3, count=12):
+def cloud(seed=3, count=8):
     """Points of a lumpy solid about the origin."""
     points = np.random.default_rng(seed).normal(size=(count, 3))
     return HALF * points / np.linalg.norm(points, axis=1)[:, None]

@@ -12,10 +12,10 @@ namespace pn {
 // G of n1 rows of one block, from position p1, with n2 of another, from p2: B B^T summed over their common dofs, below
 // the diagonal.
 template <int n1, int n2>
-static void multiply_tile(const double* X, int r1, const double* Y, int r2, const RowLayout::Pair& pair,
+static void multiply_tile(const double* X, int r1, const double* Y, int r2, const RowLayout::Common& common,
                           const RowLayout& layout, int p1, int p2, double* G) {
     double sum[n1][n2] = {};
-    for (const auto& [l, k] : pair.common) {
+    for (const auto& [l, k] : common) {
         const double *x = X + l * r1, *y = Y + k * r2;
         for (int i = 0; i < n1; ++i)
             for (int j = 0; j < n2; ++j) sum[i][j] += x[i] * y[j];
@@ -28,24 +28,29 @@ static void multiply_tile(const double* X, int r1, const double* Y, int r2, cons
     }
 }
 
-void delassus(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s) {
-    for (const RowLayout::Pair& pair : layout.pairs) {
-        if (!s.block_used[pair.block1] || !s.block_used[pair.block2]) continue;
-        const Block &b1 = blocks[pair.block1], &b2 = blocks[pair.block2];
-        const int r1 = static_cast<int>(b1.kept.size()), r2 = static_cast<int>(b2.kept.size());
-        const double *X = B.data() + b1.offset, *Y = B.data() + b2.offset;
-        for (int i0 = 0; i0 < r1; i0 += tile)  // a tile at a time
-            for (int j0 = 0; j0 < r2; j0 += tile) {
-                // The rows of a block stand side by side in the layout, and those of the first block not before those
-                // of the second.
-                const int p1 = layout.position[b1.row] + i0, p2 = layout.position[b2.row] + j0;
-                with_constant(std::min(tile, r1 - i0), [&](auto n1) {
-                    with_constant(std::min(tile, r2 - j0), [&](auto n2) {
-                        multiply_tile<n1, n2>(X + i0, r1, Y + j0, r2, pair, layout, p1, p2, s.G.data());
-                    });
+// The product of the rows of two blocks, a tile at a time. The rows of a block stand side by side in the layout, and those
+// of the first block not before those of the second.
+static void multiply_blocks(const RowLayout& layout, const Block& b1, const Block& b2, const RowLayout::Common& common,
+                            const std::vector<double>& B, RowSystem& s) {
+    const int r1 = static_cast<int>(b1.kept.size()), r2 = static_cast<int>(b2.kept.size());
+    const double *X = B.data() + b1.offset, *Y = B.data() + b2.offset;
+    for (int i0 = 0; i0 < r1; i0 += tile)
+        for (int j0 = 0; j0 < r2; j0 += tile) {
+            const int p1 = layout.position[b1.row] + i0, p2 = layout.position[b2.row] + j0;
+            with_constant(std::min(tile, r1 - i0), [&](auto n1) {
+                with_constant(std::min(tile, r2 - j0), [&](auto n2) {
+                    multiply_tile<n1, n2>(X + i0, r1, Y + j0, r2, common, layout, p1, p2, s.G.data());
                 });
-            }
-    }
+            });
+        }
+}
+
+void delassus(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s) {
+    for (int b : s.blocks)
+        for (int i = layout.first_pair[b]; i < layout.first_pair[b + 1]; ++i) {
+            const auto& [other, common] = layout.pairs[i];
+            if (s.block_used[other]) multiply_blocks(layout, blocks[b], blocks[other], layout.commons[common], B, s);
+        }
 }
 
 void scale_to_unit_length(const RowLayout& layout, const std::vector<char>& use, RowSystem& s) {

@@ -1,6 +1,7 @@
 #include "constraints/row_layout.hpp"
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 
 namespace pn {
@@ -31,6 +32,23 @@ std::vector<int> elimination_order(const std::vector<std::vector<int>>& neighbor
     }
     std::reverse(order.begin(), order.end());
     return order;
+}
+
+// The same number for blocks with the same support.
+std::vector<int> numbered_supports(const std::vector<Block>& blocks) {
+    std::map<std::vector<int>, int> numbers;
+    std::vector<int> out;
+    for (const Block& block : blocks)
+        out.push_back(numbers.emplace(block.support, static_cast<int>(numbers.size())).first->second);
+    return out;
+}
+
+RowLayout::Common common_dofs(const Block& one, const Block& other) {
+    RowLayout::Common common;
+    for (size_t l = 0; l < one.support.size(); ++l)
+        for (size_t k = 0; k < other.support.size(); ++k)
+            if (one.support[l] == other.support[k]) common.emplace_back(l, k);
+    return common;
 }
 
 }  // namespace
@@ -64,7 +82,10 @@ RowLayout layout_rows(const std::vector<Block>& blocks, int nv) {
     }
     layout.first.resize(layout.rows);
     layout.start.resize(layout.rows);
+    const std::vector<int> support = numbered_supports(blocks);
+    std::map<std::pair<int, int>, int> known;  // number of what two supports have in common
     std::vector<int> lead(n);  // first position of the first neighbor of each block
+    layout.first_pair.push_back(0);
     for (int b = 0; b < n; ++b) {
         int earliest = b;
         for (int c : neighbors[b])
@@ -72,12 +93,11 @@ RowLayout layout_rows(const std::vector<Block>& blocks, int nv) {
         lead[b] = blocks[earliest].kept.empty() ? 0 : layout.position[blocks[earliest].row];
         for (int c : neighbors[b]) {
             if (place[c] > place[b]) continue;
-            RowLayout::Pair pair{b, c, {}};
-            for (size_t l = 0; l < blocks[b].support.size(); ++l)
-                for (size_t k = 0; k < blocks[c].support.size(); ++k)
-                    if (blocks[b].support[l] == blocks[c].support[k]) pair.common.emplace_back(l, k);
-            if (!pair.common.empty()) layout.pairs.push_back(std::move(pair));
+            const auto [found, is_new] = known.emplace(std::pair(support[b], support[c]), layout.commons.size());
+            if (is_new) layout.commons.push_back(common_dofs(blocks[b], blocks[c]));
+            if (!layout.commons[found->second].empty()) layout.pairs.push_back({c, found->second});
         }
+        layout.first_pair.push_back(static_cast<int>(layout.pairs.size()));
     }
     for (int b = 0; b < n; ++b)
         for (size_t k = 0; k < blocks[b].kept.size(); ++k) layout.first[layout.position[blocks[b].row + k]] = lead[b];

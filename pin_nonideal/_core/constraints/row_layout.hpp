@@ -16,11 +16,13 @@ struct RowLayout {
     std::vector<int> row_at;    // inverse of position
     std::vector<int> first, start;
     size_t entries = 0;
-    struct Pair {  // blocks with common dofs, and where these stand in the two supports
-        int block1, block2;
-        std::vector<std::pair<int, int>> common;
+    using Common = std::vector<std::pair<int, int>>;  // where common dofs stand in two supports
+    struct Pair {  // a block with another one with common dofs
+        int other, common;
     };
-    std::vector<Pair> pairs;
+    std::vector<Common> commons;  // of any two blocks with the same supports the same
+    std::vector<Pair> pairs;      // those of each block after those of the one before
+    std::vector<int> first_pair;  // of each block, and the end
 };
 
 RowLayout layout_rows(const std::vector<Block>& blocks, int nv);

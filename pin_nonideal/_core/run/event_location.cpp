@@ -95,6 +95,7 @@ void EventLocator::step_onto(const Crossing& crossing) {
     const double full = stepper_.h, resolution = time_rounding * std::max(std::abs(stepper_.t0), full);
     double rate = crossing.slope / full;
     end_step_at(std::clamp(crossing.part, 0.0, 1.0) * full);
+    if (crossing.leaps) return;
     double size = stepper_.h, here = margin_at_end(watch);
     for (int it = 0; it < correction_passes; ++it) {
         if (of_gap) rate = gap_rate(p, w, watch.index);

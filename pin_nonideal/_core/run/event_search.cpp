@@ -33,6 +33,9 @@ constexpr double beyond = 2.0;     // part of a step: none of it
 // A parabola through three points lies lower than the middle one by an eighth of its second difference at most; twice
 // that is looked into.
 constexpr double parabola_part = 0.25;
+// A margin that is so far below zero, in parts of that at the step's start, where it should be zero has leapt there; parts of
+// a time that tell an instant from the next.
+constexpr double leap_part = 1e-3, leap_digits = 1e-15;
 constexpr double slope_part = 1e-4;  // of the step, over which the rate of a margin is a difference
 constexpr double doubted_part = 1e-2;  // of the change of a share, to which an interpolant of low order tells it
 // What the shares' rates tell is confirmed in so many evaluations, until a correction is this part of the step: what is
@@ -282,6 +285,16 @@ std::optional<double> EventSearch::confirm(const Watch& watch, double part, doub
     return std::nullopt;
 }
 
+// What a contact carries falls below zero in one leap where its place changes: a corner that comes to an edge flies off.
+// The event is behind it, by digits of the time that tell it from the instant before.
+std::optional<Crossing> EventSearch::behind_leap(const Watch& watch, Source from, double part) {
+    if (!(margin_inside(watch, from, part) < -leap_part * margin_inside(watch, from, 0.0))) return std::nullopt;
+    part = std::max(part, leap_digits * (std::abs(stepper_.t0) + stepper_.h) / stepper_.h);
+    for (; part < 1.0; part *= 2.0)
+        if (margin_inside(watch, from, part) < 0.0) return Crossing{watch, part, 0.0, true};
+    return std::nullopt;
+}
+
 Crossing EventSearch::cross(const Watch& watch, Source from) {
     if (watch.kind == Watch::Kind::gap) {
         const auto touch = gaps_.first_touch(watch.index);
@@ -290,6 +303,8 @@ Crossing EventSearch::cross(const Watch& watch, Source from) {
     if (from == Source::shares && watch.kind == Watch::Kind::stick) doubt_ = share_error(watch.index);
     const double part = first_crossing(watch, from);
     if (part == beyond) return {watch, part, 0.0};
+    if (watch.kind == Watch::Kind::load)
+        if (const auto crossing = behind_leap(watch, from, part)) return *crossing;
     const double before = std::max(0.0, part - slope_part), after = before + slope_part;
     return {watch, part, (margin_inside(watch, from, after) - margin_inside(watch, from, before)) / slope_part};
 }

@@ -23,6 +23,7 @@ struct Watch {
 struct Crossing {
     Watch watch;
     double part, slope;  // of the step, and the rate of the margin there over the step
+    bool leaps = false;  // the margin is no root: it falls below zero at once
 };
 
 class EventSearch {
@@ -57,6 +58,7 @@ private:
     double margin_inside(const Watch& watch, Source source, double part);
     double first_crossing(const Watch& watch, Source source);
     Crossing cross(const Watch& watch, Source source);
+    std::optional<Crossing> behind_leap(const Watch& watch, Source source, double part);
     Crossing confirmed(const Crossing& told);
     std::optional<double> confirm(const Watch& watch, double part, double slope);
 

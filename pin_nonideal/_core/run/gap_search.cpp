@@ -77,6 +77,9 @@ std::vector<int> GapSearch::doubtful() {
     system_.read(stepper_.y1);
     near_.clear();
     unseen_.clear();
+    held_.clear();
+    for (int i = 0; i < n; ++i)
+        if (w.state.closed[i] && Separation::has(p, i)) held_.push_back(i);
     bool bounded = false;
     for (int i = 0; i < n; ++i) {
         start_.travel[i] = 0.0;
@@ -113,11 +116,20 @@ bool GapSearch::stays_open(int gap, const Look& a, const Look& b, double bound) 
     return a.width + meet * (a.rate - 0.5 * bound * meet) > least;
 }
 
+bool GapSearch::same_bodies(int gap, int other) const {
+    const Block &a = p.blocks[p.gaps[gap].block], &b = p.blocks[p.gaps[other].block];
+    return (a.joint1 == b.joint1 && a.joint2 == b.joint2) || (a.joint1 == b.joint2 && a.joint2 == b.joint1);
+}
+
 GapSearch::Look GapSearch::look_at_start(int gap) const {
     Look out{0.0, start_.width[gap] - plane(gap), start_.rate[gap], std::nullopt};
     if (!Separation::has(p, gap)) return out;
+    double level = plane(gap);
+    for (int held : held_)
+        if (same_bodies(gap, held)) level = std::min(level, start_.width[held]);
+    out.width = start_.width[gap] - level;
     out.separation = start_.separation[gap];
-    out.separation->radius += plane(gap);
+    out.separation->radius += level;
     return out;
 }
 
@@ -125,8 +137,15 @@ GapSearch::Look GapSearch::look_at_start(int gap) const {
 GapSearch::Look GapSearch::look_here(int gap, double part) const {
     Look out{part, gap_width(p, w, gap) - plane(gap), gap_rate(p, w, gap), std::nullopt};
     if (!Separation::has(p, gap)) return out;
+    double level = plane(gap);
+    for (int held : held_) {
+        if (!same_bodies(gap, held)) continue;
+        measure_gap(p, w, stepper_.t0 + part * stepper_.h, system_.v, held);
+        level = std::min(level, gap_width(p, w, held));
+    }
+    out.width = gap_width(p, w, gap) - level;
     out.separation = Separation::of(p, w, gap);
-    out.separation->radius += plane(gap);
+    out.separation->radius += level;
     return out;
 }
 
@@ -154,7 +173,10 @@ std::optional<GapSearch::Touch> GapSearch::search(int gap, const Look& a, const 
     // It goes on closing all the way.
     if (b.width < -rounding_ && a.rate + bends.above * length < 0.0) return between(gap, a, b);
     if (bends.above * length * length < rounding_ || looks_ > most_looks) {
-        if (b.width < -rounding_ || looks_ > most_looks) return Touch{b.part, b.rate * stepper_.h};
+        // Bodies that slide from one place to the next, a corner from a face on to an edge, bring the gap of the next down
+        // to zero there, where it stays: nothing touches before it goes below.
+        const bool has_closed = looks_ > most_looks && !a.separation;
+        if (b.width < -rounding_ || has_closed) return Touch{b.part, b.rate * stepper_.h};
         return std::nullopt;
     }
     // What leaves its plane is sure to be above it for half the time that the bound gives it.

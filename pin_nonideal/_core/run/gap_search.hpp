@@ -53,6 +53,7 @@ private:
     Touch between(int gap, const Look& a, const Look& b);
     void bound_rates();
     bool stays_far(int gap);
+    bool same_bodies(int gap, int other) const;
     void look_at_starts(const std::vector<int>& gaps);
     Bends bends(int gap) const;
 
@@ -65,6 +66,7 @@ private:
     std::vector<Look> end_;
     std::vector<Bends> bends_;
     std::vector<int> near_, unseen_;
+    std::vector<int> held_;  // closed ones of round bodies: a place that the same two bodies come to next is no lower
     VecX speed_, acceleration_, probe_;
     double rounding_ = 0.0;
     int looks_ = 0;
