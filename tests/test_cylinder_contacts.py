@@ -132,6 +132,29 @@ def test_a_coin_wobbles_about_its_middle(angle):
     np.testing.assert_allclose(run.lam[:, 0], 2.0 * GRAVITY, rtol=1e-6)
 
 
+def test_a_cylinder_spins_in_a_groove():
+    """Both walls of 45 degrees rub: loads, deceleration and the instant of rest, after which it sticks."""
+    mu, spin, r = 0.3, 40.0, 0.05
+    lying = cylinder(r, 0.1)
+    geometry = pin.GeometryModel()
+    geometry.addGeometryObject(lying.collision_model.geometryObjects[0])
+    for side in (-1.0, 1.0):
+        wall = coal.Halfspace(np.array([side, 0.0, 1.0]) / np.sqrt(2.0), 0.0)
+        geometry.addGeometryObject(pin.GeometryObject(f"wall {side:+g}", 0, pin.SE3.Identity(), wall))
+    contacts = [pn.GeometryContact("thing", f"wall {side:+g}", mu=mu) for side in (-1.0, 1.0)]
+    groove = pn.Scene(lying.model, contacts=contacts, collision_model=geometry)
+    q = state(pin.rpy.rpyToMatrix(-0.5 * np.pi, 0.0, 0.0), r * np.sqrt(2.0))
+    run = pn.simulate(groove, 0.4, q=q, v=[0, 0, 0, 0, 0, spin], record="forces")
+    loads = np.sort([run.lam[0, : len(run.lam[0]) // 2].sum(), run.lam[0, len(run.lam[0]) // 2 :].sum()])
+    whole = GRAVITY / (np.sqrt(2.0) * (1.0 + mu**2))
+    np.testing.assert_allclose(loads, [whole * (1.0 - mu), whole * (1.0 + mu)], rtol=1e-9)
+    rate = 2.0 * np.sqrt(2.0) * mu * GRAVITY / (r * (1.0 + mu**2))
+    rest = next(event.time for event in run.events if event.kind == "stick")
+    assert rest == pytest.approx(spin / rate, abs=1e-9)
+    assert np.abs(run.v[-1]).max() == 0.0
+    assert np.abs(run.q[:, :3] - q[:3]).max() < 1e-10
+
+
 def test_a_wheel_that_spins_upright_rolls_straight():
     """On both rims, for 10 m."""
     q = state(pin.rpy.rpyToMatrix(-0.5 * np.pi, 0.0, 0.0), RADIUS)

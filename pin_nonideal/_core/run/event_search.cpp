@@ -33,8 +33,8 @@ constexpr double beyond = 2.0;     // part of a step: none of it
 // A parabola through three points lies lower than the middle one by an eighth of its second difference at most; twice
 // that is looked into.
 constexpr double parabola_part = 0.25;
-// A margin that is so far below zero, in parts of that at the step's start, where it should be zero has leapt there; parts of
-// a time that tell an instant from the next.
+// A margin that is so far below zero, in parts of that at the step's start, where it should be zero has leapt there; and
+// parts of a time that tell an instant from the next.
 constexpr double leap_part = 1e-3, leap_digits = 1e-15;
 constexpr double slope_part = 1e-4;  // of the step, over which the rate of a margin is a difference
 constexpr double doubted_part = 1e-2;  // of the change of a share, to which an interpolant of low order tells it
