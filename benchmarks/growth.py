@@ -25,6 +25,7 @@ from .problems import Problem
 
 OURS, ABA, ODEINT, MUJOCO = "pin_nonideal", "pinocchio aba in C++", "aba + odeint in C++", "mujoco"
 MOST_NESTED = 300  # elements of XML in each other that Python writes
+SWAYING = 0.2  # seconds until a humanoid stands still, and less
 LEAST_RUN, LONG_RUN = 1e-3, 0.05  # seconds of a turn
 COULOMB: dict[str, Any] = {"coulomb": 0.1}
 LOADED: dict[str, Any] = {"mu": 0.1, "radius": 0.05}
@@ -231,6 +232,9 @@ def standing(sizes: tuple[int, ...]) -> Iterator[Row]:
     yield Row("Talos on two feet", 1, "1 s by dop853", {OURS: timing.per_call(run)})
     steps = partial(run, method="moreau", dt=1e-3)
     yield Row("Talos on two feet", 1, "a step of moreau", {OURS: timing.per_call(steps)}, per=1000.0)
+    swaying = partial(pn.simulate, scene, SWAYING, q, v, **steps.keywords)
+    what = "a step of moreau before it stands still"
+    yield Row("Talos on two feet", 1, what, {OURS: timing.per_call(swaying)}, per=1e3 * SWAYING)
 
 
 def slipping(sizes: tuple[int, ...]) -> Iterator[Row]:

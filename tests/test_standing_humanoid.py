@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
+from pin_nonideal.actuation import Table
 
 SOLES = ("left_sole_link", "right_sole_link")
 # By which a sole may leave its place: far above rounding, far below what dropped rows would let it drift [m].
@@ -53,3 +54,57 @@ def test_stands_on_both_soles(coulomb: float, kp: float, kd: float, seed: int) -
     rubbed = np.sum([run.energy[name] for name in scene.law_names], axis=0)
     assert (np.diff(rubbed) < 1e-9).all()  # friction only takes
     assert np.abs(run.energy["balance"]).max() < 1e-5
+
+
+def held_arm(**more) -> pn.Scene:
+    """Two links that friction holds up against their weight."""
+    model, joint, place = pin.Model(), 0, pin.SE3.Identity()
+    for name in ("shoulder", "elbow"):
+        joint = model.addJoint(joint, pin.JointModelRY(), place, name)
+        lever = np.array([0.0, 0.0, -0.5])
+        model.appendBodyToJoint(joint, pin.Inertia(1.0, lever, 0.1 * np.eye(3)), pin.SE3.Identity())
+        place = pin.SE3(np.eye(3), 2.0 * lever)
+    model.addFrame(pin.Frame("push", joint, 0, place, pin.FrameType.OP_FRAME))
+    laws = [pn.JointFriction(name, coulomb=20.0) for name in ("shoulder", "elbow")]
+    return pn.Scene(model, laws=laws, q0=np.array([0.3, 0.4]), **more)
+
+
+MOREAU = {"method": "moreau", "dt": 1e-3}
+
+
+def test_time_stepping_stands_still() -> None:
+    """Once all is held no step changes a bit; a callback, which might push, has each one taken: the same."""
+    scene = standing(20.0, 500.0, 20.0)
+    bent = np.concatenate([np.zeros(6), 0.02 * np.random.default_rng(1).standard_normal(scene.model.nv - 6)])
+    q, v = scene.project(pin.integrate(scene.model, scene.q0, bent), np.zeros(scene.model.nv))
+    run = pn.simulate(scene, 0.4, q, v, **MOREAU, record=("energy", "a"))
+    stepped = pn.simulate(scene, 0.4, q, v, **MOREAU, record=("energy", "a"), callback=lambda t, q, v: None)
+    rest = run.t > 0.3
+    assert (run.v[rest] == 0.0).all()
+    assert (run.a[rest] == 0.0).all()
+    assert (run.q[rest] == run.q[-1]).all()
+    np.testing.assert_allclose(run.q, stepped.q, rtol=0, atol=KEPT)
+    np.testing.assert_array_equal(run.modes, stepped.modes)
+    np.testing.assert_allclose(run.energy["total"], stepped.energy["total"], rtol=0, atol=1e-8)
+    assert run.stats.evaluations < stepped.stats.evaluations
+
+
+@pytest.mark.parametrize("late", ["table", "stepper", "wrench"])
+def test_what_stands_is_moved_by_what_begins_to_push(late: str) -> None:
+    times, torques = np.array([0.0, 0.1, 0.2]), np.array([[0.0, 0.0], [60.0, 0.0], [0.0, 0.0]])
+    if late == "stepper":
+        stepper = held_arm().stepper(1e-3, method="moreau")
+        for _ in range(50):
+            q, v = stepper.step()
+        assert (q == [0.3, 0.4]).all()
+        assert (v == 0.0).all()
+        _, v = stepper.step([60.0, 0.0])
+        assert v[0] > 0.01
+        return
+    if late == "table":
+        scene = held_arm(actuation=Table(times, torques))
+    else:
+        scene = held_arm(forces=[pn.Wrench("push", lambda t: [0.0, 0.0, 0.0, 0.0, 60.0 * (t > 0.1), 0.0])])
+    run = pn.simulate(scene, 0.2, **MOREAU)
+    assert (run.q[run.t < 0.03] == [0.3, 0.4]).all()
+    assert np.abs(run.q[-1] - [0.3, 0.4]).max() > 0.01

@@ -88,6 +88,7 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
 
 void Simulation::run() {
     const bool in_time = options.method.scheme == Method::Scheme::moreau;
+    time_stepping.forget();
     while (!done() && between_steps()) {
         if (in_time) {
             time_stepping.step(options.dt, t_end, t_end);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/solution.hpp"
 #include "dynamics/step_start.hpp"
 #include "run/events.hpp"
 
@@ -13,18 +14,59 @@ namespace {
 // Part of a step that is not worth one of its own.
 constexpr double least_part = 1e-9;
 
+// Whether another step from the same state may go elsewhere: by time, by the user, or where steps of another method lie
+// between those of time stepping.
+bool may_differ(const Program& p, const Options& options) {
+    return options.method.scheme != Method::Scheme::moreau || p.asks_functions || p.moves_in_time || options.callback ||
+           std::holds_alternative<SampledTorque>(p.actuation) || std::holds_alternative<TorqueTable>(p.actuation);
+}
+
 }  // namespace
 
 TimeStepping::TimeStepping(System& system, Progress& progress, const Options& options, Torques& torques,
                            Output& output, Notices& notices, UserEvents& user_events, Recording& out)
     : p(system.p), w(system.w), system_(system), now_(progress), options_(options), torques_(torques),
       output_(output), notices_(notices), user_events_(user_events), out_(out), moreau_(system),
-      moreau_contacts_(system) {}
+      moreau_contacts_(system), lasts_(!may_differ(system.p, options)) {}
 
 double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     double end = std::min({now_.t + size, stop, torques_.next_stop(t_end)});
     if (options_.output_dt > 0.0) end = std::min(end, std::max(output_.next(), std::nextafter(now_.t, stop)));
     return stop - end < least_part * size ? stop : end;
+}
+
+// Whether nothing moves, and what sticks leaves no freedom.
+bool TimeStepping::rests() const {
+    return lasts_ && system_.ng == 0 && (system_.velocity(now_.y).array() == 0.0).all() && is_immobile(p, w);
+}
+
+void TimeStepping::take(double end) {
+    double& t = now_.t;
+    VecX &y = now_.y, y_from = y;
+    const bool rested = rests();
+    const Modes before = w.state.mode;
+    const double moved_from = now_.moved_energy;
+    if (system_.ng > 0) moreau_contacts_.step(t, end - t, y, now_.moved_energy, now_.impact_energy);
+    else moreau_.step(t, end - t, y, now_.moved_energy);
+    t = end;
+    const bool held = rested && std::equal(before.begin(), before.end(), w.state.mode.begin());
+    if (!held) {
+        system_.read(y);
+        // Factors of the new modes: what sticks must not move as the rest is projected.
+        begin_rows(p, w, t, system_.q, system_.v);
+        system_.project_and_evaluate(t, y, now_.rate);
+        now_.moved_energy += system_.moved_energy;
+        return;
+    }
+    // Rounding moves nothing that is held at rest; states of laws go on.
+    y.head(system_.nq + system_.nv) = y_from.head(system_.nq + system_.nv);
+    system_.work(y) = system_.work(y_from);
+    now_.moved_energy = moved_from;
+    system_.read(y);
+    system_.read_law_states(y);
+    begin_step(p, w, t, system_.q, system_.v);
+    system_.rate_of_evaluation(t, y, now_.rate);
+    stands_ = y == y_from;
 }
 
 void TimeStepping::step(double size, double stop, double t_end) {
@@ -35,17 +77,11 @@ void TimeStepping::step(double size, double stop, double t_end) {
     const Modes before = w.state.mode;
     const std::vector<char> closed = w.state.closed;
     const VecX y_from = options_.record.dense ? y : VecX();
-    if (system_.ng > 0) moreau_contacts_.step(t, end - t, y, now_.moved_energy, now_.impact_energy);
-    else moreau_.step(t, end - t, y, now_.moved_energy);
-    ++out_.steps;
+    if (!stands_) take(end);
     t = end;
-    system_.read(y);
-    // Factors of the new modes: what sticks must not move as the rest is projected.
-    begin_rows(p, w, t, system_.q, system_.v);
-    system_.project_and_evaluate(t, y, now_.rate);
+    ++out_.steps;
     output_.configured_now();
     remember_directions(system_, now_.slip_at_start);
-    now_.moved_energy += system_.moved_energy;
     for (const Event& change : changes_since(system_, t, closed, before)) out_.events.push_back(change);
     notices_.pulls(std::nullopt);
     notices_.several(false);

@@ -17,8 +17,12 @@ public:
 
     // One step of this size, not beyond `stop` nor the end of the run.
     void step(double size, double stop, double t_end);
+    // Torques may have changed since the last step.
+    void forget() { stands_ = false; }
 
 private:
+    bool rests() const;
+    void take(double end);
     double end_of_step(double size, double stop, double t_end) const;
 
     const Program& p;
@@ -33,6 +37,8 @@ private:
     Recording& out_;
     Moreau moreau_;
     MoreauContacts moreau_contacts_;
+    const bool lasts_;     // what a step has left as it was stays so
+    bool stands_ = false;  // the last step has left all as it was
 };
 
 }  // namespace pn
