@@ -132,7 +132,7 @@ def test_what_slides_over_an_edge_flies_off(fixed, radius):
     assert run.q[-1, :3] == pytest.approx([0.7, 0.1, 0.2 + radius - fallen], abs=1e-8)
 
 
-@pytest.mark.parametrize("seed", [2, 21])
+@pytest.mark.parametrize("seed", [2, 19])
 def test_bricks_that_slide_over_edges(seed):
     """Thrown at each other so that a corner slides from a face over its edge: the run goes on."""
     rng = np.random.default_rng(seed)

@@ -121,6 +121,10 @@ bool GapSearch::same_bodies(int gap, int other) const {
     return (a.joint1 == b.joint1 && a.joint2 == b.joint2) || (a.joint1 == b.joint2 && a.joint2 == b.joint1);
 }
 
+bool GapSearch::slides_on(int gap) const {
+    return std::any_of(held_.begin(), held_.end(), [&](int held) { return same_bodies(gap, held); });
+}
+
 GapSearch::Look GapSearch::look_at_start(int gap) const {
     Look out{0.0, start_.width[gap] - plane(gap), start_.rate[gap], std::nullopt};
     if (!Separation::has(p, gap)) return out;
@@ -175,7 +179,7 @@ std::optional<GapSearch::Touch> GapSearch::search(int gap, const Look& a, const 
     if (bends.above * length * length < rounding_ || looks_ > most_looks) {
         // Bodies that slide from one place to the next, a corner from a face on to an edge, bring the gap of the next down
         // to zero there, where it stays: nothing touches before it goes below.
-        const bool has_closed = looks_ > most_looks && !a.separation;
+        const bool has_closed = looks_ > most_looks && !(a.separation && slides_on(gap));
         if (b.width < -rounding_ || has_closed) return Touch{b.part, b.rate * stepper_.h};
         return std::nullopt;
     }

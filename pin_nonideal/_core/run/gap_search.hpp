@@ -54,6 +54,7 @@ private:
     void bound_rates();
     bool stays_far(int gap);
     bool same_bodies(int gap, int other) const;
+    bool slides_on(int gap) const;  // the same two bodies touch elsewhere
     void look_at_starts(const std::vector<int>& gaps);
     Bends bends(int gap) const;
 
