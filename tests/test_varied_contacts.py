@@ -43,7 +43,7 @@ def planar(mass, inertia, corners, gravity):
 def test_a_ball_bounces_to_rest(draw):
     """Flights shrink by e, so that their instants have a limit; mass, height and gravity are any."""
     rng = np.random.default_rng([1, draw])
-    e, height, gravity = rng.uniform(0.2, 0.82), decades(rng, 1e-2, 20.0), rng.uniform(1.6, 25.0)
+    e, height, gravity = rng.uniform(0.2, 0.9), decades(rng, 1e-2, 20.0), rng.uniform(1.6, 25.0)
     model = point_mass("Z", mass=decades(rng, 1e-3, 1e3), gravity=(0.0, 0.0, -gravity))
     scene = pn.Scene(model, contacts=[pn.PointContact("mass", restitution=e)], q0=[height])
     first = np.sqrt(2.0 * height / gravity)
@@ -56,6 +56,20 @@ def test_a_ball_bounces_to_rest(draw):
     assert at(run, "touch_down") == pytest.approx([limit], abs=TIME)
     assert (run.v[-1] == 0.0).all()
     assert run.stats.steps <= 200
+
+
+def test_a_hundred_flights():
+    """The last flights are a millionth of the steps tried; their impacts lie on the plane as well."""
+    e, height, gravity = 0.878, 4.54, 5.12
+    model = point_mass("Z", gravity=(0.0, 0.0, -gravity))
+    scene = pn.Scene(model, contacts=[pn.PointContact("mass", restitution=e)], q0=[height])
+    first = np.sqrt(2.0 * height / gravity)
+    limit = first * (1.0 + e) / (1.0 - e)
+    run = pn.simulate(scene, 1.3 * limit)
+    assert at(run, "touch_down") == pytest.approx([limit], abs=TIME)
+    bounces = [event for event in run.events if event.kind == "impact"]
+    speeds = gravity * first * e ** np.arange(len(bounces))
+    assert [-bounce.v_minus[0] for bounce in bounces] == pytest.approx(speeds, rel=1e-4)
 
 
 @each_draw

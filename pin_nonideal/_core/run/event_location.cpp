@@ -27,8 +27,9 @@ constexpr double part_toward_rest = 0.5, least_shortened = 1e-3;
 // --- The step taken again
 constexpr int correction_passes = 12;
 constexpr double time_rounding = 2e-16, corrected_width = 1e-13;
-// Part of the step by which its end moves along the rate there, instead of the step being taken again: what that leaves
-// out is half the square of it, of the step's own change of the rate.
+// Part of the step as it ends by which its end moves along the rate there, instead of the step being taken again: what
+// that leaves out is half the square of it, of the step's own change of the rate. A flight may be a millionth of the step
+// that was tried, and moving by all of it would leave out its fall.
 constexpr double moved_part = 1e-6;
 // The instant of a release is found to this part of the step or of the time. A secant of the rates beyond it is believed
 // where they have fallen to this part, and keeps off its root by this part of the way.
@@ -80,8 +81,8 @@ void EventLocator::end_step_at(double size) {
 }
 
 // The step's end moves a little, or the step is taken again.
-void EventLocator::correct_end_to(double size, double full) {
-    if (std::abs(size - stepper_.h) > moved_part * full) return end_step_at(size);
+void EventLocator::correct_end_to(double size) {
+    if (std::abs(size - stepper_.h) > moved_part * stepper_.h) return end_step_at(size);
     stepper_.move_end(size - stepper_.h);
     system_.project_and_evaluate(stepper_.t0 + stepper_.h, stepper_.y1, stepper_.end_rate());
 }
@@ -103,7 +104,7 @@ void EventLocator::step_onto(const Crossing& crossing) {
         if (!(rate < 0.0)) return;  // it hardly dipped: from here on it moves away again, and no root lies ahead
         const double next = std::clamp(size - here / rate, 0.0, full), change = next - size, before = here;
         if (std::abs(change) <= resolution || (it > 0 && std::abs(change) < corrected_width * full)) return;
-        correct_end_to(next, full);
+        correct_end_to(next);
         size = next;
         here = margin_at_end(watch);
         if (const double secant = (here - before) / change; secant < 0.0) rate = secant;

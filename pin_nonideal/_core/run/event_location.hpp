@@ -48,7 +48,7 @@ private:
 
     double margin_at_end(const Watch& watch);
     void end_step_at(double size);
-    void correct_end_to(double size, double full);
+    void correct_end_to(double size);
     void step_onto(const Crossing& crossing);
 
     std::optional<double> release_rate(double t, const VecX& y, const std::vector<Mode>& modes, ModeQuestion& asked);
