@@ -23,7 +23,7 @@ class Stance:
     """
 
     def __init__(self, feet, weight, mu, load, at, couple):
-        self.feet, self.mu, n = np.asarray(feet, float), mu, len(feet)
+        self.feet, self.mu, self.weight, n = np.asarray(feet, float), mu, weight, len(feet)
         self.load, self.couple = np.asarray(load, float), np.cross(at, load) + couple
         presses = np.array([np.ones(n), self.feet[:, 1], -self.feet[:, 0]])  # force z, moments x and y
         share = np.linalg.pinv(presses)

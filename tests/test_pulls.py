@@ -79,7 +79,7 @@ def check_instant(scene, run):
     return True
 
 
-@pytest.mark.parametrize("seed", range(15))
+@pytest.mark.parametrize("seed", [*range(15), 941])
 def test_feet_pull_when_no_sharing_lets_them_all_press(seed):
     scene = stance(seed)
     assert check_instant(scene, pn.simulate(scene, 6.0, record="forces", output_dt=0.2))

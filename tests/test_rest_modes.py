@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -69,7 +71,7 @@ def test_two_loaded_joints(first):
 def test_many_loaded_joints():
     counts = [check(seed, 1) for seed in range(10_000)] + [check(seed, 2) for seed in range(1000)]
     print({k: counts.count(k) for k in set(counts)})
-    assert counts.count(0) > 10
+    assert counts.count(0) == 0  # at rest forces within continuous limits always suffice for some motion
     assert counts.count(3) > 10
 
 
@@ -109,12 +111,28 @@ def random_stance(seed, static_ratio):
 
 
 def check_stance(seed, static_ratio, beyond):
-    """It gives way at the optimum, and nothing fails `beyond` seconds later; None where a foot would lift."""
+    """It gives way at the optimum, and nothing fails `beyond` seconds later; None where a foot would lift.
+
+    A foot that is kept and pulls rubs as if it pressed: with it the optimum is another, and several motions
+    are possible.
+    """
     scene, stance = random_stance(seed, static_ratio)
     time, normals, lacks = stance.gives_way(1.0)
     if normals.min() < PRESSED or lacks > CONVERGED:
         return None
-    run = pn.simulate(scene, time + beyond)
+    try:
+        run = pn.simulate(scene, time + beyond)
+    except pn.FrictionParadoxError as several:
+        run = several.trajectory
+        if not any(event.kind == "pull" for event in run.events):
+            loads = several.limits[1] * static_ratio / stance.mu
+            signs = np.array(list(product((1.0, -1.0), repeat=len(loads))))
+            weighs = np.abs(signs @ loads - stance.weight) < GIVE_WAY * stance.weight
+            if not weighs[1:].any():  # some foot pulls in the other motion
+                raise
+            return None
+    if any(event.kind == "pull" and event.time < time for event in run.events):
+        return None
     first = min(event.time for event in run.events if event.kind == "slip")
     assert first == pytest.approx(time, rel=GIVE_WAY)
     return run.stats.steps
@@ -123,6 +141,12 @@ def check_stance(seed, static_ratio, beyond):
 @pytest.mark.parametrize("seed", range(12))
 def test_stances(seed):
     check_stance(seed, 1.15, 0.01)
+
+
+@pytest.mark.parametrize("seed", [34, 97, 538])
+def test_what_gives_way_before_another_event_of_the_same_step(seed):
+    """A kept foot begins to pull within the step: by then the feet slip already."""
+    assert check_stance(seed, 1.15, 1.0)
 
 
 @pytest.mark.stress

@@ -137,7 +137,7 @@ LargestLeast largest_least(const MatX& Z, const VecX& N) {
     LargestLeast found{size, VecX()};
     for (int cut = 0; cut < most_cuts; ++cut) {
         const VecX violation = least_violation(Z, (N.array() - value).matrix());
-        if (violation.isZero(0.0)) break;
+        if (largest(violation) <= met_rounding * size) break;  // its parts would be rounding
         found.weight = violation / violation.sum();
         const double bound = found.weight.dot(N);
         if (!(bound < value - rounding * size)) { value = bound; break; }

@@ -37,6 +37,9 @@ constexpr double release_width = 1e-12, least_fall = 0.7, short_of_root = 1e-2;
 // Where the step does not show yet what its interpolant does, it goes on by this part of it, then by so many times that.
 constexpr double least_later = 1e-11, further_part = 10.0;
 
+// A share inside a step counts as larger than those at its ends where it is by this factor.
+constexpr double farther_inside = 1.0 + 1e-6;
+
 }  // namespace
 
 EventLocator::EventLocator(System& system, Stepper& stepper, const std::vector<double>& slip_at_start,
@@ -131,11 +134,11 @@ std::optional<FoundEvent> EventLocator::locate() {
     if (const auto lifted = lift_together()) return lifted;  // which may come earlier
     if (!crossing) return release_together();
     const Watch& watch = crossing->watch;
+    const bool reverses = watch.kind == Watch::Kind::slip && passes_by_rest(watch.index);
+    if (const auto released = release_together()) return released;  // which may come earlier
     if (watch.kind == Watch::Kind::gap) return found(EventKind::touch, watch.index);
     if (watch.kind == Watch::Kind::load) return found(EventKind::lift, watch.index);
     if (watch.kind == Watch::Kind::contact) return found(EventKind::pull, watch.index);
-    const bool reverses = watch.kind == Watch::Kind::slip && passes_by_rest(watch.index);
-    if (const auto released = release_together()) return released;  // which may come earlier
     return found(reverses ? EventKind::reversal : EventKind::rest_or_limit, watch.index);
 }
 
@@ -186,6 +189,10 @@ std::optional<FoundEvent> EventLocator::lift_together() {
         end_step_at(mid);
         (all_press() ? low : high) = mid;
     }
+    if (low > 0.0) {
+        end_step_at(low);
+        if (const auto released = release_together()) return released;  // before
+    }
     end_step_at(high);
     return FoundEvent{EventKind::lift, -1, stepper_.t0 + stepper_.h};
 }
@@ -222,16 +229,53 @@ double EventLocator::release_part(double rate, const std::vector<Mode>& modes, M
     return high;
 }
 
+// The stage between the step's ends at which the share of what sticks is farthest beyond its limit, and farther than at
+// both ends: what holds there and then may not have held in between.
+std::optional<double> EventLocator::hardest_inside() const {
+    const std::vector<Stepper::Look>& looks = stepper_.looks();
+    std::optional<double> part;
+    double most = 1.0;
+    for (int e = 0; e < system_.ne; ++e) {
+        if (w.state.mode[e] != sticking) continue;
+        const auto share = [&](const Stepper::Look& look) { return std::abs(system_.share(*look.rate, e)); };
+        const double ends = std::max(share(looks.front()), share(looks.back()));
+        for (size_t k = 1; k + 1 < looks.size(); ++k) {
+            const double here = share(looks[k]);
+            if (!(here > most && here > farther_inside * ends)) continue;
+            most = here;
+            part = looks[k].part;
+        }
+    }
+    return part;
+}
+
 // Where redundant elements stick together, the multiplier of one says little: they hold as long as some forces within
 // all limits do, those of elements included that slip but do not move. The step is taken again up to where its
 // interpolant shows that none do, and a little further where the step itself does not show it yet.
 std::optional<FoundEvent> EventLocator::release_together() {
     if (!w.state.indeterminate) return std::nullopt;
-    const double full = stepper_.h;
     const std::vector<Mode> modes = w.state.mode;
     ModeQuestion asked;
-    const std::optional<double> rate = release_rate_at_end(modes, asked);
-    if (!rate) return std::nullopt;
+    std::optional<double> rate = release_rate_at_end(modes, asked);
+    if (!rate) {
+        const std::optional<double> inside = hardest_inside();
+        if (!inside) return std::nullopt;
+        const double t = stepper_.t0 + *inside * stepper_.h;
+        VecX y(system_.ny);
+        stepper_.make_interpolant();
+        stepper_.interpolate(*inside, y);
+        system_.read(y);
+        update_kinematics(p, w, t, system_.q, system_.v);
+        if (!release_rate(t, y, modes, asked)) {
+            system_.read(stepper_.y1);
+            begin_step(p, w, stepper_.t0 + stepper_.h, system_.q, system_.v);
+            return std::nullopt;
+        }
+        end_step_at(*inside * stepper_.h);
+        rate = release_rate_at_end(modes, asked);
+        if (!rate) return std::nullopt;
+    }
+    const double full = stepper_.h;
     const double part = release_part(*rate, modes, asked);
     for (double later = 0.0;; later = std::max(further_part * later, least_later)) {
         end_step_at(std::min(part + later, 1.0) * full);
