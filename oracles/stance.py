@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize
 
+from .slow_slip import Plate
+
 
 class Stance:
     """Feet of one body on the plane z = 0.
@@ -23,8 +25,9 @@ class Stance:
     """
 
     def __init__(self, feet, weight, mu, load, at, couple):
-        self.feet, self.mu, self.weight, n = np.asarray(feet, float), mu, weight, len(feet)
+        self.feet, self.mu, n = np.asarray(feet, float), mu, len(feet)
         self.load, self.couple = np.asarray(load, float), np.cross(at, load) + couple
+        self.at, self.turning = at, np.asarray(couple, float)
         presses = np.array([np.ones(n), self.feet[:, 1], -self.feet[:, 0]])  # force z, moments x and y
         share = np.linalg.pinv(presses)
         self.normal0 = share @ [weight, 0.0, 0.0]
@@ -45,6 +48,10 @@ class Stance:
 
     def normals(self, f, t):
         return self.normal0 + self.normal_t * t + self.normal_f @ f
+
+    def plate(self, mu):
+        """The same as it slides, a plate of 10 kg."""
+        return Plate(self.feet, mu, lambda t: np.concatenate([self.load * t, self.turning * t]), self.at)
 
     def gives_way(self, guess):
         """The time, and the normal forces then."""
