@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.optimize import brentq
 
 import pin_nonideal as pn
 from oracles.rest_modes import CloseError, RestingTree
@@ -12,6 +13,7 @@ from oracles.stance import Stance
 
 from .mechanisms import GRAVITY, empty, frame
 from .random_loaded_trees import loaded_tree
+from .standing import plate, star
 
 # A fold of the equation of rest costs half the digits of a force near it.
 MOTION = 1e-7
@@ -153,6 +155,31 @@ def test_many_stances(static_ratio):
     told = [count for count in steps if count is not None]
     print(len(told), "stances, steps at most", max(told), "and in the middle", np.median(told))
     assert len(told) > 300
+
+
+def pulse(seed):
+    """Feet under a push of 5 to 63 ms that they do not hold, when they let go, and a time after it."""
+    rng = np.random.default_rng(seed)
+    feet, mu = star(int(rng.integers(3, 6)), 0.1), 0.5
+    peak, length, part = rng.uniform(0.3, 2.0), 10.0 ** rng.uniform(-2.3, -1.2), rng.uniform(1.02, 2.0)
+    way, most = rng.uniform(0.0, 2.0 * np.pi), mu * part * 10.0 * GRAVITY
+
+    def wrench(t):
+        size = most * np.exp(-(((t - peak) / length) ** 2))
+        return np.array([size * np.cos(way), size * np.sin(way), 0.0, 0.0, 0.0, 0.0])
+
+    scene, oracle = plate(feet, mu, wrench, [0.0, 0.0, -0.1], unilateral=bool(rng.random() < 0.5))
+    begins = brentq(lambda t: oracle.excess(t)[0], peak - 5.0 * length, peak, xtol=1e-12)
+    return scene, begins, peak + 10.0 * length
+
+
+@pytest.mark.parametrize("seed", [10, 13, 21, 23, 32, 52, 58])
+def test_a_push_within_a_step_at_rest(seed):
+    """What holds again by the end of the step has slipped inside it."""
+    scene, begins, after = pulse(seed)
+    run = pn.simulate(scene, after)
+    first = min(event.time for event in run.events if event.kind == "slip")
+    assert first == pytest.approx(begins, rel=GIVE_WAY)
 
 
 def test_four_feet_give_way_together():

@@ -37,8 +37,8 @@ constexpr double release_width = 1e-12, least_fall = 0.7, short_of_root = 1e-2;
 // Where the step does not show yet what its interpolant does, it goes on by this part of it, then by so many times that.
 constexpr double least_later = 1e-11, further_part = 10.0;
 
-// A share inside a step counts as larger than those at its ends where it is by this factor.
-constexpr double farther_inside = 1.0 + 1e-6;
+// A step at rest is divided into so many parts, at whose ends it is asked whether what sticks holds.
+constexpr int places_inside = 8;
 
 }  // namespace
 
@@ -229,24 +229,22 @@ double EventLocator::release_part(double rate, const std::vector<Mode>& modes, M
     return high;
 }
 
-// The stage between the step's ends at which the share of what sticks is farthest beyond its limit, and farther than at
-// both ends: what holds there and then may not have held in between.
-std::optional<double> EventLocator::hardest_inside() const {
-    const std::vector<Stepper::Look>& looks = stepper_.looks();
-    std::optional<double> part;
-    double most = 1.0;
-    for (int e = 0; e < system_.ne; ++e) {
-        if (w.state.mode[e] != sticking) continue;
-        const auto share = [&](const Stepper::Look& look) { return std::abs(system_.share(*look.rate, e)); };
-        const double ends = std::max(share(looks.front()), share(looks.back()));
-        for (size_t k = 1; k + 1 < looks.size(); ++k) {
-            const double here = share(looks[k]);
-            if (!(here > most && here > farther_inside * ends)) continue;
-            most = here;
-            part = looks[k].part;
-        }
+// While nothing moves, steps are long beside what functions of time may do: whether what sticks holds is asked inside
+// as well. The step ends at the first place where it does not.
+std::optional<double> EventLocator::release_rate_inside(const std::vector<Mode>& modes, ModeQuestion& asked) {
+    if (!p.asks_functions || (system_.velocity(stepper_.y1).array() != 0.0).any()) return std::nullopt;
+    const double whole = stepper_.h;
+    for (int k = 1; k < places_inside; ++k) {
+        const double t = stepper_.t0 + whole * k / places_inside;
+        system_.read(stepper_.y1);
+        update_kinematics(p, w, t, system_.q, system_.v);
+        if (!release_rate(t, stepper_.y1, modes, asked)) continue;
+        end_step_at(t - stepper_.t0);
+        return release_rate_at_end(modes, asked);
     }
-    return part;
+    system_.read(stepper_.y1);
+    begin_step(p, w, stepper_.t0 + whole, system_.q, system_.v);
+    return std::nullopt;
 }
 
 // Where redundant elements stick together, the multiplier of one says little: they hold as long as some forces within
@@ -257,24 +255,8 @@ std::optional<FoundEvent> EventLocator::release_together() {
     const std::vector<Mode> modes = w.state.mode;
     ModeQuestion asked;
     std::optional<double> rate = release_rate_at_end(modes, asked);
-    if (!rate) {
-        const std::optional<double> inside = hardest_inside();
-        if (!inside) return std::nullopt;
-        const double t = stepper_.t0 + *inside * stepper_.h;
-        VecX y(system_.ny);
-        stepper_.make_interpolant();
-        stepper_.interpolate(*inside, y);
-        system_.read(y);
-        update_kinematics(p, w, t, system_.q, system_.v);
-        if (!release_rate(t, y, modes, asked)) {
-            system_.read(stepper_.y1);
-            begin_step(p, w, stepper_.t0 + stepper_.h, system_.q, system_.v);
-            return std::nullopt;
-        }
-        end_step_at(*inside * stepper_.h);
-        rate = release_rate_at_end(modes, asked);
-        if (!rate) return std::nullopt;
-    }
+    if (!rate) rate = release_rate_inside(modes, asked);
+    if (!rate) return std::nullopt;
     const double full = stepper_.h;
     const double part = release_part(*rate, modes, asked);
     for (double later = 0.0;; later = std::max(further_part * later, least_later)) {

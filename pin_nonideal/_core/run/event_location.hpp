@@ -54,7 +54,7 @@ private:
     std::optional<double> release_rate(double t, const VecX& y, const std::vector<Mode>& modes, ModeQuestion& asked);
     std::optional<double> release_rate_at_end(const std::vector<Mode>& modes, ModeQuestion& asked);
     double release_part(double rate, const std::vector<Mode>& modes, ModeQuestion& asked);
-    std::optional<double> hardest_inside() const;
+    std::optional<double> release_rate_inside(const std::vector<Mode>& modes, ModeQuestion& asked);
     std::optional<FoundEvent> release_together();
     bool all_press();
     std::optional<FoundEvent> lift_together();
