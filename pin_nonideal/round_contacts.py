@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .checks import Vector3, array, fraction, label, nonnegative, optional_text, text
+from .checks import Vector3, array
+from .contact_checks import check_rubbing, check_two_frames, check_vectors
 from .errors import InputError
-from .laws import static_ratio
 from .types import Array
 
 __all__ = ["BoxContact", "CapsuleContact", "SphereContact"]
@@ -16,18 +16,10 @@ __all__ = ["BoxContact", "CapsuleContact", "SphereContact"]
 
 def _check(c: SphereContact | CapsuleContact | BoxContact) -> str:
     """What both say: names of frames, radii and friction."""
-    optional_text(f"{type(c).__name__}: name", c.name)
-    who = label(c)
-    text(f"{who}: frame1", c.frame1)
-    text(f"{who}: frame2", c.frame2)
-    if c.frame1 == c.frame2:
-        raise InputError(f'{who}: frame1 and frame2 must differ; both are "{c.frame1}"')
-    for key in ("radius1", "radius2", "mu"):
-        object.__setattr__(c, key, nonnegative(f"{who}: {key}", getattr(c, key)))
+    who = check_rubbing(c, "radius1", "radius2")
+    check_two_frames(c, who)
     if c.radius1 + c.radius2 == 0.0:
         raise InputError(f"{who}: one of radius1 and radius2 must be positive; two points have no normal")
-    object.__setattr__(c, "static_ratio", static_ratio(who, c.static_ratio))
-    object.__setattr__(c, "restitution", fraction(f"{who}: restitution", c.restitution))
     return who
 
 
@@ -147,8 +139,7 @@ class BoxContact:
 
     def __post_init__(self) -> None:
         who = _check(self)
-        for key in ("size", "offset", "xyz", "rpy"):
-            object.__setattr__(self, key, tuple(array(f"{who}: {key}", getattr(self, key), (3,)).tolist()))
+        check_vectors(self, who, "size", "offset", "xyz", "rpy")
         if not min(self.size) > 2.0 * self.radius2:
             raise InputError(
                 f"{who}: each edge of size must be longer than twice radius2; got {list(self.size)} and "

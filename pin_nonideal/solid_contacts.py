@@ -3,51 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from .checks import (
-    Vector3,
-    array,
-    fraction,
-    label,
-    nonnegative,
-    number,
-    optional_text,
-    positive,
-    text,
-    unit_axis,
-)
+from .checks import Vector3, array, label, number, optional_text, positive, text, unit_axis
 from .constraints import Axis
+from .contact_checks import check_rubbing, check_two_frames, check_vectors
 from .errors import InputError
 from .hulls import convex_hull
-from .laws import static_ratio
 
 __all__ = ["CylinderContact", "EllipsoidContact", "HullContact"]
-
-
-def _check(c: EllipsoidContact | HullContact | CylinderContact, *lengths: str) -> str:
-    """What all say: name, friction, and lengths that are not negative."""
-    optional_text(f"{type(c).__name__}: name", c.name)
-    who = label(c)
-    for key in (*lengths, "mu"):
-        object.__setattr__(c, key, nonnegative(f"{who}: {key}", getattr(c, key)))
-    object.__setattr__(c, "static_ratio", static_ratio(who, c.static_ratio))
-    object.__setattr__(c, "restitution", fraction(f"{who}: restitution", c.restitution))
-    return who
-
-
-def _check_frames(c: HullContact | CylinderContact, who: str) -> None:
-    text(f"{who}: frame1", c.frame1)
-    text(f"{who}: frame2", c.frame2)
-    if c.frame1 == c.frame2:
-        raise InputError(f'{who}: frame1 and frame2 must differ; both are "{c.frame1}"')
-
-
-def _check_vectors(c: Any, who: str, *keys: str) -> None:
-    for key in keys:
-        object.__setattr__(c, key, tuple(array(f"{who}: {key}", getattr(c, key), (3,)).tolist()))
 
 
 @dataclass(frozen=True)
@@ -88,12 +53,12 @@ class EllipsoidContact:
     name: str | None = None
 
     def __post_init__(self) -> None:
-        who = _check(self)
+        who = check_rubbing(self)
         text(f"{who}: frame", self.frame)
         optional_text(f"{who}: plane", self.plane)
         if self.plane == self.frame:
             raise InputError(f'{who}: frame and plane must differ; both are "{self.frame}"')
-        _check_vectors(self, who, "semiaxes", "offset", "rpy")
+        check_vectors(self, who, "semiaxes", "offset", "rpy")
         if not sorted(self.semiaxes)[1] > 0.0 <= min(self.semiaxes):
             raise InputError(
                 f"{who}: two of the semiaxes must be positive, and none negative; got {list(self.semiaxes)}"
@@ -134,11 +99,11 @@ class HullContact:
     name: str | None = None
 
     def __post_init__(self) -> None:
-        who = _check(self, "radius1", "radius2")
-        _check_frames(self, who)
+        who = check_rubbing(self, "radius1", "radius2")
+        check_two_frames(self, who)
         if self.radius1 + self.radius2 == 0.0:
             raise InputError(f"{who}: one of radius1 and radius2 must be positive; a point has no normal")
-        _check_vectors(self, who, "offset")
+        check_vectors(self, who, "offset")
         points = array(f"{who}: points", self.points, (None, 3))
         convex_hull(points, f"{who}: points")
         object.__setattr__(self, "points", tuple(tuple(point) for point in points.tolist()))
@@ -184,11 +149,11 @@ class CylinderContact:
     def __post_init__(self) -> None:
         if self.above is None:
             object.__setattr__(self, "above", self.below)
-        who = _check(self, "below", "above")
-        _check_frames(self, who)
+        who = check_rubbing(self, "below", "above")
+        check_two_frames(self, who)
         for key in ("length", "radius1"):
             object.__setattr__(self, key, positive(f"{who}: {key}", getattr(self, key)))
-        _check_vectors(self, who, "offset", "xyz", "rpy")
+        check_vectors(self, who, "offset", "xyz", "rpy")
         if self.below == self.above == 0.0:
             raise InputError(f"{who}: one of below and above must be positive; a line is a CapsuleContact's")
 

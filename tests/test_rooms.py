@@ -16,8 +16,8 @@ PACKAGE = ROOT / "pin_nonideal"
 # All modules from the top down, a line a room. CONTRIBUTING shows the same order.
 ORDER = """
 version errors types checks files equation
-timefunctions constraints laws round_contacts hulls solid_contacts contacts collision_shapes manifolds \
-geometry_contacts forces actuation
+timefunctions constraints laws contact_checks round_contacts hulls solid_contacts contacts collision_shapes \
+manifolds geometry_contacts forces actuation
 _core core cones
 states: placements configurations orders named rows closure projection
 compilation: failures callbacks names constraints contacts friction laws forces lowering analysis scene \
