@@ -55,6 +55,17 @@ static PN_INLINE Force about(const Wrench& w, const Body& body) {
     return {w.force, w.couple + (w.point - body.ref).cross(w.force)};
 }
 
+// A of bodies in deep trees, which have reference points of their own.
+[[gnu::noinline]] static void fill_deep_A(const Block& block, const Mechanism& m, const Terms& terms,
+                                          const RowValues& values, double* A) {
+    const int r = static_cast<int>(block.kept.size());
+    for (int k = 0; k < r; ++k) {
+        const Wrench& w = values.wrench[block.kept[k]];
+        for (const Block::Entry& e : block.entries)  // Eq. (3)
+            A[e.place * r + k] = e.sign * dot(terms.J[e.dof], about(w, terms.body[m.dof_joint[e.dof]]));
+    }
+}
+
 PN_WIDE void fill_A(const Block& block, const Mechanism& m, const Terms& terms, const RowValues& values, double* A) {
     const int r = static_cast<int>(block.kept.size()), n = static_cast<int>(block.support.size());
     if (!values.geometric) {
@@ -63,18 +74,20 @@ PN_WIDE void fill_A(const Block& block, const Mechanism& m, const Terms& terms, 
         return;
     }
     std::fill(A, A + static_cast<size_t>(r) * n, 0.0);
+    if (block.deep) return fill_deep_A(block, m, terms, values, A);
     for (int k = 0; k < r; ++k) {
         const Wrench& w = values.wrench[block.kept[k]];
         const Force f1 = about(w, terms.body[block.joint1]), f2 = about(w, terms.body[block.joint2]);
         for (const Block::Entry& e : block.entries) {
-            const Force f = block.deep ? about(w, terms.body[m.dof_joint[e.dof]]) : e.sign > 0.0 ? f1 : f2;
-            A[e.place * r + k] = e.sign > 0.0 ? dot(terms.J[e.dof], f) : -dot(terms.J[e.dof], f);  // Eq. (3)
+            A[e.place * r + k] = e.sign > 0.0 ? dot(terms.J[e.dof], f1) : -dot(terms.J[e.dof], f2);  // Eq. (3)
         }
     }
 }
 
-// The part of deep trees: of a row of bodies the wrench itself enters the sweep, of another its numbers.
-static void scale_deep_rows(const Mechanism& m, Terms& terms, const Block& block, const RowValues& values, double* B) {
+// The part of deep trees: of a row of bodies the wrench itself enters the sweep, of another its numbers. It stands apart:
+// inside scale_rows it would take the registers of the part that every robot has.
+[[gnu::noinline]] static void scale_deep_rows(const Mechanism& m, Terms& terms, const Block& block,
+                                              const RowValues& values, double* B) {
     const int r = static_cast<int>(block.kept.size());
     for (int k = 0; k < r; ++k) {
         Force f1, f2;
@@ -89,25 +102,33 @@ static void scale_deep_rows(const Mechanism& m, Terms& terms, const Block& block
     }
 }
 
-void scale_rows(const Mechanism& m, Terms& terms, const Block& block, const RowValues& values, const double* A,
-                double* B) {
+// The part of the dofs that have rows of the factor.
+template <bool some_deep>
+static PN_INLINE void scale_flat_rows(const Mechanism& m, const Terms& terms, const Block& block, double* B) {
     const int n = static_cast<int>(block.support.size());
-    std::copy(A, A + block.kept.size() * n, B);
-    if (block.deep) scale_deep_rows(m, terms, block, values, B);
+    const double *L = terms.L.data(), *inv_sqrt_D = terms.inv_sqrt_D.data();
     with_rows(static_cast<int>(block.kept.size()), [&](auto r) {
         for (int l = 0; l < n; ++l) {
             const int dof = block.support[l];
-            if (m.is_deep[dof]) continue;
-            const double* row = terms.L.data() + m.row_offset[dof];
+            if (some_deep && m.is_deep[dof]) continue;
+            const double* row = L + m.row_offset[dof];
             double* __restrict x = B + l * r;
             for (int p = block.parent[l], s = 1; p >= 0; p = block.parent[p], ++s) {
                 double* __restrict y = B + p * r;  // of an ancestor
                 for (int k = 0; k < r; ++k) y[k] -= row[s] * x[k];
             }
-            const double d = terms.inv_sqrt_D[dof];
+            const double d = inv_sqrt_D[dof];
             for (int k = 0; k < r; ++k) x[k] *= d;  // Eq. (7)
         }
     });
+}
+
+void scale_rows(const Mechanism& m, Terms& terms, const Block& block, const RowValues& values, const double* A,
+                double* B) {
+    std::copy(A, A + block.kept.size() * block.support.size(), B);
+    if (!block.deep) return scale_flat_rows<false>(m, terms, block, B);
+    scale_deep_rows(m, terms, block, values, B);
+    scale_flat_rows<true>(m, terms, block, B);
 }
 
 void add_transpose(const Block& block, const std::vector<double>& B, const VecX& lam, VecX& y) {
@@ -152,16 +173,6 @@ void add_along(const Block& block, const std::vector<double>& rows, const Vec3& 
         double sum = 0.0;
         for (int k = 0; k < n; ++k) sum += A[l * n + k] * f[k];
         if (sum != 0.0) force[block.support[l]] += sum;
-    }
-}
-
-void add_wrench(const Block& block, const Terms& terms, const Wrench& unit, double size, std::vector<Force>& body) {
-    for (int side = 0; side < 2; ++side) {
-        const int joint = side == 0 ? block.joint1 : block.joint2;
-        if (joint == 0) continue;
-        const double s = side == 0 ? size : -size;
-        const Vec3 force = s * unit.force;
-        body[joint] += Force{force, s * unit.couple + (unit.point - terms.body[joint].ref).cross(force)};
     }
 }
 

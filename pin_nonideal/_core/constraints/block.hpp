@@ -50,6 +50,15 @@ void add_along(const Block& block, const std::vector<double>& rows, const Vec3& 
 void add_transpose(const Block& block, const Mechanism& m, const Terms& terms, const RowValues& values,
                    const std::vector<double>& A, const VecX& lam, VecX& y, std::vector<Force>& body);
 // Adds a unit wrench times its size to the forces on the two bodies of a block, about their reference points.
-void add_wrench(const Block& block, const Terms& terms, const Wrench& unit, double size, std::vector<Force>& body);
+inline void add_wrench(const Block& block, const Terms& terms, const Wrench& unit, double size,
+                       std::vector<Force>& body) {
+    for (int side = 0; side < 2; ++side) {
+        const int joint = side == 0 ? block.joint1 : block.joint2;
+        if (joint == 0) continue;
+        const double s = side == 0 ? size : -size;
+        const Vec3 force = s * unit.force;
+        body[joint] += Force{force, s * unit.couple + (unit.point - terms.body[joint].ref).cross(force)};
+    }
+}
 
 }  // namespace pn

@@ -30,8 +30,8 @@ static void multiply_tile(const double* X, int r1, const double* Y, int r2, cons
 
 // The product of the rows of two blocks, a tile at a time. The rows of a block stand side by side in the layout, and those
 // of the first block not before those of the second.
-static void multiply_blocks(const RowLayout& layout, const Block& b1, const Block& b2, const RowLayout::Common& common,
-                            const std::vector<double>& B, RowSystem& s) {
+static PN_INLINE void multiply_blocks(const RowLayout& layout, const Block& b1, const Block& b2,
+                                      const RowLayout::Common& common, const std::vector<double>& B, RowSystem& s) {
     const int r1 = static_cast<int>(b1.kept.size()), r2 = static_cast<int>(b2.kept.size());
     const double *X = B.data() + b1.offset, *Y = B.data() + b2.offset;
     for (int i0 = 0; i0 < r1; i0 += tile)

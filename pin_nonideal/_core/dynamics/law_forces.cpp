@@ -72,7 +72,10 @@ const VecX& ask(const Program& p, const UserLaw& law, Workspace& w, double t, co
 }
 
 void add_smooth_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& C) {
-    each_law<UserLaw>(p.laws, [&](const UserLaw& law) { if (law.reaction == Reaction::none) ask(p, law, w, t, q, v); });
+    if (p.user_laws > 0)
+        each_law<UserLaw>(p.laws, [&](const UserLaw& law) {
+            if (law.reaction == Reaction::none) ask(p, law, w, t, q, v);
+        });
     GeneralizedForce sink{p, w.now, C, &w.now.dz};
     const LawState state = law_state(w, v);
     for (const Law& each : p.laws)

@@ -40,8 +40,10 @@ static void sweep_tree(const Mechanism& m, const Evaluation& now, Reactions& r) 
     r.motion[0] = {Vec3::Zero(), Vec3::Zero()};
     for (int i = 1; i < n; ++i) {
         const Joint& j = m.joints[i];
-        r.motion[i] = j.deep ? further(r.motion[j.parent], now.terms.deep.shift[i]) : r.motion[j.parent];
-        for (int k = j.iv; k < j.iv + j.nv; ++k) r.motion[i] += now.a[k] * now.terms.J[k];
+        Motion motion = r.motion[j.parent];
+        if (j.deep) motion = further(motion, now.terms.deep.shift[i]);
+        for (int k = j.iv; k < j.iv + j.nv; ++k) motion += now.a[k] * now.terms.J[k];
+        r.motion[i] = motion;
     }
     for (int i = n - 1; i > 0; --i) {
         const Joint& j = m.joints[i];

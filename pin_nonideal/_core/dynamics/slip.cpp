@@ -15,7 +15,7 @@ Vec3 slip_velocity(const Evaluation& now, const Friction& f) {
     return u;
 }
 
-LoadVectors load_vectors(const Program& p, Workspace& w, const Friction& f) {
+static PN_INLINE LoadVectors vectors_of_load(const Program& p, Workspace& w, const Friction& f) {
     using Load = Friction::Load;
     const Vec3 none = Vec3::Zero();
     if (f.load == Load::none || f.load == Load::user) return {none, none, none};
@@ -42,13 +42,15 @@ LoadVectors load_vectors(const Program& p, Workspace& w, const Friction& f) {
     return {rub * radial, rub * f.inverse_span * bending, f.mu * f.axial_radius * axial};
 }
 
+LoadVectors load_vectors(const Program& p, Workspace& w, const Friction& f) { return vectors_of_load(p, w, f); }
+
 double load_limit(const Program& p, Workspace& w, const Friction& f, double t, const VecX& q, const VecX& v) {
     if (f.load == Friction::Load::user) return f.user_limit(p, t, q, v, w);
     double limit = f.constant;
     if (f.load == Friction::Load::none) return limit;
     // Stages beyond the instant at which a contact opens see a force that pulls: friction goes through zero with it.
     if (f.gap >= 0) return limit + f.mu * p.described.share(f.row, reactions(p, w).lam);
-    for (const Vec3& vector : load_vectors(p, w, f)) limit += vector.norm();
+    for (const Vec3& vector : vectors_of_load(p, w, f)) limit += vector.norm();
     return limit;
 }
 
@@ -83,7 +85,8 @@ std::pair<double, double> slip_toward_rest(const Program& p, Workspace& w, int e
 
 double limit_under(const Program& p, const Workspace& w, int e, double load) {
     const Friction& f = p.frictions[e];
-    return f.kinetic_limit(load, w.state.mode[e] == sticking ? 0.0 : slip_velocity(w.now, f).norm());
+    const bool slips = f.varies_with_speed() && w.state.mode[e] != sticking;
+    return f.kinetic_limit(load, slips ? slip_velocity(w.now, f).norm() : 0.0);
 }
 
 void update_limit(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
@@ -122,7 +125,7 @@ static Vec3 force_direction(const Program& p, Workspace& w, int e) {
     return -w.state.last_direction[e];
 }
 
-void add_slip_force(const Program& p, Workspace& w, int e, VecX& C) {
+static PN_INLINE void add_force_of_slip(const Program& p, Workspace& w, int e, VecX& C) {
     if (!slips(w.state.mode[e])) return;
     const Block& block = p.blocks[p.frictions[e].block];
     w.now.slip_force[e] = w.now.limit[e] * force_direction(p, w, e);
@@ -133,9 +136,11 @@ void add_slip_force(const Program& p, Workspace& w, int e, VecX& C) {
         add_along(block, w.now.A, w.now.slip_force[e], C);
 }
 
+void add_slip_force(const Program& p, Workspace& w, int e, VecX& C) { add_force_of_slip(p, w, e, C); }
+
 void add_slip_forces(const Program& p, Workspace& w, bool loaded, VecX& C) {
     for (int e : w.now.slipping)
-        if ((p.frictions[e].reaction != Reaction::none) == loaded) add_slip_force(p, w, e, C);
+        if ((p.frictions[e].reaction != Reaction::none) == loaded) add_force_of_slip(p, w, e, C);
 }
 
 }  // namespace pn

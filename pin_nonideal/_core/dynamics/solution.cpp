@@ -17,7 +17,7 @@ void scale_rows(const Program& p, Workspace& w) {
 }
 
 // r := b - A x, or b - B x with the scaled rows, for the rows in use.
-static void row_residuals(const Program& p, const Evaluation& now, const std::vector<double>& rows, const VecX& x,
+static PN_INLINE void row_residuals(const Program& p, const Evaluation& now, const std::vector<double>& rows, const VecX& x,
                           const VecX& b, VecX& r) {
     for (int i : now.rows.blocks) {
         const Block& block = p.blocks[i];
@@ -26,7 +26,8 @@ static void row_residuals(const Program& p, const Evaluation& now, const std::ve
     }
 }
 
-void solve_scaled(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b, VecX& lam) {
+static PN_INLINE void solve_scaled_motion(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b,
+                                          VecX& lam) {
     Evaluation& now = w.now;
     solve_R(p.mechanism, now.terms, x, body);  // a_s' = R^-1 (F + C), Eq. (5)
     if (now.rows.blocks.empty()) return;
@@ -35,9 +36,14 @@ void solve_scaled(const Program& p, Workspace& w, VecX& x, const Force* body, co
     for (int i : now.rows.blocks) add_transpose(p.blocks[i], now.B, lam, x);  // scaled, Eq. (40)
 }
 
+void solve_scaled(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b, VecX& lam) {
+    solve_scaled_motion(p, w, x, body, b, lam);
+}
+
 // x, a force, becomes the acceleration under it and the constraints A a = b; lam are their multipliers.
-static void constrained_solve(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b, VecX& lam) {
-    solve_scaled(p, w, x, body, b, lam);
+static PN_INLINE void constrained_solve(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b,
+                                        VecX& lam) {
+    solve_scaled_motion(p, w, x, body, b, lam);
     solve_Rt(p.mechanism, w.now.terms, x);  // without rows a = M^-1 F, Eq. (1)
 }
 

@@ -22,6 +22,7 @@ struct Unknowns {
     void each(const OnElement& on_element, const OnLaw& on_law) const {
         for (int e : w.now.slipping)
             if (p.frictions[e].reaction == Reaction::total) on_element(static_cast<size_t>(e));
+        if (p.user_laws == 0) return;
         each_law<UserLaw>(p.laws, [&](const UserLaw& law) { if (law.reaction == Reaction::total) on_law(law); });
     }
     std::vector<int> elements() const;

@@ -32,11 +32,12 @@ struct Friction {
     int axis_dof = -1;          // dof whose axis it is, where it is fixed in no frame
     std::function<double(const Program& p, double t, const VecX& q, const VecX& v, Workspace& w)> user_limit;
 
+    bool varies_with_speed() const { return static_ratio != 1.0 && stribeck_velocity != 0.0; }
     // Limit over load at a slip speed.
     template <class Real>
     Real speed_factor(const Real& speed) const {
         using std::exp;
-        if (static_ratio == 1.0 || stribeck_velocity == 0.0) return 1.0;
+        if (!varies_with_speed()) return 1.0;
         const Real x = speed / stribeck_velocity;
         return 1.0 + (static_ratio - 1.0) * exp(-x * x);
     }

@@ -24,13 +24,13 @@ System::System(const Program& program, Workspace& workspace, bool with_energy)
       q(VecX::Zero(nq)), v(VecX::Zero(nv)) {}
 
 void System::read(const VecX& y) {
-    q = y.head(nq);
-    v = y.segment(nq, nv);
+    std::copy_n(y.data(), nq, q.data());
+    std::copy_n(y.data() + nq, nv, v.data());
 }
 
 void System::write(VecX& y) const {
-    y.head(nq) = q;
-    y.segment(nq, nv) = v;
+    std::copy_n(q.data(), nq, y.data());
+    std::copy_n(v.data(), nv, y.data() + nq);
 }
 
 void System::read_law_states(const VecX& y) {
@@ -53,7 +53,7 @@ void System::rate_of_evaluation(double t, const VecX& y, VecX& dy) {
 
 void System::write_rate(double t, VecX& dy) {
     configuration_rate(p.mechanism, q.data(), v.data(), dy.data());
-    dy.segment(nq, nv) = w.now.a;
+    std::copy_n(w.now.a.data(), nv, dy.data() + nq);
     if (nz > 0) dy.segment(nq + nv, nz) = w.now.dz;
     if (energy) powers(p, w, v, dy.data() + nq + nv + nz);
     watch(t, dy);
@@ -61,7 +61,7 @@ void System::write_rate(double t, VecX& dy) {
 }
 
 void System::watch(double t, VecX& dy) {
-    dy.segment(ns, 2 * ne).setZero();
+    std::fill_n(dy.data() + ns, 2 * ne, 0.0);
     for (int e : w.now.loaded) {
         double *of_element = dy.data() + ns + 2 * e, &share = of_element[0], &rate = of_element[1];
         if (slips(w.state.mode[e])) {
@@ -103,7 +103,7 @@ void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
     require_closed(p, w, t);
     moved |= begin_step_on_rates(p, w, t, v);
     write(y);
-    rate_of_evaluation(t, y, dy);
+    write_rate(t, dy);
     moved_energy = 0.0;
     if (!moved || !energy) return;
     moved_energy =

@@ -7,11 +7,14 @@
 
 namespace pn {
 
-int factorize(const Mechanism& m, Terms& terms) {
+// What sweeps over all dofs is compiled twice, as the pass over bodies is: with deep trees, and without.
+
+template <bool some_deep>
+static int factorize_rows(const Mechanism& m, Terms& terms) {
     // From the leaves to the root: row k eliminates itself from the rows of its ancestors.
     terms.L = terms.M;
     for (int k = m.nv - 1; k >= 0; --k) {
-        if (m.is_deep[k]) continue;
+        if (some_deep && m.is_deep[k]) continue;
         const int depth = m.depth[k];
         const int* up = m.ancestors.data() + m.row_offset[k];
         double* __restrict row = terms.L.data() + m.row_offset[k];
@@ -47,19 +50,31 @@ int factorize(const Mechanism& m, Terms& terms) {
             row[s] = f;
         }
     }
-    return m.deep_dofs.empty() ? -1 : factorize_articulated(m, terms);
+    return -1;
 }
 
-void solve_R(const Mechanism& m, Terms& terms, VecX& x, const Force* body) {
-    if (!m.deep_dofs.empty()) solve_R_articulated(m, terms, body, x);
+int factorize(const Mechanism& m, Terms& terms) {
+    if (m.deep_dofs.empty()) return factorize_rows<false>(m, terms);
+    const int failed = factorize_rows<true>(m, terms);
+    return failed < 0 ? factorize_articulated(m, terms) : failed;
+}
+
+template <bool some_deep>
+static PN_INLINE void solve_R_rows(const Mechanism& m, const Terms& terms, VecX& x) {
     for (int k = m.nv - 1; k >= 0; --k) {
         const double xk = x[k];
-        if (xk == 0.0 || m.is_deep[k]) continue;
+        if (xk == 0.0 || (some_deep && m.is_deep[k])) continue;
         const double* row = terms.L.data() + m.row_offset[k];
         const int* up = m.ancestors.data() + m.row_offset[k];
         for (int s = 1; s <= m.depth[k]; ++s) x[up[s]] -= row[s] * xk;
         x[k] = xk * terms.inv_sqrt_D[k];  // Eq. (5)
     }
+}
+
+void solve_R(const Mechanism& m, Terms& terms, VecX& x, const Force* body) {
+    if (m.deep_dofs.empty()) return solve_R_rows<false>(m, terms, x);
+    solve_R_articulated(m, terms, body, x);
+    solve_R_rows<true>(m, terms, x);
 }
 
 // Row k of R^-T x, once those of its ancestors are there.
@@ -77,7 +92,11 @@ static inline void solve_Rt_row(const Mechanism& m, const Terms& terms, int k, V
 }
 
 void solve_Rt(const Mechanism& m, Terms& terms, VecX& x) {
-    if (!m.deep_dofs.empty()) solve_Rt_articulated(m, terms, m.deep_dofs, x);
+    if (m.deep_dofs.empty()) {
+        for (int k = 0; k < m.nv; ++k) solve_Rt_row(m, terms, k, x);
+        return;
+    }
+    solve_Rt_articulated(m, terms, m.deep_dofs, x);
     for (int k = 0; k < m.nv; ++k)
         if (!m.is_deep[k]) solve_Rt_row(m, terms, k, x);
 }

@@ -9,20 +9,27 @@ namespace pn {
 
 namespace {
 
-// R0 turned about the joint's axis by the angle with this cosine and sine, touching only the columns that change.
-PN_INLINE void rotate(const Joint& j, const Mat3& R0, double c, double s, Mat3& R) {
-    if (j.axis_index < 0) {
-        const Vec3& e = j.axis;
-        const Mat3 turned({c, s * e[2], -s * e[1]}, {-s * e[2], c, s * e[0]}, {s * e[1], -s * e[0], c});
-        R = R0 * Mat3(turned.c[0] + ((1.0 - c) * e[0]) * e, turned.c[1] + ((1.0 - c) * e[1]) * e,
-                      turned.c[2] + ((1.0 - c) * e[2]) * e);
-        return;
-    }
-    const int k = j.axis_index, a = (k + 1) % 3, b = (k + 2) % 3;
-    s *= j.axis_sign;
+// R0 turned about its column k: columns that are known when this is compiled stay in registers.
+template <int k>
+PN_INLINE void rotate_about(const Mat3& R0, double c, double s, Mat3& R) {
+    constexpr int a = (k + 1) % 3, b = (k + 2) % 3;
     R.col(k) = R0.col(k);
     R.col(a) = c * R0.col(a) + s * R0.col(b);
     R.col(b) = c * R0.col(b) - s * R0.col(a);
+}
+
+// R0 turned about the joint's axis by the angle with this cosine and sine.
+PN_INLINE void rotate(const Joint& j, const Mat3& R0, double c, double s, Mat3& R) {
+    switch (j.axis_index) {
+        case 0: return rotate_about<0>(R0, c, j.axis_sign * s, R);
+        case 1: return rotate_about<1>(R0, c, j.axis_sign * s, R);
+        case 2: return rotate_about<2>(R0, c, j.axis_sign * s, R);
+        default: break;
+    }
+    const Vec3& e = j.axis;
+    const Mat3 turned({c, s * e[2], -s * e[1]}, {-s * e[2], c, s * e[0]}, {s * e[1], -s * e[0], c});
+    R = R0 * Mat3(turned.c[0] + ((1.0 - c) * e[0]) * e, turned.c[1] + ((1.0 - c) * e[1]) * e,
+                  turned.c[2] + ((1.0 - c) * e[2]) * e);
 }
 
 PN_INLINE Vec3 axis_in_world(const Joint& j, const Mat3& R) {
@@ -152,14 +159,17 @@ OwnPass::OwnPass(const Mechanism& m) : cos_sin(m.joints.size()), others(m), rest
     motion.S.resize(most);
 }
 
+// What follows is compiled twice, for mechanisms with deep trees and for those without, which ask nothing about them.
+
 // Places body i behind its parent; `shift` is where, in a deep tree.
+template <bool some_deep>
 static PN_INLINE void place_body(const Mechanism& m, OwnPass& pass, BodyTerms& terms, int i, Vec3& shift) {
     const Joint& j = m.joints[i];
     if (j.kind == JointKind::other) pass.others.evaluate(i, terms.q, pass.rest, pass.motion);
     Body& b = terms.body[i];
     place(j, terms.body[j.parent], terms.q, pass.cos_sin[i], b, pass.motion);
     if (j.recenters) recenter(m, i, terms);
-    if (!j.deep) return;
+    if (!some_deep || !j.deep) return;
     shift = b.p;
     b.ref += b.p;
     b.p = Vec3::Zero();
@@ -183,14 +193,14 @@ PN_WIDE void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms, c
                           const std::vector<Angle>& angles) {
     find_cos_sin(pass, terms, angles);
     Vec3 shift;  // those of the factors stay
-    for (int i : joints) place_body(m, pass, terms, i, shift);
+    for (int i : joints) place_body<true>(m, pass, terms, i, shift);
 }
 
-PN_WIDE void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms) {
-    find_cos_sin(pass, terms, m.angles);
+template <bool some_deep>
+static PN_INLINE void place_all(const Mechanism& m, OwnPass& pass, BodyTerms& terms) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
-        place_body(m, pass, terms, i, terms.deep.shift[i]);
+        place_body<some_deep>(m, pass, terms, i, terms.deep.shift[i]);
         const Joint& j = m.joints[i];
         columns(j, terms.body[i], pass.motion, terms.J.data() + j.iv);
         weigh_body(j, terms.body[i]);
@@ -200,14 +210,25 @@ PN_WIDE void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms) {
     }
 }
 
-PN_WIDE void move_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms, const VecX& v) {
+PN_WIDE void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms) {
+    find_cos_sin(pass, terms, m.angles);
+    if (m.deep_joints.empty()) place_all<false>(m, pass, terms);
+    else place_all<true>(m, pass, terms);
+}
+
+template <bool some_deep>
+static PN_INLINE void move_all(const Mechanism& m, OwnPass& pass, BodyTerms& terms, const VecX& v) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
         const Joint& j = m.joints[i];
         Body& b = terms.body[i];
         const Body& parent = terms.body[j.parent];
-        b.v = j.deep ? further(parent.v, terms.deep.shift[i]) : parent.v;
-        b.a = j.deep ? further(parent.a, terms.deep.shift[i]) : parent.a;
+        b.v = parent.v;
+        b.a = parent.a;
+        if (some_deep && j.deep) {
+            b.v = further(parent.v, terms.deep.shift[i]);
+            b.a = further(parent.a, terms.deep.shift[i]);
+        }
         const Motion r = relative_velocity(j, terms.J, v);
         b.v += r;
         b.a += cross(b.v, r);
@@ -218,11 +239,17 @@ PN_WIDE void move_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms, co
     }
 }
 
-PN_WIDE void mass_matrix(const Mechanism& m, OwnPass&, BodyTerms& terms) {
+PN_WIDE void move_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms, const VecX& v) {
+    if (m.deep_joints.empty()) move_all<false>(m, pass, terms, v);
+    else move_all<true>(m, pass, terms, v);
+}
+
+template <bool some_deep>
+static PN_INLINE void fill_M(const Mechanism& m, BodyTerms& terms) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = n - 1; i > 0; --i) {
         const Joint& j = m.joints[i];
-        if (j.deep) continue;
+        if (some_deep && j.deep) continue;
         const Body& b = terms.body[i];
         for (int dof = j.iv + j.nv - 1; dof >= j.iv; --dof) {
             terms.Ag[dof] = b.Y * terms.J[dof];
@@ -235,19 +262,32 @@ PN_WIDE void mass_matrix(const Mechanism& m, OwnPass&, BodyTerms& terms) {
     }
 }
 
-PN_WIDE void bias_forces(const Mechanism& m, OwnPass&, BodyTerms& terms) {
+PN_WIDE void mass_matrix(const Mechanism& m, OwnPass&, BodyTerms& terms) {
+    if (m.deep_joints.empty()) fill_M<false>(m, terms);
+    else fill_M<true>(m, terms);
+}
+
+template <bool some_deep>
+static PN_INLINE void sum_bias_forces(const Mechanism& m, BodyTerms& terms) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
         Body& b = terms.body[i];
         b.f = bias_force(b);
-        if (m.joints[i].deep) terms.deep.bias[i] = b.f;
+        if (some_deep && m.joints[i].deep) terms.deep.bias[i] = b.f;
     }
     for (int i = n - 1; i > 0; --i) {
         const Joint& j = m.joints[i];
         const Body& b = terms.body[i];
         for (int dof = j.iv; dof < j.iv + j.nv; ++dof) terms.nle[dof] = dot(terms.J[dof], b.f);  // in F of Eq. (1)
-        if (j.parent != 0) terms.body[j.parent].f += j.deep ? before(b.f, terms.deep.shift[i]) : b.f;
+        if (j.parent == 0) continue;
+        if (some_deep && j.deep) terms.body[j.parent].f += before(b.f, terms.deep.shift[i]);
+        else terms.body[j.parent].f += b.f;
     }
+}
+
+PN_WIDE void bias_forces(const Mechanism& m, OwnPass&, BodyTerms& terms) {
+    if (m.deep_joints.empty()) sum_bias_forces<false>(m, terms);
+    else sum_bias_forces<true>(m, terms);
 }
 
 }  // namespace pn
