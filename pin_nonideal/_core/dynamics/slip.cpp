@@ -63,8 +63,12 @@ double slip_along_mode(const Program& p, const Workspace& w, int e) {
 // Rates of the slip velocities in the motion at hand.
 static Vec3 slip_acceleration(const Program& p, Workspace& w, const Friction& f) {
     const Block& block = p.blocks[f.block];
-    multiply(block, w.now.A, w.now.a, w.scratch.r);
     Vec3 rate = Vec3::Zero();
+    if (block.dof >= 0) {
+        for (int k = 0; k < f.dim; ++k) rate[k] = w.now.a[block.dof + k];
+        return rate;
+    }
+    multiply(block, w.now.A, w.now.a, w.scratch.r);
     for (int k = 0; k < f.dim; ++k) rate[k] = w.scratch.r[block.row + k] - w.now.b[block.row + k];
     return rate;
 }
@@ -77,9 +81,11 @@ double slip_rate_along_mode(const Program& p, Workspace& w, int e) {
 
 std::pair<double, double> slip_toward_rest(const Program& p, Workspace& w, int e) {
     const Friction& f = p.frictions[e];
+    const double along = slip_along_mode(p, w, e);
+    if (f.dim == 1) return {along, slip_rate_along_mode(p, w, e)};
     const Vec3 u = slip_velocity(w.now, f);
-    const double along = slip_along_mode(p, w, e), size = u.norm();
-    if (f.dim == 1 || 2.0 * along * along > size * size) return {along, slip_rate_along_mode(p, w, e)};
+    const double size = u.norm();
+    if (2.0 * along * along > size * size) return {along, slip_rate_along_mode(p, w, e)};
     return {size, size > 0.0 ? slip_acceleration(p, w, f).dot(u) / size : 0.0};
 }
 

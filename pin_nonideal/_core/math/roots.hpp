@@ -50,7 +50,14 @@ double root_after_start(double high, double margin_high, double least, const Mar
     return 0.0;
 }
 
-// Least value of the cubic with values u0, u1 and slopes a0, a1 at 0 and 1 inside, where it has one there.
+// What the cubic with values u0, u1 and slopes a0, a1 at 0 and 1 nowhere between goes below: the least of its Bernstein
+// coefficients.
+inline double lower_bound_inside(double u0, double a0, double u1, double a1) {
+    constexpr double third = 1.0 / 3.0;
+    return std::min({u0, u0 + third * a0, u1 - third * a1, u1});
+}
+
+// Its least value inside, where it has one there.
 inline double least_inside(double u0, double a0, double u1, double a1) {
     // u' = a0 + 2 b x + 3 c x^2
     const double b = 3.0 * (u1 - u0) - 2.0 * a0 - a1, c = a0 + a1 - 2.0 * (u1 - u0);

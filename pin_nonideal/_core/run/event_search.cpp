@@ -114,11 +114,12 @@ bool EventSearch::dips(int e) const {
     }
     if (below) return true;
     if (most <= allowed - below_rest) return false;  // held by what sticks, it never left rest
+    const double dip = dip_part * (most - least);
     for (size_t k = 0; k + 1 < looks.size(); ++k) {
         const double length = (looks[k + 1].part - looks[k].part) * stepper_.h;
-        const double inside = least_inside(speed(k), length * system_.slip_rate(*looks[k].rate, e), speed(k + 1),
-                                           length * system_.slip_rate(*looks[k + 1].rate, e));
-        if (inside < dip_part * (most - least)) return true;
+        const double from = speed(k), to = speed(k + 1), leaves = length * system_.slip_rate(*looks[k].rate, e),
+                     comes = length * system_.slip_rate(*looks[k + 1].rate, e);
+        if (lower_bound_inside(from, leaves, to, comes) < dip && least_inside(from, leaves, to, comes) < dip) return true;
     }
     return false;
 }
