@@ -96,7 +96,7 @@ class DenseOutput:
             np.ascontiguousarray(self.torque[step] if len(self.torque) else self.torque),
             moved,
         )
-        return outcome_fields(scene, outcome, self.options, 0.0)
+        return outcome_fields(scene, outcome, self.options)
 
 
 def inside_steps(states: Array, step: NDArray[np.int64], part: Array) -> Array:

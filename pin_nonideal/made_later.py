@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from threading import RLock
 from typing import Any, TypeVar
 
 from .types import Table
 
 Made = TypeVar("Made", bound="MadeLater")
 MAKER = "_make"
+_one_at_a_time = RLock()  # of threads that ask; making the fields of one object may ask for another's
 
 
 class _Plain:
@@ -25,15 +27,15 @@ class MadeLater(_Plain):
     """
 
     @classmethod
-    def later(cls: type[Made], make: Callable[[], Table]) -> Made:
+    def later(cls: type[Made], make: Callable[[], Table], **known: Any) -> Made:
         """An object whose fields `make` gives.
 
         Args:
-            make: a function without arguments; of two threads that ask at once both may call it, and one
-                wins.
+            make: a function without arguments, called once.
+            known: fields that are there at once.
         """
         made = cls.__new__(cls)
-        _own(made)[MAKER] = make
+        _own(made).update(known, **{MAKER: make})
         return made
 
     def __getattr__(self, name: str) -> Any:
@@ -45,11 +47,11 @@ class MadeLater(_Plain):
 
     def _fields(self) -> Table:
         own = _own(self)
-        make = own.get(MAKER)
-        if make is not None:
-            for name, value in make().items():
-                own.setdefault(name, value)
-            own.pop(MAKER, None)
+        if MAKER in own:
+            with _one_at_a_time:
+                if MAKER in own:
+                    own.update({**own[MAKER](), **own})
+                    del own[MAKER]
         return own
 
     # What looks into an object, such as `vars`, finds all of its fields.

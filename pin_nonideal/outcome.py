@@ -13,14 +13,34 @@ from .scene import Scene
 from .types import Array, Table
 
 
-def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any, wall: float) -> Table:
-    """Fields of a Trajectory from the core's flat arrays.
+def outcome_stats(outcome: core.Outcome, wall: float) -> Stats:
+    """Counters of a run.
+
+    Args:
+        outcome: of the core.
+        wall: wall time [s].
+    """
+    return Stats(
+        outcome.steps,
+        outcome.rejected,
+        outcome.evaluations,
+        outcome.factorizations,
+        outcome.projections,
+        outcome.iterations,
+        wall,
+        *outcome.contact_misses,
+        outcome.limited,
+        outcome.rounding,
+    )
+
+
+def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any) -> Table:
+    """Fields of a Trajectory from the core's flat arrays; all but its counters.
 
     Args:
         scene: the scene that ran.
         outcome: of the core.
         options: what was asked for, a RunOptions.
-        wall: wall time [s].
     """
     t, nq, nv, program = outcome.t, scene.q0.size, scene.v0.size, scene._compiled.program
     nt = len(t)
@@ -61,18 +81,6 @@ def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any, wall: floa
         violation=outcome.violation,
         violation_rate=outcome.violation_rate,
         events=[_event(scene, event, options.event_names) for event in outcome.events],
-        stats=Stats(
-            outcome.steps,
-            outcome.rejected,
-            outcome.evaluations,
-            outcome.factorizations,
-            outcome.projections,
-            outcome.iterations,
-            wall,
-            *outcome.contact_misses,
-            outcome.limited,
-            outcome.rounding,
-        ),
         scene=scene,
         element_names=list(elements),
         element_laws=list(program.element_laws),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -262,7 +263,17 @@ class Trajectory(MadeLater, ByName):
         return dataclasses.replace(run, scene=scene)
 
 
-# What `later` makes is not to be hidden by attributes of the class.
+_DEFAULTS: Table = {}
+_MAKERS: dict[str, Callable[[], Any]] = {}
 for _field in dataclasses.fields(Trajectory):
     if _field.default is not dataclasses.MISSING:
-        delattr(Trajectory, _field.name)
+        _DEFAULTS[_field.name] = _field.default
+        delattr(Trajectory, _field.name)  # what `later` makes is not to be hidden by attributes of the class
+    elif _field.default_factory is not dataclasses.MISSING and _field.name != "stats":
+        _MAKERS[_field.name] = _field.default_factory
+
+
+def with_defaults(fields: Table) -> Table:
+    """All fields of a Trajectory but its counters: those given, and of all others the defaults."""
+    made = {name: make() for name, make in _MAKERS.items() if name not in fields}
+    return {**_DEFAULTS, **made, **fields}

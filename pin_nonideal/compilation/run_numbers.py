@@ -68,7 +68,7 @@ def run_numbers(compiled: CompiledScene, parameters: Mapping[str, Any], n: int) 
         UnknownNameError: there is nothing of that name.
     """
     columns: dict[tuple[str, int, str], Array] = {}
-    parts = _parts(compiled)
+    parts = _parts(compiled) if parameters else {}
     for name, given in parameters.items():
         if name == "gravity":
             columns["gravity", 0, ""] = array("rollout: gravity", given, (n, 3))

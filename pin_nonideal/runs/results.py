@@ -12,11 +12,12 @@ from pin_nonideal.compilation.failures import opened
 from pin_nonideal.core import core
 from pin_nonideal.dense import dense_output
 from pin_nonideal.errors import LoopClosureError, OutputError, RunError, RunInterrupted, UserFunctionError
-from pin_nonideal.outcome import outcome_fields
+from pin_nonideal.outcome import outcome_fields, outcome_stats
 from pin_nonideal.records import UserEventRecord
 from pin_nonideal.scene import Scene
 from pin_nonideal.states.rows import rows_at
-from pin_nonideal.trajectory import Trajectory
+from pin_nonideal.trajectory import Trajectory, with_defaults
+from pin_nonideal.types import Table
 
 from .asked import exact_grid, grid_of
 from .options import RunOptions
@@ -49,7 +50,12 @@ def finish(
         RunError: the run stopped early.
         OutputError: its first checkpoint could not be written.
     """
-    shaped = partial(_shaped, scene, outcome, options, wall, list(notes))
+    fields = partial(_fields, scene, outcome, options, list(notes))
+    stats = outcome_stats(outcome, wall)
+
+    def shaped() -> Trajectory:
+        return Trajectory(**fields(), stats=stats)
+
     # A time step may enter a contact, which the next one finds; a loop that opens ends the steps by itself.
     enters = options.method == "moreau" and bool(scene._compiled.opening_names)
     if (
@@ -59,7 +65,7 @@ def finish(
     ):
         raise _opened(scene, shaped())
     if stopped is None:
-        return Trajectory.later(lambda: vars(shaped()))
+        return Trajectory.later(fields, stats=stats)
     if isinstance(stopped, OutputError):
         raise stopped
     trajectory = shaped()
@@ -80,11 +86,9 @@ def finish(
     raise error from cause
 
 
-def _shaped(
-    scene: Scene, outcome: core.Outcome, options: RunOptions, wall: float, notes: list[str]
-) -> Trajectory:
-    """The trajectory; without its events, where they are to be kept apart from the samples."""
-    fields = outcome_fields(scene, outcome, options, wall)
+def _fields(scene: Scene, outcome: core.Outcome, options: RunOptions, notes: list[str]) -> Table:
+    """All fields of the trajectory but its counters; without its events, where they are to be kept apart."""
+    fields = outcome_fields(scene, outcome, options)
     t, q, v = fields["t"], fields["q"], fields["v"]
     grid = grid_of(t, options)
     for name in options.event_names:
@@ -93,12 +97,12 @@ def _shaped(
         fields.setdefault("user_events", []).append(UserEventRecord(name, np.array(times), q[at], v[at]))
     if options.dense:
         fields["dense"] = dense_output(outcome, options, scene.model.nv, len(scene.element_names))
-    run = Trajectory(**fields, grid=grid, notes=notes)
+    made = with_defaults({**fields, "grid": grid, "notes": notes})
     if not options.separate:
-        return run
-    run = run.samples(grid)
+        return made
+    run = Trajectory(**made).samples(grid)
     run.t[:] = exact_grid(run.t, options)
-    return run
+    return {name: value for name, value in vars(run).items() if name != "stats"}
 
 
 def _opened(scene: Scene, trajectory: Trajectory) -> LoopClosureError:

@@ -134,7 +134,7 @@ static double part_stopped(const Program& p, Workspace& w, double t, const VecX&
     return before > 0.0 ? std::abs(before - after) / before : 0.0;
 }
 
-void keep_moving(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+void keep_moving(const Program& p, Workspace& w, double t, const VecX& v) {
     if (!w.now.rows.redundant || !sticks_anywhere(w) || v.cwiseAbs().maxCoeff() <= immobile_speed) return;
     const auto choose = [&](double tolerance) {
         w.state.rank_tolerance = tolerance;

@@ -14,7 +14,7 @@ void begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const V
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v);
 // Where modes have changed and rows just chosen would stop what moves: those that elements which stick hold by hardly any
 // of their forces count as dependent from here on. The workspace must be evaluated at (q, v), and is so after.
-void keep_moving(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
+void keep_moving(const Program& p, Workspace& w, double t, const VecX& v);
 // Brings a state onto the rows of modes that have just been set, of which it chooses the independent ones there.
 void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 

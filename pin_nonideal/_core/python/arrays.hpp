@@ -10,6 +10,7 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>  // in every source alike: what a source does not know it would take for a class
 
 #include "constraints/geometry.hpp"
 

@@ -77,22 +77,6 @@ nb::object what_stopped(const Kept::Stop& run) {
     }
 }
 
-// One thread's room: a workspace with the state of a new one, and the run that works in it, used again and again.
-struct Room {
-    std::unique_ptr<Workspace> own;
-    RunState first;
-    KeptRun run;
-
-    void carry(const Program& p, const Options& options, bool anew, const VecX& q0, const VecX& v0) {
-        if (!own || anew) {
-            run.forget();
-            own = std::make_unique<Workspace>(p);
-            first = own->state;
-        }
-        run.carry(p, *own, first, options, q0, v0);
-    }
-};
-
 // Threads draw some runs at a time, so many times each: neighbors in memory belong to one of them, and they end together.
 constexpr size_t draws = 32;
 

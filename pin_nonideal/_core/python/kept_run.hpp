@@ -50,4 +50,21 @@ private:
     std::unique_ptr<SteppedRun> run_;
 };
 
+// One thread's room: a workspace with the state of a new one, and the run that works in it, used again and again.
+struct Room {
+    std::unique_ptr<Workspace> own;
+    RunState first;
+    KeptRun run;
+
+    // `anew`: nothing of the runs before is used again.
+    void carry(const Program& p, const Options& options, bool anew, const VecX& q0, const VecX& v0) {
+        if (!own || anew) {
+            run.forget();
+            own = std::make_unique<Workspace>(p);
+            first = own->state;
+        }
+        run.carry(p, *own, first, options, q0, v0);
+    }
+};
+
 }  // namespace pn

@@ -11,6 +11,7 @@
 
 #include "dynamics/projection.hpp"
 #include "python/failures.hpp"
+#include "python/kept_run.hpp"
 #include "python/options.hpp"
 #include "python/run_programs.hpp"
 #include "python/share_out.hpp"
@@ -193,13 +194,15 @@ static bool is_interrupt(const std::exception_ptr& error) {
     }
 }
 
-// Outcomes of runs from many states, on several threads, each with a workspace of its own. Where one is interrupted
+// Outcomes of runs from many states, on several threads, each in a room of its own. Where one is interrupted
 // all stop, and those not begun are None.
 static nb::typed<nb::list, std::optional<Outcome>> rollout(const Program& p, const Array2& q, const Array2& v,
                                                            Options options, int threads,
                                                            const std::vector<NumberTuple>& names, const Array2& values) {
     const size_t count = q.shape(0);
-    RunPrograms programs(p, names, values, useful_threads(count, threads));
+    const int useful = useful_threads(count, threads);
+    RunPrograms programs(p, names, values, useful);
+    std::vector<Room> rooms(useful);
     std::vector<std::optional<Outcome>> outcomes(count);
     std::atomic<bool> stopped{false};
     const auto stop = [&stopped](double t) {
@@ -215,12 +218,11 @@ static nb::typed<nb::list, std::optional<Outcome>> rollout(const Program& p, con
     const auto q_all = map(q), v_all = map(v);
     try {
         share_out(count, threads, stopped, [&](size_t i, int k) {
-            const Program& program = programs.of(i, k);
-            Workspace space(program);
-            Recording mine;  // neighbors in one array would share lines of cache between the threads
-            simulate(program, space, q_all.row(i), v_all.row(i), k == 0 ? own : options, mine);
-            if (is_interrupt(mine.error)) stopped = true;
-            outcomes[i] = Outcome{space.counters, std::move(mine)};
+            const bool anew = !names.empty() || options.record.dense;
+            Room& room = rooms[k];
+            room.carry(programs.of(i, k), k == 0 ? own : options, anew, q_all.row(i), v_all.row(i));
+            if (is_interrupt(room.run.out.error)) stopped = true;
+            outcomes[i] = Outcome{room.own->counters, std::exchange(room.run.out, {})};
         });
     } catch (...) {  // a run that the interrupt ended tells of it
         const auto tells = [](const std::optional<Outcome>& one) {

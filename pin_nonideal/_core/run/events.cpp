@@ -32,7 +32,7 @@ void resolve_together(System& system, double t, ModeQuestion& asked, bool strike
     std::vector<int>& resting = asked.at_rest;
     for (;;) {
         resolve_modes(p, w, t, system.q, system.v, asked);
-        if (!strikes) keep_moving(p, w, t, system.q, system.v);
+        if (!strikes) keep_moving(p, w, t, system.v);
         // What sticks from now on has no slip velocity at all, not one of rounding.
         project(p, w, t, system.q, system.v);
         begin_step(p, w, t, system.q, system.v);

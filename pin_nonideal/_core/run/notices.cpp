@@ -12,7 +12,7 @@ Notices::Notices(System& system, Stepper& stepper, Progress& progress, Recording
     : p(system.p), w(system.w), system_(system), stepper_(stepper), progress_(progress), out_(out),
       sample_(VecX::Zero(system.ny)) {}
 
-void Notices::pulls(const std::optional<FoundEvent>& event) {
+void Notices::tell_pulls(const std::optional<FoundEvent>& event) {
     const int n = static_cast<int>(p.contacts.size());
     std::vector<char> asked(n, 0), now(n, 0);
     const auto ask = [&](int i, bool located) {
@@ -30,10 +30,7 @@ void Notices::pulls(const std::optional<FoundEvent>& event) {
     progress_.pulls = now;
 }
 
-std::optional<double> Notices::several(bool after_step) {
-    const bool before = progress_.several;
-    progress_.several = w.state.unique == Uniqueness::several || w.now.several;
-    if (before || !progress_.several) return std::nullopt;
+std::optional<double> Notices::begin_several(bool after_step) {
     const int element = w.now.several_element;
     const double at = after_step && w.state.unique == Uniqueness::several ? last_unique() : progress_.t;
     out_.events.push_back({at, Event::Kind::several, element});

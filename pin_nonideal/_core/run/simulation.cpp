@@ -229,8 +229,10 @@ bool Simulation::control_error(const Proposal& proposal, std::optional<double> e
 // --- Locate events --------------------------------------------------------------------------------------------------
 
 void Simulation::find_event() {
-    event = locator.locate();
-    if (user_events.locate(event.has_value()))
+    event.reset();
+    if (system.has_events())
+        if (const auto found = locator.locate()) event = *found;
+    if (!user_events.empty() && user_events.locate(event.has_value()))
         event = FoundEvent{FoundEvent::Kind::user, user_events.found().front(), stepper.t0 + stepper.h};
 }
 

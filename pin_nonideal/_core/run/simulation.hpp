@@ -78,7 +78,7 @@ protected:
     Clock::time_point next_save;
     const Clock::time_point begun = Clock::now();
     std::optional<FoundEvent> event;  // in the step just taken
-    RunState before_step{};
+    RunState before_step;
     std::optional<Failure> opened;  // a loop that a trial of this step could not close
 };
 

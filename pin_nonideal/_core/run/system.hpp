@@ -28,6 +28,8 @@ struct System {
 
     System(const Program& program, Workspace& workspace, bool with_energy);
 
+    // Whether anything in the scene may end a smooth stretch of motion by itself.
+    bool has_events() const { return ne > 0 || ng > 0 || !p.contacts.empty(); }
     // Takes q and v from y, or puts them there.
     void read(const VecX& y);
     void write(VecX& y) const;

@@ -111,7 +111,6 @@ void UserEvents::take_signs() {
 
 bool UserEvents::locate(bool ends_at_event) {
     found_.clear();
-    if (empty()) return false;
     stepper_.make_interpolant();
     const std::vector<signed char> side = side_;
     int first = -1;
