@@ -81,6 +81,12 @@ struct Mat3 {
     PN_INLINE Mat3(const Vec3& a, const Vec3& b, const Vec3& d) : c{a, b, d} {}
     template <class Derived>
     Mat3(const Eigen::MatrixBase<Derived>& m) : c{m.col(0), m.col(1), m.col(2)} {}
+    // By hand, as of a vector: in line wherever it stands.
+    PN_INLINE Mat3(const Mat3& o) : c{o.c[0], o.c[1], o.c[2]} {}
+    PN_INLINE Mat3& operator=(const Mat3& o) {
+        for (int k = 0; k < 3; ++k) c[k] = o.c[k];
+        return *this;
+    }
 
     static Mat3 Identity() { return {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}; }
     Eigen::Matrix3d eigen() const {
