@@ -40,6 +40,7 @@ void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q,
 
 // Residuals and A, Eq. (3); and the users' own b.
 static void place_rows(const Program& p, Workspace& w, double t, const VecX& v) {
+    if (w.now.awake.empty()) return;
     const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
     for (int i : w.now.awake) {
         const Block& block = p.blocks[i];
@@ -53,6 +54,7 @@ static void place_rows(const Program& p, Workspace& w, double t, const VecX& v) 
 
 // Rates and b, Eq. (3).
 static void move_rows(const Program& p, Workspace& w, double t, const VecX& v) {
+    if (w.now.awake.empty()) return;
     const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
     for (int i : w.now.awake) {
         const Block& block = p.blocks[i];
@@ -142,7 +144,8 @@ void solve_dynamics(const Program& p, Workspace& w, double t, const VecX& v) {
         solve_motion(p, w, false);
     } else {
         w.now.v = v;
-        w.now.speed = v.cwiseAbs().maxCoeff();
+        w.now.speed = 0.0;
+        for (int k = 0; k < v.size(); ++k) w.now.speed = std::max(w.now.speed, std::abs(v[k]));
         find_known_forces(p, w, t, w.now.terms.q, v);
         solve_with_laws(p, w, t, w.now.terms.q, v, w.now.C_smooth);
     }

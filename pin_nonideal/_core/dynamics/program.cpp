@@ -85,6 +85,8 @@ void Program::finish() {
         if (described.rows[f.row].kept < 0) f.load = Friction::Load::none;
     }
     for (const Friction& f : frictions) needs_reactions |= f.reaction != Reaction::none;
+    rubs_while_closed = laws.empty() && std::all_of(frictions.begin(), frictions.end(),
+                                                    [](const Friction& f) { return f.gap >= 0; });
     // Kinds stand together, so that the order of their descriptions decides no sum.
     std::stable_sort(laws.begin(), laws.end(), [](const Law& a, const Law& b) { return a.index() < b.index(); });
     each_law<UserLaw>(laws, [&](const UserLaw& law) { needs_reactions |= law.reaction != Reaction::none; });

@@ -53,6 +53,7 @@ struct Program {
     // What the scene does not need is not computed.
     bool has_laws() const { return !frictions.empty() || !laws.empty(); }
     bool needs_reactions = false;        // some law reads them
+    bool rubs_while_closed = false;      // no law acts but friction of contacts that may open
     bool driven = false;                 // forces or actuation
     bool has_body_forces = false;        // given forces that act on bodies
     bool moves_in_time = false;          // some constraint moves by itself

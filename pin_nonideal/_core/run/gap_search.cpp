@@ -29,13 +29,18 @@ GapSearch::GapSearch(System& system, Stepper& stepper, GapState& at_start)
 
 // Largest |v| and |a| of each dof over the step, from the rates at the stages.
 void GapSearch::bound_rates() {
+    const int nq = system_.nq, nv = system_.nv;
     acceleration_.setZero();
-    for (const Stepper::Look& look : stepper_.looks())
-        acceleration_ = acceleration_.cwiseMax(system_.velocity(*look.rate).cwiseAbs());
-    acceleration_ *= between_stages;
-    const auto v0 = system_.velocity(stepper_.y0).cwiseAbs(), v1 = system_.velocity(stepper_.y1).cwiseAbs();
-    // Never farther from both ends than their mean and what half a step of acceleration adds.
-    speed_ = 0.5 * (v0 + v1) + 0.5 * stepper_.h * acceleration_;
+    for (const Stepper::Look& look : stepper_.looks()) {
+        const double* a = look.rate->data() + nq;
+        for (int k = 0; k < nv; ++k) acceleration_[k] = std::max(acceleration_[k], std::abs(a[k]));
+    }
+    const double *v0 = stepper_.y0.data() + nq, *v1 = stepper_.y1.data() + nq;
+    for (int k = 0; k < nv; ++k) {
+        acceleration_[k] *= between_stages;
+        // Never farther from both ends than their mean and what half a step of acceleration adds.
+        speed_[k] = 0.5 * (std::abs(v0[k]) + std::abs(v1[k])) + 0.5 * stepper_.h * acceleration_[k];
+    }
     reach_.bound_bodies(w, speed_, acceleration_, stepper_.h);
 }
 

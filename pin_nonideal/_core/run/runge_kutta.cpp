@@ -16,10 +16,9 @@ static PN_INLINE void add_weighted_at(int i, const VecX& y, const double* part, 
     store(x, out.data() + i);
 }
 
-PN_WIDE void add_weighted(const VecX& y, double h, const WeightedSum& sum, VecX& out) {
+PN_WIDE void add_weighted(int size, const VecX& y, double h, const WeightedSum& sum, VecX& out) {
     double part[most_rates];
     for (int j = 0; j < sum.terms; ++j) part[j] = h * sum.weight[j];
-    const int size = static_cast<int>(y.size());
     int i = 0;
     for (; i + 3 < size; i += 4) add_weighted_at<Lanes>(i, y, part, sum, out);
     if (i + 1 < size) {
@@ -59,7 +58,7 @@ RungeKutta::RungeKutta(const Method& method, Step& step)
 void RungeKutta::sum_powers() {
     for (int i = 0; i < method_.powers; ++i) {
         coefficients_[i] = (step_.h * method_.P[method_.powers * step_.stages + i]) * step_.end_rate();
-        add_weighted(coefficients_[i], step_.h, to_terms_[i], coefficients_[i]);
+        add_weighted(step_.active, coefficients_[i], step_.h, to_terms_[i], coefficients_[i]);
     }
 }
 
@@ -70,7 +69,7 @@ void RungeKutta::sum_terms() {
     coefficients_[2] = 2.0 * delta - step_.h * (step_.end_rate() + step_.start_rate());
     for (int i = 0; i < method_.terms; ++i) {
         coefficients_[3 + i].setZero();
-        add_weighted(coefficients_[3 + i], step_.h, to_terms_[i], coefficients_[3 + i]);
+        add_weighted(step_.active, coefficients_[3 + i], step_.h, to_terms_[i], coefficients_[3 + i]);
     }
 }
 

@@ -19,8 +19,8 @@ struct WeightedSum {
     WeightedSum(const double* weights, int n, const std::vector<VecX>& rates);
 };
 
-// out = y + h (a_0 K_0 + ... + a_{n-1} K_{n-1}); out may be y.
-void add_weighted(const VecX& y, double h, const WeightedSum& sum, VecX& out);
+// out = y + h (a_0 K_0 + ... + a_{n-1} K_{n-1}), of the first `size` numbers; out may be y.
+void add_weighted(int size, const VecX& y, double h, const WeightedSum& sum, VecX& out);
 
 class RungeKutta {
 public:
@@ -32,10 +32,11 @@ public:
     template <class System>
     void advance(System& system) {
         for (int i = 1; i < method_.stages; ++i) {
-            add_weighted(step_.y0, step_.h, to_stage_[i - 1], stage_);
+            add_weighted(step_.states, step_.y0, step_.h, to_stage_[i - 1], stage_);
             system.derivative(step_.t0 + method_.C[i] * step_.h, stage_, step_.rates[i]);
         }
-        add_weighted(step_.y0, step_.h, to_end_, step_.y1);
+        add_weighted(step_.active, step_.y0, step_.h, to_end_, step_.y1);
+        step_.y1.tail(step_.y1.size() - step_.active).setZero();
         system.normalize(step_.y1);
     }
 
@@ -44,13 +45,13 @@ public:
     double error(Norm& norm) {
         error_.setZero();
         if (to_errors_.size() == 1) {
-            add_weighted(error_, step_.h, to_errors_[0], error_);
+            add_weighted(step_.active, error_, step_.h, to_errors_[0], error_);
             return norm(error_, step_.y0);
         }
         double each[2];
         for (int i = 0; i < 2; ++i) {
             error_.setZero();
-            add_weighted(error_, 1.0, to_errors_[i], error_);
+            add_weighted(step_.active, error_, 1.0, to_errors_[i], error_);
             each[i] = norm(error_, step_.y0);
         }
         const auto [fine, coarse] = each;
@@ -62,7 +63,7 @@ public:
     template <class System>
     void make_interpolant(System& system) {
         for (int i = 0; i < method_.further_stages; ++i) {
-            add_weighted(step_.y0, step_.h, to_further_[i], stage_);
+            add_weighted(step_.states, step_.y0, step_.h, to_further_[i], stage_);
             system.derivative(step_.t0 + method_.C_further[i] * step_.h, stage_, step_.rates[step_.stages + 1 + i]);
         }
         if (method_.P) sum_powers();

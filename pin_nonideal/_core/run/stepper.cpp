@@ -5,7 +5,7 @@
 namespace pn {
 
 Stepper::Stepper(const Method& chosen, System& system, ErrorNorm& norm)
-    : Step(chosen.stages, chosen.rates(), system.ny), method(chosen), system_(system), norm_(norm),
+    : Step(chosen.stages, chosen.rates(), system.ns, system.ny), method(chosen), system_(system), norm_(norm),
       collocation_(*this, system, norm) {
     if (method.scheme == Method::Scheme::runge_kutta) scheme_.emplace<RungeKutta>(method, *this);
     if (method.scheme == Method::Scheme::semi_implicit_euler) scheme_.emplace<SemiImplicitEuler>(*this);
@@ -36,6 +36,7 @@ void Stepper::take(double t, double size) {
     h = size;
     has_interpolant_ = false;
     collocates_ = system_.w.state.seeks_directions;
+    active = system_.watches() ? static_cast<int>(y0.size()) : states;
     if (collocates_) return collocation_.advance();
     with_scheme(scheme_, [&](auto& scheme) { scheme.advance(system_); });
 }

@@ -23,6 +23,11 @@ System::System(const Program& program, Workspace& workspace, bool with_energy)
       ng(static_cast<int>(p.gaps.size())), ns(nq + nv + nz + nw), ny(ns + 2 * ne + ng),
       q(VecX::Zero(nq)), v(VecX::Zero(nv)) {}
 
+bool System::watches() const {
+    const auto& closed = w.state.closed;
+    return !w.now.loaded.empty() || std::find(closed.begin(), closed.end(), char(1)) != closed.end();
+}
+
 void System::read(const VecX& y) {
     std::copy_n(y.data(), nq, q.data());
     std::copy_n(y.data() + nq, nv, v.data());

@@ -30,6 +30,8 @@ struct System {
 
     // Whether anything in the scene may end a smooth stretch of motion by itself.
     bool has_events() const { return ne > 0 || ng > 0 || !p.contacts.empty(); }
+    // Whether elements or gaps are watched in the modes that hold now: some are not open.
+    bool watches() const;
     // Takes q and v from y, or puts them there.
     void read(const VecX& y);
     void write(VecX& y) const;
