@@ -226,6 +226,15 @@ def test_a_corner_comes_to_an_edge(kind, seed):
     assert run.events[-1].kind == "lift_off"
 
 
+def test_a_corner_lands_beside_one_that_slides():
+    """Slowly, while the other one leaves later in the same step: it is struck before, and does not enter."""
+    scene, (first, second), edge, start = thrown("mesh at mesh", 168)
+    run = pn.simulate(scene, 0.25, output_dt=1e-4, **start)
+    assert len({event.element for event in run.events if event.kind == "impact"}) > 1
+    depths = [by_coal(first, pin.XYZQUATToSE3(q), second, pin.SE3.Identity())[0] for q in run.q]
+    assert min(depths) > 2.0 * edge - DEPTH
+
+
 def test_faces_move_inward():
     """Each by the same way; corners where more than three faces meet part."""
     inner = convex_hull(shrunk(cloud(), 0.01, "mesh"), "inner")
