@@ -120,16 +120,31 @@ def test_a_ball_rests_on_a_tip():
 @pytest.mark.parametrize(
     "fixed", [coal.Box(1.0, 1.0, 0.4), convex(CUBE * [1.0, 1.0, 0.4]), coal.Cylinder(0.5, 0.4)], ids=type
 )
-@pytest.mark.parametrize("radius", [1e-4, 1e-2])
-def test_what_slides_over_an_edge_flies_off(fixed, radius):
-    """Without friction at 1 m/s: round the edge v^2/r is more than g, so it falls freely from there."""
+@pytest.mark.parametrize(
+    ("radius", "speed"), [(1e-2, 1.0), (1e-4, 1.0), (1e-4, 3.0), (1e-5, 1.0), (1e-6, 1.0), (1e-7, 3.0)]
+)
+def test_what_slides_over_an_edge_flies_off(fixed, radius, speed):
+    """Without friction: round the edge v^2/r is 10 to 1e7 times g, so it falls freely from there."""
     scene = pair(coal.Sphere(radius), fixed)
-    run = pn.simulate(scene, 0.5, q=[0.2, 0.1, 0.2 + radius, 0, 0, 0, 1], v=[1.0, 0, 0, 0, 0, 0])
+    run = pn.simulate(scene, 0.5, q=[0.2, 0.1, 0.2 + radius, 0, 0, 0, 1], v=[speed, 0, 0, 0, 0, 0])
     edge = np.sqrt(0.25 - 0.01) if isinstance(fixed, coal.Cylinder) else 0.5
-    leaves = next(event.time for event in run.events if event.kind == "lift_off")
-    assert leaves == pytest.approx(edge - 0.2, abs=1e-9)
+    assert [event.kind for event in run.events] == ["lift_off"]
+    leaves = run.events[0].time
+    assert leaves == pytest.approx((edge - 0.2) / speed, abs=1e-12)
     fallen = 0.5 * GRAVITY * (run.t[-1] - leaves) ** 2
-    assert run.q[-1, :3] == pytest.approx([0.7, 0.1, 0.2 + radius - fallen], abs=1e-8)
+    assert run.q[-1, :3] == pytest.approx([0.2 + 0.5 * speed, 0.1, 0.2 + radius - fallen], abs=1e-8)
+
+
+@pytest.mark.parametrize("fixed", [coal.Box(1.0, 1.0, 0.4), convex(CUBE * [1.0, 1.0, 0.4])], ids=type)
+@pytest.mark.parametrize("mu", [0.05, 0.5])
+def test_what_rolls_over_an_edge_flies_off(fixed, mu):
+    """Sticking until there: what holds it leaps with its load, and it neither slips nor chatters."""
+    radius, speed = 1e-4, 7.0
+    scene = pair(coal.Sphere(radius), fixed, mu=mu, inertia=0.4 * radius**2)
+    v = [speed, 0, 0, 0, speed / radius, 0]
+    run = pn.simulate(scene, 0.05, q=[0.2, 0.1, 0.2 + radius, 0, 0, 0, 1], v=v)
+    assert [event.kind for event in run.events] == ["lift_off"]
+    assert run.events[0].time == pytest.approx(0.3 / speed, abs=1e-8)
 
 
 @pytest.mark.parametrize("seed", [2, 19])
@@ -197,6 +212,27 @@ def test_thrown_bodies_do_not_enter(kind, seeds):
         if seed == 0:
             assert_same_run(run, pn.simulate(scene, 0.5, output_dt=0.002, max_steps=20000, **start))
     assert struck > len(seeds) // 2
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed"), [("box at mesh", 2), ("box at mesh", 73), ("box at mesh", 107), ("mesh at mesh", 92)]
+)
+def test_a_corner_comes_to_an_edge(kind, seed):
+    """Thrown so that what a corner carries leaps from some newtons to none: it flies off there, at once."""
+    scene, _, _, start = thrown(kind, seed)
+    run = pn.simulate(scene, 0.5, **start)
+    assert run.t[-1] == 0.5
+    assert not any(event.kind == "chatter" for event in run.events)
+    assert run.events[-1].kind == "lift_off"
+
+
+def test_a_corner_lands_beside_one_that_slides():
+    """Slowly, while the other one leaves later in the same step: it is struck before, and does not enter."""
+    scene, (first, second), edge, start = thrown("mesh at mesh", 168)
+    run = pn.simulate(scene, 0.25, output_dt=1e-4, **start)
+    assert len({event.element for event in run.events if event.kind == "impact"}) > 1
+    depths = [by_coal(first, pin.XYZQUATToSE3(q), second, pin.SE3.Identity())[0] for q in run.q]
+    assert min(depths) > 2.0 * edge - DEPTH
 
 
 def test_faces_move_inward():

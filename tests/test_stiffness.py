@@ -105,6 +105,24 @@ def test_stiff_friction_that_crowds_its_events():
         pn.simulate(pulled(1e11, coulomb=0.1), 1.0, v=[1.0])
 
 
+def test_a_force_that_leaps_is_not_stiff():
+    """A push that turns a million times a second crowds events; what rests at a leap beside it rests on."""
+    model = empty(gravity=(0.0, 0.0, 0.0))
+    body(model, 0, pin.JointModelPX(), "slide", 1.0)
+    body(model, 0, pin.JointModelPY(), "beside", 1.0)
+    friction = pn.JointFriction("slide", coulomb=0.5)
+    leap = pn.UserLaw(lambda t, q, v, lam: np.array([0.0, -1.0 if v[1] > 0.0 else 0.0]))
+    alone, both = (
+        pn.simulate(
+            pn.Scene(model, laws=laws, actuation=lambda t, q, v: [np.sin(3e6 * t), 0.0]), 1e-3, atol=1e-12
+        )
+        for laws in ([friction], [friction, leap])
+    )
+    assert any(event.kind == "chatter" for event in both.events)
+    assert both.v[-1, 1] == 0.0
+    assert both.v[-1, 0] == pytest.approx(alone.v[-1, 0], abs=1e-9)
+
+
 def test_rollout_tells_of_it_too():
     scene = pulled(1e9)
     with pytest.raises(StiffnessError) as caught:

@@ -42,6 +42,9 @@ constexpr double doubted_part = 1e-2;  // of the change of a share, to which an 
 // left is the square of it, and the step taken again corrects that.
 constexpr int confirmations = 3;
 constexpr double confirmed_width = 1e-4;
+// A margin leaps where the shares' rates say that it is gone and more than this part of it is left. The polynomial through
+// rates before a leap and behind it falls so steeply that a correction by its slope is tiny wherever the leap lies.
+constexpr double left_part = 0.1;
 
 }  // namespace
 
@@ -273,10 +276,11 @@ double EventSearch::first_crossing(const Watch& watch, Source source) {
 }
 
 // Newton's method on the motion that the interpolant gives, from where the shares' rates say that a limit was reached;
-// nothing where it does not converge.
-std::optional<double> EventSearch::confirm(const Watch& watch, double part, double slope) {
+// nothing where it does not converge, or where the margin there is still near what it was as the step began: it leaps.
+std::optional<double> EventSearch::confirm(const Watch& watch, double part, double slope, double at_start) {
     for (int it = 0; it < confirmations && slope < 0.0; ++it) {
         const double here = margin_inside(watch, Source::evaluation, part);
+        if (!(std::abs(here) < left_part * std::abs(at_start))) break;
         const double next = part - here / slope;
         if (!(next >= 0.0 && next <= 1.0)) break;
         const double change = std::abs(next - part);
@@ -314,11 +318,12 @@ Crossing EventSearch::cross(const Watch& watch, Source from) {
 Crossing EventSearch::confirmed(const Crossing& told) {
     system_.read(stepper_.y1);
     if (told.watch.kind == Watch::Kind::load) {
-        const auto part = confirm(told.watch, told.part, told.slope);
+        const auto part = confirm(told.watch, told.part, told.slope, system_.load(stepper_.start_rate(), told.watch.index));
         return part ? Crossing{told.watch, *part, told.slope} : cross(told.watch, Source::evaluation);
     }
     const double limit = static_limit(p, w, told.watch.index, stepper_.t0 + stepper_.h, system_.q, system_.v);
-    const auto part = confirm(told.watch, told.part, told.slope * limit);
+    const double at_start = limit * (1.0 - std::abs(system_.share(stepper_.start_rate(), told.watch.index)));
+    const auto part = confirm(told.watch, told.part, told.slope * limit, at_start);
     return part ? Crossing{told.watch, *part, told.slope * limit} : cross(told.watch, Source::evaluation);
 }
 

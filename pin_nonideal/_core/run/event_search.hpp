@@ -60,7 +60,7 @@ private:
     Crossing cross(const Watch& watch, Source source);
     std::optional<Crossing> behind_leap(const Watch& watch, Source source, double part);
     Crossing confirmed(const Crossing& told);
-    std::optional<double> confirm(const Watch& watch, double part, double slope);
+    std::optional<double> confirm(const Watch& watch, double part, double slope, double at_start);
 
     System& system_;
     Stepper& stepper_;

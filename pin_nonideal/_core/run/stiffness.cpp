@@ -24,6 +24,9 @@ constexpr double least_damping = 0.1;
 // Relative step of differences; passes of the power iteration.
 constexpr double difference_step = 1e-8;
 constexpr int power_passes = 20;
+// Over shorter differences a rate stays what it is to this part; that of a leap, as of a load whose place changes, grows
+// as they shrink, or falls to none where they do not reach it any more.
+constexpr double shorter_step = 1e-9, same_rate = 0.5;
 
 // A run is looked ahead after so many steps first, and twice as many each time. It takes long where so many seconds are
 // left, and vibrates where so many periods are, by steps longer than this part of one (in radians).
@@ -57,10 +60,10 @@ double StiffnessGuard::stage_rate() const {
 }
 
 // Derivative of the rate along a unit direction, and what the forces on the way change.
-VecX StiffnessGuard::difference(const VecX& direction, VecX& force) {
+VecX StiffnessGuard::difference(double relative, const VecX& direction, VecX& force) {
     const double at = stepper_.t0 + stepper_.h;
     const int n = static_cast<int>(direction.size());
-    const double step = difference_step * (1.0 + stepper_.y1.head(n).cwiseAbs().maxCoeff());
+    const double step = relative * (1.0 + stepper_.y1.head(n).cwiseAbs().maxCoeff());
     VecX there[2], forces[2];
     for (int side = 0; side < 2; ++side) {
         probe_ = stepper_.y1;
@@ -75,18 +78,18 @@ VecX StiffnessGuard::difference(const VecX& direction, VecX& force) {
     return (there[0] - there[1]) / (2.0 * step);
 }
 
-StiffnessGuard::FastestMode StiffnessGuard::fastest_mode() {
+StiffnessGuard::FastestMode StiffnessGuard::fastest_mode(double relative) {
     const int n = system_.nq + system_.nv + system_.nz;
     VecX x = VecX::Ones(n).normalized(), force, other_force;
-    for (int pass = 0; pass < power_passes; ++pass) x = difference(x, force).normalized();
+    for (int pass = 0; pass < power_passes; ++pass) x = difference(relative, x, force).normalized();
     // The largest eigenvalue in the plane of x and where it goes.
-    const VecX image = difference(x, force);
+    const VecX image = difference(relative, x, force);
     VecX other = image - x.dot(image) * x;
     const double a = x.dot(image), c = other.norm();
     std::complex<double> eigenvalue = a;
     if (c > 1e-9 * image.norm()) {
         other /= c;
-        const VecX other_image = difference(other, other_force);
+        const VecX other_image = difference(relative, other, other_force);
         const double b = x.dot(other_image), d = other.dot(other_image);
         const std::complex<double> root = std::sqrt(std::complex<double>(0.25 * (a - d) * (a - d) + b * c));
         const std::complex<double> one = 0.5 * (a + d) + root, two = 0.5 * (a + d) - root;
@@ -104,7 +107,7 @@ StiffnessGuard::FastestMode StiffnessGuard::fastest_mode() {
 
 StiffnessGuard::FastestMode StiffnessGuard::mode_here() {
     const RunState kept = system_.w.state;
-    const FastestMode mode = fastest_mode();
+    const FastestMode mode = fastest_mode(difference_step);
     system_.w.state = kept;
     system_.read(stepper_.y1);
     system_.read_law_states(stepper_.y1);
@@ -152,9 +155,11 @@ void StiffnessGuard::look_ahead() {
 }
 
 void StiffnessGuard::require_time_steps(double size) {
-    const FastestMode mode = fastest_mode();
-    if (size * mode.rate() > euler_border && mode.decays())
-        throw Failure(Failure::Kind::stiff, stepper_.t0 + stepper_.h, {mode.dof}, mode.rate());
+    const FastestMode mode = fastest_mode(difference_step);
+    if (!(size * mode.rate() > euler_border && mode.decays())) return;
+    const double shorter = fastest_mode(shorter_step).rate();
+    if (shorter < same_rate * mode.rate() || mode.rate() < same_rate * shorter) return;
+    throw Failure(Failure::Kind::stiff, stepper_.t0 + stepper_.h, {mode.dof}, mode.rate());
 }
 
 }  // namespace pn

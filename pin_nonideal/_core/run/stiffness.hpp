@@ -34,8 +34,8 @@ private:
     // Of the motion at the step's end, which the workspace is at before and after.
     FastestMode mode_here();
     double stage_rate() const;
-    VecX difference(const VecX& direction, VecX& force);
-    FastestMode fastest_mode();
+    VecX difference(double relative, const VecX& direction, VecX& force);
+    FastestMode fastest_mode(double relative);  // by differences of so small a part of the state
 
     System& system_;
     Stepper& stepper_;
