@@ -53,6 +53,27 @@ def point_mass(axes="XYZ", mass=1.0, gravity=(0.0, 0.0, -GRAVITY)):
     return model
 
 
+def planar(mass, inertia, corners, gravity=(0.0, 0.0, -GRAVITY)):
+    """A body that slides in the x-z plane and turns about y, with frames "c0", "c1", ... at its corners."""
+    model = empty(gravity)
+    joint = body(model, 0, pin.JointModelPX(), "x", 0.0)
+    joint = body(model, joint, pin.JointModelPZ(), "z", 0.0)
+    joint = body(model, joint, pin.JointModelRY(), "turn", mass, inertia=inertia * np.eye(3))
+    for k, (x, z) in enumerate(corners):
+        frame(model, f"c{k}", joint, pin.SE3(np.eye(3), np.array([x, 0.0, z])))
+    return model
+
+
+def at(run, *kinds):
+    """Times of events of these kinds."""
+    return np.array([event.time for event in run.events if event.kind in kinds])
+
+
+def decades(rng, low, high):
+    """A random number whose logarithm is uniform."""
+    return 10.0 ** rng.uniform(np.log10(low), np.log10(high))
+
+
 def dof(scene, joint):
     """Place of a one-dof joint's velocity in v (and of its angle in q, when all joints have one)."""
     return int(scene.model.idx_vs[scene.model.getJointId(joint)])

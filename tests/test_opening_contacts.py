@@ -16,26 +16,11 @@ import pytest
 
 import pin_nonideal as pn
 
-from .mechanisms import GRAVITY, TIGHT, body, empty, frame, point_mass
+from .mechanisms import GRAVITY, TIGHT, at, body, empty, frame, planar, point_mass
 from .same_run import assert_same_run
 
 TIME = 1e-9  # [s], to which instants of references hold
 ROUNDING = 1e-12
-
-
-def planar(mass, inertia, corners, gravity=(0.0, 0.0, -GRAVITY)):
-    """A body that slides in the x-z plane and turns about y, with frames "c0", "c1", ... at its corners."""
-    model = empty(gravity)
-    joint = body(model, 0, pin.JointModelPX(), "x", 0.0)
-    joint = body(model, joint, pin.JointModelPZ(), "z", 0.0)
-    joint = body(model, joint, pin.JointModelRY(), "turn", mass, inertia=inertia * np.eye(3))
-    for k, (x, z) in enumerate(corners):
-        frame(model, f"c{k}", joint, pin.SE3(np.eye(3), np.array([x, 0.0, z])))
-    return model
-
-
-def at(run, *kinds):
-    return np.array([e.time for e in run.events if e.kind in kinds])
 
 
 def ball(restitution=0.8, **more):

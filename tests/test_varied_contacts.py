@@ -9,7 +9,7 @@ from scipy.integrate import quad
 
 import pin_nonideal as pn
 
-from .mechanisms import GRAVITY, TIGHT, body, empty, frame, point_mass
+from .mechanisms import GRAVITY, TIGHT, at, body, decades, empty, frame, planar, point_mass
 
 DRAWS = 20
 TIME = 1e-9  # [s], to which instants of references hold
@@ -17,26 +17,6 @@ ROUNDING = 1e-12
 SIDE = 1e-9  # of a threshold, relative or in radians
 
 each_draw = pytest.mark.parametrize("draw", range(DRAWS))
-
-
-def decades(rng, low, high):
-    """A number whose logarithm is uniform."""
-    return 10.0 ** rng.uniform(np.log10(low), np.log10(high))
-
-
-def at(run, kind):
-    return np.array([event.time for event in run.events if event.kind == kind])
-
-
-def planar(mass, inertia, corners, gravity):
-    """A body that slides in the x-z plane and turns about y, with frames "c0", "c1" at its corners."""
-    model = empty(gravity)
-    joint = body(model, 0, pin.JointModelPX(), "x", 0.0)
-    joint = body(model, joint, pin.JointModelPZ(), "z", 0.0)
-    joint = body(model, joint, pin.JointModelRY(), "turn", mass, inertia=inertia * np.eye(3))
-    for k, (x, z) in enumerate(corners):
-        frame(model, f"c{k}", joint, pin.SE3(np.eye(3), np.array([x, 0.0, z])))
-    return model
 
 
 @each_draw

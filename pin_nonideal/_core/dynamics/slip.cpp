@@ -85,8 +85,10 @@ std::pair<double, double> slip_toward_rest(const Program& p, Workspace& w, int e
     if (f.dim == 1) return {along, slip_rate_along_mode(p, w, e)};
     const Vec3 u = slip_velocity(w.now, f);
     const double size = u.norm();
-    if (2.0 * along * along > size * size) return {along, slip_rate_along_mode(p, w, e)};
-    return {size, size > 0.0 ? slip_acceleration(p, w, f).dot(u) / size : 0.0};
+    // What is too slow to tell a direction goes along the one that is remembered.
+    const bool slow = size <= directed_speed * (1.0 + w.now.speed);
+    if (slow || 2.0 * along * along > size * size) return {along, slip_rate_along_mode(p, w, e)};
+    return {size, slip_acceleration(p, w, f).dot(u) / size};
 }
 
 double limit_under(const Program& p, const Workspace& w, int e, double load) {

@@ -244,6 +244,11 @@ double EventSearch::margin_inside(const Watch& watch, Source source, double part
     return margin(watch, t, probe_);
 }
 
+// Whether slip falls by more than a speed of rest over the step, at the rate that it starts with.
+bool EventSearch::slows_down(int e, double rest) const {
+    return stepper_.h * system_.slip_rate(stepper_.start_rate(), e) < -rest;
+}
+
 // Part of the step at which a watched margin first falls below zero, on a grid and between its points; beyond the step
 // where it does not.
 double EventSearch::first_crossing(const Watch& watch, Source source) {
@@ -258,8 +263,8 @@ double EventSearch::first_crossing(const Watch& watch, Source source) {
         g[k] = margin_at(k * apart);
         if (begins && g[k] < 0.0) {
             // Slip of several directions that has just begun may first turn into its own; it has come to rest again
-            // where it rose before.
-            const bool turns = slips && p.frictions[watch.index].dim > 1;
+            // where it rose before. What slows down did not begin: it came to rest just as the step before ended.
+            const bool turns = slips && p.frictions[watch.index].dim > 1 && !slows_down(watch.index, rest);
             const double part = k > 1 ? 0.0 : root_after_start(apart, g[1], turns ? rest : 0.0, margin_at);
             if (part > 0.0 || !turns) return part;
             continue;

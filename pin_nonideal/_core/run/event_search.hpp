@@ -47,6 +47,7 @@ private:
     bool may_reach_limit(int element);
     bool may_stop(int element) const;
     bool dips(int element) const;
+    bool slows_down(int element, double rest) const;
     void add_pulls(std::vector<Watch>& list);
     std::vector<Watch> crossed();
     bool may_pull(int gap);
