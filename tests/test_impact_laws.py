@@ -11,26 +11,15 @@ import pytest
 import pin_nonideal as pn
 from oracles.impacts import velocities_after
 
-from .mechanisms import GRAVITY, body, empty, frame
+from .mechanisms import GRAVITY, body, empty, frame, planar
 from .same_run import assert_same_run
 
 ROUNDING = 1e-11
 
 
-def planar(mass, inertia, corners):
-    """A body that slides in the x-z plane and turns about y, with frames "c0", "c1", ... at its corners."""
-    model = empty((0.0, 0.0, 0.0))
-    joint = body(model, 0, pin.JointModelPX(), "x", 0.0)
-    joint = body(model, joint, pin.JointModelPZ(), "z", 0.0)
-    joint = body(model, joint, pin.JointModelRY(), "turn", mass, inertia=inertia * np.eye(3))
-    for k, (x, z) in enumerate(corners):
-        frame(model, f"c{k}", joint, pin.SE3(np.eye(3), np.array([x, 0.0, z])))
-    return model
-
-
 def struck(corners, inertia, v, mu, e, law, mass=1.0):
     """The impacts at t = 0 of corners that all lie on the floor."""
-    model = planar(mass, inertia, corners)
+    model = planar(mass, inertia, corners, (0.0, 0.0, 0.0))
     for k in range(len(corners)):
         frame(model, f"floor {k}", 0, pin.SE3(np.eye(3), np.array([0.0, 0.0, corners[k][1]])))
     contacts = [

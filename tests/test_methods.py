@@ -40,7 +40,7 @@ int main() {
     method.E = E;
     method.first_same_as_last = true;
     for (int steps : {20, 40, 80}) {
-        pn::Step step(method.stages, method.rates(), 2);
+        pn::Step step(method.stages, method.rates(), 2, 2);
         pn::RungeKutta stepper(method, step);
         Oscillator system;
         pn::VecX middle(2);
