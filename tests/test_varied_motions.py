@@ -1,4 +1,4 @@
-"""Closed forms of motions in contact at random numbers: blocks that rock and ride, balls that hit and roll."""
+"""Closed forms of motions in contact at random numbers: blocks rock and ride, balls strike and roll."""
 
 from __future__ import annotations
 
