@@ -11,6 +11,8 @@ from scipy.optimize import minimize
 
 from .slow_slip import Plate
 
+FEASIBLE = 1e-9  # [N], which forces may lack of what holds
+
 
 class Stance:
     """Feet of one body on the plane z = 0.
@@ -54,7 +56,16 @@ class Stance:
         return Plate(self.feet, mu, lambda t: np.concatenate([self.load * t, self.turning * t]), self.at)
 
     def gives_way(self, guess):
-        """The time, and the normal forces then."""
+        """The time, the normal forces then, and what they lack; the latest of three searches.
+
+        The set of times is convex, but a search may end before its optimum, whose forces then lack nothing.
+        """
+        found = [self.search(part * guess) for part in (0.4, 1.0, 2.5)]
+        held = [each for each in found if each[2] <= FEASIBLE]
+        return max(held, key=lambda each: each[0]) if held else min(found, key=lambda each: each[2])
+
+    def search(self, guess):
+        """The same, from one guess of the time."""
         n = len(self.feet)
         against = np.array([self.load[0], self.load[1], self.couple[2]])
 
