@@ -56,11 +56,11 @@ class Stance:
         return Plate(self.feet, mu, lambda t: np.concatenate([self.load * t, self.turning * t]), self.at)
 
     def gives_way(self, guess):
-        """The time, the normal forces then, and what they lack; the latest of three searches.
+        """The time, the normal forces then, and what they lack; the latest of several searches.
 
         The set of times is convex, but a search may end before its optimum, whose forces then lack nothing.
         """
-        found = [self.search(part * guess) for part in (0.4, 1.0, 2.5)]
+        found = [self.search(part * guess) for part in (0.1, 0.3, 0.6, 1.0, 2.0, 3.0)]
         held = [each for each in found if each[2] <= FEASIBLE]
         return max(held, key=lambda each: each[0]) if held else min(found, key=lambda each: each[2])
 
