@@ -29,6 +29,7 @@ from .scene_steps import Steps
 from .scene_tables import Tables
 from .states.closure import CLOSURE_TOLERANCE
 from .states.configurations import unit_parts
+from .states.named import named_configuration
 from .states.projection import ProjectionReport
 from .types import Array, GeometryModel, Model, State, Table
 
@@ -135,12 +136,11 @@ class Scene(States, Geometry, Tables, Steps):
             for what, value in (("source", source), ("licence", licence))
         )
         check_model(model)
-        self._as_made = model.copy()
         self._unit_parts = tuple(unit_parts(model))
         self._q0: Array = pin.neutral(model)
         self._v0: Array = np.zeros(model.nv)
         if q0 is not None:
-            self._q0 = self._configuration(q0, "q0")
+            self._q0 = named_configuration(model, q0, self._q0, "q0", self._unit_parts)
         if v0 is not None:
             self._v0 = self._velocity(v0, "v0")
         for state in (self._q0, self._v0):
@@ -161,6 +161,7 @@ class Scene(States, Geometry, Tables, Steps):
                 f"{names}: no residual and no rate, so drift of these rows cannot be projected away"
             )
         self._runner = self._compiled.program.runner()
+        self._steps: dict[tuple[str, float], core.SteppedRun] = {}  # by method and length
         self._nv = int(model.nv)
         self._closed: tuple[Array, Array, ProjectionReport] | None = None
         self._told: list[str] | None = None

@@ -27,7 +27,6 @@ class States:
     if TYPE_CHECKING:
         name: str
         model: Model
-        _as_made: Model
         _unit_parts: tuple[tuple[str, slice], ...]
         _q0: Array
         _v0: Array
@@ -55,7 +54,7 @@ class States:
         Raises:
             InputError: the model is no longer what it was.
         """
-        if self.model != self._as_made:
+        if not self._compiled.program.is_of(self.model):
             raise InputError(
                 f'the model of scene "{self.name}" was changed after the scene was made, which has its own '
                 "numbers; make a new Scene of the changed model"

@@ -125,6 +125,7 @@ class Steps:
 
     if TYPE_CHECKING:
         _compiled: CompiledScene
+        _steps: dict[tuple[str, float], core.SteppedRun]
         _call: Callable[..., Any]
         _require_unchanged: Callable[[], None]
         project: Callable[..., Any]
@@ -161,11 +162,11 @@ class Steps:
         """
         self._require_unchanged()
         known = isinstance(dt, float) and isinstance(method, str)
-        run = self._kept_runs().get((method, dt)) if known else None
+        run = self._steps.get((method, dt)) if known else None
         if run is None:
             choice("step: method", method, FIXED)
             length = positive("step: dt", dt)
-            run = self._kept_runs()[method, length] = self._new_run(method, length, length, RTOL, ATOL)
+            run = self._steps[method, length] = self._new_run(method, length, length, RTOL, ATOL)
         try:  # arrays of the right shape go straight to the core, which checks sizes, lengths and finiteness
             return run.step(q, v, t, tau)
         except (TypeError, ValueError, core.CoreFailure):
@@ -226,10 +227,6 @@ class Steps:
         at, speed = self.project(q, v, begin)
         made.reset(at, speed, begin, tau)
         return made
-
-    def _kept_runs(self) -> dict[tuple[str, float], core.SteppedRun]:
-        kept: dict[tuple[str, float], core.SteppedRun] = self.__dict__.setdefault("_runs_of_steps", {})
-        return kept
 
     def _new_run(self, method: str, period: float, dt: float, rtol: float, atol: float) -> core.SteppedRun:
         program = self._compiled.program

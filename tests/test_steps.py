@@ -7,7 +7,15 @@ import pytest
 
 import pin_nonideal as pn
 
-ROBOTS = ("four_bar", "rough_four_bar", "panda_friction", "loaded_joint", "belt_oscillator")
+ROBOTS = (
+    "four_bar",
+    "rough_four_bar",
+    "panda",
+    "panda_friction",
+    "loaded_joint",
+    "belt_oscillator",
+    "double_pendulum",
+)
 METHODS = ("semi_implicit_euler", "rk4", "moreau")
 
 

@@ -164,13 +164,29 @@ void follow_constraints(const Program& p, Workspace& w, double h, VecX& move) {
 
 void learn_third_order(Workspace& w, double h) { w.state.third_order_lam += w.now.closing_lam / (h * h * h); }
 
+static double position_floor(const Program& p, const Workspace& w) { return rounding_part(w) * scene_size(p, w); }
+
+static double velocity_floor(const Workspace& w, const VecX& v) {
+    return rounding_part(w) * std::max(1.0, v.cwiseAbs().maxCoeff());
+}
+
+bool is_on_constraints(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    w.now.closing_lam.setZero();
+    if (p.constraints == 0) return true;
+    evaluate_residuals(p, w, t, q, v);
+    if (gather_residuals(p, w) > position_floor(p, w)) return false;
+    if (p.constrained_joints.empty()) evaluate_rows(p, w, t, v);  // of coordinates only
+    else update_kinematics(p, w, t, q, v);
+    return gather_rates(p, w, t, v) <= velocity_floor(w, v);
+}
+
 bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
     w.now.closing_lam.setZero();
     double largest = 0.0, floor = 0.0;
     if (!w.now.rows.blocks.empty()) {
         evaluate_residuals(p, w, t, q, v);
         largest = gather_residuals(p, w);
-        floor = rounding_part(w) * scene_size(p, w);
+        floor = position_floor(p, w);
     }
     const bool moves = largest > floor;
     bool configured = false;
@@ -261,7 +277,7 @@ bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
     for (int dof = 0; dof < p.mechanism.nv; ++dof)
         if (w.now.terms.locked[dof]) v[dof] = 0.0;  // what sticks has exactly no velocity
     if (w.now.rows.blocks.empty()) return false;
-    const double floor = rounding_part(w) * std::max(1.0, v.cwiseAbs().maxCoeff());
+    const double floor = velocity_floor(w, v);
     double last = gather_rates(p, w, t, v);
     bool moved = false;
     for (int it = 0; it < projection_limit && last > floor; ++it) {

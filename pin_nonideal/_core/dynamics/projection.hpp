@@ -44,6 +44,9 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
 bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 // Moves v; the workspace must be configured at (t, q).
 bool project_velocity(const Program& p, Workspace& w, double t, VecX& v);
+// Whether both are on the constraints as they are, as projecting would find them; rows and rates are evaluated, and no
+// factors taken.
+bool is_on_constraints(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 // Moves both, and leaves the workspace configured there.
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 // And evaluates them there.

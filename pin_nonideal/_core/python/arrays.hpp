@@ -67,6 +67,20 @@ private:
     size_t size_ = 0;
 };
 
+// Arrays of n numbers that Python gets again and again: NumPy copies one that is kept faster than it takes over another.
+class NumpyCopies {
+public:
+    explicit NumpyCopies(size_t n) : numbers_(to_numpy(std::vector<double>(n))), copy_(nb::cast(numbers_).attr("copy")) {}
+    nb::object operator()(const double* x) {
+        std::copy_n(x, numbers_.size(), numbers_.data());
+        return copy_();
+    }
+
+private:
+    Numbers numbers_;
+    nb::object copy_;
+};
+
 inline void read_into(const nb::object& from, VecX& to) {
     const Array a = nb::cast<Array>(from);
     to = map(a);

@@ -19,7 +19,7 @@ public:
         clear(p, w, first);
         try {
             if (!run_) run_ = std::make_unique<SteppedRun>(p, w, options, out);
-            run_->begin(q0, v0, options.duration);
+            run_->begin(q0, v0, options.duration, true);
             run_->run();
         } catch (const Failure& failure) {
             out.failure = failure;

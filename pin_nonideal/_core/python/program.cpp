@@ -8,11 +8,17 @@
 #include "dynamics/power.hpp"
 #include "python/constraints.hpp"
 #include "python/runner.hpp"
+#include "tree/model_extraction.hpp"
+
+using namespace nanobind::literals;
 
 namespace pn {
 
 void bind_program(nb::module_& m) {
     nb::class_<Program>(m, "Program")
+        .def("is_of", [](const Program& p, nb::handle model) {
+            return same_model(p.mechanism.model.get(), model_pointer(model.ptr()));
+        }, "model"_a)
         .def_prop_ro("constraints", &constraint_rows)
         .def_prop_ro("rows", [](const Program& p) { return p.user_rows; })
         .def_prop_ro("states", [](const Program& p) { return p.states; })

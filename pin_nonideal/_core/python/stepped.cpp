@@ -4,7 +4,6 @@
 #include <memory>
 #include <utility>
 
-#include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -47,13 +46,15 @@ struct Stepped {
     Recording out;
     std::unique_ptr<SteppedRun> run;
     VecX q, v, tau;
+    NumpyCopies q_out, v_out;
 
     Stepped(std::shared_ptr<const Program> program, const std::string& method, double period_, double dt, double rtol,
             const Array& atol)
         : p(std::move(program)), period(period_), options(options_of(method, period, dt, rtol, atol)),
-          w(*p), first(w.state), q(p->mechanism.nq), v(p->mechanism.nv), tau(p->mechanism.nv) {}
+          w(*p), first(w.state), q(p->mechanism.nq), v(p->mechanism.nv), tau(p->mechanism.nv),
+          q_out(q.size()), v_out(v.size()) {}
 
-    void begin(nb::handle q_in, nb::handle v_in, double t, nb::handle torque) {
+    void begin(nb::handle q_in, nb::handle v_in, double t, nb::handle torque, bool only) {
         read_buffer(q_in, q);
         if (!has_unit_lengths(p->mechanism, q.data(), unit_tolerance))
             throw std::invalid_argument("q holds a part that is not of unit length");
@@ -68,7 +69,7 @@ struct Stepped {
         out.events.clear();
         attempt([&] {
             if (!run) run = std::make_unique<SteppedRun>(*p, w, options, out);
-            run->begin(q, v, period);
+            run->begin(q, v, period, only);
         });
     }
 
@@ -100,13 +101,13 @@ struct Stepped {
         out.closed.clear();
     }
 
-    std::pair<Numbers, Numbers> state() const {
-        const VecX& y = run->state();
-        return {to_numpy(y.data(), q.size()), to_numpy(y.data() + q.size(), v.size())};
+    nb::tuple state() {
+        const double* y = run->state().data();
+        return nb::make_tuple(q_out(y), v_out(y + q.size()));
     }
 
-    std::pair<Numbers, Numbers> step(nb::handle q_in, nb::handle v_in, double t, nb::handle torque) {
-        begin(q_in, v_in, t, torque);
+    nb::tuple step(nb::handle q_in, nb::handle v_in, double t, nb::handle torque) {
+        begin(q_in, v_in, t, torque, true);
         attempt([&] { run->advance(period); });
         return state();
     }
@@ -115,14 +116,18 @@ struct Stepped {
 }  // namespace
 
 void bind_stepped(nb::module_& m) {
-    constexpr auto own = nb::rv_policy::automatic;
     nb::class_<Stepped>(m, "SteppedRun")
         .def(nb::init<std::shared_ptr<const Program>, const std::string&, double, double, double, const Array&>(),
              "program"_a, "method"_a, "period"_a, "dt"_a, "rtol"_a, "atol"_a)
-        .def("begin", &Stepped::begin, "q"_a, "v"_a, "t"_a, "tau"_a.none())
+        .def("begin", [](Stepped& s, nb::handle q, nb::handle v, double t, nb::handle tau) {
+            s.begin(q, v, t, tau, false);
+        }, "q"_a, "v"_a, "t"_a, "tau"_a.none())
         .def("advance", &Stepped::advance, "tau"_a.none())
-        .def("step", &Stepped::step, "q"_a, "v"_a, "t"_a, "tau"_a.none(), own)
-        .def("state", &Stepped::state, own)
+        .def("step", &Stepped::step, "q"_a, "v"_a, "t"_a, "tau"_a.none(),
+             nb::sig("def step(self, q: object, v: object, t: float, tau: object | None) -> "
+                     "tuple[NDArray[numpy.float64], NDArray[numpy.float64]]"))
+        .def("state", &Stepped::state,
+             nb::sig("def state(self) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]"))
         .def_prop_ro("begun", [](const Stepped& s) { return s.run != nullptr; })
         .def_prop_ro("t", [](const Stepped& s) { return s.run->time(); })
         .def_prop_ro("modes", [](const Stepped& s) { return static_cast<const std::vector<Mode>&>(s.w.state.mode); })

@@ -176,7 +176,7 @@ std::optional<double> Simulation::integrate(const Proposal& proposal) {
     stepper.y0.tail(2 * system.ne + system.ng).setZero();  // what elements watch is theirs over one step
     stepper.start_rate() = rate;
     try {
-        return try_step(proposal.size);
+        return try_step(proposal);
     } catch (const Failure& failure) {
         // A stage may leave the domain where the step is too long; a shorter one decides whether it is the motion.
         // Where the motion runs away no step is short enough, and that is what is wrong.
@@ -191,7 +191,8 @@ std::optional<double> Simulation::integrate(const Proposal& proposal) {
 }
 
 // One step; where its error is allowed its end is projected and evaluated.
-std::optional<double> Simulation::try_step(double size) {
+std::optional<double> Simulation::try_step(const Proposal& proposal) {
+    const double size = proposal.size;
     const double start_pivot = w.now.rows.distance;
     system.on_constraints = start_pivot < near_singular && !w.now.rows.blocks.empty();
     system.smallest_pivot = 1.0;
@@ -208,7 +209,8 @@ std::optional<double> Simulation::try_step(double size) {
         w.state.seeks_directions &= !stepper.collocates() || size > shortest_sought;
         return error;
     }
-    system.project_and_evaluate(t + size, stepper.y1, stepper.end_rate());
+    if (!leaves_rate(proposal) || !system.is_on_constraints(t + size, stepper.y1))
+        system.project_and_evaluate(t + size, stepper.y1, stepper.end_rate());
     stepper.learn();
     if (needs_end) error = stepper.error();
     choice.look();
@@ -251,6 +253,13 @@ bool Simulation::locate_event(const Proposal& proposal) {
     h = shortened * proposal.size;
     back_to_start();
     return false;
+}
+
+// A method with an error takes it from there; events, functions, and what is recorded beside the state ask for it.
+bool Simulation::leaves_rate(const Proposal& proposal) const {
+    return stops_there && proposal.last && proposal.stop >= t_end && !options.method.adaptive() &&
+           !system.has_events() && system.nz == 0 && !p.asks_functions && user_events.empty() &&
+           !options.record.evaluates() && !options.record.dense && !options.callback && !options.save;
 }
 
 // Modes, and what hangs on them, as the step began.

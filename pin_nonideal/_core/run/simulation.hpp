@@ -46,7 +46,9 @@ protected:
     void find_event();
     void back_to_start();
 
-    std::optional<double> try_step(double size);
+    std::optional<double> try_step(const Proposal& proposal);
+    // Whether nothing asks for the acceleration at the end of this step.
+    bool leaves_rate(const Proposal& proposal) const;
 
     bool done() const { return t >= t_end || user_events.ends_run(); }
     // Whether the run goes on.
@@ -79,6 +81,7 @@ protected:
     const Clock::time_point begun = Clock::now();
     std::optional<FoundEvent> event;  // in the step just taken
     RunState before_step;
+    bool stops_there = false;  // at t_end: nobody goes on from the state that is left
     std::optional<Failure> opened;  // a loop that a trial of this step could not close
 };
 

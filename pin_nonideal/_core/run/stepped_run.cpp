@@ -2,7 +2,7 @@
 
 namespace pn {
 
-void SteppedRun::begin(const VecX& q0, const VecX& v0, double period) {
+void SteppedRun::begin(const VecX& q0, const VecX& v0, double period, bool only) {
     static_cast<Progress&>(*this) = at_first_;
     stepper.forget();
     stiffness.forget();
@@ -12,6 +12,7 @@ void SteppedRun::begin(const VecX& q0, const VecX& v0, double period) {
     out.steps = 0;  // a run of its own: what watches over runs that get nowhere counts anew
     periods_ = 0;
     t_end = options.t0 + period;
+    stops_there = only;
     start(q0, v0);
 }
 

@@ -10,8 +10,9 @@ class SteppedRun : public Simulation {
 public:
     using Simulation::Simulation;
 
-    // From a state on, at the time that the options say, for a first period; nothing is left of what was before.
-    void begin(const VecX& q0, const VecX& v0, double period);
+    // From a state on, at the time that the options say, for a first period; nothing is left of what was before. `only`:
+    // no other period follows, so that its end needs no acceleration where nothing records one.
+    void begin(const VecX& q0, const VecX& v0, double period, bool only);
     // Torques in place of the actuation's from here on; the derivative is taken anew.
     void set_torque(const VecX& torque) { torques.set(torque); }
     // To the end of the next period.

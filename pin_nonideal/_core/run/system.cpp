@@ -115,6 +115,11 @@ void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
         kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms) - before;
 }
 
+bool System::is_on_constraints(double t, const VecX& y) {
+    read(y);
+    return pn::is_on_constraints(p, w, t, q, v);
+}
+
 void System::normalize(VecX& y) const { pn::normalize(p.mechanism, y.data()); }
 
 }  // namespace pn
