@@ -54,7 +54,7 @@ struct Stepped {
           w(*p), first(w.state), q(p->mechanism.nq), v(p->mechanism.nv), tau(p->mechanism.nv),
           q_out(q.size()), v_out(v.size()) {}
 
-    void begin(nb::handle q_in, nb::handle v_in, double t, nb::handle torque, bool only) {
+    void read(nb::handle q_in, nb::handle v_in, double t, nb::handle torque) {
         read_buffer(q_in, q);
         if (!has_unit_lengths(p->mechanism, q.data(), unit_tolerance))
             throw std::invalid_argument("q holds a part that is not of unit length");
@@ -67,10 +67,16 @@ struct Stepped {
         if (w.now.has_override) w.now.override_torque = tau;
         forget_samples();
         out.events.clear();
-        attempt([&] {
-            if (!run) run = std::make_unique<SteppedRun>(*p, w, options, out);
-            run->begin(q, v, period, only);
-        });
+    }
+
+    void start(bool only) {
+        if (!run) run = std::make_unique<SteppedRun>(*p, w, options, out);
+        run->begin(q, v, period, only);
+    }
+
+    void begin(nb::handle q_in, nb::handle v_in, double t, nb::handle torque) {
+        read(q_in, v_in, t, torque);
+        attempt([&] { start(false); });
     }
 
     void advance(nb::handle torque) {
@@ -107,8 +113,11 @@ struct Stepped {
     }
 
     nb::tuple step(nb::handle q_in, nb::handle v_in, double t, nb::handle torque) {
-        begin(q_in, v_in, t, torque, true);
-        attempt([&] { run->advance(period); });
+        read(q_in, v_in, t, torque);
+        attempt([&] {
+            start(true);
+            run->advance(period);
+        });
         return state();
     }
 };
@@ -119,9 +128,7 @@ void bind_stepped(nb::module_& m) {
     nb::class_<Stepped>(m, "SteppedRun")
         .def(nb::init<std::shared_ptr<const Program>, const std::string&, double, double, double, const Array&>(),
              "program"_a, "method"_a, "period"_a, "dt"_a, "rtol"_a, "atol"_a)
-        .def("begin", [](Stepped& s, nb::handle q, nb::handle v, double t, nb::handle tau) {
-            s.begin(q, v, t, tau, false);
-        }, "q"_a, "v"_a, "t"_a, "tau"_a.none())
+        .def("begin", &Stepped::begin, "q"_a, "v"_a, "t"_a, "tau"_a.none())
         .def("advance", &Stepped::advance, "tau"_a.none())
         .def("step", &Stepped::step, "q"_a, "v"_a, "t"_a, "tau"_a.none(),
              nb::sig("def step(self, q: object, v: object, t: float, tau: object | None) -> "
