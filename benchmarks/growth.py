@@ -277,7 +277,7 @@ def short(sizes: tuple[int, ...]) -> Iterator[Row]:
         initial = np.zeros((count, mujoco.mj_stateSize(mj, full)))
         for state in initial:
             mujoco.mj_getState(mj, data, state, full)
-        pool = rollout.Rollout(nthread=1)
+        pool = rollout.Rollout(nthread=0)
         batches[MUJOCO] = timing.per_call(lambda: pool.rollout(mj, [data], initial, nstep=1))
         step[MUJOCO] = timing.per_call(lambda: mujoco.mj_step(mj, data))
     yield Row("short runs", count, "a run of one step in a rollout", batches, per=float(count))
