@@ -105,6 +105,7 @@ def at_equal_errors(records: Records) -> Iterator[KeyFigure]:
     four_bar = level(records, "four_bar", 1e-6)
     yield times_faster("four-bar to 1e-6: MuJoCo's time over ours", four_bar, 150.0, "mujoco")
     yield times_faster("four-bar to 1e-6: Python loop's time over ours", four_bar, 5.0, "pin+scipy")
+    yield times_faster("four-bar to 1e-6: compiled loop's time over ours", four_bar, 2.5, "pin+odeint")
     coarse = level(records, "four_bar", 1e-3)
     yield times_faster("four-bar to 1e-3: MuJoCo's time over ours", coarse, 1.0, "mujoco")
     errors = [

@@ -11,7 +11,14 @@ from matplotlib.figure import Figure
 
 from .goals import Records
 
-COLORS = {"pin_nonideal": "C0", "pin+scipy": "C2", "mujoco": "C1", "exudyn": "C4", "drake": "C3"}
+COLORS = {
+    "pin_nonideal": "C0",
+    "pin+scipy": "C2",
+    "pin+odeint": "C5",
+    "mujoco": "C1",
+    "exudyn": "C4",
+    "drake": "C3",
+}
 COLUMNS = 3
 MARKERS, DASHES = "osD^vP*X", ("-", (0, (5, 2)), (0, (1, 1.5)), "-.")
 

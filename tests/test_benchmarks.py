@@ -106,6 +106,24 @@ def test_accuracy(command: ModuleType, tmp_path: Path) -> None:
     assert (tmp_path / "benchmarks" / "accuracy.svg").is_file()
 
 
+def test_the_compiled_loop_states_what_it_can() -> None:
+    from benchmarks import problems
+    from benchmarks.tools import TOOLS
+
+    tool = TOOLS["pin+odeint"]
+    assert not tool.settings(problems.problem("coulomb_pendulum"))
+    assert not tool.settings(problems.problem("solo12"))
+    problem = problems.problem("four_bar")
+    chosen = [s for s in tool.settings(problem) if s.label == "rtol 1e-09"]
+    assert [s.family for s in chosen] == ["fehlberg78", "dopri5", "bulirsch_stoer"]
+    if reason := tool.missing():
+        pytest.skip(reason)
+    for setting in chosen:
+        assert (
+            problem.error(tool.prepare(problem, setting, problems.SAMPLES)().q) < 1e4 * setting.values["rtol"]
+        )
+
+
 def test_features(command: ModuleType, tmp_path: Path) -> None:
     found = results(command, tmp_path, "features")
     assert [row["feature"] for row in found["added"]][:2] == ["open chains, nothing else", "+ loop (2 rows)"]

@@ -1,12 +1,15 @@
-// Pinocchio's own forward dynamics, called many times from C++ at one state: seconds per evaluation; and motions of trees
-// by Boost.odeint on top of it.
+// Pinocchio's own forward dynamics, called many times from C++ at one state: seconds per evaluation; and motions by
+// Boost.odeint on top of it.
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
 
 #include <boost/numeric/odeint.hpp>
 #include <boost/python.hpp>
@@ -15,6 +18,7 @@
 #include <pinocchio/multibody.hpp>
 
 namespace nb = nanobind;
+namespace odeint = boost::numeric::odeint;
 using namespace nb::literals;
 
 namespace {
@@ -77,35 +81,71 @@ public:
         Eigen::Map<VectorX>(out.data(), model_.nv) = data_.ddq;
     }
 
-    // The motion of a tree whose coordinates are plain numbers, by the method of order 8 of Fehlberg; its steps.
-    int integrate(Array q, Array v, double duration, double rtol, double atol) {
-        namespace odeint = boost::numeric::odeint;
-        using State = std::vector<double>;
-        const int n = model_.nv;
-        if (model_.nq != n || !models_.empty()) throw std::invalid_argument("expected a tree of plain coordinates");
-        State y(2 * n);
-        std::copy(q.data(), q.data() + n, y.begin());
-        std::copy(v.data(), v.data() + n, y.begin() + n);
-        const ConstView tau_view(tau_);
-        const auto rate = [&](const State& at, State& to, double) {
-            const ConstView q_view(Eigen::Map<const VectorX>(at.data(), n));
-            const ConstView v_view(Eigen::Map<const VectorX>(at.data() + n, n));
-            pinocchio::aba(model_, data_, q_view, v_view, tau_view, pinocchio::Convention::LOCAL);
-            std::copy(at.begin() + n, at.end(), to.begin());
-            Eigen::Map<VectorX>(to.data() + n, n) = data_.ddq;
-        };
-        auto stepper = odeint::make_controlled<odeint::runge_kutta_fehlberg78<State>>(atol, rtol);
-        const size_t steps = odeint::integrate_adaptive(stepper, rate, y, 0.0, duration, first_step);
-        std::copy(y.begin(), y.begin() + n, q.data());
-        std::copy(y.begin() + n, y.end(), v.data());
-        return static_cast<int>(steps);
+    // The motion of a mechanism whose coordinates are plain numbers, under constant torques, by an adaptive method of
+    // Boost.odeint: configurations at the times, row by row, into q_out, the velocity at the last into v_out; returns the
+    // number of evaluations, or -1 where it takes more than `most`.
+    long integrate(const Array& q, const Array& v, const Array& tau, const Array& times, const std::string& method,
+                   double rtol, double atol, long most, Array q_out, Array v_out) {
+        if (model_.nq != model_.nv) throw std::invalid_argument("expected plain coordinates");
+        tau_ = copy(tau);
+        State y(2 * model_.nv);
+        std::copy_n(q.data(), model_.nv, y.begin());
+        std::copy_n(v.data(), model_.nv, y.begin() + model_.nv);
+        try {
+            if (method == "dopri5")
+                return carry(odeint::make_controlled<odeint::runge_kutta_dopri5<State>>(atol, rtol), y, times, most, q_out,
+                             v_out);
+            if (method == "fehlberg78")
+                return carry(odeint::make_controlled<odeint::runge_kutta_fehlberg78<State>>(atol, rtol), y, times, most,
+                             q_out, v_out);
+            if (method == "bulirsch_stoer")
+                return carry(odeint::bulirsch_stoer<State>(atol, rtol), y, times, most, q_out, v_out);
+        } catch (const TooLong&) {
+            return -1;
+        }
+        throw std::invalid_argument("unknown method");
     }
 
 private:
+    using State = std::vector<double>;
+    struct TooLong {};
+
+    void rate(const State& at, State& to) {
+        const int n = model_.nv;
+        const Eigen::Map<const VectorX> q(at.data(), n), v(at.data() + n, n);
+        if (models_.empty()) {
+            const ConstView q_view(q), v_view(v), tau_view(tau_);
+            pinocchio::aba(model_, data_, q_view, v_view, tau_view, pinocchio::Convention::LOCAL);
+        } else {
+            q_ = q, v_ = v;
+            pinocchio::constraintDynamics(model_, data_, q_, v_, tau_, models_, datas_, settings_);
+        }
+        std::copy(at.begin() + n, at.end(), to.begin());
+        Eigen::Map<VectorX>(to.data() + n, n) = data_.ddq;
+    }
+
+    template <class Stepper>
+    long carry(Stepper stepper, State& y, const Array& times, long most, Array& q_out, Array& v_out) {
+        const int n = model_.nv;
+        long count = 0;
+        const auto derivative = [&](const State& at, State& to, double) {
+            if (++count > most) throw TooLong{};
+            rate(at, to);
+        };
+        double t = 0.0, step = first_step;
+        for (size_t k = 0; k < times.shape(0); ++k) {
+            odeint::integrate_adaptive(std::ref(stepper), derivative, y, t, times.data()[k], step);
+            t = times.data()[k];
+            std::copy_n(y.begin(), n, q_out.data() + k * n);
+        }
+        std::copy_n(y.begin() + n, n, v_out.data());
+        return count;
+    }
+
     static constexpr double first_step = 1e-3;  // [s]
     const pinocchio::Model model_;
     pinocchio::Data data_;
-    VectorX tau_;
+    VectorX tau_, q_, v_;
     pinocchio::ProximalSettings settings_;
     std::vector<ConstraintModel> models_;
     std::vector<ConstraintData> datas_;
@@ -119,5 +159,6 @@ NB_MODULE(PEER_NAME, m) {
         .def("time_aba", &Peer::time_aba, "q"_a, "v"_a, "count"_a, "world"_a)
         .def("time_constraint_dynamics", &Peer::time_constraint_dynamics, "q"_a, "v"_a, "count"_a)
         .def("acceleration", &Peer::acceleration, "q"_a, "v"_a, "out"_a)
-        .def("integrate", &Peer::integrate, "q"_a, "v"_a, "duration"_a, "rtol"_a, "atol"_a);
+        .def("integrate", &Peer::integrate, "q"_a, "v"_a, "tau"_a, "times"_a, "method"_a, "rtol"_a, "atol"_a, "most"_a,
+             "q_out"_a, "v_out"_a);
 }
