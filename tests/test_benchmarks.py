@@ -121,8 +121,6 @@ def test_the_compiled_loop_states_what_it_can() -> None:
     for setting in chosen:
         found = tool.prepare(problem, setting, problems.SAMPLES)()
         assert problem.error(found.q) < 1e4 * setting.values["rtol"]
-            problem.error(tool.prepare(problem, setting, problems.SAMPLES)().q) < 1e4 * setting.values["rtol"]
-        )
 
 
 def test_features(command: ModuleType, tmp_path: Path) -> None:
