@@ -78,9 +78,9 @@ def best_rival(tools: dict[str, Any]) -> tuple[str, dict[str, Any]] | None:
 
 def times_faster(title: str, tools: dict[str, Any], goal: float, rival: str | None = None) -> KeyFigure:
     """Time of a rival, or of the best one, over ours, at equal errors."""
-    if OURS not in tools or "seconds" not in tools[OURS]:
+    if OURS not in tools or "seconds" not in tools[OURS] or (rival is not None and rival not in tools):
         return KeyFigure(title, None, goal)
-    found = best_rival({rival: tools[rival]} if rival in tools else {} if rival else tools)
+    found = best_rival({rival: tools[rival]} if rival is not None else tools)
     if found is None:
         return KeyFigure(title, None, goal, remark="no rival got there in the time limit")
     return KeyFigure(f"{title} ({found[0]}, {found[1]['setting']})", found[1]["ratio"], goal)

@@ -256,6 +256,8 @@ def test_key_figures_take_the_fastest_rival_that_got_there() -> None:
     nobody = goals.times_faster("x", tools, 2.0, "lost")
     assert (nobody.value, nobody.met, nobody.shown) == (None, True, "no rival got there in the time limit")
     assert not goals.times_faster("x", {"slow": tools["slow"]}, 2.0).met
+    absent = goals.times_faster("x", tools, 2.0, "nobody measured it")
+    assert (absent.value, absent.met, absent.shown) == (None, False, "not measured")
     assert goals.earlier("x", tools, tools).value == 3.0
 
 
