@@ -198,7 +198,7 @@ def long(options: argparse.Namespace) -> Any:
 def contacts(options: argparse.Namespace) -> Any:
     from . import contacts
 
-    rivals = any(tool.name == "mujoco" for tool in chosen_tools(options))
+    rivals = {tool.name for tool in chosen_tools(options)}
     return contacts.measure(rivals, options.quick, options.only, say)
 
 

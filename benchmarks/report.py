@@ -76,8 +76,8 @@ CONTACTS = """## Contacts
 
 A ball bounces (restitution 0.8), a box slides to rest (friction 0.3), a box stands on a slope below its
 angle of friction for 10 s: time of the fastest setting of each tool whose error of the place at the end,
-known in closed form, is below a level. MuJoCo has elliptic cones and contacts as stiff as its step allows,
-of the ball with the damping of its restitution.
+known in closed form, is below a level. MuJoCo (elliptic cones) and Drake (its discrete solver SAP) have
+contacts as stiff as their step allows, of the ball with the damping of its restitution.
 """
 QUADRUPED = """One step of 1 ms of Solo12 as it stands on its feet, held by its motors; Pinocchio's solver in
 the time stepping of its examples, at its default tolerance.

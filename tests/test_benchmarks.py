@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.integrate import solve_ivp
 
 pytest.importorskip("matplotlib")
 
@@ -146,6 +147,37 @@ def test_closed_forms_of_contacts(name: str) -> None:
     case = contacts.CASES[name]()
     run = contacts.ours(case, ())[2]
     np.testing.assert_allclose(run.run(), case.end, atol=GAP)
+
+
+def test_a_soft_contact_has_the_damping_of_its_restitution() -> None:
+    from benchmarks.contact_rivals import damping_ratio
+
+    for restitution in (0.2, 0.8):
+        damping = 2.0 * damping_ratio(restitution)
+
+        def swing(t: float, x: Any, damping: float = damping) -> Any:
+            return [x[1], -x[0] - damping * x[1]]
+
+        def lets_go(t: float, x: Any, damping: float = damping) -> float:
+            return float(-x[0] - damping * x[1]) if t else -1.0
+
+        lets_go.terminal = True  # type: ignore[attr-defined]
+        run = solve_ivp(swing, (0.0, 10.0), [0.0, 1.0], events=lets_go, rtol=1e-10, atol=1e-12)
+        assert run.y[1, -1] == pytest.approx(-restitution, abs=1e-8)
+
+
+@pytest.mark.parametrize(("name", "gap"), [("sliding", 2e-3), ("standing", 1e-4)])  # first order in the step
+def test_rivals_of_contacts_come_near_the_closed_forms(name: str, gap: float) -> None:
+    from benchmarks import contacts
+    from benchmarks.tools import TOOLS
+
+    case = contacts.CASES[name]()
+    makers = {tool: make for tool, make in contacts.RIVALS.items() if TOOLS[tool].missing() is None}
+    assert "mujoco" in makers
+    for tool, make in makers.items():
+        (run,) = make(case, [1e-3])
+        assert run.tool == tool
+        np.testing.assert_allclose(run.run(), case.end, atol=gap)
 
 
 def test_batches(command: ModuleType, tmp_path: Path) -> None:
