@@ -39,7 +39,7 @@ void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q,
 }
 
 // Residuals and A, Eq. (3); and the users' own b.
-static void place_rows(const Program& p, Workspace& w, double t, const VecX& v) {
+void place_rows(const Program& p, Workspace& w, double t, const VecX& v) {
     if (w.now.awake.empty()) return;
     const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
     for (int i : w.now.awake) {
@@ -90,6 +90,13 @@ void configure(const Program& p, Workspace& w, double t, const VecX& q, const Ve
     mass_matrix(p.mechanism, w.now.terms);
     factor_mass(p, w, t);
     if (!p.blocks.empty()) factor_placed_rows(p, w, t, v);
+}
+
+void place(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    w.now.renew();
+    place_bodies(p.mechanism, w.now.terms, q);
+    mass_matrix(p.mechanism, w.now.terms);
+    place_rows(p, w, t, v);
 }
 
 void configure_velocity(const Program& p, Workspace& w, double t, const VecX& v) {
@@ -160,7 +167,10 @@ void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const Vec
 }
 
 void evaluate_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) {
-    const int i = p.gaps[gap].block;
+    evaluate_block(p, w, t, v, p.gaps[gap].block);
+}
+
+void evaluate_block(const Program& p, Workspace& w, double t, const VecX& v, int i) {
     const Block& block = p.blocks[i];
     RowValues& values = w.now.values[i];
     const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};

@@ -55,17 +55,27 @@ double size_of(const MatX& W, const VecX& alpha0, const VecX& f) {
     return alpha0.cwiseAbs().maxCoeff() + (W * f.cwiseAbs()).cwiseAbs().maxCoeff();
 }
 
-// Primal active set: from f = 0, steps that lower f^T W f / 2 + alpha0^T f and stay in the box. Where redundant
-// elements cannot all stick, since what they would have to hold back is no acceleration that forces cause, the program
-// falls without end along a direction with W d = 0, until one of them is at its limit and slips.
-VecX active_set(const MatX& W, const VecX& alpha0, const VecX& s) {
+// Forces that the limits allow, those near by: each at its limit or free.
+VecX start(const VecX& s, const VecX* near, std::vector<char>& is_free) {
     const int n = static_cast<int>(s.size());
     VecX f = VecX::Zero(n);
+    for (int i = 0; i < n; ++i) {
+        is_free[i] = s[i] > 0.0 && (!near || std::abs((*near)[i]) < s[i] * (1.0 - at_limit));
+        if (near && s[i] > 0.0) f[i] = is_free[i] ? (*near)[i] : (*near)[i] > 0.0 ? s[i] : -s[i];
+    }
+    return f;
+}
+
+// Primal active set: from forces near by, or none, steps that lower f^T W f / 2 + alpha0^T f and stay in the box. Where
+// redundant elements cannot all stick, since what they would have to hold back is no acceleration that forces cause, the
+// program falls without end along a direction with W d = 0, until one of them is at its limit and slips.
+VecX active_set(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* near) {
+    const int n = static_cast<int>(s.size());
     std::vector<char> is_free(n);
-    for (int i = 0; i < n; ++i) is_free[i] = s[i] > 0.0;
+    VecX f = start(s, near, is_free);
+    const double size = size_of(W, alpha0, s);
     for (int it = 0; it < 20 * (n + 1) * (n + 1); ++it) {
         const VecX alpha = alpha0 + W * f;
-        const double size = size_of(W, alpha0, s);
         VecX step = solve_free(W, -alpha, is_free), left = alpha + W * step;
         for (int i = 0; i < n; ++i)
             if (!is_free[i]) left[i] = 0.0;
@@ -122,7 +132,7 @@ VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* n
         const double size = size_of(W, alpha0, f);
         std::vector<int> wrong;
         for (int i = 0; i < n; ++i) {
-            if (is_free[i] && std::abs(alpha[i]) > met * size) return active_set(W, alpha0, s);
+            if (is_free[i] && std::abs(alpha[i]) > met * size) return active_set(W, alpha0, s, near);
             const bool outside = is_free[i] && std::abs(f[i]) > s[i] * (1.0 + 1e-13);
             const bool drives = !is_free[i] && alpha[i] * f[i] > 1e-13 * size * std::abs(f[i]);
             if (outside || drives) wrong.push_back(i);
@@ -139,7 +149,7 @@ VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* n
             is_free[i] = !is_free[i];
         }
     }
-    return active_set(W, alpha0, s);
+    return active_set(W, alpha0, s, near);
 }
 
 }  // namespace pn

@@ -1,6 +1,7 @@
 #include "friction/problem.hpp"
 
 #include "dynamics/solution.hpp"
+#include "math/lanes.hpp"
 #include "tree/factor.hpp"
 
 namespace pn {
@@ -35,9 +36,14 @@ FrictionProblem::FrictionProblem(const Program& p, const std::vector<int>& list)
     W.resize(rows, rows);
     response.resize(p.mechanism.nv, rows);
     multipliers.resize(p.layout.rows, rows);
+    free = VecX::Zero(rows);
 }
 
 FrictionProblem::FrictionProblem(const Program& p, Workspace& w, std::vector<int> list) : FrictionProblem(p, list) {
+    respond(p, w);
+}
+
+void FrictionProblem::respond(const Program& p, Workspace& w) {
     const VecX no_drift = VecX::Zero(p.layout.rows);
     VecX a(p.mechanism.nv), lam = no_drift;
     each_unit_force(p, w, elements, [&](int column, const VecX& force) {
@@ -49,20 +55,23 @@ FrictionProblem::FrictionProblem(const Program& p, Workspace& w, std::vector<int
 }
 
 // Bodies whose pivots of M differ much take refined solutions.
-FrictionProblem FrictionProblem::of_step(const Program& p, Workspace& w, std::vector<int> list) {
-    if (w.now.rows.refine) return FrictionProblem(p, w, std::move(list));
-    FrictionProblem problem(p, list);
-    problem.scaled = true;
+void FrictionProblem::respond_in_step(const Program& p, Workspace& w) {
+    scaled = !w.now.rows.refine;
+    if (!scaled) return respond(p, w);
     const VecX no_drift = VecX::Zero(p.layout.rows);
-    VecX a, lam = no_drift;
-    each_unit_force(p, w, problem.elements, [&](int column, const VecX& force) {
-        a = force;
-        solve_scaled(p, w, a, nullptr, no_drift, lam);
-        problem.response.col(column) = a;
-        problem.multipliers.col(column) = lam;
+    VecX lam = no_drift;
+    each_unit_force(p, w, elements, [&](int column, VecX& force) {
+        free[column] = solve_scaled(p, w, force, nullptr, no_drift, lam);
+        response.col(column) = force;
+        multipliers.col(column) = lam;
     });
-    problem.W.noalias() = problem.response.transpose() * problem.response;
-    return problem;
+    gram(response, rows, W);
+}
+
+PN_WIDE void gram(const MatX& X, int n, MatX& W) {
+    const int length = static_cast<int>(X.rows());
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j <= i; ++j) W(i, j) = W(j, i) = dot(X.col(i).data(), X.col(j).data(), length);
 }
 
 VecX FrictionProblem::acceleration(const Program& p, Workspace& w, const VecX& f) const {
@@ -104,14 +113,22 @@ void FrictionProblem::add_forces(const Program& p, Workspace& w, const VecX& f, 
 }
 
 void FrictionProblem::clean(const Program& p, Workspace& w) {
+    if (scaled) {
+        for (int i = 0; i < rows; ++i) drop_held(i, free[i]);
+        return;
+    }
     W = (0.5 * (W + W.transpose())).eval();
     each_unit_force(p, w, elements, [&](int i, VecX& force) {
         solve_R(p.mechanism, w.now.terms, force);
-        const double free = force.squaredNorm();  // what it would cause if no constraint held
-        if (W(i, i) > least_response * free) return;
-        W.row(i).setZero();
-        W.col(i).setZero();
+        drop_held(i, force.squaredNorm());
     });
+}
+
+// Whose response is rounding beside what it would be if no constraint held.
+void FrictionProblem::drop_held(int i, double unconstrained) {
+    if (W(i, i) > least_response * unconstrained) return;
+    W.row(i).setZero();
+    W.col(i).setZero();
 }
 
 }  // namespace pn

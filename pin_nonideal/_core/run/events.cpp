@@ -243,7 +243,7 @@ void remember_directions(System& system, std::vector<double>& slip) {
     for (int e = 0; e < system.ne; ++e) {
         const Friction& f = system.p.frictions[e];
         if (w.state.lingers[e] && !hardly_moves(system, e)) w.state.lingers[e] = 0;
-        if (f.dim == 1 || !slips(w.state.mode[e])) continue;
+        if (!slips(w.state.mode[e]) || f.dim == 1) continue;
         const Vec3 u = slip_velocity(w.now, f);
         slip[e] = u.norm();
         const Vec3& n = w.state.last_direction[e];
