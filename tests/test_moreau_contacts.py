@@ -93,7 +93,7 @@ def test_a_box_on_a_slope_rests_or_slides(slope, rests):
 
 @pytest.mark.parametrize("feet", [4, 6, 8, 12])
 def test_a_pushed_table_slides(feet):
-    """Feet on a circle share the load in several ways, some carry none; v = (F / m - mu g) t however they do."""
+    """Feet on a circle share the load in several ways; v = (F / m - mu g) t whichever of them carry none."""
     model = empty()
     joint = body(model, 0, pin.JointModelFreeFlyer(), "table", 10.0, inertia=0.3 * np.eye(3))
     turn = 2.0 * np.pi * np.arange(feet) / feet

@@ -131,8 +131,7 @@ void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v) {
 // Where closed contacts carry the weight, accelerations of rounding are none: M a below the rounding of the forces that
 // add up to it.
 static bool is_balanced(const Program& p, Workspace& w) {
-    const auto closed = std::find(w.state.closed.begin(), w.state.closed.end(), char(1));
-    if (closed == w.state.closed.end() || p.moves_in_time) return false;
+    if (!any_closed(w.state) || p.moves_in_time) return false;
     if (w.now.a.cwiseAbs().maxCoeff() <= balance_rounding * p.mechanism.gravity.norm()) return true;
     VecX &left = w.scratch.work, &size = w.scratch.trial;
     multiply_M(p.mechanism, w.now.terms, w.now.a, left);

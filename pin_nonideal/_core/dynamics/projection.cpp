@@ -251,9 +251,9 @@ static double dependent_residual(const Program& p, const Workspace& w) {
 
 bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
     if (!w.now.rows.redundant) return false;
-    const std::vector<Mode> modes = w.state.mode;
-    if (std::find(modes.begin(), modes.end(), sticking) == modes.end()) return false;
+    if (std::find(w.state.mode.begin(), w.state.mode.end(), sticking) == w.state.mode.end()) return false;
     if (dependent_residual(p, w) <= creeping_gap * scene_size(p, w)) return false;
+    const std::vector<Mode> modes = w.state.mode;
     std::vector<Mode> released = modes;
     std::replace(released.begin(), released.end(), sticking, unloaded);
     set_modes(p, w, released);
@@ -289,9 +289,9 @@ static void stop_locked(const Program& p, const Workspace& w, VecX& v) {
 }
 
 bool keeps_to_rows(const Program& p, Workspace& w, double t, const VecX& q, VecX& v) {
-    w.now.closing_lam.setZero();
     stop_locked(p, w, v);
     if (w.now.rows.blocks.empty()) return true;
+    w.now.closing_lam.setZero();
     const double fastest = v.cwiseAbs().maxCoeff();
     if (!p.affine_rates || fastest > slow_speed) return false;
     // Whether nothing can move is for the rows to tell that are independent.

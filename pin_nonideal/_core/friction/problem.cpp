@@ -11,10 +11,9 @@ constexpr double least_response = 1e-13;
 
 static const Block& block_of(const Program& p, int element) { return p.blocks[p.frictions[element].block]; }
 
-// Calls act(column, force) with the generalized force of a unit of each friction force in turn, which it may change.
+// Calls act(column) with `force` the generalized force of a unit of each friction force in turn, which it may change.
 template <class Act>
-static void each_unit_force(const Program& p, const Workspace& w, const std::vector<int>& elements, const Act& act) {
-    VecX force(p.mechanism.nv), unit = VecX::Zero(p.layout.rows);
+void FrictionProblem::each_unit_force(const Program& p, const Workspace& w, const Act& act) {
     int column = 0;
     for (int e : elements) {
         const Block& block = block_of(p, e);
@@ -23,7 +22,7 @@ static void each_unit_force(const Program& p, const Workspace& w, const std::vec
             unit[block.row + k] = 1.0;
             add_transpose(block, w.now.A, unit, force);
             unit[block.row + k] = 0.0;
-            act(column, force);
+            act(column);
         }
     }
 }
@@ -37,6 +36,8 @@ FrictionProblem::FrictionProblem(const Program& p, const std::vector<int>& list)
     response.resize(p.mechanism.nv, rows);
     multipliers.resize(p.layout.rows, rows);
     free = VecX::Zero(rows);
+    force = VecX::Zero(p.mechanism.nv);
+    unit = lam = none = VecX::Zero(p.layout.rows);
 }
 
 FrictionProblem::FrictionProblem(const Program& p, Workspace& w, std::vector<int> list) : FrictionProblem(p, list) {
@@ -44,10 +45,9 @@ FrictionProblem::FrictionProblem(const Program& p, Workspace& w, std::vector<int
 }
 
 void FrictionProblem::respond(const Program& p, Workspace& w) {
-    const VecX no_drift = VecX::Zero(p.layout.rows);
-    VecX a(p.mechanism.nv), lam = no_drift;
-    each_unit_force(p, w, elements, [&](int column, const VecX& force) {
-        solve_acceleration(p, w, force, no_drift, a, lam);
+    VecX a(p.mechanism.nv);
+    each_unit_force(p, w, [&](int column) {
+        solve_acceleration(p, w, force, none, a, lam);
         response.col(column) = a;
         multipliers.col(column) = lam;
         W.col(column) = along(p, w, a);
@@ -58,10 +58,8 @@ void FrictionProblem::respond(const Program& p, Workspace& w) {
 void FrictionProblem::respond_in_step(const Program& p, Workspace& w) {
     scaled = !w.now.rows.refine;
     if (!scaled) return respond(p, w);
-    const VecX no_drift = VecX::Zero(p.layout.rows);
-    VecX lam = no_drift;
-    each_unit_force(p, w, elements, [&](int column, VecX& force) {
-        free[column] = solve_scaled(p, w, force, nullptr, no_drift, lam);
+    each_unit_force(p, w, [&](int column) {
+        free[column] = solve_scaled(p, w, force, nullptr, none, lam);
         response.col(column) = force;
         multipliers.col(column) = lam;
     });
@@ -74,21 +72,24 @@ PN_WIDE void gram(const MatX& X, int n, MatX& W) {
         for (int j = 0; j <= i; ++j) W(i, j) = W(j, i) = dot(X.col(i).data(), X.col(j).data(), length);
 }
 
-VecX FrictionProblem::acceleration(const Program& p, Workspace& w, const VecX& f) const {
-    VecX a = response * f;
+void FrictionProblem::acceleration(const Program& p, Workspace& w, const VecX& f, VecX& a) const {
+    a.noalias() = response * f;
     if (scaled) solve_Rt(p.mechanism, w.now.terms, a);
-    return a;
 }
 
 VecX FrictionProblem::along(const Program& p, Workspace& w, const VecX& x) const {
     VecX out(rows);
+    along(p, w, x, out);
+    return out;
+}
+
+void FrictionProblem::along(const Program& p, Workspace& w, const VecX& x, VecX& out) const {
     int at = 0;
     for (int e : elements) {
         const Block& block = block_of(p, e);
         multiply(block, w.now.A, x, w.scratch.r);
         for (size_t k = 0; k < block.kept.size(); ++k) out[at++] = w.scratch.r[block.row + k];
     }
-    return out;
 }
 
 VecX FrictionProblem::slip_accelerations(const Program& p, Workspace& w) const {
@@ -118,7 +119,7 @@ void FrictionProblem::clean(const Program& p, Workspace& w) {
         return;
     }
     W = (0.5 * (W + W.transpose())).eval();
-    each_unit_force(p, w, elements, [&](int i, VecX& force) {
+    each_unit_force(p, w, [&](int i) {
         solve_R(p.mechanism, w.now.terms, force);
         drop_held(i, force.squaredNorm());
     });

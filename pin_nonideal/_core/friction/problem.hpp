@@ -13,6 +13,7 @@ struct FrictionProblem {
     MatX W;            // alpha for a unit of each friction force
     MatX response, multipliers;  // a and lam for it
     VecX free;                   // square of what each force would cause if no constraint held, by the scaled response
+    VecX unit, force, lam, none;  // work
     bool scaled = false;         // the response is a_s = R^T a
 
     // For the factors in the workspace, in which these elements do not stick; alpha0 is left to the caller.
@@ -23,10 +24,11 @@ struct FrictionProblem {
     // responses X.
     void respond_in_step(const Program& p, Workspace& w);
     // Acceleration by friction forces.
-    VecX acceleration(const Program& p, Workspace& w, const VecX& f) const;
+    void acceleration(const Program& p, Workspace& w, const VecX& f, VecX& a) const;
 
     // Rows A x of the elements' directions.
     VecX along(const Program& p, Workspace& w, const VecX& x) const;
+    void along(const Program& p, Workspace& w, const VecX& x, VecX& out) const;
     // Slip accelerations A a - b of the motion at hand.
     VecX slip_accelerations(const Program& p, Workspace& w) const;
     // C += A^T f; each element's part of f becomes its slip force.
@@ -36,6 +38,8 @@ struct FrictionProblem {
     void clean(const Program& p, Workspace& w);
 
 private:
+    template <class Act>
+    void each_unit_force(const Program& p, const Workspace& w, const Act& act);
     void respond(const Program& p, Workspace& w);
     void drop_held(int row, double unconstrained);
 };

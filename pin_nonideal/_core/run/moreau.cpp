@@ -32,7 +32,10 @@ std::vector<int> all_elements(const System& system) {
 Moreau::Moreau(System& system)
     : system_(system), p(system.p), w(system.w), problem_(p, all_elements(system)), modes_(system.ne, unloaded),
       unloaded_(modes_), q_mid_(VecX::Zero(system.nq)), limit_(VecX::Zero(system.ne)), force_limit_(limit_),
-      power_(VecX::Zero(system.nw)) {}
+      power_(VecX::Zero(system.nw)) {
+    problem_.alpha0 = alpha_ = near_ = VecX::Zero(problem_.rows);
+    for (int dim : problem_.dims) boxes_ = boxes_ && dim == 1;
+}
 
 void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
     const Mechanism& m = p.mechanism;
@@ -76,7 +79,7 @@ void Moreau::solve_without_friction(double t) {
 void Moreau::pose_problem() {
     problem_.respond_in_step(p, w);
     problem_.clean(p, w);
-    problem_.alpha0 = problem_.along(p, w, a_free_);
+    problem_.along(p, w, a_free_, problem_.alpha0);
     int at = 0;
     for (const Friction& friction : p.frictions) {
         const RowValues& values = w.now.values[friction.block];
@@ -86,8 +89,10 @@ void Moreau::pose_problem() {
 
 // The motion under the friction forces.
 void Moreau::apply_forces() {
-    w.now.a = a_free_ + problem_.acceleration(p, w, force_);
-    w.now.lam = lam_free_ + problem_.multipliers * force_;
+    problem_.acceleration(p, w, force_, a_friction_);
+    w.now.a = a_free_ + a_friction_;
+    w.now.lam = lam_free_;
+    w.now.lam.noalias() += problem_.multipliers * force_;
     for (int e = 0, at = 0; e < system_.ne; ++e) {
         w.now.slip_force[e] = Vec3::Zero();
         for (int k = 0; k < problem_.dims[e]; ++k) w.now.slip_force[e][k] = force_[at++];
@@ -111,10 +116,9 @@ double Moreau::update_limits(double t) {
 
 // Friction forces, with limits for the load of this very step.
 void Moreau::solve_friction(double t) {
-    VecX near(problem_.rows);  // forces of the last step, whose modes mostly last
-    int at = 0;
+    int at = 0;  // from forces of the last step, whose modes mostly last
     for (const Friction& friction : p.frictions)
-        for (int k = 0; k < friction.dim; ++k) near[at++] = w.state.percussion[p.blocks[friction.block].row + k];
+        for (int k = 0; k < friction.dim; ++k) near_[at++] = w.state.percussion[p.blocks[friction.block].row + k];
     force_.setZero(problem_.rows);
     for (int pass = 0; pass < load_passes; ++pass) {
         // Limits that no load decides need no motion.
@@ -122,8 +126,9 @@ void Moreau::solve_friction(double t) {
         const double change = update_limits(t + 0.5 * h_);
         const double largest = system_.ne > 0 ? std::max(0.0, limit_.maxCoeff()) : 0.0;
         if (pass > 0 && (change <= load_tolerance * largest || !p.needs_reactions)) return;
-        force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_, &near);
-        near = force_;
+        if (problem_.rows > 0 && boxes_) box_.solve(problem_.W, problem_.alpha0, limit_, &near_, force_);
+        else force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_, &near_);
+        near_ = force_;
         force_limit_ = limit_;
         if (pass + 1 == load_passes) throw Failure(Failure::Kind::not_converged, t, problem_.elements);
     }
@@ -131,13 +136,15 @@ void Moreau::solve_friction(double t) {
 
 // Velocity at the step's end, and the modes there: what stays below its limit sticks.
 void Moreau::end_velocity() {
-    const VecX alpha = problem_.alpha0 + problem_.W * force_;
-    v1_ = v0_ + h_ * (a_free_ + problem_.acceleration(p, w, force_));
+    alpha_ = problem_.alpha0;
+    alpha_.noalias() += problem_.W * force_;
+    problem_.acceleration(p, w, force_, a_friction_);
+    v1_ = v0_ + h_ * (a_free_ + a_friction_);
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const int dim = problem_.dims[e];
         w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim) = force_.segment(at, dim);
         const bool held = force_.segment(at, dim).norm() < force_limit_[e] * (1.0 - limit_rounding);
-        modes_[e] = held ? sticking : dim > 1 || alpha[at] > 0.0 ? slip_plus : slip_minus;
+        modes_[e] = held ? sticking : dim > 1 || alpha_[at] > 0.0 ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[e].block];
         if (held && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
     }
@@ -146,13 +153,14 @@ void Moreau::end_velocity() {
 // Work over the step, by the mean velocity. Where a slip turns inside the step its mean velocity may go with the
 // friction that meets its end: that is work of the scheme, not of friction.
 void Moreau::book_work(VecX& y, double& moved_energy) {
-    w.now.lam = lam_free_ + problem_.multipliers * force_;
-    const VecX mean = 0.5 * (v0_ + v1_);
-    powers(p, w, mean, power_.data());  // of all but dry friction, whose modes are still open
-    const VecX slip = problem_.along(p, w, mean);
+    w.now.lam = lam_free_;
+    w.now.lam.noalias() += problem_.multipliers * force_;
+    move_ = 0.5 * (v0_ + v1_);
+    powers(p, w, move_, power_.data());  // of all but dry friction, whose modes are still open
+    problem_.along(p, w, move_, alpha_);
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         double& power = power_[first_law_power + p.frictions[e].law];
-        power += slip.segment(at, problem_.dims[e]).dot(force_.segment(at, problem_.dims[e]));
+        power += alpha_.segment(at, problem_.dims[e]).dot(force_.segment(at, problem_.dims[e]));
         if (!(power > 0.0)) continue;
         moved_energy += h_ * power;
         power = 0.0;

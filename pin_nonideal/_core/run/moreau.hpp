@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "friction/box_program.hpp"
 #include "friction/problem.hpp"
 #include "run/system.hpp"
 
@@ -38,6 +39,9 @@ private:
     std::vector<Mode> modes_, unloaded_;
     double h_ = 0.0;
     VecX q_mid_, v0_, v1_, move_, b_, a_free_, lam_free_;  // free: without friction of the elements
+    VecX a_friction_, alpha_, near_;
+    BoxProgram box_;
+    bool boxes_ = true;  // every element has one direction
     VecX force_, limit_, force_limit_, power_;  // of the elements; force_limit is the one that force was found for
 };
 

@@ -74,7 +74,7 @@ void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, dou
 // Contacts and modes, with the rows that go with them; most of a flight nothing changes.
 void MoreauContacts::select(const std::vector<char>& closed, const std::vector<Mode>& modes) {
     const std::vector<Mode>& now = w.state.mode;
-    const bool flies = w.now.loaded.empty() && w.state.closed == open_ && closed == open_ && now == modes;
+    const bool flies = w.now.loaded.empty() && !any_closed(w.state) && same_bytes(closed, open_) && same_bytes(now, modes);
     if (!flies || w.now.rows.redundant || w.now.rows.orthogonal) return set_contacts(p, w, closed, modes);
     w.now.renew();
 }
@@ -258,8 +258,10 @@ void MoreauContacts::solve(double t) {
         ++w.counters.iterations;
     }
     if (n == 0) apply();
-    w.state.percussion.setZero();
+    if (presses_ || n > 0) w.state.percussion.setZero();
+    presses_ = n > 0;
     for (int i = 0; i < n; ++i) w.state.percussion[p.blocks[rows_[i].block].row + rows_[i].k] = f_[i];
+    if (n == 0) return;
     const ConeResiduals r = ConeComplementarity::residuals(W, w0_.head(n), cones_, f_.head(n));
     w.counters.signorini = std::max(w.counters.signorini, r.signorini);
     w.counters.coulomb = std::max(w.counters.coulomb, r.coulomb);

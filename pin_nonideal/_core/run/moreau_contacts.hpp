@@ -55,7 +55,8 @@ private:
     std::vector<Row> rows_;
     std::vector<Part> parts_;
     std::vector<ConeElement> cones_;
-    bool scaled_ = true;  // the response is a_s = R^T a
+    bool scaled_ = true;   // the response is a_s = R^T a
+    bool presses_ = true;  // there may be percussions of the last step
     VecX q_mid_, v0_, v1_, a_free_, lam_free_, w0_, w1_, f_, power_, unit_, zero_, force_, lam_;
     MatX W_, response_, multipliers_;
     ConeComplementarity solver_;
