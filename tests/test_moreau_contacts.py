@@ -116,6 +116,25 @@ def test_a_pushed_table_slides(feet):
     assert max(run.stats.signorini, run.stats.coulomb, run.stats.dissipation) < 1e-10
 
 
+def test_random_tables_slide_without_a_halt():
+    """Pushed and turned on 4 to 12 feet: what the scheme itself takes is far below the joules that slide."""
+    rng, taken = np.random.default_rng(0), []
+    for _ in range(20):
+        feet, model = int(rng.integers(4, 13)), empty()
+        joint = body(model, 0, pin.JointModelFreeFlyer(), "table", 10.0, inertia=0.3 * np.eye(3))
+        turn = np.sort(rng.uniform(0.0, 2.0 * np.pi, feet))
+        places = np.column_stack([0.3 * np.cos(turn), 0.3 * np.sin(turn), np.full(feet, -0.3)])
+        for k, place in enumerate([*places, np.array([0.05, 0.02, -0.25])]):
+            frame(model, f"at {k}", joint, pin.SE3(np.eye(3), place))
+        contacts = [pn.PointContact(f"at {k}", mu=0.7, static_ratio=1.0) for k in range(feet)]
+        push = [*rng.uniform(-100.0, 100.0, 2), 0.0, 0.0, 0.0, rng.uniform(-8.0, 8.0)]
+        scene = pn.Scene(model, contacts=contacts, forces=[pn.Wrench(f"at {feet}", push)])
+        q = [0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0]
+        run = pn.simulate(scene, 0.3, q=q, method="moreau", dt=1e-3, output_dt=0.3, record="energy")
+        taken.append(np.abs(run.energy["projection"]).max())
+    assert max(taken) < 1e-4  # [J]; a foot that halted the table by mistake took up to 2 J
+
+
 @pytest.mark.parametrize("count", [3, 30])
 def test_contacts_far_off_change_no_bit(count):
     """A whirling pendulum over floors that it does not reach, and one that it does."""

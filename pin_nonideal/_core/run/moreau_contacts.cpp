@@ -269,7 +269,7 @@ void MoreauContacts::solve(double t) {
 }
 
 // Velocity at the step's end, which contacts stay closed, and the modes: what stays below its limit sticks. Whether a
-// force that is rounding beside the others is below its own only the slip tells.
+// force is below it by what is rounding beside the others only the slip tells.
 void MoreauContacts::end_velocity() {
     const int n = static_cast<int>(rows_.size());
     v1_ = v0_ + h_ * w.now.a;
@@ -286,8 +286,9 @@ void MoreauContacts::end_velocity() {
         if (head) closed_[part.gap] = w1_[at] - part.approach <= still;
         if (part.element < 0 || (head && !closed_[part.gap])) continue;
         const double limit = cones_[e].bound * (head ? f_[at] : 1.0);
-        const bool held = limit > clear ? f_.segment(at + head, dim).norm() < limit * (1.0 - limit_rounding)
-                                        : w1_.segment(at + head, dim).norm() <= still;
+        const double size = f_.segment(at + head, dim).norm();
+        const bool rests = w1_.segment(at + head, dim).norm() <= still;
+        const bool held = limit - size > clear || (rests && (limit <= clear || size < limit * (1.0 - limit_rounding)));
         const bool forward = dim > 1 || (dim > 0 && w1_[at + head] > 0.0);
         modes_[part.element] = held && dim > 0 ? sticking : forward ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[part.element].block];
