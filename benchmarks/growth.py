@@ -25,7 +25,7 @@ from .problems import Problem
 
 OURS, ABA, ODEINT, MUJOCO = "pin_nonideal", "pinocchio aba in C++", "aba + odeint in C++", "mujoco"
 MOST_NESTED = 300  # elements of XML in each other that Python writes
-SWAYING = 0.2  # seconds until a humanoid stands still, and less
+SWAYING = 0.2  # seconds in which a humanoid sways, and less
 LEAST_RUN, LONG_RUN = 1e-3, 0.05  # seconds of a turn
 COULOMB: dict[str, Any] = {"coulomb": 0.1}
 LOADED: dict[str, Any] = {"mu": 0.1, "radius": 0.05}

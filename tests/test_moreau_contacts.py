@@ -91,6 +91,70 @@ def test_a_box_on_a_slope_rests_or_slides(slope, rests):
         assert moved > 1e-7
 
 
+@pytest.mark.parametrize("feet", [4, 6, 8, 12])
+def test_a_pushed_table_slides(feet):
+    """Feet on a circle share the load in several ways; v = (F / m - mu g) t whichever of them carry none."""
+    model = empty()
+    joint = body(model, 0, pin.JointModelFreeFlyer(), "table", 10.0, inertia=0.3 * np.eye(3))
+    turn = 2.0 * np.pi * np.arange(feet) / feet
+    places = np.column_stack([0.3 * np.cos(turn), 0.3 * np.sin(turn), np.full(feet, -0.3)])
+    for k, place in enumerate(places):
+        frame(model, f"foot {k}", joint, pin.SE3(np.eye(3), place))
+    frame(model, "middle", joint)
+    mu, push, duration = 0.7, 90.0, 0.5
+    contacts = [pn.PointContact(f"foot {k}", mu=mu) for k in range(feet)]
+    forces = [pn.Wrench("middle", [push, 0, 0, 0, 0, 0])]
+    scene = pn.Scene(model, contacts=contacts, forces=forces)
+    q = [0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0]
+    run = pn.simulate(scene, duration, q=q, method="moreau", dt=1e-3, output_dt=0.05, record="energy")
+    rate = push / 10.0 - mu * GRAVITY
+    rounding = 1e-12  # of a few hundred steps, in m/s and m
+    assert np.abs(run.v[:, 0] - rate * run.t).max() < rounding
+    assert np.abs(run.q[:, 0] - 0.5 * rate * run.t**2).max() < rounding
+    assert np.abs(run.v[:, 1:]).max() < rounding
+    assert np.abs(run.energy["balance"]).max() < 1e-10
+    assert max(run.stats.signorini, run.stats.coulomb, run.stats.dissipation) < 1e-10
+
+
+def test_random_tables_slide_without_a_halt():
+    """Pushed and turned on 4 to 12 feet: what the scheme itself takes is far below the joules that slide."""
+    rng, taken = np.random.default_rng(0), []
+    for _ in range(20):
+        feet, model = int(rng.integers(4, 13)), empty()
+        joint = body(model, 0, pin.JointModelFreeFlyer(), "table", 10.0, inertia=0.3 * np.eye(3))
+        turn = np.sort(rng.uniform(0.0, 2.0 * np.pi, feet))
+        places = np.column_stack([0.3 * np.cos(turn), 0.3 * np.sin(turn), np.full(feet, -0.3)])
+        for k, place in enumerate([*places, np.array([0.05, 0.02, -0.25])]):
+            frame(model, f"at {k}", joint, pin.SE3(np.eye(3), place))
+        contacts = [pn.PointContact(f"at {k}", mu=0.7, static_ratio=1.0) for k in range(feet)]
+        push = [*rng.uniform(-100.0, 100.0, 2), 0.0, 0.0, 0.0, rng.uniform(-8.0, 8.0)]
+        scene = pn.Scene(model, contacts=contacts, forces=[pn.Wrench(f"at {feet}", push)])
+        q = [0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0]
+        run = pn.simulate(scene, 0.3, q=q, method="moreau", dt=1e-3, output_dt=0.3, record="energy")
+        taken.append(np.abs(run.energy["projection"]).max())
+    assert max(taken) < 1e-4  # [J]; a foot that halted the table by mistake took up to 2 J
+
+
+@pytest.mark.parametrize("count", [3, 30])
+def test_contacts_far_off_change_no_bit(count):
+    """A whirling pendulum over floors that it does not reach, and one that it does."""
+    model = empty()
+    half, whole = np.array([0.0, 0.0, -0.5]), pin.SE3(np.eye(3), np.array([0.0, 0.0, -1.0]))
+    rod = {"lever": half, "inertia": np.diag([0.08, 0.08, 0.01])}
+    upper = body(model, 0, pin.JointModelRY(), "upper", 1.0, **rod)
+    lower = body(model, upper, pin.JointModelRY(), "lower", 1.0, place=whole, **rod)
+    frame(model, "tip", lower, whole)
+    near = pn.PointContact("tip", mu=0.1, height=-1.5, restitution=0.3)
+    far = [pn.PointContact("tip", mu=0.5, height=-2.1 - 0.1 * k, name=f"far {k}") for k in range(count)]
+    runs = [
+        pn.simulate(pn.Scene(model, contacts=contacts), 2.0, q=[1.9, 0.2], method="moreau", dt=1e-3)
+        for contacts in ([near], [near, *far])
+    ]
+    assert len(runs[0].events) >= 2
+    assert np.array_equal(runs[0].q, runs[1].q)
+    assert np.array_equal(runs[0].v, runs[1].v)
+
+
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_a_ball_bounces_and_rests(restitution):
     contact = pn.PointContact("mass", restitution=restitution)

@@ -95,6 +95,41 @@ for k in range(6):  # a box on its corners: contacts that open, stick and slide,
     solved(1, True)
     for warm in (False, True):
         found[f"cones {k} {warm}"] = [solved(10, warm), solved(1010, warm)]
+
+
+def stepped(scene, steps, **state):  # a run of time stepping with a sample at both ends
+    before, length = allocations.value, steps * 1e-3
+    options = {"method": "moreau", "dt": 1e-3, "output_dt": length, "progress": False}
+    pn.simulate(scene, length, **options, **state)
+    return allocations.value - before
+
+
+def rubbing_humanoid():  # on two feet, held by a controller, with dry friction in all joints
+    talos = pn.load("talos")
+    model = talos.model
+    scene = pn.Scene(
+        model,
+        constraints=[pn.FrameAnchor("left_sole_link"), pn.FrameAnchor("right_sole_link")],
+        laws=[pn.JointFriction(joint, coulomb=20.0) for joint in list(model.names)[2:]],
+        actuation=pn.HoldPosition(kp=500.0, kd=20.0),
+        q0=talos.q0,
+    )
+    bent = np.concatenate([np.zeros(6), 0.02 * np.random.default_rng(3).standard_normal(model.nv - 6)])
+    return scene, *scene.project(pin.integrate(model, scene.q0, bent), np.zeros(model.nv))
+
+
+solo = pn.load("solo12_dropped")
+landed = pn.simulate(solo, 1.5, method="moreau", dt=1e-3, output_dt=1.5, progress=False)
+humanoid, q, v = rubbing_humanoid()
+arm = pn.load("panda_friction")
+for name, scene, state in [
+    ("standing contacts", solo, {"q": landed.q[-1], "v": landed.v[-1]}),
+    ("landing contacts", solo, {}),
+    ("friction in joints", arm, {}),
+    ("friction beside constraints", humanoid, {"q": q, "v": v}),
+]:
+    stepped(scene, 500, **state)
+    found[name] = [min(stepped(scene, steps, **state) for _ in range(3)) for steps in (100, 400)]
 found["the counter itself"] = [0, allocations.value]
 print(json.dumps(found))
 """
@@ -102,6 +137,7 @@ print(json.dumps(found))
 ROBOTS = ["four_bar", "delta", "solo12_standing", "panda_friction", "n_four_bar", "rolling_disk", "five_bar"]
 ROBOTS.append("deep_ring")
 NAMES = [f"{name}:{terms}" for terms in ("core", "pinocchio") for name in ROBOTS]
+STEPS = ["standing contacts", "landing contacts", "friction in joints", "friction beside constraints"]
 CONES = [f"cones {k} {warm}" for k in range(6) for warm in (False, True)]
 
 
@@ -142,3 +178,10 @@ def test_an_evaluation_allocates_nothing(counts, name):
 def test_a_contact_problem_allocates_nothing(counts, name):
     few, many = counts[name]
     assert many - few == 0, f"{(many - few) / 1000} allocations a solve"
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_a_step_of_time_stepping_allocates_nothing(counts, name):
+    few, many = counts[name]
+    between = 0.1  # a step: what the interpreter takes as it looks for Ctrl-C every few of them
+    assert many - few < between * 300, f"{(many - few) / 300} allocations a step"

@@ -47,10 +47,10 @@ forces: given_forces laws mode friction
 dynamics: failure program numbers reaction_equation reaction_roots workspace \
 given_forces law_forces solution \
 reactions split slip unknowns uniqueness implicit power evaluation projection step_start
-friction: box_program lorentz cone_program dense_solver cone_problem cone_newton cone_path cone_shares \
+friction: dense_solver box_program lorentz cone_program cone_problem cone_newton cone_path cone_shares \
 cone_certificate cone_complementarity rest_equation rest_solver rest_branches problem rest_problem \
 beginning modes continuation
-contact: gaps reach separation contact_rows impact resting closing
+contact: gaps far_gaps reach separation contact_rows impact resting closing
 run: archive method step outside_step step_control runge_kutta system semi_implicit_euler error_norm \
 collocation stepper gap_search moreau moreau_contacts dense_output recorder inside_samples checkpoint \
 options output stiffness rounding event_search event_location events stepper_choice bouncing notices \

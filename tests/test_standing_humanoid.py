@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.optimize import lsq_linear
 
 import pin_nonideal as pn
 from pin_nonideal.actuation import Table
@@ -74,12 +75,12 @@ MOREAU = {"method": "moreau", "dt": 1e-3}
 
 def test_time_stepping_stands_still() -> None:
     """Once all is held no step changes a bit; a callback, which might push, has each one taken: the same."""
-    scene = standing(20.0, 500.0, 20.0)
+    scene = standing(40.0, 500.0, 20.0)
     bent = np.concatenate([np.zeros(6), 0.02 * np.random.default_rng(1).standard_normal(scene.model.nv - 6)])
     q, v = scene.project(pin.integrate(scene.model, scene.q0, bent), np.zeros(scene.model.nv))
-    run = pn.simulate(scene, 0.4, q, v, **MOREAU, record=("energy", "a"))
-    stepped = pn.simulate(scene, 0.4, q, v, **MOREAU, record=("energy", "a"), callback=lambda t, q, v: None)
-    rest = run.t > 0.3
+    run = pn.simulate(scene, 1.0, q, v, **MOREAU, record=("energy", "a"))
+    stepped = pn.simulate(scene, 1.0, q, v, **MOREAU, record=("energy", "a"), callback=lambda t, q, v: None)
+    rest = run.t > 0.9
     assert (run.v[rest] == 0.0).all()
     assert (run.a[rest] == 0.0).all()
     assert (run.q[rest] == run.q[-1]).all()
@@ -108,3 +109,34 @@ def test_what_stands_is_moved_by_what_begins_to_push(late: str) -> None:
     run = pn.simulate(scene, 0.2, **MOREAU)
     assert (run.q[run.t < 0.03] == [0.3, 0.4]).all()
     assert np.abs(run.q[-1] - [0.3, 0.4]).max() > 0.01
+
+
+@pytest.mark.parametrize("seed", [1, 2, 5, 6])
+def test_sinks_as_friction_lets_it(seed: int) -> None:
+    """From rest, by Gauss's principle: the least |R^T a|^2 over friction within its limits.
+
+    What sticks in a leg is told by the accelerations of legs, not by those of a wrist that is much lighter.
+    """
+    limit, kp = 20.0, 500.0
+    scene = standing(limit, kp, 20.0)
+    model = scene.model
+    bent = np.concatenate([np.zeros(6), 0.02 * np.random.default_rng(seed).standard_normal(model.nv - 6)])
+    q, v = scene.project(pin.integrate(model, scene.q0, bent), np.zeros(model.nv))
+    data = model.createData()
+    M = pin.crba(model, data, q)
+    R = np.linalg.cholesky(np.triu(M) + np.triu(M, 1).T)
+    tau = np.zeros(model.nv)
+    tau[6:] = kp * pin.difference(model, q, scene.q0)[6:]
+    feet = [pin.computeFrameJacobian(model, data, q, model.getFrameId(sole), pin.LOCAL) for sole in SOLES]
+    B = np.linalg.solve(R, np.vstack(feet).T)
+    free = np.eye(model.nv) - B @ np.linalg.pinv(B)
+    X = free @ np.linalg.solve(R, np.eye(model.nv)[:, 6:])
+    given = free @ np.linalg.solve(R, tau - pin.nonLinearEffects(model, data, q, 0.0 * v))
+    friction = lsq_linear(X, -given, (-limit, limit), method="bvls", tol=1e-16, max_iter=5000).x
+    a = np.linalg.solve(R.T, given + X @ friction)
+    dt = 1e-5
+    step = pn.simulate(scene, dt, q, v, method="moreau", dt=dt)
+    start = pn.simulate(scene, dt, q, v, record="a")
+    assert a[2] < -2.0  # it sinks
+    np.testing.assert_allclose(step.v[-1] / dt, a, rtol=0, atol=1e-4 * np.abs(a).max())
+    np.testing.assert_allclose(start.a[0], a, rtol=0, atol=1e-4 * np.abs(a).max())

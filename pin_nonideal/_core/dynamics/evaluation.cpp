@@ -39,7 +39,7 @@ void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q,
 }
 
 // Residuals and A, Eq. (3); and the users' own b.
-static void place_rows(const Program& p, Workspace& w, double t, const VecX& v) {
+void place_rows(const Program& p, Workspace& w, double t, const VecX& v) {
     if (w.now.awake.empty()) return;
     const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
     for (int i : w.now.awake) {
@@ -92,6 +92,13 @@ void configure(const Program& p, Workspace& w, double t, const VecX& q, const Ve
     if (!p.blocks.empty()) factor_placed_rows(p, w, t, v);
 }
 
+void place(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    w.now.renew();
+    place_bodies(p.mechanism, w.now.terms, q);
+    mass_matrix(p.mechanism, w.now.terms);
+    place_rows(p, w, t, v);
+}
+
 void configure_velocity(const Program& p, Workspace& w, double t, const VecX& v) {
     if (!p.affine_rates) factor_placed_rows(p, w, t, v);
 }
@@ -124,8 +131,7 @@ void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v) {
 // Where closed contacts carry the weight, accelerations of rounding are none: M a below the rounding of the forces that
 // add up to it.
 static bool is_balanced(const Program& p, Workspace& w) {
-    const auto closed = std::find(w.state.closed.begin(), w.state.closed.end(), char(1));
-    if (closed == w.state.closed.end() || p.moves_in_time) return false;
+    if (!any_closed(w.state) || p.moves_in_time) return false;
     if (w.now.a.cwiseAbs().maxCoeff() <= balance_rounding * p.mechanism.gravity.norm()) return true;
     VecX &left = w.scratch.work, &size = w.scratch.trial;
     multiply_M(p.mechanism, w.now.terms, w.now.a, left);
@@ -160,7 +166,10 @@ void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const Vec
 }
 
 void evaluate_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) {
-    const int i = p.gaps[gap].block;
+    evaluate_block(p, w, t, v, p.gaps[gap].block);
+}
+
+void evaluate_block(const Program& p, Workspace& w, double t, const VecX& v, int i) {
     const Block& block = p.blocks[i];
     RowValues& values = w.now.values[i];
     const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};

@@ -11,13 +11,17 @@ void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const Vec
 // The part of it that the configuration decides: placements, M and the rows, with their factors. A user's own A may
 // depend on v; where it does, a change of v has it taken anew.
 void configure(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
+// Placements, M and the rows alone; their factors stay.
+void place(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 void configure_velocity(const Program& p, Workspace& w, double t, const VecX& v);
 // The rest, which needs the velocity: bias and given forces F, and b; then C, a and lam.
 void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v);
 void solve_dynamics(const Program& p, Workspace& w, double t, const VecX& v);
 
-// Kinematics and rows alone; rows of bodies in motion; residuals of the constraints, and no more than they need.
+// Kinematics and rows alone; rows of bodies in their places, without their motion; rows of bodies in motion; residuals of
+// the constraints, and no more than they need.
 void update_kinematics(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
+void place_rows(const Program& p, Workspace& w, double t, const VecX& v);
 void evaluate_rows(const Program& p, Workspace& w, double t, const VecX& v);
 void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 
@@ -26,6 +30,8 @@ void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q,
 void measure_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
 void follow_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
 void evaluate_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
+// Of any block, for bodies in motion.
+void evaluate_block(const Program& p, Workspace& w, double t, const VecX& v, int block);
 
 // Largest residual and rate over all rows of all descriptions at the state last evaluated; of contacts that may open
 // the depth, and the rate of closed ones.

@@ -204,8 +204,7 @@ struct Implicit : Unknowns {
 
 // Whether any law acts: friction of contacts does not where all are open.
 static bool acts(const Program& p, const Workspace& w) {
-    const auto& closed = w.state.closed;
-    return !p.rubs_while_closed || std::find(closed.begin(), closed.end(), char(1)) != closed.end();
+    return !p.rubs_while_closed || any_closed(w.state);
 }
 
 // Loads that the ideal motion gives, as the paper's Example (c) takes them; their laws are then known.

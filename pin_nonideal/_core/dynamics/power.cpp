@@ -1,5 +1,7 @@
 #include "dynamics/power.hpp"
 
+#include <algorithm>
+
 #include "dynamics/law_forces.hpp"
 #include "dynamics/reactions.hpp"
 #include "dynamics/slip.hpp"
@@ -45,6 +47,10 @@ void powers(const Program& p, Workspace& w, const VecX& v, double* out) {
         out[2] = v.dot(w.scratch.work);
     }
     if (!p.has_laws()) return;
+    if (p.rubs_while_closed && w.now.slipping.empty()) {
+        std::fill_n(out + first_law_power, p.law_names.size(), 0.0);
+        return;
+    }
     std::vector<VecX>& force = w.scratch.law_force;
     moving_law_forces(p, w, v, force);
     for (size_t l = 0; l < p.law_names.size(); ++l) out[first_law_power + l] = v.dot(force[l]);

@@ -29,39 +29,45 @@ void least_move(const Program& p, Workspace& w, VecX& x) {
     solve_Rt(p.mechanism, w.now.terms, x);
 }
 
-// Takes a residual or rate of each kept row into r, negative; returns the largest of the rows in use.
+// Takes a residual or rate of each kept row into r, negative; returns the largest of the rows that count.
 template <class Value>
-double gather(const Program& p, Workspace& w, Value value) {
+double gather(const Program& p, Workspace& w, const std::vector<char>& counts, Value value) {
     double largest = 0.0;
     for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
         for (size_t k = 0; k < block.kept.size(); ++k) {
             const double x = value(i, static_cast<int>(k));
             w.scratch.r[block.row + k] = -x;
-            if (w.now.rows.active[block.row + k]) largest = std::max(largest, std::abs(x));
+            if (counts[block.row + k]) largest = std::max(largest, std::abs(x));
         }
     }
     return largest;
 }
 
-double gather_residuals(const Program& p, Workspace& w) {
-    return gather(p, w, [&](int i, int k) { return w.now.values[i].residual[p.blocks[i].kept[k]]; });
+double gather_residuals(const Program& p, Workspace& w, const std::vector<char>& counts) {
+    return gather(p, w, counts, [&](int i, int k) { return w.now.values[i].residual[p.blocks[i].kept[k]]; });
 }
 
+double gather_residuals(const Program& p, Workspace& w) { return gather_residuals(p, w, w.now.rows.active); }
+
 // A v + phi_t by the rows in the workspace, which needs no motion of the bodies; a user's rate is his own function.
-double gather_rates(const Program& p, Workspace& w, double t, const VecX& v) {
+double gather_rates(const Program& p, Workspace& w, double t, const VecX& v, const std::vector<char>& counts) {
     const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
     for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
         if (block.affine_rate) multiply(block, w.now.A, v, w.scratch.residual);
         else evaluate(block.kind, state, Part::motion, w.now.values[i]);
     }
-    return gather(p, w, [&](int i, int k) {
+    return gather(p, w, counts, [&](int i, int k) {
         const Block& block = p.blocks[i];
         const RowValues& values = w.now.values[i];
         if (!block.affine_rate) return values.rate[block.kept[k]];
         return w.scratch.residual[block.row + k] + values.phi_t[block.kept[k]];
     });
+}
+
+double gather_rates(const Program& p, Workspace& w, double t, const VecX& v) {
+    return gather_rates(p, w, t, v, w.now.rows.active);
 }
 
 // Whether factors of the new place are worth their cost when each iteration goes on to take as much as the last did.
@@ -180,16 +186,17 @@ bool is_on_constraints(const Program& p, Workspace& w, double t, const VecX& q, 
     return gather_rates(p, w, t, v) <= velocity_floor(w, v);
 }
 
-bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
+bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v, bool configured,
+                      bool keeps_factors) {
     w.now.closing_lam.setZero();
     double largest = 0.0, floor = 0.0;
     if (!w.now.rows.blocks.empty()) {
-        evaluate_residuals(p, w, t, q, v);
+        if (!configured) evaluate_residuals(p, w, t, q, v);
         largest = gather_residuals(p, w);
         floor = position_floor(p, w);
     }
     const bool moves = largest > floor;
-    bool configured = false;
+    configured &= !moves;
     int count = 0;      // steps since the factors were taken
     double rate = 1.0;  // of the largest residual, by the last of them
     for (int it = 0; it < projection_limit && largest > floor; ++it) {
@@ -220,7 +227,10 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
         largest = now;
     }
     if (count > 0 && static_cast<int>(p.constrained_dofs.size()) < p.mechanism.nv) move_position(p, w, q);
-    if (!configured) configure(p, w, t, q, v);
+    // In deep trees M and its factor are one.
+    const bool serves = p.affine_rates && w.now.rows.distance >= near_singular && p.mechanism.deep_dofs.empty();
+    if (!configured && keeps_factors && serves) place(p, w, t, q, v);
+    else if (!configured) configure(p, w, t, q, v);
     if (moves) ++w.counters.projections;
     return moves;
 }
@@ -241,9 +251,9 @@ static double dependent_residual(const Program& p, const Workspace& w) {
 
 bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
     if (!w.now.rows.redundant) return false;
-    const std::vector<Mode> modes = w.state.mode;
-    if (std::find(modes.begin(), modes.end(), sticking) == modes.end()) return false;
+    if (std::find(w.state.mode.begin(), w.state.mode.end(), sticking) == w.state.mode.end()) return false;
     if (dependent_residual(p, w) <= creeping_gap * scene_size(p, w)) return false;
+    const std::vector<Mode> modes = w.state.mode;
     std::vector<Mode> released = modes;
     std::replace(released.begin(), released.end(), sticking, unloaded);
     set_modes(p, w, released);
@@ -273,9 +283,29 @@ static void rest_alone(const Program& p, const Workspace& w, VecX& v) {
     }
 }
 
-bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
+static void stop_locked(const Program& p, const Workspace& w, VecX& v) {
     for (int dof = 0; dof < p.mechanism.nv; ++dof)
         if (w.now.terms.locked[dof]) v[dof] = 0.0;  // what sticks has exactly no velocity
+}
+
+bool keeps_to_rows(const Program& p, Workspace& w, double t, const VecX& q, VecX& v) {
+    stop_locked(p, w, v);
+    if (w.now.rows.blocks.empty()) return true;
+    w.now.closing_lam.setZero();
+    const double fastest = v.cwiseAbs().maxCoeff();
+    if (!p.affine_rates || fastest > slow_speed) return false;
+    // Whether nothing can move is for the rows to tell that are independent.
+    if (fastest <= immobile_speed && (fastest > 0.0 || p.gaps.empty()) && is_immobile(p, w)) return false;
+    place_bodies(p.mechanism, w.now.terms, q);
+    place_rows(p, w, t, v);
+    if (gather_residuals(p, w, w.now.rows.required) > projection_floor * scene_size(p, w)) return false;
+    if (gather_rates(p, w, t, v, w.now.rows.required) > projection_floor) return false;
+    rest_alone(p, w, v);
+    return true;
+}
+
+bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
+    stop_locked(p, w, v);
     if (w.now.rows.blocks.empty()) return false;
     const double floor = velocity_floor(w, v);
     double last = gather_rates(p, w, t, v);

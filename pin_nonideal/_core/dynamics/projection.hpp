@@ -20,6 +20,8 @@ constexpr double trusted_part = 0.5;
 constexpr double falling_square = 0.01;
 // Where nothing can move, a velocity below this [rad/s or m/s] is what the last event left by rounding.
 constexpr double immobile_speed = 1e-8;
+// Slower than this [rad/s or m/s] rows turn by rounding only over a step of time stepping.
+constexpr double slow_speed = 1e-5;
 
 // A larger gap than this part of the scene's size that projection leaves has opened for good: after every step it comes
 // down to rounding, in singular positions too.
@@ -38,12 +40,19 @@ void learn_third_order(Workspace& w, double h);
 // Each returns false when nothing had to move.
 // Moves q; the workspace must hold factors near (t, q), and is left configured there. v is only what a user's own rows are
 // shown.
-bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
+// `configured`: it is there already. `keeps_factors`: where these serve they stay those of the place before, for a velocity
+// that is to be projected and no more; M and the rows are those of q.
+bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v, bool configured = false,
+                      bool keeps_factors = false);
 // Closes what rows that count as dependent have left open, where elements stick: these hold them by too small a part of
 // their forces to be kept (rank_tolerance_sticking), and creep by as little.
 bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 // Moves v; the workspace must be configured at (t, q).
 bool project_velocity(const Program& p, Workspace& w, double t, VecX& v);
+// Whether both keep to the rows in use as they are, rows that count as dependent among them, of a state that moves too
+// slowly to leave them by more than rounding over a step; no factors are taken. What sticks alone has exactly no velocity
+// then.
+bool keeps_to_rows(const Program& p, Workspace& w, double t, const VecX& q, VecX& v);
 // Whether both are on the constraints as they are, as projecting would find them; rows and rates are evaluated, and no
 // factors taken.
 bool is_on_constraints(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);

@@ -26,18 +26,26 @@ static PN_INLINE void row_residuals(const Program& p, const Evaluation& now, con
     }
 }
 
-static PN_INLINE void solve_scaled_motion(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b,
-                                          VecX& lam) {
+// Takes x as R^-1 (F + C).
+static PN_INLINE void follow_rows(const Program& p, Workspace& w, VecX& x, const VecX& b, VecX& lam) {
     Evaluation& now = w.now;
-    solve_R(p.mechanism, now.terms, x, body);  // a_s' = R^-1 (F + C), Eq. (5)
     if (now.rows.blocks.empty()) return;
     row_residuals(p, now, now.B, x, b, w.scratch.r);
     solve_rows(p.layout, now.rows, w.scratch.r, lam);  // J B^T (b - B a_s') = B^T lam, Eqs. (38), (39)
     for (int i : now.rows.blocks) add_transpose(p.blocks[i], now.B, lam, x);  // scaled, Eq. (40)
 }
 
-void solve_scaled(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b, VecX& lam) {
-    solve_scaled_motion(p, w, x, body, b, lam);
+static PN_INLINE void solve_scaled_motion(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b,
+                                          VecX& lam) {
+    solve_R(p.mechanism, w.now.terms, x, body);  // a_s' = R^-1 (F + C), Eq. (5)
+    follow_rows(p, w, x, b, lam);
+}
+
+double solve_scaled(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b, VecX& lam) {
+    solve_R(p.mechanism, w.now.terms, x, body);
+    const double free = x.squaredNorm();
+    follow_rows(p, w, x, b, lam);
+    return free;
 }
 
 // x, a force, becomes the acceleration under it and the constraints A a = b; lam are their multipliers.

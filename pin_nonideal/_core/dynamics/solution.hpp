@@ -10,7 +10,8 @@ namespace pn {
 void scale_rows(const Program& p, Workspace& w);
 
 // x, a force, becomes a_s, the acceleration scaled by R; lam are the multipliers.
-void solve_scaled(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b, VecX& lam);
+// Returns the square of what it would be without rows.
+double solve_scaled(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b, VecX& lam);
 // Acceleration and multipliers under a generalized force and right-hand side b, by the factors in the workspace; refined
 // where light bodies spoil them. `body` adds forces on the bodies of deep trees.
 void solve_acceleration(const Program& p, Workspace& w, const VecX& force, const VecX& b, VecX& a, VecX& lam,

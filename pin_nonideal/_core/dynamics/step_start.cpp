@@ -82,8 +82,7 @@ static void choose_rows(const Program& p, Workspace& w) {
     ++w.counters.factorizations;
 }
 
-// Chooses the rows of a step where the factors found there ask for it; returns whether it did.
-static bool configure_step(const Program& p, Workspace& w) {
+bool configure_step(const Program& p, Workspace& w) {
     w.state.ideal_decided = false;
     if (w.now.rows.blocks.empty() || !w.now.rows.orthogonal) return false;
     choose_rows(p, w);
@@ -146,9 +145,9 @@ void keep_moving(const Program& p, Workspace& w, double t, const VecX& v) {
     if (tolerance >= most_unheld) choose(rank_tolerance_sticking);
 }
 
-void begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     configure(p, w, t, q, v);
-    configure_step(p, w);
+    return configure_step(p, w);
 }
 
 void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
@@ -156,12 +155,16 @@ void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX&
     project(p, w, t, q, v);
 }
 
-bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v) {
+bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v, bool chosen, bool evaluates) {
     if (w.state.steps_since != never_decided) ++w.state.steps_since;
-    const bool chosen = configure_step(p, w);
     const bool moved = project_velocity(p, w, t, v);
-    move_step(p, w, t, v, chosen);
+    if (evaluates) move_step(p, w, t, v, chosen);
     return moved;
+}
+
+bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v) {
+    const bool chosen = configure_step(p, w);
+    return begin_step_on_rates(p, w, t, v, chosen, true);
 }
 
 }  // namespace pn

@@ -8,10 +8,15 @@ namespace pn {
 // Evaluates and decides which rows are independent; contradicting rows are a failure.
 void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 // The part of it that needs no forces: configures, and decides which rows are independent.
-void begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
+// Returns whether it chose among them.
+bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
+// Only that, where the workspace is configured.
+bool configure_step(const Program& p, Workspace& w);
 // An evaluation that decides them too, where the workspace is configured, after v was brought to A v + phi_t = 0; returns
 // whether v moved.
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v);
+// The same with rows that were chosen there, or not; without the evaluation where nobody asks for it.
+bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v, bool chosen, bool evaluates);
 // Where modes have changed and rows just chosen would stop what moves: those that elements which stick hold by hardly any
 // of their forces count as dependent from here on. The workspace must be evaluated at (q, v), and is so after.
 void keep_moving(const Program& p, Workspace& w, double t, const VecX& v);

@@ -2,6 +2,8 @@
 // last evaluation found, Scratch means nothing after the call that wrote it.
 #pragma once
 
+#include <cstring>
+
 #include "constraints/rank.hpp"
 #include "dynamics/program.hpp"
 #include "dynamics/reaction_equation.hpp"
@@ -132,6 +134,16 @@ void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes);
 void set_closed(const Program& p, Workspace& w, const std::vector<char>& closed);
 // Both at once.
 void set_contacts(const Program& p, Workspace& w, const std::vector<char>& closed, const std::vector<Mode>& modes);
+// Of modes or flags.
+template <class Byte>
+bool same_bytes(const std::vector<Byte>& a, const std::vector<Byte>& b) {
+    static_assert(sizeof(Byte) == 1);
+    return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size()) == 0);
+}
+// Whether any contact that may open is closed.
+inline bool any_closed(const RunState& state) {
+    return !state.closed.empty() && std::memchr(state.closed.data(), 1, state.closed.size());
+}
 // Whether an element rubs at a contact that is open.
 inline bool is_open(const Program& p, const Workspace& w, int element) {
     const int gap = p.frictions[element].gap;

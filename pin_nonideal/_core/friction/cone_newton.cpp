@@ -118,19 +118,44 @@ void ConeNewton::differentiate(const ConeProblem& p, const Eigen::Ref<const VecX
 }
 
 // A step as long as it makes the error smaller; false where none does and no more blind ones are left.
-bool ConeNewton::advance(const ConeProblem& p, Eigen::Ref<VecX> f, double merit) {
+bool ConeNewton::advance(const ConeProblem& p, Eigen::Ref<VecX> f, double& merit) {
     auto step = step_.vector(p.n), ahead = ahead_.vector(p.n);
     double length = 1.0;
     for (int halving = 0; halving < most_halvings; ++halving, length *= 0.5) {
         ahead = f - length * step;
-        if (evaluate(p, ahead) < (1.0 - 2.0 * enough * length) * merit) {
+        const double there = evaluate(p, ahead);
+        if (there < (1.0 - 2.0 * enough * length) * merit) {
             f = ahead;
+            merit = there;
             return true;
         }
     }
     if (++blind_ > most_blind) return false;
     f -= step;
-    return evaluate(p, f) < HUGE_VAL;
+    merit = evaluate(p, f);
+    return merit < HUGE_VAL;
+}
+
+// Whether the equations at f are others than those that were factored last. What slips has some of its own everywhere.
+bool ConeNewton::changes_piece(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
+    constexpr signed char curved = -1, unknown = -2;
+    const auto w = w_.vector(p.n);
+    piece_.resize(p.size(), unknown);
+    bool changes = false;
+    for (int e = 0; e < p.size(); ++e) {
+        const ConeElement& element = p.elements[e];
+        signed char now = 0;
+        if (!element.is(Kind::equality)) {
+            const int i = p.at[e];
+            const bool closed = element.is(Kind::contact) && f[i] > p.stiffness(e) * w[i];
+            const Disk disk = disk_of(p, e, f, w);
+            const bool sticks = disk.sticks() && disk.radius > 0.0;
+            now = disk.dim == 0 || sticks || disk.radius == 0.0 ? static_cast<signed char>(1 + 2 * closed + sticks) : curved;
+        }
+        changes |= now == curved || now != piece_[e];
+        piece_[e] = now;
+    }
+    return changes;
 }
 
 double ConeNewton::solve(const ConeProblem& p, Eigen::Ref<VecX> f, int most_steps) {
@@ -142,12 +167,13 @@ double ConeNewton::solve(const ConeProblem& p, Eigen::Ref<VecX> f, int most_step
     int stalled = 0;
     regular_ = false;
     for (int it = 0; it < most_steps && last > rounding; ++it, ++steps_) {
-        differentiate(p, f);
-        solver_.factor(J);
-        regular_ = solver_.regular();
+        if (changes_piece(p, f) || it == 0) {
+            differentiate(p, f);
+            solver_.factor(J);
+            regular_ = solver_.regular();
+        }
         solver_.solve(F, step);
         if (!advance(p, f, merit)) break;
-        merit = evaluate(p, f);
         const double now = relative(p, f);
         if (now < least) {
             least = now;

@@ -21,10 +21,12 @@ private:
     double evaluate(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
     double relative(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
     void differentiate(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
-    bool advance(const ConeProblem& problem, Eigen::Ref<VecX> f, double merit);
+    bool advance(const ConeProblem& problem, Eigen::Ref<VecX> f, double& merit);
+    bool changes_piece(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
 
     DenseSolver solver_;
     Buffer J_, F_, w_, step_, ahead_, best_, size_;
+    std::vector<signed char> piece_;  // of the equations that were factored: modes, where these are all linear
     bool regular_ = false;
     int steps_ = 0, blind_ = 0;
 };

@@ -8,9 +8,8 @@ namespace pn {
 
 namespace {
 
-// Part of the largest entry below which a pivot of the elimination no longer tells a full rank, and below which what
-// orthogonal factors leave of a column is rounding.
-constexpr double regular_pivot = 1e-9, rank_tolerance = 1e-12;
+// Part of the largest entry below which a pivot of the elimination no longer tells a full rank.
+constexpr double regular_pivot = 1e-9;
 
 // The reflector that makes of x = (x0, rest) the vector (beta, 0): I - tau (1, u)(1, u)^T, u in place of rest.
 template <class Rest>
@@ -50,7 +49,7 @@ bool DenseSolver::eliminate(const Eigen::Ref<const MatX>& A) {
     return true;
 }
 
-void DenseSolver::factor_orthogonally(const Eigen::Ref<const MatX>& A) {
+void DenseSolver::factor_orthogonally(const Eigen::Ref<const MatX>& A, double tolerance) {
     regular_ = false;
     n_ = static_cast<int>(A.rows());
     auto F = factors_.matrix(n_, n_);
@@ -69,7 +68,7 @@ void DenseSolver::factor_orthogonally(const Eigen::Ref<const MatX>& A) {
         }
         length = std::sqrt(length);
         largest = std::max(largest, length);
-        if (!(length > rank_tolerance * largest)) break;
+        if (!(length > tolerance * largest)) break;
         if (best != k) {
             F.col(k).swap(F.col(best));
             std::swap(order_[k], order_[best]);

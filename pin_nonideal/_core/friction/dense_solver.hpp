@@ -30,11 +30,13 @@ private:
 
 class DenseSolver {
 public:
+    static constexpr double rank_tolerance = 1e-12;
+
     // By elimination, and where its pivots fall below `regular_pivot` of their rows by orthogonal factors, with the
     // rank by `rank_tolerance`.
     void factor(const Eigen::Ref<const MatX>& A);
-    // Orthogonal factors whatever the pivots.
-    void factor_orthogonally(const Eigen::Ref<const MatX>& A);
+    // Orthogonal factors whatever the pivots; columns of which they leave no more than this part of the largest are none.
+    void factor_orthogonally(const Eigen::Ref<const MatX>& A, double tolerance = rank_tolerance);
     bool regular() const { return regular_; }
     int rank() const { return rank_; }
     // x of least norm with A x = r, or the nearest to it where none is. x may be r.

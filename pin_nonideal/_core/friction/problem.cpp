@@ -1,6 +1,7 @@
 #include "friction/problem.hpp"
 
 #include "dynamics/solution.hpp"
+#include "math/lanes.hpp"
 #include "tree/factor.hpp"
 
 namespace pn {
@@ -10,10 +11,9 @@ constexpr double least_response = 1e-13;
 
 static const Block& block_of(const Program& p, int element) { return p.blocks[p.frictions[element].block]; }
 
-// Calls act(column, force) with the generalized force of a unit of each friction force in turn, which it may change.
+// Calls act(column) with `force` the generalized force of a unit of each friction force in turn, which it may change.
 template <class Act>
-static void each_unit_force(const Program& p, const Workspace& w, const std::vector<int>& elements, const Act& act) {
-    VecX force(p.mechanism.nv), unit = VecX::Zero(p.layout.rows);
+void FrictionProblem::each_unit_force(const Program& p, const Workspace& w, const Act& act) {
     int column = 0;
     for (int e : elements) {
         const Block& block = block_of(p, e);
@@ -22,7 +22,7 @@ static void each_unit_force(const Program& p, const Workspace& w, const std::vec
             unit[block.row + k] = 1.0;
             add_transpose(block, w.now.A, unit, force);
             unit[block.row + k] = 0.0;
-            act(column, force);
+            act(column);
         }
     }
 }
@@ -35,13 +35,19 @@ FrictionProblem::FrictionProblem(const Program& p, const std::vector<int>& list)
     W.resize(rows, rows);
     response.resize(p.mechanism.nv, rows);
     multipliers.resize(p.layout.rows, rows);
+    free = VecX::Zero(rows);
+    force = VecX::Zero(p.mechanism.nv);
+    unit = lam = none = VecX::Zero(p.layout.rows);
 }
 
 FrictionProblem::FrictionProblem(const Program& p, Workspace& w, std::vector<int> list) : FrictionProblem(p, list) {
-    const VecX no_drift = VecX::Zero(p.layout.rows);
-    VecX a(p.mechanism.nv), lam = no_drift;
-    each_unit_force(p, w, elements, [&](int column, const VecX& force) {
-        solve_acceleration(p, w, force, no_drift, a, lam);
+    respond(p, w);
+}
+
+void FrictionProblem::respond(const Program& p, Workspace& w) {
+    VecX a(p.mechanism.nv);
+    each_unit_force(p, w, [&](int column) {
+        solve_acceleration(p, w, force, none, a, lam);
         response.col(column) = a;
         multipliers.col(column) = lam;
         W.col(column) = along(p, w, a);
@@ -49,37 +55,41 @@ FrictionProblem::FrictionProblem(const Program& p, Workspace& w, std::vector<int
 }
 
 // Bodies whose pivots of M differ much take refined solutions.
-FrictionProblem FrictionProblem::of_step(const Program& p, Workspace& w, std::vector<int> list) {
-    if (w.now.rows.refine) return FrictionProblem(p, w, std::move(list));
-    FrictionProblem problem(p, list);
-    problem.scaled = true;
-    const VecX no_drift = VecX::Zero(p.layout.rows);
-    VecX a, lam = no_drift;
-    each_unit_force(p, w, problem.elements, [&](int column, const VecX& force) {
-        a = force;
-        solve_scaled(p, w, a, nullptr, no_drift, lam);
-        problem.response.col(column) = a;
-        problem.multipliers.col(column) = lam;
+void FrictionProblem::respond_in_step(const Program& p, Workspace& w) {
+    scaled = !w.now.rows.refine;
+    if (!scaled) return respond(p, w);
+    each_unit_force(p, w, [&](int column) {
+        free[column] = solve_scaled(p, w, force, nullptr, none, lam);
+        response.col(column) = force;
+        multipliers.col(column) = lam;
     });
-    problem.W.noalias() = problem.response.transpose() * problem.response;
-    return problem;
+    gram(response, rows, W);
 }
 
-VecX FrictionProblem::acceleration(const Program& p, Workspace& w, const VecX& f) const {
-    VecX a = response * f;
+PN_WIDE void gram(const MatX& X, int n, MatX& W) {
+    const int length = static_cast<int>(X.rows());
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j <= i; ++j) W(i, j) = W(j, i) = dot(X.col(i).data(), X.col(j).data(), length);
+}
+
+void FrictionProblem::acceleration(const Program& p, Workspace& w, const VecX& f, VecX& a) const {
+    a.noalias() = response * f;
     if (scaled) solve_Rt(p.mechanism, w.now.terms, a);
-    return a;
 }
 
 VecX FrictionProblem::along(const Program& p, Workspace& w, const VecX& x) const {
     VecX out(rows);
+    along(p, w, x, out);
+    return out;
+}
+
+void FrictionProblem::along(const Program& p, Workspace& w, const VecX& x, VecX& out) const {
     int at = 0;
     for (int e : elements) {
         const Block& block = block_of(p, e);
         multiply(block, w.now.A, x, w.scratch.r);
         for (size_t k = 0; k < block.kept.size(); ++k) out[at++] = w.scratch.r[block.row + k];
     }
-    return out;
 }
 
 VecX FrictionProblem::slip_accelerations(const Program& p, Workspace& w) const {
@@ -104,14 +114,22 @@ void FrictionProblem::add_forces(const Program& p, Workspace& w, const VecX& f, 
 }
 
 void FrictionProblem::clean(const Program& p, Workspace& w) {
+    if (scaled) {
+        for (int i = 0; i < rows; ++i) drop_held(i, free[i]);
+        return;
+    }
     W = (0.5 * (W + W.transpose())).eval();
-    each_unit_force(p, w, elements, [&](int i, VecX& force) {
+    each_unit_force(p, w, [&](int i) {
         solve_R(p.mechanism, w.now.terms, force);
-        const double free = force.squaredNorm();  // what it would cause if no constraint held
-        if (W(i, i) > least_response * free) return;
-        W.row(i).setZero();
-        W.col(i).setZero();
+        drop_held(i, force.squaredNorm());
     });
+}
+
+// Whose response is rounding beside what it would be if no constraint held.
+void FrictionProblem::drop_held(int i, double unconstrained) {
+    if (W(i, i) > least_response * unconstrained) return;
+    W.row(i).setZero();
+    W.col(i).setZero();
 }
 
 }  // namespace pn

@@ -1,6 +1,7 @@
 #include "run/events.hpp"
 
 #include <algorithm>
+#include <cstring>
 
 #include "contact/closing.hpp"
 #include "contact/impact.hpp"
@@ -174,6 +175,7 @@ std::vector<Event> changes_since(const System& system, double t, const std::vect
     const Program& p = system.p;
     const RunState& now = system.w.state;
     std::vector<Event> changes;
+    if (turned < 0 && same_bytes(closed, now.closed) && same_bytes<Mode>(before, now.mode)) return changes;
     for (size_t i = 0; i < closed.size(); ++i)
         if (closed[i] != now.closed[i])
             changes.push_back({t, closed[i] ? Event::Kind::lift_off : Event::Kind::touch_down, p.gaps[i].block});
@@ -240,10 +242,12 @@ Strike strike_contacts(System& system, double t, VecX& y, bool starts) {
 
 void remember_directions(System& system, std::vector<double>& slip) {
     Workspace& w = system.w;
+    const bool lingers = system.ne > 0 && std::memchr(w.state.lingers.data(), 1, w.state.lingers.size());
+    if (w.now.slipping.empty() && !lingers) return;
     for (int e = 0; e < system.ne; ++e) {
         const Friction& f = system.p.frictions[e];
         if (w.state.lingers[e] && !hardly_moves(system, e)) w.state.lingers[e] = 0;
-        if (f.dim == 1 || !slips(w.state.mode[e])) continue;
+        if (!slips(w.state.mode[e]) || f.dim == 1) continue;
         const Vec3 u = slip_velocity(w.now, f);
         slip[e] = u.norm();
         const Vec3& n = w.state.last_direction[e];

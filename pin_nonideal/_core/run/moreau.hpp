@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "friction/box_program.hpp"
 #include "friction/problem.hpp"
 #include "run/system.hpp"
 
@@ -24,19 +25,23 @@ public:
 
 private:
     void solve_without_friction(double t);
-    FrictionProblem pose_problem();
-    void solve_friction(const FrictionProblem& problem, double t);
-    void apply_forces(const FrictionProblem& problem);
+    void pose_problem();
+    void solve_friction(double t);
+    void apply_forces();
     double update_limits(double t);
-    std::vector<Mode> end_velocity(const FrictionProblem& problem);
-    void book_work(const FrictionProblem& problem, VecX& y, double& moved_energy);
+    void end_velocity();
+    void book_work(VecX& y, double& moved_energy);
 
     System& system_;
     const Program& p;
     Workspace& w;
-    std::vector<int> elements_;  // all of them
+    FrictionProblem problem_;  // of all elements
+    std::vector<Mode> modes_, unloaded_;
     double h_ = 0.0;
-    VecX q_mid_, v0_, v1_, a_free_, lam_free_;  // free: without friction of the elements
+    VecX q_mid_, v0_, v1_, move_, b_, a_free_, lam_free_;  // free: without friction of the elements
+    VecX a_friction_, alpha_, near_;
+    BoxProgram box_;
+    bool boxes_ = true;  // every element has one direction
     VecX force_, limit_, force_limit_, power_;  // of the elements; force_limit is the one that force was found for
 };
 

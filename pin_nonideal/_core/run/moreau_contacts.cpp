@@ -11,6 +11,7 @@
 #include "dynamics/slip.hpp"
 #include "dynamics/solution.hpp"
 #include "dynamics/step_start.hpp"
+#include "friction/problem.hpp"
 #include "run/moreau.hpp"
 #include "tree/factor.hpp"
 #include "tree/liegroup.hpp"
@@ -27,18 +28,21 @@ constexpr double least_response = 1e-13;  // part of a row's free response that 
 }  // namespace
 
 MoreauContacts::MoreauContacts(System& system)
-    : system_(system), p(system.p), w(system.w), active_(system.ng, 0), closed_(system.ng, 0),
-      modes_(system.ne, unloaded), unloaded_(modes_), q_mid_(VecX::Zero(system.nq)),
+    : system_(system), p(system.p), w(system.w), far_(system.p), was_closed_(system.ng, 0), closed_(system.ng, 0),
+      open_(system.ng, 0), modes_(system.ne, unloaded), unloaded_(modes_), q_mid_(VecX::Zero(system.nq)),
       v0_(VecX::Zero(system.nv)), v1_(v0_), a_free_(v0_),
       power_(VecX::Zero(system.nw)), zero_(VecX::Zero(p.layout.rows)), force_(v0_) {
     if (system.ng == 0) return;
-    for (int i = 0; i < system.ng; ++i) users_ |= p.is_users(i);
+    for (int e = 0; e < system.ne; ++e)
+        if (p.frictions[e].gap < 0) own_.push_back(e);
     const int most = p.layout.rows;
     unit_ = lam_ = lam_free_ = zero_;
-    w0_ = f_ = VecX::Zero(most);
+    w0_ = w1_ = f_ = VecX::Zero(most);
     W_.resize(most, most);
     response_.resize(system.nv, most);
     multipliers_.resize(most, most);
+    touching_.reserve(system.ng);
+    rubbing_.reserve(system.ne);
     rows_.reserve(most);
     parts_.reserve(most);
     cones_.reserve(most);
@@ -52,49 +56,59 @@ void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, dou
     retract(m, y.data(), force_.data(), q_mid_.data());
     const double middle = t + 0.5 * h;
     std::copy(w.state.mode.begin(), w.state.mode.end(), modes_.begin());
-    find_active(middle);
+    was_closed_ = w.state.closed;
     solve_free(middle);
+    find_touching(middle);
     add_rows();
     respond();
     solve(middle);
     end_velocity();
     if (system_.energy) book_work(y, moved_energy, impact_energy);
-    set_contacts(p, w, closed_, modes_);
+    select(closed_, modes_);
     if (system_.nz > 0) y.segment(system_.nq + system_.nv, system_.nz) += h * w.now.dz;
     force_ = 0.5 * h * v1_;
     retract(m, q_mid_.data(), force_.data(), y.data());
     y.segment(system_.nq, system_.nv) = v1_;
 }
 
-// Contacts whose gap is closed at the step's middle, and those that were closed: their loads tell whether they stay so.
-void MoreauContacts::find_active(double t) {
-    if (users_) update_kinematics(p, w, t, q_mid_, v0_);
-    else place_bodies(p.mechanism, w.now.terms, q_mid_);
-    for (int i = 0; i < system_.ng; ++i) {
-        if (is_bare(p, i)) continue;
-        measure_gap(p, w, t, v0_, i);
-        active_[i] = w.state.closed[i] || gap_width(p, w, i) <= 0.0;
-    }
+// Contacts and modes, with the rows that go with them; most of a flight nothing changes.
+void MoreauContacts::select(const std::vector<char>& closed, const std::vector<Mode>& modes) {
+    const std::vector<Mode>& now = w.state.mode;
+    const bool flies = w.now.loaded.empty() && !any_closed(w.state) && same_bytes(closed, open_) && same_bytes(now, modes);
+    if (!flies || w.now.rows.redundant || w.now.rows.orthogonal) return set_contacts(p, w, closed, modes);
+    w.now.renew();
 }
 
 // The motion without contacts and dry friction, constraints met at the step's end.
 void MoreauContacts::solve_free(double t) {
-    set_contacts(p, w, active_, unloaded_);
-    bool any = false;
-    for (int i = 0; i < system_.ng; ++i) {
-        if (!active_[i]) continue;
-        any = true;
-        const Block& block = p.blocks[p.gaps[i].block];
-        std::fill_n(w.now.rows.required.begin() + block.row, block.kept.size(), char(0));
-    }
-    if (any) w.now.rows.use_required(p.blocks);
+    select(open_, unloaded_);
     begin_step(p, w, t, q_mid_, v0_);
+    a_free_ = w.now.a;
+    if (w.now.rows.blocks.empty()) {
+        w.now.rows.distance = 1.0;
+        return;
+    }
     unit_ = w.now.b;
     meet_at_end(p, w.now, h_, unit_);
-    a_free_ = w.now.a;
     lam_free_ = w.now.lam;
     solve_motion(p, w, p.has_laws(), unit_, a_free_, lam_free_);
     unit_.setZero();
+}
+
+// Contacts whose gap is closed at the step's middle, and those that were closed: their loads tell whether they stay so.
+void MoreauContacts::find_touching(double t) {
+    touching_.clear();
+    far_.each_near(w, [&](int i) {
+        measure_gap(p, w, t, v0_, i);
+        const double width = gap_width(p, w, i);
+        if (was_closed_[i] || width <= 0.0) touching_.push_back(i);
+        return width;
+    });
+    std::sort(touching_.begin(), touching_.end());
+    for (int i : touching_) {
+        evaluate_block(p, w, t, v0_, p.gaps[i].block);
+        for (int e : p.gaps[i].elements) evaluate_block(p, w, t, v0_, p.frictions[e].block);
+    }
 }
 
 // The coefficient of a contact: the static one where it sticks or comes to rest.
@@ -120,26 +134,28 @@ void MoreauContacts::add_rows() {
     rows_.clear();
     parts_.clear();
     cones_.clear();
-    for (int i = 0; i < system_.ng; ++i) {
-        if (!active_[i]) continue;
+    rubbing_ = own_;
+    for (int i : touching_) {
         const Gap& gap = p.gaps[i];
         const int slides = gap.sliding < 0 ? 0 : static_cast<int>(p.blocks[p.frictions[gap.sliding].block].kept.size());
         const double mu = gap.sliding < 0 ? 0.0 : coefficient(gap.sliding);
         const double approach = gap.restitution * std::min(0.0, gap_rate(p, w, i));
         add_part({i, gap.sliding, approach}, gap.block, 1, ConeElement::contact(1 + slides, mu));
+        for (int e : gap.elements)
+            if (e != gap.sliding) rubbing_.push_back(e);
     }
-    for (int e = 0; e < system_.ne; ++e) {
-        const Friction& friction = p.frictions[e];
-        const int gap = friction.gap;
-        if (gap >= 0 && (!active_[gap] || p.gaps[gap].sliding == e)) continue;
-        const int kept = static_cast<int>(p.blocks[friction.block].kept.size());
-        if (kept > 0) add_part({-1, e, 0.0}, friction.block, kept, ConeElement::box(kept, 0.0));
+    std::sort(rubbing_.begin(), rubbing_.end());
+    for (int e : rubbing_) {
+        const int block = p.frictions[e].block, kept = static_cast<int>(p.blocks[block].kept.size());
+        if (kept > 0) add_part({-1, e, 0.0}, block, kept, ConeElement::box(kept, 0.0));
     }
 }
 
 // What a unit of each force does, and the velocities at the step's end without them, over h.
 void MoreauContacts::respond() {
     const int n = static_cast<int>(rows_.size());
+    if (n == 0) return;
+    scaled_ = !w.now.rows.refine;
     for (int column = 0; column < n; ++column) {
         const Row& row = rows_[column];
         const Block& block = p.blocks[row.block];
@@ -147,26 +163,41 @@ void MoreauContacts::respond() {
         unit_[block.row + row.k] = 1.0;
         add_transpose(block, w.now.A, unit_, force_);
         unit_[block.row + row.k] = 0.0;
-        solve_acceleration(p, w, force_, zero_, v1_, lam_);
-        response_.col(column) = v1_;
-        multipliers_.col(column) = lam_;
-        solve_R(p.mechanism, w.now.terms, force_);
-        const double free = force_.squaredNorm();
-        for (int i = 0; i < n; ++i) {
-            multiply(p.blocks[rows_[i].block], w.now.A, v1_, w.scratch.r);
-            W_(i, column) = w.scratch.r[p.blocks[rows_[i].block].row + rows_[i].k];
+        double free;
+        if (scaled_) {
+            free = solve_scaled(p, w, force_, nullptr, zero_, lam_);
+            response_.col(column) = force_;
+        } else {
+            solve_acceleration(p, w, force_, zero_, v1_, lam_);
+            response_.col(column) = v1_;
+            solve_R(p.mechanism, w.now.terms, force_);
+            free = force_.squaredNorm();
+            for (int i = 0; i < n; ++i) {
+                multiply(p.blocks[rows_[i].block], w.now.A, v1_, w.scratch.r);
+                W_(i, column) = w.scratch.r[p.blocks[rows_[i].block].row + rows_[i].k];
+            }
         }
-        if (W_(column, column) <= least_response * free) W_(column, column) = 0.0;
+        if (!w.now.rows.blocks.empty()) multipliers_.col(column) = lam_;
+        f_[column] = free;
     }
-    for (int i = 0; i < n; ++i) {
+    if (scaled_) gram(response_, n, W_);
+    for (int i = 0; i < n; ++i)
+        if (W_(i, i) <= least_response * f_[i]) W_(i, i) = 0.0;
+    for (int i = 0; i < n; ++i)
         for (int j = 0; j < i; ++j) {
             const bool held = W_(i, i) == 0.0 || W_(j, j) == 0.0;
             W_(i, j) = W_(j, i) = held ? 0.0 : 0.5 * (W_(i, j) + W_(j, i));
         }
+    measure_free();
+}
+
+void MoreauContacts::measure_free() {
+    const int n = static_cast<int>(rows_.size());
+    for (int i = 0; i < n; ++i) {
         const Block& block = p.blocks[rows_[i].block];
         const RowValues& values = w.now.values[rows_[i].block];
         const int k = block.kept[rows_[i].k];
-        multiply(block, w.now.A, a_free_, w.scratch.r);
+        if (i == 0 || rows_[i].block != rows_[i - 1].block) multiply(block, w.now.A, a_free_, w.scratch.r);
         w0_[i] = w.scratch.r[block.row + rows_[i].k] + values.rate[k] / h_ + 0.5 * values.drift[k];
         f_[i] = w.state.percussion[block.row + rows_[i].k];
     }
@@ -177,17 +208,24 @@ void MoreauContacts::respond() {
 void MoreauContacts::apply() {
     const int n = static_cast<int>(rows_.size());
     w.now.a = a_free_;
-    w.now.a.noalias() += response_.leftCols(n) * f_.head(n);
-    w.now.lam = lam_free_;
-    w.now.lam.noalias() += multipliers_.leftCols(n) * f_.head(n);
-    for (Vec3& force : w.now.slip_force) force = Vec3::Zero();
+    w.now.renew();
+    if (n == 0) return;
+    force_.noalias() = response_.leftCols(n) * f_.head(n);
+    if (scaled_) solve_Rt(p.mechanism, w.now.terms, force_);
+    w.now.a += force_;
+    if (w.now.rows.blocks.empty()) w.now.lam.setZero();
+    else {
+        w.now.lam = lam_free_;
+        w.now.lam.noalias() += multipliers_.leftCols(n) * f_.head(n);
+    }
     for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
         const int head = parts_[e].gap >= 0;
         if (head) w.now.lam[p.blocks[p.gaps[parts_[e].gap].block].row] = f_[at];
         if (parts_[e].element < 0) continue;
-        for (int k = head; k < cones_[e].dim; ++k) w.now.slip_force[parts_[e].element][k - head] = f_[at + k];
+        Vec3& force = w.now.slip_force[parts_[e].element];
+        force = Vec3::Zero();
+        for (int k = head; k < cones_[e].dim; ++k) force[k - head] = f_[at + k];
     }
-    w.now.renew();
 }
 
 // Takes the limits of dry friction for the load of the motion at hand; whether they are what they were.
@@ -209,52 +247,69 @@ bool MoreauContacts::limits_settle(double t) {
 
 void MoreauContacts::solve(double t) {
     const int n = static_cast<int>(rows_.size());
-    for (int pass = 0;; ++pass) {
-        apply();
+    const auto W = W_.topLeftCorner(n, n);
+    const bool loads = n > 0 && cones_.back().is(ConeElement::Kind::box);  // limits that may depend on the motion
+    for (int pass = 0; n > 0; ++pass) {
+        if (loads || pass > 0) apply();
         if (limits_settle(t) && pass > 0) break;
         if (pass == load_passes) throw Failure(Failure::Kind::not_converged, t);
-        const auto W = W_.topLeftCorner(n, n);
         const ConeStatus status = solver_.solve(W, w0_.head(n), cones_, true, f_.head(n), true);
         if (status != ConeStatus::solved) throw Failure(Failure::Kind::not_converged, t);
         ++w.counters.iterations;
     }
-    w.state.percussion.setZero();
+    if (n == 0) apply();
+    if (presses_ || n > 0) w.state.percussion.setZero();
+    presses_ = n > 0;
     for (int i = 0; i < n; ++i) w.state.percussion[p.blocks[rows_[i].block].row + rows_[i].k] = f_[i];
-    const ConeResiduals r = ConeComplementarity::residuals(W_.topLeftCorner(n, n), w0_.head(n), cones_, f_.head(n));
+    if (n == 0) return;
+    const ConeResiduals r = ConeComplementarity::residuals(W, w0_.head(n), cones_, f_.head(n));
     w.counters.signorini = std::max(w.counters.signorini, r.signorini);
     w.counters.coulomb = std::max(w.counters.coulomb, r.coulomb);
     w.counters.dissipation = std::max(w.counters.dissipation, r.dissipation);
 }
 
-// Velocity at the step's end, which contacts stay closed, and the modes: what stays below its limit sticks.
+// Velocity at the step's end, which contacts stay closed, and the modes: what stays below its limit sticks. Whether a
+// force is below it by what is rounding beside the others only the slip tells.
 void MoreauContacts::end_velocity() {
+    const int n = static_cast<int>(rows_.size());
     v1_ = v0_ + h_ * w.now.a;
-    const double still = rest_rate(v1_);
     std::fill(closed_.begin(), closed_.end(), char(0));
     std::fill(modes_.begin(), modes_.end(), unloaded);
+    if (n == 0) return;
+    const double still = rest_rate(v1_), clear = limit_rounding * f_.head(n).cwiseAbs().maxCoeff();
+    w1_.head(n) = w0_.head(n);
+    w1_.head(n).noalias() += W_.topLeftCorner(n, n) * f_.head(n);
+    w1_.head(n) *= h_;
     for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
         const Part& part = parts_[e];
-        const int head = part.gap >= 0, dim = cones_[e].dim - head, n = static_cast<int>(rows_.size());
-        const auto speed = [&](size_t row) { return h_ * (w0_[row] + W_.row(row).head(n).dot(f_.head(n))); };
-        if (head) closed_[part.gap] = speed(at) - part.approach <= still;
+        const int head = part.gap >= 0, dim = cones_[e].dim - head;
+        if (head) closed_[part.gap] = w1_[at] - part.approach <= still;
         if (part.element < 0 || (head && !closed_[part.gap])) continue;
         const double limit = cones_[e].bound * (head ? f_[at] : 1.0);
-        const bool held = f_.segment(at + head, dim).norm() < limit * (1.0 - limit_rounding) || limit == 0.0;
-        const bool forward = dim > 1 || speed(at + head) > 0.0;
+        const double size = f_.segment(at + head, dim).norm();
+        const bool rests = w1_.segment(at + head, dim).norm() <= still;
+        const bool held = limit - size > clear || (rests && (limit <= clear || size < limit * (1.0 - limit_rounding)));
+        const bool forward = dim > 1 || (dim > 0 && w1_[at + head] > 0.0);
         modes_[part.element] = held && dim > 0 ? sticking : forward ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[part.element].block];
         if (held && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
     }
-    for (int e = 0; e < system_.ne; ++e)  // what the constraints hold has no mode of its own but rest
+    const auto rest = [&](int e) {  // what the constraints hold has no mode of its own but rest
         if (modes_[e] == unloaded && (p.frictions[e].gap < 0 || closed_[p.frictions[e].gap])) modes_[e] = sticking;
+    };
+    for (int e : own_) rest(e);
+    for (int i : touching_)
+        for (int e : p.gaps[i].elements) rest(e);
 }
 
 // Work over the step, by the mean velocity. Where a slip turns inside the step its mean velocity may go with the
 // friction that meets its end: that is work of the scheme, not of friction.
 void MoreauContacts::book_work(VecX& y, double& moved_energy, double& impact_energy) {
     const int n = static_cast<int>(rows_.size());
-    w.now.lam = lam_free_;
-    w.now.lam.noalias() += multipliers_.leftCols(n) * f_.head(n);
+    if (!w.now.rows.blocks.empty()) {
+        w.now.lam = lam_free_;
+        w.now.lam.noalias() += multipliers_.leftCols(n) * f_.head(n);
+    }
     force_ = 0.5 * (v0_ + v1_);
     powers(p, w, force_, power_.data());
     for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {

@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "contact/far_gaps.hpp"
 #include "friction/cone_complementarity.hpp"
 #include "run/system.hpp"
 
@@ -28,11 +29,13 @@ private:
         double approach = 0.0; // restitution times the rate at which its gap closed, over the step
     };
 
-    void find_active(double t);
+    void select(const std::vector<char>& closed, const std::vector<Mode>& modes);
     void solve_free(double t);
+    void find_touching(double t);
     void add_rows();
     void add_part(Part part, int first_block, int kept, ConeElement element);
     void respond();
+    void measure_free();
     void solve(double t);
     void apply();
     bool limits_settle(double t);
@@ -44,13 +47,17 @@ private:
     const Program& p;
     Workspace& w;
     double h_ = 0.0;
-    bool users_ = false;  // gaps that functions of the user's measure
-    std::vector<char> active_, closed_;
+    FarGaps far_;
+    std::vector<int> touching_, own_;  // gaps that take part, and dry friction of no contact that may open
+    std::vector<int> rubbing_;         // dry friction that takes part, but the sliding of contacts
+    std::vector<char> was_closed_, closed_, open_;
     std::vector<Mode> modes_, unloaded_;
     std::vector<Row> rows_;
     std::vector<Part> parts_;
     std::vector<ConeElement> cones_;
-    VecX q_mid_, v0_, v1_, a_free_, lam_free_, w0_, f_, power_, unit_, zero_, force_, lam_;
+    bool scaled_ = true;   // the response is a_s = R^T a
+    bool presses_ = true;  // there may be percussions of the last step
+    VecX q_mid_, v0_, v1_, a_free_, lam_free_, w0_, w1_, f_, power_, unit_, zero_, force_, lam_;
     MatX W_, response_, multipliers_;
     ConeComplementarity solver_;
 };

@@ -38,6 +38,7 @@ void Output::before_jump() {
 void Output::now() { emit(progress_.t, progress_.y, true); }
 
 void Output::configured_now() {
+    if (!options_.save) return;
     progress_.configured_t = progress_.t;
     progress_.configured_y = progress_.y;
 }

@@ -115,6 +115,28 @@ void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
         kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms) - before;
 }
 
+void System::settle(double t, VecX& y, VecX& dy, bool evaluates) {
+    read(y);
+    read_law_states(y);
+    moved_energy = 0.0;
+    if (!evaluates && keeps_to_rows(p, w, t, q, v)) return write(y);
+    const auto total = [&] {
+        return kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms);
+    };
+    // Factors of the new modes: what sticks must not move as the rest is projected.
+    bool chosen = begin_rows(p, w, t, q, v);
+    const double before = energy && !w.now.rows.blocks.empty() ? total() : 0.0;
+    bool moved = project_position(p, w, t, q, v, true, !evaluates);
+    const bool past_sticking = project_past_sticking(p, w, t, q, v);
+    require_closed(p, w, t);
+    if (past_sticking || (moved && evaluates)) chosen = configure_step(p, w);
+    moved |= past_sticking;
+    moved |= begin_step_on_rates(p, w, t, v, chosen, evaluates);
+    write(y);
+    if (evaluates) write_rate(t, dy);
+    if (moved && energy) moved_energy = total() - before;
+}
+
 bool System::is_on_constraints(double t, const VecX& y) {
     read(y);
     return pn::is_on_constraints(p, w, t, q, v);

@@ -50,6 +50,8 @@ struct System {
     void rate_of_evaluation(double t, const VecX& y, VecX& dy);
     // Brings a step's end onto the constraints and evaluates there, as the next step begins.
     void project_and_evaluate(double t, VecX& y, VecX& dy);
+    // The same of a step of time stepping, whose modes have just been set; evaluated only where that is asked for.
+    void settle(double t, VecX& y, VecX& dy, bool evaluates);
     // Whether y needs no projection; all that a sample of it tells is evaluated then, and no more.
     bool is_on_constraints(double t, const VecX& y);
     void normalize(VecX& y) const;

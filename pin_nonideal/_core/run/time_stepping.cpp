@@ -21,13 +21,19 @@ bool may_differ(const Program& p, const Options& options) {
            std::holds_alternative<SampledTorque>(p.actuation) || std::holds_alternative<TorqueTable>(p.actuation);
 }
 
+// Whether the accelerations and forces of every step's end tell something.
+bool asks_always(const Program& p, const Options& options) {
+    return options.method.scheme != Method::Scheme::moreau || options.output_dt == 0.0 || options.record.dense ||
+           options.callback || options.save || !options.events.empty() || !p.contacts.empty() || p.asks_functions;
+}
+
 }  // namespace
 
 TimeStepping::TimeStepping(System& system, Progress& progress, const Options& options, Torques& torques,
                            Output& output, Notices& notices, UserEvents& user_events, Recording& out)
     : p(system.p), w(system.w), system_(system), now_(progress), options_(options), torques_(torques),
       output_(output), notices_(notices), user_events_(user_events), out_(out), moreau_(system),
-      moreau_contacts_(system), lasts_(!may_differ(system.p, options)) {}
+      moreau_contacts_(system), lasts_(!may_differ(system.p, options)), asked_always_(asks_always(system.p, options)) {}
 
 double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     double end = std::min({now_.t + size, stop, torques_.next_stop(t_end)});
@@ -40,21 +46,29 @@ bool TimeStepping::rests() const {
     return lasts_ && system_.ng == 0 && (system_.velocity(now_.y).array() == 0.0).all() && is_immobile(p, w);
 }
 
-void TimeStepping::take(double end) {
+// Whether anything asks for the accelerations and forces at the step's end: a sample, what follows the run, or slip
+// whose direction or limit goes on with them.
+bool TimeStepping::asks_for_motion(double end, double t_end) const {
+    if (asked_always_ || end >= t_end || end >= options_.end() || output_.next() <= end + same_time(end)) return true;
+    return std::any_of(w.now.slipping.begin(), w.now.slipping.end(), [&](int e) {
+        return p.frictions[e].dim > 1 || p.frictions[e].reaction != Reaction::none;
+    });
+}
+
+void TimeStepping::take(double end, double t_end) {
     double& t = now_.t;
-    VecX &y = now_.y, y_from = y;
+    VecX &y = now_.y, &y_from = y_from_;
     const bool rested = rests();
-    const Modes before = w.state.mode;
+    if (rested) y_from = y;
+    Modes& before = before_step_;
+    before = w.state.mode;
     const double moved_from = now_.moved_energy;
     if (system_.ng > 0) moreau_contacts_.step(t, end - t, y, now_.moved_energy, now_.impact_energy);
     else moreau_.step(t, end - t, y, now_.moved_energy);
     t = end;
     const bool held = rested && std::equal(before.begin(), before.end(), w.state.mode.begin());
     if (!held) {
-        system_.read(y);
-        // Factors of the new modes: what sticks must not move as the rest is projected.
-        begin_rows(p, w, t, system_.q, system_.v);
-        system_.project_and_evaluate(t, y, now_.rate);
+        system_.settle(t, y, now_.rate, asks_for_motion(end, t_end));
         now_.moved_energy += system_.moved_energy;
         return;
     }
@@ -74,15 +88,16 @@ void TimeStepping::step(double size, double stop, double t_end) {
     double& t = now_.t;
     VecX& y = now_.y;
     const double end = end_of_step(size, stop, t_end), from = t;
-    const Modes before = w.state.mode;
-    const std::vector<char> closed = w.state.closed;
+    Modes& before = before_;
+    before = w.state.mode;
+    closed_before_ = w.state.closed;
     const VecX y_from = options_.record.dense ? y : VecX();
-    if (!stands_) take(end);
+    if (!stands_) take(end, t_end);
     t = end;
     ++out_.steps;
     output_.configured_now();
     remember_directions(system_, now_.slip_at_start);
-    for (const Event& change : changes_since(system_, t, closed, before)) out_.events.push_back(change);
+    for (const Event& change : changes_since(system_, t, closed_before_, before)) out_.events.push_back(change);
     notices_.pulls(std::nullopt);
     notices_.several(false);
     output_.keep_time_step(from, y_from);

@@ -22,7 +22,8 @@ public:
 
 private:
     bool rests() const;
-    void take(double end);
+    void take(double end, double t_end);
+    bool asks_for_motion(double end, double t_end) const;
     double end_of_step(double size, double stop, double t_end) const;
 
     const Program& p;
@@ -39,6 +40,10 @@ private:
     MoreauContacts moreau_contacts_;
     const bool lasts_;     // what a step has left as it was stays so
     bool stands_ = false;  // the last step has left all as it was
+    const bool asked_always_;  // for the motion of every step's end
+    VecX y_from_;
+    Modes before_, before_step_;
+    std::vector<char> closed_before_;
 };
 
 }  // namespace pn
