@@ -31,6 +31,7 @@ static void size(const Program& p, Evaluation& now) {
     for (size_t i = 0; i < p.blocks.size(); ++i) now.values[i].resize(p.blocks[i].kind, nv);
     now.idle.assign(p.blocks.size(), 0);
     now.awake.reserve(p.blocks.size());
+    now.touching.reserve(p.gaps.size());
     now.loaded.reserve(elements);
     now.slipping.reserve(elements);
     now.A.assign(p.entries, 0.0);
@@ -72,10 +73,12 @@ Workspace::Workspace(const Program& p) {
 
 void select_rows(const Program& p, Workspace& w) {
     for (int r = 0; r < p.layout.rows; ++r) w.now.rows.required[r] = r < p.constraint_rows();
+    w.now.touching.clear();
     for (size_t i = 0; i < p.gaps.size(); ++i) {
         const Gap& gap = p.gaps[i];
         const Block& block = p.blocks[gap.block];
         const char open = !w.state.closed[i];
+        if (!open) w.now.touching.push_back(static_cast<int>(i));
         w.now.idle[gap.block] = open;
         for (int e : gap.elements) w.now.idle[p.frictions[e].block] = open;
         if (open) std::fill_n(w.now.rows.required.begin() + block.row, block.kept.size(), char(0));
