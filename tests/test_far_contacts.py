@@ -106,7 +106,7 @@ ALIKE = 1e-6  # [m or rad], to which two runs at a tolerance of 1e-9 are one mot
 
 
 def random_contacts(model, q, rng, count):
-    """Points, balls and stops around a tree, open at q a bit or a long way, and their gaps by Pinocchio's data."""
+    """Points, balls and stops around a tree, open a bit or a long way, and their gaps by Pinocchio."""
     data = model.createData()
     names = [f.name for f in model.frames if f.name.endswith("tip")]
     index = model.getFrameId
@@ -155,8 +155,8 @@ def random_contacts(model, q, rng, count):
 
 @pytest.mark.parametrize("seed", range(16))
 def test_the_first_of_many_touches(seed):
-    """Random trees among contacts near and far: by the motion without them, looked at every 0.5 ms, none closes
-    before the first touch, and one does there.
+    """Random trees among contacts near and far: by the motion without them, looked at each 0.5 ms, none
+    closes before the first touch, and one does there.
     """
     rng = np.random.default_rng(seed)
     model = random_trees.tree(rng.choice(KINDS, int(rng.integers(2, 6))).tolist(), rng, gravity=False)
