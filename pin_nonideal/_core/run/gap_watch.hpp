@@ -23,6 +23,7 @@ struct GapLook {
 struct GapState {
     std::vector<double> width, rate;
     std::vector<Separation> separation;
+    static constexpr char from_the_end = 2;  // near, and not looked at before the end of the step at hand
     std::vector<char> near, far;           // looked at in each step, or far; neither where closed, or nothing moves
     std::vector<double> way, turn, apart;  // of far ones: their bodies' ways when they were looked at (contact/ways.hpp)
     Ways ways;
