@@ -11,6 +11,7 @@ import pin_nonideal as pn
 
 from . import random_trees
 from .mechanisms import GRAVITY, body, empty, frame, hinge
+from .same_run import assert_same_run
 
 INSTANT = 1e-9  # of the time itself
 
@@ -97,6 +98,17 @@ def test_pairs_that_are_far_change_no_bit(count):
     np.testing.assert_array_equal(alone.v, among.v)
     assert [(e.time, e.kind) for e in alone.events] == [(e.time, e.kind) for e in among.events]
     assert alone.stats.steps == among.stats.steps
+
+
+def test_resumed_among_far_ones(kept, tmp_path):
+    """From states in flight and at rest the run goes on bit by bit: what has come near by then is known."""
+    path, scene = tmp_path / "run", far_shapes(40)
+    alone = pn.simulate(scene, 2.0)
+    assert_same_run(alone, pn.simulate(scene, 2.0, checkpoint=path, checkpoint_interval=0.0))
+    states = list(kept)
+    for k in np.linspace(0, len(states) - 1, 12).astype(int):
+        path.write_bytes(states[k])
+        assert_same_run(alone, pn.resume(path, scene, checkpoint_interval=1e9))
 
 
 KINDS = ("revolute y", "revolute unaligned", "prismatic z", "helical x", "planar", "spherical", "free flyer",
