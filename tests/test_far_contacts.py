@@ -9,7 +9,9 @@ import pytest
 
 import pin_nonideal as pn
 
+from . import random_trees
 from .mechanisms import GRAVITY, body, empty, frame, hinge
+from .same_run import assert_same_run
 
 INSTANT = 1e-9  # of the time itself
 
@@ -96,3 +98,102 @@ def test_pairs_that_are_far_change_no_bit(count):
     np.testing.assert_array_equal(alone.v, among.v)
     assert [(e.time, e.kind) for e in alone.events] == [(e.time, e.kind) for e in among.events]
     assert alone.stats.steps == among.stats.steps
+
+
+def test_resumed_among_far_ones(kept, tmp_path):
+    """From states in flight and at rest the run goes on bit by bit: what has come near by then is known."""
+    path, scene = tmp_path / "run", far_shapes(40)
+    alone = pn.simulate(scene, 2.0)
+    assert_same_run(alone, pn.simulate(scene, 2.0, checkpoint=path, checkpoint_interval=0.0))
+    states = list(kept)
+    for k in np.linspace(0, len(states) - 1, 12).astype(int):
+        path.write_bytes(states[k])
+        assert_same_run(alone, pn.resume(path, scene, checkpoint_interval=1e9))
+
+
+KINDS = ("revolute y", "revolute unaligned", "prismatic z", "helical x", "planar", "spherical", "free flyer",
+         "translation", "universal", "endless z")  # fmt: skip
+TIMES = np.linspace(0.0, 1.5, 3001)  # [s], at which the oracle looks
+ALIKE = 1e-6  # [m or rad], to which two runs at a tolerance of 1e-9 are one motion
+
+
+def random_contacts(model, q, rng, count):
+    """Points, balls and stops around a tree, open a bit or a long way, and their gaps by Pinocchio."""
+    data = model.createData()
+    names = [f.name for f in model.frames if f.name.endswith("tip")]
+    index = model.getFrameId
+
+    def height(a, b, n, at):
+        def gap(data, q):
+            A, B = data.oMf[index(a)], (data.oMf[index(b)] if b else pin.SE3.Identity())
+            return (B.rotation @ n) @ (A.translation - B.translation) - at
+
+        return gap
+
+    def apart(a, b, size):
+        return lambda data, q: (
+            np.linalg.norm(data.oMf[index(a)].translation - data.oMf[index(b)].translation) - size
+        )
+
+    pin.framesForwardKinematics(model, data, q)
+    contacts, gaps = [], []
+    for k in range(count):
+        wide = float(10.0 ** rng.uniform(-3.0, 1.5))
+        a, b = rng.choice(names, 2, replace=False)
+        kind = rng.integers(4)
+        if kind == 0 or kind == 1:
+            n = rng.standard_normal(3)
+            n /= np.linalg.norm(n)
+            b = b if kind == 1 else None
+            at = height(a, b, n, 0.0)(data, q) - wide
+            contacts.append(pn.PointContact(a, plane=b, normal=tuple(n), height=at, mu=0.3, name=f"c{k}"))
+            n = np.array(contacts[-1].normal)
+            gaps.append(height(a, b, n, at))
+        elif kind == 2:
+            size = apart(a, b, 0.0)(data, q) - min(wide, 0.1)
+            if size <= 0.0:
+                continue
+            contacts.append(pn.SphereContact(a, b, size, mu=0.3, name=f"c{k}"))
+            gaps.append(apart(a, b, size))
+        else:
+            joint = int(rng.integers(1, model.njoints))
+            if model.joints[joint].nq != 1:
+                continue
+            at = model.joints[joint].idx_q
+            contacts.append(pn.JointLimit(model.names[joint], upper=q[at] + wide, lower=-1e3, name=f"c{k}"))
+            gaps.append(lambda data, q, at=at, stop=q[at] + wide: stop - q[at])
+    return contacts, gaps
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_the_first_of_many_touches(seed):
+    """Random trees among contacts near and far: by the motion without them, looked at each 0.5 ms, none
+    closes before the first touch, and one does there.
+    """
+    rng = np.random.default_rng(seed)
+    model = random_trees.tree(rng.choice(KINDS, int(rng.integers(2, 6))).tolist(), rng, gravity=False)
+    q, v = random_trees.state(model, rng, speed=float(10.0 ** rng.uniform(-1.0, 1.0)), spread=0.5)
+    contacts, gaps = random_contacts(model, q, rng, 30)
+    tight = {"q": q, "v": v, "rtol": 1e-9, "atol": 1e-9}
+    free = pn.simulate(pn.Scene(model), TIMES[-1], record="dense", **tight)
+    data = model.createData()
+
+    def widths(t):
+        states = free.at(t).q
+        out = np.empty((len(states), len(gaps)))
+        for row, state in zip(out, states, strict=True):
+            pin.framesForwardKinematics(model, data, state)
+            row[:] = [gap(data, state) for gap in gaps]
+        return out
+
+    below = (widths(TIMES) < 0.0).any(axis=1)
+    end = TIMES[int(below.argmax())] if below.any() else TIMES[-1]
+    try:
+        run = pn.simulate(pn.Scene(model, contacts=contacts), end, **tight)
+    except pn.RunError as error:  # what follows a touch of bodies without shapes is another matter
+        run = error.trajectory
+    touch = first(run)
+    assert (touch is not None) or not below.any()
+    if touch is not None:
+        assert not below[touch - INSTANT > TIMES].any()
+        assert np.abs(widths([touch])).min() < ALIKE

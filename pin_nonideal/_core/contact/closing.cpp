@@ -16,6 +16,8 @@ using Choice = std::vector<char>;  // of closed gaps
 
 // All choices of so many contacts are looked through where steps from one to the next do not lead to the right one.
 constexpr int most_enumerated = 12;
+// What would close a wider gap [m or rad] within `touching_time` outruns light.
+constexpr double sure_gap = 1e-3;
 // Contacts of which some may share a load in several ways.
 constexpr int may_share = 3;
 
@@ -105,6 +107,10 @@ Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX&
     const double still = rest_rate(v);
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
         if (is_bare(p, i)) continue;
+        if (!w.state.closed[i] && !p.is_users(i)) {
+            measure_gap(p, w, t, v, i);
+            if (gap_width(p, w, i) > sure_gap) continue;
+        }
         evaluate_gap(p, w, t, v, i);
         const double gap = gap_width(p, w, i), rate = gap_rate(p, w, i);
         out.touch[i] = w.state.closed[i] || gap <= std::max(width, -rate * touching_time);

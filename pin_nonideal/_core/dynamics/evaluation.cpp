@@ -34,8 +34,8 @@ static void factor_mass(const Program& p, Workspace& w, double t) {
 void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     place_bodies(p.mechanism, w.now.terms, q, p.constrained_joints, p.constrained_angles);
     const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
-    for (int i = 0; i < p.constraints; ++i)
-        if (!w.now.idle[i]) evaluate(p.blocks[i].kind, state, Part::residual, w.now.values[i]);
+    for (int i : w.now.awake)
+        if (i < p.constraints) evaluate(p.blocks[i].kind, state, Part::residual, w.now.values[i]);
 }
 
 // Residuals and A, Eq. (3); and the users' own b.
@@ -131,7 +131,7 @@ void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v) {
 // Where closed contacts carry the weight, accelerations of rounding are none: M a below the rounding of the forces that
 // add up to it.
 static bool is_balanced(const Program& p, Workspace& w) {
-    if (!any_closed(w.state) || p.moves_in_time) return false;
+    if (w.now.touching.empty() || p.moves_in_time) return false;
     if (w.now.a.cwiseAbs().maxCoeff() <= balance_rounding * p.mechanism.gravity.norm()) return true;
     VecX &left = w.scratch.work, &size = w.scratch.trial;
     multiply_M(p.mechanism, w.now.terms, w.now.a, left);
@@ -145,13 +145,24 @@ static bool is_balanced(const Program& p, Workspace& w) {
     return (left.cwiseAbs().array() <= sum_rounding * size.array()).all();
 }
 
+// What laws leave where none acts.
+static void leave_laws(Workspace& w) {
+    w.now.C.setZero();
+    w.now.C_smooth.setZero();
+    w.now.determinant = 1.0;
+    w.state.unique = Uniqueness::shown;
+}
+
 void solve_dynamics(const Program& p, Workspace& w, double t, const VecX& v) {
-    if (!p.has_laws()) {
-        solve_motion(p, w, false);
-    } else {
+    if (p.has_laws()) {
         w.now.v = v;
         w.now.speed = 0.0;
         for (int k = 0; k < v.size(); ++k) w.now.speed = std::max(w.now.speed, std::abs(v[k]));
+    }
+    if (!laws_act(p, w)) {
+        solve_motion(p, w, false);
+        if (p.has_laws()) leave_laws(w);
+    } else {
         find_known_forces(p, w, t, w.now.terms.q, v);
         solve_with_laws(p, w, t, w.now.terms.q, v, w.now.C_smooth);
     }
@@ -193,9 +204,10 @@ void follow_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap
 }
 
 // A contact violates where its gap is negative; that of an open one is looked at here only.
-static void gap_violations(const Program& p, Workspace& w, double t, const VecX& v, double& position,
-                           double& velocity) {
+static void gap_violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity,
+                           const std::vector<char>* sure) {
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
+        if (sure && (*sure)[i]) continue;
         const RowValues& values = w.now.values[p.gaps[i].block];
         if (!w.state.closed[i]) measure_gap(p, w, t, v, i);
         else velocity = std::max(velocity, std::abs(values.rate[0]));
@@ -203,7 +215,8 @@ static void gap_violations(const Program& p, Workspace& w, double t, const VecX&
     }
 }
 
-void violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity) {
+void violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity,
+                const std::vector<char>* sure) {
     position = velocity = 0.0;
     for (int i = 0; i < p.first_gap; ++i) {
         const RowValues& values = w.now.values[i];
@@ -212,7 +225,7 @@ void violations(const Program& p, Workspace& w, double t, const VecX& v, double&
             velocity = std::max(velocity, std::abs(values.rate[k]));
         }
     }
-    gap_violations(p, w, t, v, position, velocity);
+    gap_violations(p, w, t, v, position, velocity, sure);
 }
 
 }  // namespace pn

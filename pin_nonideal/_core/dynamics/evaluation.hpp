@@ -34,7 +34,8 @@ void evaluate_gap(const Program& p, Workspace& w, double t, const VecX& v, int g
 void evaluate_block(const Program& p, Workspace& w, double t, const VecX& v, int block);
 
 // Largest residual and rate over all rows of all descriptions at the state last evaluated; of contacts that may open
-// the depth, and the rate of closed ones.
-void violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity);
+// the depth, and the rate of closed ones. Open ones that are known to be so are passed over: `sure`, by gap.
+void violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity,
+                const std::vector<char>* sure = nullptr);
 
 }  // namespace pn

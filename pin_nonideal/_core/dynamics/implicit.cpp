@@ -202,11 +202,6 @@ struct Implicit : Unknowns {
 
 }  // namespace
 
-// Whether any law acts: friction of contacts does not where all are open.
-static bool acts(const Program& p, const Workspace& w) {
-    return !p.rubs_while_closed || any_closed(w.state);
-}
-
 // Loads that the ideal motion gives, as the paper's Example (c) takes them; their laws are then known.
 static void ideal_loads(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     bool asked = false;
@@ -223,7 +218,6 @@ static void ideal_loads(const Program& p, Workspace& w, double t, const VecX& q,
 
 void find_known_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     w.now.C_smooth.setZero();
-    if (!acts(p, w)) return;
     add_smooth_forces(p, w, t, q, v, w.now.C_smooth);
     for (size_t e = 0; e < p.frictions.size(); ++e)
         if (p.frictions[e].reaction == Reaction::none) update_limit(p, w, e, t, q, v);
@@ -232,11 +226,11 @@ void find_known_forces(const Program& p, Workspace& w, double t, const VecX& q, 
 
 void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const VecX& known) {
     w.now.determinant = 1.0;
-    const bool rubs = acts(p, w);
-    if (!p.needs_reactions || !rubs) {
+    const bool act = laws_act(p, w);
+    if (!p.needs_reactions || !act) {
         w.now.C = known;
         solve_motion(p, w, true);
-        if (!rubs) w.state.unique = Uniqueness::shown;
+        if (!act) w.state.unique = Uniqueness::shown;
         return;
     }
     w.now.base_C = known;  // C that does not change while the reactions are sought

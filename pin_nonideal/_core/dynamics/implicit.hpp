@@ -9,6 +9,11 @@
 
 namespace pn {
 
+// Whether any law acts: friction of contacts does not where all are open.
+inline bool laws_act(const Program& p, const Workspace& w) {
+    return p.has_laws() && (!p.rubs_while_closed || !w.now.touching.empty());
+}
+
 // C of all that reads no reactions, slipping friction of constant limits among it, into w.now.C_smooth.
 void find_known_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 // C, a and lam for the forces F, what is known of C (the laws that read no reactions), and the laws that do.

@@ -138,8 +138,8 @@ void require_closed(const Program& p, const Workspace& w, double t) {
     const double allowed = open_gap * scene_size(p, w);
     double largest = 0.0;
     int worst = -1;
-    for (int i = 0; i < p.constraints; ++i)
-        for (int k = 0; k < w.now.values[i].rows && !w.now.idle[i]; ++k) {
+    for (int i : w.now.awake)
+        for (int k = 0; i < p.constraints && k < w.now.values[i].rows; ++k) {
             const double gap = std::abs(w.now.values[i].residual[k]);
             if (gap <= allowed || gap <= allowed * row_size(w, p.blocks[i], k) || gap < largest) continue;
             largest = gap;

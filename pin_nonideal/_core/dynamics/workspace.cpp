@@ -31,6 +31,7 @@ static void size(const Program& p, Evaluation& now) {
     for (size_t i = 0; i < p.blocks.size(); ++i) now.values[i].resize(p.blocks[i].kind, nv);
     now.idle.assign(p.blocks.size(), 0);
     now.awake.reserve(p.blocks.size());
+    now.touching.reserve(p.gaps.size());
     now.loaded.reserve(elements);
     now.slipping.reserve(elements);
     now.A.assign(p.entries, 0.0);
@@ -71,14 +72,19 @@ Workspace::Workspace(const Program& p) {
 }
 
 void select_rows(const Program& p, Workspace& w) {
-    for (int r = 0; r < p.layout.rows; ++r) w.now.rows.required[r] = r < p.constraint_rows();
+    const int before_gaps = p.gaps.empty() ? p.constraint_rows() : p.blocks[p.first_gap].row;
+    std::fill(w.now.rows.required.begin(), w.now.rows.required.end(), char(0));
+    std::fill_n(w.now.rows.required.begin(), before_gaps, char(1));
+    w.now.touching.clear();
     for (size_t i = 0; i < p.gaps.size(); ++i) {
         const Gap& gap = p.gaps[i];
-        const Block& block = p.blocks[gap.block];
         const char open = !w.state.closed[i];
         w.now.idle[gap.block] = open;
         for (int e : gap.elements) w.now.idle[p.frictions[e].block] = open;
-        if (open) std::fill_n(w.now.rows.required.begin() + block.row, block.kept.size(), char(0));
+        if (open) continue;
+        const Block& block = p.blocks[gap.block];
+        w.now.touching.push_back(static_cast<int>(i));
+        std::fill_n(w.now.rows.required.begin() + block.row, block.kept.size(), char(1));
     }
     w.now.awake.clear();
     for (size_t i = 0; i < p.blocks.size(); ++i)
@@ -87,8 +93,8 @@ void select_rows(const Program& p, Workspace& w) {
     w.now.slipping.clear();
     std::fill(w.now.terms.locked.begin(), w.now.terms.locked.end(), char(0));
     for (size_t e = 0; e < p.frictions.size(); ++e) {
-        const Block& block = p.blocks[p.frictions[e].block];
         if (w.state.mode[e] == unloaded) continue;
+        const Block& block = p.blocks[p.frictions[e].block];
         w.now.loaded.push_back(static_cast<int>(e));
         if (w.state.mode[e] != sticking) {
             w.now.slipping.push_back(static_cast<int>(e));

@@ -66,6 +66,7 @@ struct Evaluation {
     std::vector<RowValues> values;  // of each block
     std::vector<char> idle;  // blocks of open contacts, which are no rows and are not evaluated
     std::vector<int> awake;              // the other blocks
+    std::vector<int> touching;           // gaps that are closed
     std::vector<int> loaded, slipping;   // elements that rub, at rest or not; those that slip
     std::vector<double> A, B;
     RowSystem rows, ideal_rows;  // ideal: of the constraints without what sticks; IdealMotion swaps them in

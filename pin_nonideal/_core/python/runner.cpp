@@ -210,7 +210,7 @@ Options& Runner::read(const nb::object& run_options) {
 
 // The run of short calls, of which very many are alike, is kept; what else is asked for leaves more behind than samples.
 static bool is_plain(const Options& o) {
-    return !o.method.adaptive() && !o.record.evaluates() && !o.record.dense && o.max_wall == 0.0 && o.events.empty() &&
+    return !o.record.evaluates() && !o.record.dense && o.max_wall == 0.0 && o.events.empty() &&
            !o.callback && !o.save;
 }
 

@@ -28,13 +28,25 @@ static void fields(Archive& a, RunState& x) {
       growth, steps_since);
 }
 
+static void fields(Archive& a, Ways& x) {
+    auto& [body, joint, turn, scene, lever, slid_until, placed, body_step, joint_step, turn_step, scene_step] = x;
+    a(body, joint, turn, scene, lever, slid_until, placed, body_step, joint_step, turn_step, scene_step);
+}
+
+static void fields(Archive& a, GapState& x) {
+    auto& [width, rate, separation, near, far, way, turn, apart, ways, ask, current, near_gaps] = x;
+    a(width, rate, separation, near, far, way, turn, apart, ask, current);
+    fields(a, ways);
+    x.find_near();
+}
+
 static void fields(Archive& a, Progress& x) {
     auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, recent_events, bridged_time,
            bridged_end, slip_at_start, pulls, gaps, left, impact_energy, several, stiff_steps, quiet_steps, rounding,
            next_look, turning_steps] = x;
     a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, bridged_time, bridged_end,
-      slip_at_start, pulls, gaps.width, gaps.rate, gaps.separation, gaps.sure, gaps.travel, gaps.stale, left, impact_energy,
-      several, stiff_steps, quiet_steps, rounding, next_look, turning_steps);
+      slip_at_start, pulls, left, impact_energy, several, stiff_steps, quiet_steps, rounding, next_look, turning_steps);
+    fields(a, gaps);
     a.list(recent_events);
 }
 

@@ -90,7 +90,7 @@ double ErrorNorm::operator()(const VecX& dy, const VecX& y) {
         const double x = tangent_[k] / tolerance_[k];
         sum += x * x;
     }
-    for (int e = 0; e < system_.ne; ++e) {
+    for (int e : system_.w.now.loaded) {
         if (system_.w.state.mode[e] != sticking) continue;
         // The load of a contact may jump, over an edge: steps too short to tell its time pass it.
         if (system_.p.frictions[e].gap >= 0 && !resolves_shares_) continue;

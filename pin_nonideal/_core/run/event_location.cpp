@@ -43,14 +43,14 @@ constexpr int places_inside = 8;
 }  // namespace
 
 EventLocator::EventLocator(System& system, Stepper& stepper, const std::vector<double>& slip_at_start,
-                           const std::vector<char>& pulls, GapState& gaps_at_start)
+                           const std::vector<char>& pulls, GapWatch& watch)
     : system_(system), stepper_(stepper), p(system.p), w(system.w), slip_at_start_(slip_at_start),
-      search_(system, stepper, pulls, gaps_at_start) {}
+      search_(system, stepper, pulls, watch) {}
 
 double EventLocator::shorten_toward_rest(const VecX& rate, double size) {
-    for (int e = 0; e < system_.ne; ++e) {
+    for (int e : w.now.slipping) {
         const Friction& f = p.frictions[e];
-        if (f.dim == 1 || !slips(w.state.mode[e])) continue;
+        if (f.dim == 1) continue;
         const Block& block = p.blocks[f.block];
         system_.v = system_.velocity(rate);
         multiply(block, w.now.A, system_.v, w.scratch.r);
@@ -72,7 +72,7 @@ double EventLocator::margin_at_end(const Watch& watch) {
 
 // Slip of several directions that has come to rest at the end of a fixed step.
 bool EventLocator::has_arrived(int e) const {
-    if (p.frictions[e].dim == 1 || stepper_.method.adaptive() || !slips(w.state.mode[e])) return false;
+    if (p.frictions[e].dim == 1 || stepper_.method.adaptive()) return false;
     const double speed = system_.velocity(stepper_.y1).cwiseAbs().maxCoeff();
     const double slip = slip_velocity(w.now, p.frictions[e]).norm();
     return slip < slip_at_start_[e] && slip <= arrived_speed * (1.0 + speed);
@@ -127,8 +127,8 @@ std::optional<FoundEvent> EventLocator::locate() {
     const auto found = [&](EventKind kind, int index) {
         return FoundEvent{kind, index, stepper_.t0 + stepper_.h};
     };
-    for (int e = system_.ne - 1; e >= 0; --e)
-        if (has_arrived(e)) return found(EventKind::rest_or_limit, e);
+    for (auto e = w.now.slipping.rbegin(); e != w.now.slipping.rend(); ++e)
+        if (has_arrived(*e)) return found(EventKind::rest_or_limit, *e);
     const std::optional<Crossing> crossing = search_.first();
     if (crossing) step_onto(*crossing);
     if (const auto lifted = lift_together()) return lifted;  // which may come earlier
@@ -174,8 +174,8 @@ std::optional<double> EventLocator::release_rate_at_end(const std::vector<Mode>&
 // Whether all loads that redundant contacts share can press, at the step's end and at its stages.
 bool EventLocator::all_press() {
     for (const Stepper::Look& look : stepper_.looks())
-        for (int i = 0; i < system_.ng; ++i)
-            if (w.state.closed[i] && system_.load(*look.rate, i) < 0.0) return false;
+        for (int i : w.now.touching)
+            if (system_.load(*look.rate, i) < 0.0) return false;
     return true;
 }
 

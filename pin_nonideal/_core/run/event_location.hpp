@@ -33,7 +33,7 @@ class EventLocator {
 public:
     // Slip speed of each element of several directions when its step began, and whether each contact pulls by then.
     EventLocator(System& system, Stepper& stepper, const std::vector<double>& slip_at_start,
-                 const std::vector<char>& pulls, GapState& gaps_at_start);
+                 const std::vector<char>& pulls, GapWatch& watch);
 
     // Ends the step just taken at its first event; the workspace is evaluated at the step's end either way.
     std::optional<FoundEvent> locate();

@@ -48,10 +48,9 @@ constexpr double left_part = 0.1;
 
 }  // namespace
 
-EventSearch::EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls,
-                         GapState& gaps_at_start)
+EventSearch::EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls, GapWatch& watch)
     : system_(system), stepper_(stepper), p(system.p), w(system.w), pulls_(pulls),
-      gaps_(system, stepper, gaps_at_start), probe_(VecX::Zero(system.ny)),
+      gaps_(system, stepper, watch), probe_(VecX::Zero(system.ny)),
       probe_rate_(probe_) {}
 
 double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
@@ -163,8 +162,7 @@ bool EventSearch::may_pull(int gap) {
 std::vector<Watch> EventSearch::crossed() {
     std::vector<Watch> list;
     if (stepper_.method.order > 1) add_pulls(list);
-    for (int e = 0; e < system_.ne; ++e) {
-        if (w.state.mode[e] == unloaded) continue;
+    for (int e : w.now.loaded) {
         if (w.state.mode[e] != sticking) {
             if (may_stop(e)) list.push_back({Watch::Kind::slip, e});
         } else if (!w.state.indeterminate && may_reach_limit(e)) {
@@ -172,9 +170,10 @@ std::vector<Watch> EventSearch::crossed() {
         }
     }
     if (p.gaps.empty()) return list;
-    for (int i = 0; i < system_.ng && !w.now.rows.redundant; ++i)  // redundant ones are asked together
-        if (w.state.closed[i] && !is_bare(p, i) && may_pull(i)) list.push_back({Watch::Kind::load, i});
-    for (int gap : gaps_.doubtful()) list.push_back({Watch::Kind::gap, gap});
+    if (!w.now.rows.redundant)  // those are asked together
+        for (int i : w.now.touching)
+            if (!is_bare(p, i) && may_pull(i)) list.push_back({Watch::Kind::load, i});
+    for (const GapSearch::Doubt& doubt : gaps_.doubtful()) list.push_back({Watch::Kind::gap, doubt.gap});
     return list;
 }
 

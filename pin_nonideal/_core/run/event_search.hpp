@@ -29,7 +29,7 @@ struct Crossing {
 class EventSearch {
 public:
     // Whether each contact pulls by the step's start.
-    EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls, GapState& gaps_at_start);
+    EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls, GapWatch& watch);
 
     // The first crossing; the workspace must be evaluated at the step's end, and is so again where there is none.
     std::optional<Crossing> first();

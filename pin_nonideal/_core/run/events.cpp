@@ -81,9 +81,8 @@ void linger(RunState& state, const std::vector<Mode>& before, const FoundEvent& 
 }  // namespace
 
 bool turning(const System& system) {
-    for (int e = 0; e < system.ne; ++e)
-        if (system.p.frictions[e].dim > 1 && slips(system.w.state.mode[e])) return true;
-    return false;
+    const std::vector<int>& slipping = system.w.now.slipping;
+    return std::any_of(slipping.begin(), slipping.end(), [&](int e) { return system.p.frictions[e].dim > 1; });
 }
 
 Event::Kind kind_of_change(Mode before, Mode after) {
@@ -242,9 +241,7 @@ Strike strike_contacts(System& system, double t, VecX& y, bool starts) {
 
 void remember_directions(System& system, std::vector<double>& slip) {
     Workspace& w = system.w;
-    const bool lingers = system.ne > 0 && std::memchr(w.state.lingers.data(), 1, w.state.lingers.size());
-    if (w.now.slipping.empty() && !lingers) return;
-    for (int e = 0; e < system.ne; ++e) {
+    for (int e : w.now.loaded) {
         const Friction& f = system.p.frictions[e];
         if (w.state.lingers[e] && !hardly_moves(system, e)) w.state.lingers[e] = 0;
         if (!slips(w.state.mode[e]) || f.dim == 1) continue;

@@ -18,49 +18,42 @@ constexpr double between_stages = 2.0;
 constexpr int most_looks = 4000;
 // Bodies are allowed this many times their travel, for what projections add.
 constexpr double travel_factor = 2.0;
+// A far gap is looked at when so many times the way since it was, and so many steps, might close it.
+constexpr double asked_again = 2.0, steps_ahead = 4.0;
+// Part of the ways so far that rounding may leave of their difference.
+constexpr double way_rounding = 1e-15;
 constexpr double rate_rounding = 1e-12;  // part of the rates of a gap that moves evenly
 
 }  // namespace
 
-GapSearch::GapSearch(System& system, Stepper& stepper, GapState& at_start)
-    : system_(system), stepper_(stepper), p(system.p), w(system.w), start_(at_start), reach_(system.p),
-      end_(p.gaps.size()), bends_(p.gaps.size()), speed_(VecX::Zero(system.nv)),
-      acceleration_(speed_), probe_(VecX::Zero(system.ny)) {}
+GapSearch::GapSearch(System& system, Stepper& stepper, GapWatch& watch)
+    : system_(system), stepper_(stepper), p(system.p), w(system.w), watch_(watch), start_(watch.gaps), ways_(watch.ways),
+      reach_(system.p), speed_(VecX::Zero(system.nv)), acceleration_(speed_), probe_(VecX::Zero(system.ny)) {}
 
 // Largest |v| and |a| of each dof over the step, from the rates at the stages.
 void GapSearch::bound_rates() {
     const int nq = system_.nq, nv = system_.nv;
     acceleration_.setZero();
-    for (const Stepper::Look& look : stepper_.looks()) {
-        const double* a = look.rate->data() + nq;
-        for (int k = 0; k < nv; ++k) acceleration_[k] = std::max(acceleration_[k], std::abs(a[k]));
-    }
+    for (const Stepper::Look& look : stepper_.looks())
+        acceleration_ = acceleration_.cwiseMax(look.rate->segment(nq, nv).cwiseAbs());
     const double *v0 = stepper_.y0.data() + nq, *v1 = stepper_.y1.data() + nq;
     for (int k = 0; k < nv; ++k) {
         acceleration_[k] *= between_stages;
         // Never farther from both ends than their mean and what half a step of acceleration adds.
         speed_[k] = 0.5 * (std::abs(v0[k]) + std::abs(v1[k])) + 0.5 * stepper_.h * acceleration_[k];
     }
-    reach_.bound_bodies(w, speed_, acceleration_, stepper_.h);
 }
 
 // Bounds of a gap between the step's ends; of one of the user's, so many times what its cubic between them and its
 // motion at the end show.
-GapSearch::Bends GapSearch::bends(int gap) const {
+GapSearch::Bends GapSearch::bends(int gap, const Look& end) const {
     if (Reach::knows(p, gap)) return {reach_.bound(w, gap), reach_.rise(w, gap)};
-    const double h = stepper_.h, change = (end_[gap].width - start_.width[gap]) / h;
-    const double r0 = start_.rate[gap], r1 = end_[gap].rate;
+    const double h = stepper_.h, change = (end.width - start_.width[gap]) / h;
+    const double r0 = start_.rate[gap], r1 = end.rate;
     const double most = between_stages * std::max({std::abs(6.0 * change - 4.0 * r0 - 2.0 * r1) / h,
                                                    std::abs(6.0 * change - 2.0 * r0 - 4.0 * r1) / h,
                                                    std::abs(gap_acceleration(p, w, gap))});
     return {most, most};
-}
-
-bool GapSearch::stays_far(int gap) {
-    const double travel = travel_factor * reach_.travel(gap);
-    if (!(travel < start_.sure[gap])) return false;
-    start_.travel[gap] = travel;
-    return true;
 }
 
 // Of gaps that were not looked at in the steps before.
@@ -69,40 +62,78 @@ void GapSearch::look_at_starts(const std::vector<int>& gaps) {
     kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
     for (int gap : gaps) {
         follow_gap(p, w, stepper_.t0, system_.v, gap);
-        start_.look(p, w, gap);
+        start_.keep(gap, Look::here(p, w, gap, 0.0));
     }
     system_.read(stepper_.y1);
     kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
 }
 
-std::vector<int> GapSearch::doubtful() {
-    std::vector<int> list;
-    const int n = static_cast<int>(p.gaps.size());
-    rounding_ = gap_rounding * scene_size(p, w);
-    system_.read(stepper_.y1);
-    near_.clear();
+// Far gaps that the ways of their bodies may have closed by the end of this step are near from here on. Those that have used
+// up half their width are looked at at its end: they are sure to be open in it, and none has to be looked at behind.
+void GapSearch::ask_far() {
+    const Ways& ways = start_.ways;
     unseen_.clear();
-    held_.clear();
-    for (int i = 0; i < n; ++i)
-        if (w.state.closed[i] && Separation::has(p, i)) held_.push_back(i);
-    bool bounded = false;
-    for (int i = 0; i < n; ++i) {
-        start_.travel[i] = 0.0;
-        if (w.state.closed[i] || is_bare(p, i)) continue;
-        if (!bounded) bound_rates();
-        bounded = true;
-        if (stays_far(i)) continue;
-        near_.push_back(i);
-        if (start_.stale[i]) unseen_.push_back(i);
+    start_.ask = HUGE_VAL;
+    bool found = false;
+    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
+        if (!start_.far[i]) continue;
+        const WayBound::Pair& pair = ways_.pair(i);
+        const double way = ways_.way(ways, i), come = way - start_.way[i] + way_rounding * way;
+        const double turn = ways.turn[pair.second], turned = turn - start_.turn[i] + way_rounding * turn;
+        const auto is_open = [&](double times, double steps) {
+            return start_.width[i] > WayBound::change(pair, times * come + steps * ways_.way_of_step(ways, i),
+                                                      times * turned + steps * ways.turn_step[pair.second],
+                                                      start_.apart[i]);
+        };
+        if (is_open(asked_again, steps_ahead)) {
+            start_.ask = std::min(start_.ask, ways.scene + ways_.least_way(pair, start_.width[i] - come));
+            continue;
+        }
+        found = true;
+        start_.far[i] = 0;
+        start_.near[i] = is_open(1.0, 1.0) ? GapState::from_the_end : 1;
+        if (start_.near[i] == 1) unseen_.push_back(i);
     }
+    if (!found) return;
     if (!unseen_.empty()) look_at_starts(unseen_);
-    for (int i : near_) {
-        follow_gap(p, w, stepper_.t0 + stepper_.h, system_.v, i);
-        end_[i] = look_here(i, 1.0);
-        bends_[i] = bends(i);
-        if (!stays_open(i, look_at_start(i), end_[i], bends_[i].below)) list.push_back(i);
+    start_.find_near();
+}
+
+// A step that is tried again: what was to be looked at at its end has not been.
+void GapSearch::take_back() {
+    for (int i : start_.near_gaps) {
+        if (start_.near[i] != GapState::from_the_end) continue;
+        start_.near[i] = 0;
+        start_.far[i] = 1;
+        start_.ask = 0.0;
     }
-    return list;
+    start_.find_near();
+}
+
+const std::vector<GapSearch::Doubt>& GapSearch::doubtful() {
+    doubtful_.clear();
+    watch_.end.clear();
+    if (watch_.followed) take_back();
+    bound_rates();
+    ways_.step(w.now.terms, speed_, stepper_.h, start_.ways);
+    watch_.followed = true;
+    system_.read(stepper_.y1);
+    if (!(start_.ways.scene + steps_ahead * start_.ways.scene_step < start_.ask)) ask_far();
+    if (start_.near_gaps.empty()) return doubtful_;
+    rounding_ = gap_rounding * scene_size(p, w);
+    reach_.bound_bodies(w, speed_, acceleration_, stepper_.h);
+    held_.clear();
+    for (int i : w.now.touching)
+        if (Separation::has(p, i)) held_.push_back(i);
+    for (int i : start_.near_gaps) {
+        follow_gap(p, w, stepper_.t0 + stepper_.h, system_.v, i);
+        watch_.end.push_back(Look::here(p, w, i, 1.0));
+        if (start_.near[i] == GapState::from_the_end || travel_factor * reach_.travel(i) < start_.width[i]) continue;
+        const Look end = above(watch_.end.back(), level_here(i, 1.0));
+        const Bends bent = bends(i, end);
+        if (!stays_open(i, look_at_start(i), end, bent.below)) doubtful_.push_back({i, end, bent});
+    }
+    return doubtful_;
 }
 
 // The two parabolas of the bound through both ends lie below the gap; where the higher of them is least it stands.
@@ -130,32 +161,30 @@ bool GapSearch::slides_on(int gap) const {
     return std::any_of(held_.begin(), held_.end(), [&](int held) { return same_bodies(gap, held); });
 }
 
-GapSearch::Look GapSearch::look_at_start(int gap) const {
-    Look out{0.0, start_.width[gap] - plane(gap), start_.rate[gap], std::nullopt};
-    if (!Separation::has(p, gap)) return out;
-    double level = plane(gap);
-    for (int held : held_)
-        if (same_bodies(gap, held)) level = std::min(level, start_.width[held]);
-    out.width = start_.width[gap] - level;
-    out.separation = start_.separation[gap];
-    out.separation->radius += level;
-    return out;
+GapSearch::Look GapSearch::above(Look look, double level) const {
+    look.width -= level;
+    if (look.separation) look.separation->radius += level;
+    return look;
 }
 
-// Of the gap that the workspace is evaluated for.
-GapSearch::Look GapSearch::look_here(int gap, double part) const {
-    Look out{part, gap_width(p, w, gap) - plane(gap), gap_rate(p, w, gap), std::nullopt};
-    if (!Separation::has(p, gap)) return out;
+double GapSearch::level_here(int gap, double part) const {
     double level = plane(gap);
+    if (!Separation::has(p, gap)) return level;
     for (int held : held_) {
         if (!same_bodies(gap, held)) continue;
         measure_gap(p, w, stepper_.t0 + part * stepper_.h, system_.v, held);
         level = std::min(level, gap_width(p, w, held));
     }
-    out.width = gap_width(p, w, gap) - level;
-    out.separation = Separation::of(p, w, gap);
-    out.separation->radius += level;
-    return out;
+    return level;
+}
+
+GapSearch::Look GapSearch::look_at_start(int gap) const {
+    const Look out{0.0, start_.width[gap], start_.rate[gap], std::nullopt};
+    if (!Separation::has(p, gap)) return above(out, plane(gap));
+    double level = plane(gap);
+    for (int held : held_)
+        if (same_bodies(gap, held)) level = std::min(level, start_.width[held]);
+    return above({0.0, start_.width[gap], start_.rate[gap], start_.separation[gap]}, level);
 }
 
 GapSearch::Look GapSearch::look(int gap, double part) {
@@ -165,7 +194,8 @@ GapSearch::Look GapSearch::look(int gap, double part) {
     system_.read(probe_);
     kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
     follow_gap(p, w, stepper_.t0 + part * stepper_.h, system_.v, gap);
-    return look_here(gap, part);
+    const Look out = Look::here(p, w, gap, part);
+    return above(out, level_here(gap, part));
 }
 
 // The root between an instant at which the gap is open, or where it has just closed, and one at which it is through.
@@ -205,28 +235,8 @@ std::optional<GapSearch::Touch> GapSearch::search(int gap, const Look& a, const 
 std::optional<GapSearch::Touch> GapSearch::first_touch(int gap) {
     looks_ = 0;
     stepper_.make_interpolant();
-    return search(gap, look_at_start(gap), end_[gap], bends_[gap]);
-}
-
-void GapState::look(const Program& p, const Workspace& w, int gap) {
-    width[gap] = sure[gap] = gap_width(p, w, gap);
-    rate[gap] = gap_rate(p, w, gap);
-    stale[gap] = 0;
-    if (Separation::has(p, gap)) separation[gap] = Separation::of(p, w, gap);
-}
-
-void look_at_gaps(System& system, double t, GapState& out) {
-    for (int i = 0; i < static_cast<int>(system.p.gaps.size()); ++i) {
-        if (is_bare(system.p, i)) continue;
-        if (out.travel[i] > 0.0) {
-            out.sure[i] -= out.travel[i];
-            out.travel[i] = 0.0;
-            out.stale[i] = 1;
-            continue;
-        }
-        follow_gap(system.p, system.w, t, system.v, i);
-        out.look(system.p, system.w, i);
-    }
+    const auto doubt = std::find_if(doubtful_.begin(), doubtful_.end(), [&](const Doubt& d) { return d.gap == gap; });
+    return search(gap, look_at_start(gap), doubt->end, doubt->bends);
 }
 
 }  // namespace pn

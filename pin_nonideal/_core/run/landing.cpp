@@ -16,8 +16,10 @@ constexpr double gain_rounding = 1e-12;
 
 }  // namespace
 
-Landing::Landing(System& system, Progress& progress, const Options& options, Output& output, Recording& out)
-    : p(system.p), w(system.w), system_(system), now_(progress), options_(options), output_(output), out_(out) {}
+Landing::Landing(System& system, Progress& progress, GapWatch& watch, const Options& options, Output& output,
+                 Recording& out)
+    : p(system.p), w(system.w), system_(system), now_(progress), watch_(watch), options_(options), output_(output),
+      out_(out) {}
 
 bool Landing::strike(bool starts) {
     if (system_.ng == 0 || !contacts_strike(system_, now_.t, now_.y, starts)) return false;
@@ -58,10 +60,11 @@ void Landing::end_bouncing(double stop) {
     remember_gaps();
 }
 
-void Landing::remember_gaps() {
+void Landing::remember_gaps(bool whole_step) {
     if (system_.ng == 0) return;
     system_.read(now_.y);
-    look_at_gaps(system_, now_.t, now_.gaps);
+    if (whole_step) watch_.go_on(now_.t);
+    else watch_.look_at_all(now_.t);
 }
 
 }  // namespace pn

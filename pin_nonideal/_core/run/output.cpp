@@ -27,7 +27,9 @@ void Output::begin() {
 void Output::emit(double at, const VecX& state, bool evaluated) {
     if (!out_.t.empty() && (jumps_ ? at < out_.t.back() : at <= out_.t.back())) return;
     jumps_ = false;
-    recorder_.sample(at, state, {progress_.impact_energy, progress_.moved_energy}, evaluated);
+    const GapState& gaps = progress_.gaps;
+    recorder_.sample(at, state, {progress_.impact_energy, progress_.moved_energy}, evaluated,
+                     gaps.current ? &gaps.far : nullptr);
 }
 
 void Output::before_jump() {
@@ -40,7 +42,7 @@ void Output::now() { emit(progress_.t, progress_.y, true); }
 void Output::configured_now() {
     if (!options_.save) return;
     progress_.configured_t = progress_.t;
-    progress_.configured_y = progress_.y;
+    progress_.configured_y.head(system_.ns) = progress_.y.head(system_.ns);
 }
 
 void Output::end_step(bool asked) {
@@ -87,7 +89,7 @@ void Output::emit_between(double at) {
     }
     if (!w.now.rows.blocks.empty() || options_.record.evaluates() || p.constraints > 0) {
         progress_.configured_t = at;
-        progress_.configured_y = sample_;
+        progress_.configured_y.head(system_.ns) = sample_.head(system_.ns);
     }
     emit(at, sample_, false);
 }

@@ -77,8 +77,8 @@ public:
     // What has changed the energy so far beside the works that are integrated.
     struct Jumps { double impacts, projection; };
     // The state at t. The workspace is evaluated there when `evaluated`, and
-    // left so where anything of that is recorded.
-    void sample(double t, const VecX& y, const Jumps& jumps, bool evaluated);
+    // left so where anything of that is recorded. Gaps that are known to be open are not measured (`sure`).
+    void sample(double t, const VecX& y, const Jumps& jumps, bool evaluated, const std::vector<char>* sure = nullptr);
 
 private:
     void record_laws(double t);

@@ -56,31 +56,35 @@ RungeKutta::RungeKutta(const Method& method, Step& step)
 }
 
 void RungeKutta::sum_powers() {
+    const int n = step_.active;
     for (int i = 0; i < method_.powers; ++i) {
-        coefficients_[i] = (step_.h * method_.P[method_.powers * step_.stages + i]) * step_.end_rate();
-        add_weighted(step_.active, coefficients_[i], step_.h, to_terms_[i], coefficients_[i]);
+        coefficients_[i].head(n) = (step_.h * method_.P[method_.powers * step_.stages + i]) * step_.end_rate().head(n);
+        add_weighted(n, coefficients_[i], step_.h, to_terms_[i], coefficients_[i]);
     }
 }
 
 void RungeKutta::sum_terms() {
-    VecX& delta = coefficients_[0];
-    delta = step_.y1 - step_.y0;
-    coefficients_[1] = step_.h * step_.start_rate() - delta;
-    coefficients_[2] = 2.0 * delta - step_.h * (step_.end_rate() + step_.start_rate());
+    const int n = step_.active;
+    auto delta = coefficients_[0].head(n);
+    delta = step_.y1.head(n) - step_.y0.head(n);
+    coefficients_[1].head(n) = step_.h * step_.start_rate().head(n) - delta;
+    coefficients_[2].head(n) = 2.0 * delta - step_.h * (step_.end_rate().head(n) + step_.start_rate().head(n));
     for (int i = 0; i < method_.terms; ++i) {
-        coefficients_[3 + i].setZero();
-        add_weighted(step_.active, coefficients_[3 + i], step_.h, to_terms_[i], coefficients_[3 + i]);
+        coefficients_[3 + i].head(n).setZero();
+        add_weighted(n, coefficients_[3 + i], step_.h, to_terms_[i], coefficients_[3 + i]);
     }
 }
 
 void RungeKutta::interpolate(double part, VecX& y) const {
-    y.setZero();
+    const int n = step_.active;
+    auto sum = y.head(n);
+    sum.setZero();
     for (int i = static_cast<int>(coefficients_.size()) - 1; i >= 0; --i) {
-        y += coefficients_[i];
+        sum += coefficients_[i].head(n);
         // ((...) (1 - part)) part, alternating from the last coefficient; or powers of it
-        y *= method_.P || i % 2 == 0 ? part : 1.0 - part;
+        sum *= method_.P || i % 2 == 0 ? part : 1.0 - part;
     }
-    y += step_.y0;
+    sum += step_.y0.head(n);
 }
 
 std::pair<double, double> RungeKutta::interpolated(double part, int index) const {

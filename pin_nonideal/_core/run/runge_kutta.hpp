@@ -36,21 +36,20 @@ public:
             system.derivative(step_.t0 + method_.C[i] * step_.h, stage_, step_.rates[i]);
         }
         add_weighted(step_.active, step_.y0, step_.h, to_end_, step_.y1);
-        step_.y1.tail(step_.y1.size() - step_.active).setZero();
         system.normalize(step_.y1);
     }
 
     // Norm of the error estimate.
     template <class Norm>
     double error(Norm& norm) {
-        error_.setZero();
+        error_.head(step_.active).setZero();
         if (to_errors_.size() == 1) {
             add_weighted(step_.active, error_, step_.h, to_errors_[0], error_);
             return norm(error_, step_.y0);
         }
         double each[2];
         for (int i = 0; i < 2; ++i) {
-            error_.setZero();
+            error_.head(step_.active).setZero();
             add_weighted(step_.active, error_, 1.0, to_errors_[i], error_);
             each[i] = norm(error_, step_.y0);
         }

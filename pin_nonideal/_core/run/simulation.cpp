@@ -41,10 +41,10 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       stepper(options.method, system, norm), control(options.method, options.rtol),
       choice(system, stepper, *this, run_options), stiffness(system, stepper, *this, run_options),
       floor(system, stepper, norm, *this, recording),
-      locator(system, stepper, slip_at_start, pulls, gaps),
+      watch(system, gaps), locator(system, stepper, slip_at_start, pulls, watch),
       output(system, stepper, *this, run_options, recording), notices(system, stepper, *this, recording),
       user_events(run_options.events, system, stepper), torques(system, *this, run_options, output),
-      landing(system, *this, run_options, output, recording),
+      landing(system, *this, watch, run_options, output, recording),
       time_stepping(system, *this, run_options, torques, output, notices, user_events, recording),
       clusters(system, *this, run_options, stiffness, time_stepping, recording),
       modes(system, *this, run_options, torques, output, landing, clusters, recording) {
@@ -54,7 +54,6 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
     w.continues = options.continues || (in_time && system.ng > 0);
     slip_at_start.assign(p.frictions.size(), 0.0);
     pulls.assign(p.contacts.size(), 0);
-    gaps = GapState(p.gaps.size());
 }
 
 void Simulation::start(const VecX& q0, const VecX& v0) {
@@ -171,10 +170,12 @@ Simulation::Proposal Simulation::propose() {
 // --- Integrate ------------------------------------------------------------------------------------------------------
 
 std::optional<double> Simulation::integrate(const Proposal& proposal) {
-    if (system.ne > 0) before_step = w.state;
-    stepper.y0 = y;
-    stepper.y0.tail(2 * system.ne + system.ng).setZero();  // what elements watch is theirs over one step
-    stepper.start_rate() = rate;
+    watched = system.watches();
+    if (watched) before_step = w.state;
+    const int active = system.active();
+    stepper.y0.head(system.ns) = y.head(system.ns);
+    stepper.y0.segment(system.ns, active - system.ns).setZero();  // what elements watch is theirs over one step
+    stepper.start_rate().head(active) = rate.head(active);
     try {
         return try_step(proposal);
     } catch (const Failure& failure) {
@@ -201,7 +202,7 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
         system.on_constraints = true;
         stepper.take(t, size);
     }
-    if (!stepper.y1.allFinite()) throw Failure(Failure::Kind::not_finite, t + size);
+    if (!stepper.y1.head(stepper.active).allFinite()) throw Failure(Failure::Kind::not_finite, t + size);
     if (control.needs_detour(system.smallest_pivot, start_pivot, w.now.rows.distance)) return std::nullopt;
     const bool needs_end = options.method.first_same_as_last && !stepper.collocates();
     double error = needs_end ? 0.0 : stepper.error();
@@ -264,7 +265,7 @@ bool Simulation::leaves_rate(const Proposal& proposal) const {
 
 // Modes, and what hangs on them, as the step began.
 void Simulation::back_to_start() {
-    if (system.ne > 0) {
+    if (watched) {
         set_contacts(p, w, before_step.closed, before_step.mode);
         w.state = before_step;
     }
@@ -280,10 +281,10 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     t = event ? event->time : proposal.last ? proposal.stop : stepper.t0 + stepper.h;
     moved_energy += system.moved_energy;
     remember_directions(system, slip_at_start);
-    y = stepper.y1;
-    rate = stepper.end_rate();
+    y.head(stepper.active) = stepper.y1.head(stepper.active);
+    rate.head(stepper.active) = stepper.end_rate().head(stepper.active);
     output.configured_now();
-    landing.remember_gaps();
+    landing.remember_gaps(!event);
     output.keep_step();
     user_events.tell(t, out.events);
     if (!event || !event->changes_modes()) notices.pulls(event);

@@ -67,6 +67,7 @@ protected:
     StepperChoice choice;
     StiffnessGuard stiffness;
     RoundingFloor floor;
+    GapWatch watch;
     EventLocator locator;
     Output output;
     Notices notices;
@@ -80,7 +81,8 @@ protected:
     Clock::time_point next_save;
     const Clock::time_point begun = Clock::now();
     std::optional<FoundEvent> event;  // in the step just taken
-    RunState before_step;
+    RunState before_step;      // where anything was closed or rubbed
+    bool watched = false;      // it did, as the step began
     bool stops_there = false;  // at t_end: nobody goes on from the state that is left
     std::optional<Failure> opened;  // a loop that a trial of this step could not close
 };

@@ -36,7 +36,7 @@ void Stepper::take(double t, double size) {
     h = size;
     has_interpolant_ = false;
     collocates_ = system_.w.state.seeks_directions;
-    active = system_.watches() ? static_cast<int>(y0.size()) : states;
+    active = system_.active();
     if (collocates_) return collocation_.advance();
     with_scheme(scheme_, [&](auto& scheme) { scheme.advance(system_); });
 }
@@ -64,8 +64,9 @@ double Stepper::error() {
 
 double Stepper::stiffness() const {
     if (collocates_) return collocation_.stiffness();
-    const double apart = system_.velocity(y1 - last_stage()).norm();
-    return apart > 0.0 ? h * system_.velocity(rates[stages] - rates[stages - 1]).norm() / apart : 0.0;
+    const double apart = (system_.velocity(y1) - system_.velocity(last_stage())).norm();
+    if (!(apart > 0.0)) return 0.0;
+    return h * (system_.velocity(rates[stages]) - system_.velocity(rates[stages - 1])).norm() / apart;
 }
 
 void Stepper::learn() {

@@ -23,11 +23,6 @@ System::System(const Program& program, Workspace& workspace, bool with_energy)
       ng(static_cast<int>(p.gaps.size())), ns(nq + nv + nz + nw), ny(ns + 2 * ne + ng),
       q(VecX::Zero(nq)), v(VecX::Zero(nv)) {}
 
-bool System::watches() const {
-    const auto& closed = w.state.closed;
-    return !w.now.loaded.empty() || std::find(closed.begin(), closed.end(), char(1)) != closed.end();
-}
-
 void System::read(const VecX& y) {
     std::copy_n(y.data(), nq, q.data());
     std::copy_n(y.data() + nq, nv, v.data());
@@ -61,12 +56,12 @@ void System::write_rate(double t, VecX& dy) {
     std::copy_n(w.now.a.data(), nv, dy.data() + nq);
     if (nz > 0) dy.segment(nq + nv, nz) = w.now.dz;
     if (energy) powers(p, w, v, dy.data() + nq + nv + nz);
-    watch(t, dy);
-    watch_loads(dy);
+    if (!w.now.loaded.empty()) watch(t, dy);
+    if (!w.now.touching.empty()) watch_loads(dy);
 }
 
 void System::watch(double t, VecX& dy) {
-    std::fill_n(dy.data() + ns, 2 * ne, 0.0);
+    std::fill_n(dy.data() + ns, std::min(active() - ns, 2 * ne), 0.0);
     for (int e : w.now.loaded) {
         double *of_element = dy.data() + ns + 2 * e, &share = of_element[0], &rate = of_element[1];
         if (slips(w.state.mode[e])) {
@@ -84,9 +79,9 @@ void System::watch(double t, VecX& dy) {
 
 void System::watch_loads(VecX& dy) {
     double* loads = dy.data() + ns + 2 * ne;
-    for (int i = 0; i < ng; ++i) {
-        loads[i] = 0.0;
-        if (!w.state.closed[i] || p.blocks[p.gaps[i].block].kept.empty()) continue;
+    std::fill_n(loads, ng, 0.0);
+    for (int i : w.now.touching) {
+        if (p.blocks[p.gaps[i].block].kept.empty()) continue;
         if (!w.now.rows.redundant) loads[i] = w.now.lam[p.blocks[p.gaps[i].block].row];
         else loads[i] = reactions(p, w).presses ? 1.0 : -1.0;
     }

@@ -31,7 +31,12 @@ struct System {
     // Whether anything in the scene may end a smooth stretch of motion by itself.
     bool has_events() const { return ne > 0 || ng > 0 || !p.contacts.empty(); }
     // Whether elements or gaps are watched in the modes that hold now: some are not open.
-    bool watches() const;
+    bool watches() const { return !w.now.loaded.empty() || !w.now.touching.empty(); }
+    // So many numbers of a state or rate are read; those behind belong to what is open.
+    int active() const {
+        if (!w.now.touching.empty()) return ny;
+        return w.now.loaded.empty() ? ns : ns + 2 * (w.now.loaded.back() + 1);
+    }
     // Takes q and v from y, or puts them there.
     void read(const VecX& y);
     void write(VecX& y) const;

@@ -85,6 +85,7 @@ void TimeStepping::take(double end, double t_end) {
 
 void TimeStepping::step(double size, double stop, double t_end) {
     torques_.sample();
+    now_.gaps.current = false;
     double& t = now_.t;
     VecX& y = now_.y;
     const double end = end_of_step(size, stop, t_end), from = t;
