@@ -116,6 +116,7 @@ Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX&
         out.touch[i] = w.state.closed[i] || gap <= std::max(width, -rate * touching_time);
         out.rest[i] = out.touch[i] && rate <= still;
         out.strikes |= out.touch[i] && rate < -still;
+        out.lands |= out.touch[i] && rate < -still && !w.state.closed[i];
     }
     return out;
 }

@@ -17,6 +17,7 @@ constexpr double starting_width = 1e-10;
 struct Touching {
     std::vector<char> touch, rest;
     bool strikes = false;
+    bool lands = false;  // one of those that strike is open as yet
 };
 // By the widths and rates of the gaps at (t, q, v): those that are closed, or narrower than `width`, touch.
 Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, double width);

@@ -98,7 +98,8 @@ std::optional<Rest> bounce_to_rest(System& system, double t, double stop, VecX& 
         retract(p.mechanism, system.q.data(), move.data(), y.data());
         out.time += time;
         FoundEvent event{FoundEvent::Kind::touch, 0, out.time};
-        if (next.rest < next.low) event = {FoundEvent::Kind::rest_or_limit, next.element, out.time};
+        if (next.rest < next.low && !contacts_land(system, out.time, y))
+            event = {FoundEvent::Kind::rest_or_limit, next.element, out.time};
         else if (contacts_strike(system, out.time, y, false)) strike_contacts(system, out.time, y, false);
         switch_modes(system, out.time, y, dy, event);
         system.read(y);

@@ -41,13 +41,15 @@ static void fields(Archive& a, GapState& x) {
 }
 
 static void fields(Archive& a, Progress& x) {
-    auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, recent_events, bridged_time,
+    auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, recent_events,
+           last_changes, bridged_time,
            bridged_end, slip_at_start, pulls, gaps, left, impact_energy, several, stiff_steps, quiet_steps, rounding,
            next_look, turning_steps] = x;
     a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, bridged_time, bridged_end,
       slip_at_start, pulls, left, impact_energy, several, stiff_steps, quiet_steps, rounding, next_look, turning_steps);
     fields(a, gaps);
     a.list(recent_events);
+    a.list(last_changes);
 }
 
 static void fields(Archive& a, Event& x) {

@@ -20,6 +20,7 @@ struct Progress {
     long samples = 0;           // of the output grid, so far
     long next_period = 0;       // of sampled control
     std::vector<double> recent_events;  // times, for the count of those that come too thick
+    std::vector<double> last_changes;   // times of the last instants at which modes changed
     double bridged_time = 0.0, bridged_end = 0.0;  // for which a cluster of them was stepped over last, and until when
     std::vector<double> slip_at_start;  // of the step, by element
     std::vector<char> pulls;            // by contact that is kept

@@ -15,11 +15,20 @@ public:
 
     // An event that changes the motion, now.
     void count() { now_.recent_events.push_back(now_.t); }
+    // An instant at which modes change.
+    void remember();
     // Goes on by time stepping for a while where events come too thick, the last of this element; whether it did. The
     // modes are to be found anew then.
     bool bridge(int element, double t_end);
+    // Whether this event, whose motion was not found, is one of several that came closer and closer: what is left of them
+    // until they rest is less than a step can tell.
+    bool dwindles() const;
+    // Goes on by time stepping for a while.
+    void step_over(int element, double t_end);
 
 private:
+    double next_stretch() const;
+
     Workspace& w;
     Progress& now_;
     const Options& options_;

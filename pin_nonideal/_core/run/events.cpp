@@ -1,7 +1,6 @@
 #include "run/events.hpp"
 
 #include <algorithm>
-#include <cstring>
 
 #include "contact/closing.hpp"
 #include "contact/impact.hpp"
@@ -215,6 +214,12 @@ bool contacts_strike(System& system, double t, const VecX& y, bool starts) {
     system.read(y);
     const double width = starts ? starting_width * scene_size(system.p, system.w) : touching_width;
     return touching_contacts(system.p, system.w, t, system.q, system.v, width).strikes;
+}
+
+bool contacts_land(System& system, double t, const VecX& y) {
+    if (system.p.gaps.empty()) return false;
+    system.read(y);
+    return touching_contacts(system.p, system.w, t, system.q, system.v, touching_width).lands;
 }
 
 Strike strike_contacts(System& system, double t, VecX& y, bool starts) {

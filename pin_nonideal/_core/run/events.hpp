@@ -21,6 +21,8 @@ std::vector<Event> changes_since(const System& system, double t, const std::vect
 
 // Whether contacts strike at (t, y): they touch and approach each other.
 bool contacts_strike(System& system, double t, const VecX& y, bool starts);
+// Whether one of them is open as yet: it lands where something else happens.
+bool contacts_land(System& system, double t, const VecX& y);
 // Their impact, which changes the velocity: an event a contact with an impulse, the work of these, and that of moving
 // constraints.
 struct Strike {

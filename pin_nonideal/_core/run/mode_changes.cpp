@@ -10,23 +10,30 @@ namespace pn {
 // So many tiny steps lie at the least between two places at which modes are left that go no further.
 static constexpr double leaving_apart = 1e3;
 
+static bool of_modes(const Failure& failure) {
+    return failure.kind == Failure::Kind::not_converged || failure.kind == Failure::Kind::paradox;
+}
+
 ModeChanges::ModeChanges(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
                          Landing& landing, Clusters& clusters, Recording& out)
     : p(system.p), w(system.w), system_(system), now_(progress), options_(options), torques_(torques), output_(output),
       landing_(landing), clusters_(clusters), out_(out) {}
 
-void ModeChanges::change(const FoundEvent& event) {
+void ModeChanges::change(FoundEvent event) {
     const RunState before = w.state;
     bool struck = false;
+    clusters_.remember();
     try {
+        if (contacts_land(system_, now_.t, now_.y)) event = {FoundEvent::Kind::touch, -1, now_.t};
         struck = event.kind == FoundEvent::Kind::touch && landing_.strike(false);
         for (const Event& found : switch_modes(system_, now_.t, now_.y, now_.rate, event)) {
             out_.events.push_back(found);
             if (!struck) clusters_.count();
         }
-    } catch (const Failure&) {
-        if (!struck) keep_last(before);
-        throw;
+    } catch (const Failure& failure) {
+        keep_last(before, struck);
+        if (!step_over(failure)) throw;
+        return;
     }
     landing_.remember_gaps();
     if (struck) return landing_.end_bouncing(torques_.next_stop(options_.end()));
@@ -36,8 +43,7 @@ void ModeChanges::change(const FoundEvent& event) {
 }
 
 bool ModeChanges::may_end(const Failure& failure) const {
-    const bool of_modes = failure.kind == Failure::Kind::not_converged || failure.kind == Failure::Kind::paradox;
-    return of_modes && options_.method.adaptive() && system_.ng > 0 &&
+    return of_modes(failure) && options_.method.adaptive() && system_.ng > 0 &&
            now_.t >= now_.left + leaving_apart * tiny_step_at(now_.t);
 }
 
@@ -59,16 +65,27 @@ bool ModeChanges::leave() {
 }
 
 void ModeChanges::bridge(int element) {
-    if (!clusters_.bridge(element, options_.end())) return;
+    if (clusters_.bridge(element, options_.end())) go_on_with_new_modes();
+}
+
+bool ModeChanges::step_over(const Failure& failure) {
+    if (!of_modes(failure) || system_.ng == 0 || !clusters_.dwindles()) return false;
+    clusters_.step_over(failure.elements.empty() ? 0 : failure.elements.front(), options_.end());
+    go_on_with_new_modes();
+    return true;
+}
+
+void ModeChanges::go_on_with_new_modes() {
     switch_modes(system_, now_.t, now_.y, now_.rate, std::nullopt);
     landing_.remember_gaps();
     output_.configured_now();
 }
 
 // What the motion was until no modes were found for what follows.
-void ModeChanges::keep_last(const RunState& before) {
+void ModeChanges::keep_last(const RunState& before, bool struck) {
     set_contacts(p, w, before.closed, before.mode);
     w.state = before;
+    if (struck) return;
     system_.read(now_.y);
     try {
         begin_step(p, w, now_.t, system_.q, system_.v);

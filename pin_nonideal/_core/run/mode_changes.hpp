@@ -18,16 +18,19 @@ public:
                 Landing& landing, Clusters& clusters, Recording& out);
 
     // Modes and state from the event on, which has been reached.
-    void change(const FoundEvent& event);
+    void change(FoundEvent event);
     // Where no step is short enough the motion may end that these modes have, unless those found when it did last lead no
     // further either. What comes next is asked as far beyond as the shortest step goes; false where nothing is found.
     bool may_end(const Failure& failure) const;
     bool leave();
+    // What is left of events that dwindle to rest is stepped over where no motion of theirs was found; whether it was.
+    bool step_over(const Failure& failure);
     // Where events come too thick they are bridged, and the run goes on with modes of its new state.
     void bridge(int element);
 
 private:
-    void keep_last(const RunState& before);
+    void keep_last(const RunState& before, bool struck);
+    void go_on_with_new_modes();
 
     const Program& p;
     Workspace& w;

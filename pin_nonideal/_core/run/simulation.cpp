@@ -97,9 +97,7 @@ void Simulation::run() {
         try {
             while (!control_error(proposal, integrate(proposal)) || !locate_event(proposal)) proposal = propose();
         } catch (const Failure& failure) {
-            if (!modes.may_end(failure)) throw;
-            back_to_start();
-            if (!modes.leave()) throw;
+            if (!goes_on(failure)) throw;
             continue;
         }
         accept(proposal, event);
@@ -261,6 +259,17 @@ bool Simulation::leaves_rate(const Proposal& proposal) const {
     return stops_there && proposal.last && proposal.stop >= t_end && !options.method.adaptive() &&
            !system.has_events() && system.nz == 0 && !p.asks_functions && user_events.empty() &&
            !options.record.evaluates() && !options.record.dense && !options.callback && !options.save;
+}
+
+// Where no step is short enough other modes may lead on from where it began, or time stepping.
+bool Simulation::goes_on(const Failure& failure) {
+    try {
+        back_to_start();
+        if (modes.may_end(failure) && modes.leave()) return true;
+    } catch (const Failure& at_start) {  // the motion of these modes does not even begin
+        if (at_start.kind == Failure::Kind::interrupted) throw;
+    }
+    return modes.step_over(failure);
 }
 
 // Modes, and what hangs on them, as the step began.

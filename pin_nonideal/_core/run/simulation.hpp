@@ -44,6 +44,7 @@ protected:
     void record(const std::optional<FoundEvent>& event);
 
     void find_event();
+    bool goes_on(const Failure& failure);
     void back_to_start();
 
     std::optional<double> try_step(const Proposal& proposal);
