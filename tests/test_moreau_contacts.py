@@ -21,6 +21,11 @@ def box(mu, angle=0.0, restitution=0.0):
     return pn.Scene(model, contacts=corners)
 
 
+# What corners of a foot may miss the laws by: the velocities in play by which they contradict each other.
+UNCHANGEABLE = 1e-7
+# Part of an impulse that is summed up from samples of a force, one a step.
+STEPPED = 0.05
+
 ON_PLANE = [0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]
 
 
@@ -218,3 +223,58 @@ def test_random_bodies_dropped(count):
     print(f"{count} bodies: deepest penetration {deepest:.2f} of one step's approach; failed: {failed}")
     assert failed == []
     assert deepest <= 1.0
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_humanoid_lands_on_its_soles(seed):
+    """Corners of soles and dry friction in all joints share the loads; what the laws miss is told and small.
+
+    The ground gives what gravity takes and what the momentum gains from one end to the other.
+    """
+    robot, soles, edges = pn.load("talos"), ("left_sole_link", "right_sole_link"), np.array([0.2, 0.1, 0.02])
+    model, data = robot.model, robot.model.createData()
+    bent = np.concatenate([np.zeros(6), 0.02 * np.random.default_rng(seed).standard_normal(model.nv - 6)])
+    q0, v0 = pin.integrate(model, robot.q0, bent), np.zeros(model.nv)
+    pin.framesForwardKinematics(model, data, q0)
+    corners = [0.5 * edges * np.array([x, y, -1.0]) for x in (-1.0, 1.0) for y in (-1.0, 1.0)]
+    q0[2] += 1e-3 - min((data.oMf[model.getFrameId(s)] * c)[2] for s in soles for c in corners)
+    scene = pn.Scene(
+        model,
+        contacts=[contact for sole in soles for contact in pn.box_contacts(sole, edges, mu=0.6)],
+        laws=[pn.JointFriction(str(name), coulomb=20.0) for name in list(model.names)[2:]],
+        actuation=pn.HoldPosition(kp=500.0, kd=20.0),
+        q0=robot.q0,
+    )
+    dt = 1e-3
+    run = pn.simulate(scene, 0.3, q0, v0, method="moreau", dt=dt, record=["forces"])
+    assert max(run.stats.signorini, run.stats.coulomb, run.stats.dissipation) < UNCHANGEABLE
+    momentum = [
+        pin.computeCentroidalMomentum(model, data, q, v).linear for q, v in zip(run.q, run.v, strict=True)
+    ]
+    given = dt * sum(run.contact_forces[name][1:].sum(axis=0) for name in scene.contact_names)
+    gained = momentum[-1] - momentum[0] - 0.3 * pin.computeTotalMass(model) * model.gravity.linear
+    np.testing.assert_allclose(given, gained, atol=STEPPED * np.linalg.norm(gained))
+
+
+def at(place):
+    return pin.SE3(np.eye(3), np.array(place))
+
+
+@pytest.mark.parametrize("height", [-0.25, 0.0])
+@pytest.mark.parametrize("feet", [3, 6, 7, 8, 9])
+def test_feet_that_carry_nothing_slide_with_the_others(feet, height):
+    """x = a t^2 / 2 under a push beyond mu m g; of many feet in a plane some carry nothing."""
+    model, mass, mu, push = empty((0.0, 0.0, -GRAVITY)), 10.0, 0.7, 90.0
+    table = body(model, 0, pin.JointModelFreeFlyer(), "table", mass, inertia=0.3 * np.eye(3))
+    turn = 2.0 * np.pi * np.arange(feet) / feet
+    for k, angle in enumerate(turn):
+        frame(model, f"foot {k}", table, at([0.3 * np.cos(angle), 0.3 * np.sin(angle), -0.3]))
+    frame(model, "pushed", table, at([0.0, 0.0, height]))
+    contacts = [pn.PointContact(f"foot {k}", mu=mu, static_ratio=1.0) for k in range(feet)]
+    scene = pn.Scene(model, contacts=contacts, forces=[pn.Wrench("pushed", [push, 0.0, 0.0, 0.0, 0.0, 0.0])])
+    run = pn.simulate(
+        scene, 0.5, q=[0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0], v=np.zeros(6), method="moreau", dt=1e-3
+    )
+    slid = 0.5 * (push / mass - mu * GRAVITY) * run.t**2
+    np.testing.assert_allclose(run.q[:, 0], slid, atol=1e-3 * slid[-1])
+    assert run.q[:, 2] == pytest.approx(0.3, abs=1e-9)

@@ -18,6 +18,13 @@ constexpr int few_steps = 3, first_steps = 20, more_steps = 30;
 constexpr int most_turns = 30, most_rounds = 40, sweeps = 40, most_starts = 100;
 constexpr int few_turns = 10, most_stretches = 60;
 constexpr double relaxation = 0.7;
+// Compliance of contacts and joints beside their own response: it halves from the first to the last.
+constexpr double first_compliance = 1e-2, least_compliance = 1e-9;
+constexpr int most_approaches = 40;
+// A miss is of what no forces change where it lasts as elements stiffen: what shares a load, such as the corners of a foot
+// that turns, has velocities that contradict each other by that much of those in play. So small a one is not searched
+// further where any is taken.
+constexpr double unchangeable = 1e-9, lasts = 0.9;
 constexpr double first_stretch = 0.1, least_stretch = 1e-5;  // of the way from no friction to all
 
 }  // namespace
@@ -31,10 +38,11 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
     auto x = even_.vector(n);
     if (warm) x = f.cwiseQuotient(problem_.scale()) / problem_.force_unit();
     else x.setZero();
+    least_miss_ = HUGE_VAL;
     bool found = search(x, warm);
     ConeStatus status = found ? ConeStatus::solved : find_certificate(problem_, certificate_);
     if (status == ConeStatus::jammed) found = grow_friction(x);  // a solution may be there all the same
-    if (status == ConeStatus::failed) found = grow_friction(x) || scatter(x);
+    if (status == ConeStatus::failed) found = grow_friction(x) || scatter(x) || take_nearest(x);
     unique_shares_ = newton_.regular();
     const bool as_it_was = warm && may_keep_shares && newton_.steps() == steps;
     if (found && !unique_shares_ && !as_it_was) {
@@ -68,7 +76,51 @@ bool ConeComplementarity::search(Eigen::Ref<VecX> f, bool warm) {
         if (polish(f, first_steps)) return true;
     }
     path_.follow(problem_, f, ConePath::Slip::follows);
-    return polish(f, more_steps) || take_turns(f) || relax(f);
+    return polish(f, more_steps) || approach(f) || take_turns(f) || relax(f);
+}
+
+// Each element gives way by a little of what its force has changed, which makes every problem on the way a regular one,
+// however many elements share a load; forces that change no more give no way (the proximal point algorithm: Rockafellar,
+// SIAM J. Control Optim. 14, 1976).
+bool ConeComplementarity::approach(Eigen::Ref<VecX> f) {
+    grown_ = problem_;
+    auto last = x_.vector(problem_.n), nearest = nearest_.vector(problem_.n);
+    last.setZero();
+    double compliance = first_compliance, before = HUGE_VAL;
+    for (int turn = 0; turn < most_approaches && !(least_miss_ <= unchangeable); ++turn) {
+        grown_.W() = problem_.W();
+        grown_.W().diagonal().array() += compliance;
+        grown_.w0() = problem_.w0() - compliance * last;
+        f = last;
+        double error = newton_.solve(grown_, f, more_steps);
+        if (!(error <= solved)) {
+            f.setZero();
+            error = newton_.solve(grown_, f, more_steps);
+        }
+        if (!(error <= solved)) {
+            path_.follow(grown_, f, ConePath::Slip::follows);
+            if (f.allFinite()) error = newton_.solve(grown_, f, more_steps);
+        }
+        compliance = std::max(least_compliance, 0.5 * compliance);
+        if (!(error <= solved) || f.cwiseAbs().maxCoeff() > no_force) continue;
+        last = f;
+        if (polish(f, few_steps)) return true;
+        error = newton_.error(problem_, f);
+        if (error > lasts * before && error < least_miss_) {
+            nearest = f;
+            least_miss_ = error;
+        }
+        before = error;
+    }
+    return least_miss_ <= unchangeable && take_nearest(f);
+}
+
+// Of the forces that were approached those that miss least, where they may miss as much.
+bool ConeComplementarity::take_nearest(Eigen::Ref<VecX> f) {
+    if (!(least_miss_ <= most_miss_)) return false;
+    f = nearest_.vector(problem_.n);
+    error_ = least_miss_;
+    return true;
 }
 
 // No force pulls, and none leaves its cone, by rounding either.

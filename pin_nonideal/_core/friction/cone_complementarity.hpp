@@ -1,8 +1,9 @@
 // The solver of contacts with Coulomb's friction: for accelerations, impacts and time stepping alike. Finds f of the
 // problem of cone_problem.hpp for any square W (of any rank, symmetric or not): Newton's method on the modes, from a
-// warm start or from nothing; where that does not come to rest, from the end of the central path, from problems with
-// slip speeds held in turn, from forces that are relaxed element by element, from no friction on, and from starts drawn
-// by lot. Buffers grow to the largest problem met; a call that gets by without the last two takes no memory after that.
+// warm start or from nothing; where that does not come to rest, from the end of the central path, from elements that
+// give way a little and ever less, from problems with slip speeds held in turn, from forces that are relaxed element by
+// element, from no friction on, and from starts drawn by lot. Buffers grow to the largest problem met; a call that gets
+// by without the last two takes no memory after that.
 #pragma once
 
 #include "friction/cone_certificate.hpp"
@@ -30,6 +31,10 @@ public:
     static ConeResiduals residuals(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
                                    const std::vector<ConeElement>& elements, const Eigen::Ref<const VecX>& f);
 
+    // Where no forces meet the laws to rounding, those that miss them by up to so much of what is in play are a solution, for
+    // those who tell by how much; none by default.
+    void take_misses(double most) { most_miss_ = most; }
+
     double error() const { return error_; }             // of the equations, as part of what is in play
     bool unique_shares() const { return unique_shares_; }  // whether it was shown that W tells all of f
     const VecX& certificate() const { return certificate_; }
@@ -39,6 +44,8 @@ public:
 private:
     bool search(Eigen::Ref<VecX> f, bool warm);
     bool polish(Eigen::Ref<VecX> f, int most_steps);
+    bool approach(Eigen::Ref<VecX> f);
+    bool take_nearest(Eigen::Ref<VecX> f);
     bool take_turns(Eigen::Ref<VecX> f);
     bool relax(Eigen::Ref<VecX> f);
     bool grow_friction(Eigen::Ref<VecX> f);
@@ -49,9 +56,9 @@ private:
     ConeNewton newton_;
     ConePath path_;
     ConeShares shares_;
-    Buffer even_, x_, f_, w_;
+    Buffer even_, x_, f_, w_, nearest_;
     VecX certificate_;
-    double error_ = 0.0;
+    double error_ = 0.0, least_miss_ = 0.0, most_miss_ = 0.0;
     bool unique_shares_ = false;
 };
 

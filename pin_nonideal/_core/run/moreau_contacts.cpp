@@ -24,6 +24,9 @@ constexpr int load_passes = 60;           // of limits that depend on the load
 constexpr double load_tolerance = 1e-12;  // change of the limits, as a part of the largest, that is rounding
 constexpr double limit_rounding = 1e-9;   // part of its limit within which a force is at it
 constexpr double least_response = 1e-13;  // part of a row's free response that the constraints must leave it
+// Of the velocities in play, by which a step of a body that turns may contradict itself where corners share its load; the
+// statistics tell.
+constexpr double most_miss = 1e-7;
 
 }  // namespace
 
@@ -33,6 +36,7 @@ MoreauContacts::MoreauContacts(System& system)
       v0_(VecX::Zero(system.nv)), v1_(v0_), a_free_(v0_),
       power_(VecX::Zero(system.nw)), zero_(VecX::Zero(p.layout.rows)), force_(v0_) {
     if (system.ng == 0) return;
+    solver_.take_misses(most_miss);
     for (int e = 0; e < system.ne; ++e)
         if (p.frictions[e].gap < 0) own_.push_back(e);
     const int most = p.layout.rows;
