@@ -235,7 +235,7 @@ def standing(sizes: tuple[int, ...]) -> Iterator[Row]:
     steps = partial(run, method="moreau", dt=1e-3)
     yield Row("Talos on two feet", 1, "a step of moreau", {OURS: timing.per_call(steps)}, per=1000.0)
     swaying = partial(pn.simulate, scene, SWAYING, q, v, **steps.keywords)
-    what = "a step of moreau before it stands still"
+    what = f"a step of moreau in its first {SWAYING:g} s"
     yield Row("Talos on two feet", 1, what, {OURS: timing.per_call(swaying)}, per=1e3 * SWAYING)
 
 

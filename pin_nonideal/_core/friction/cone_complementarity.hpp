@@ -31,8 +31,8 @@ public:
     static ConeResiduals residuals(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
                                    const std::vector<ConeElement>& elements, const Eigen::Ref<const VecX>& f);
 
-    // Where no forces meet the laws to rounding, those that miss them by up to so much of what is in play are a solution, for
-    // those who tell by how much; none by default.
+    // Where no forces meet the laws to rounding, those that miss them by up to so much of what is in play are a solution,
+    // for those who tell by how much; none by default.
     void take_misses(double most) { most_miss_ = most; }
 
     double error() const { return error_; }             // of the equations, as part of what is in play

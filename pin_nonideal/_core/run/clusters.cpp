@@ -37,13 +37,14 @@ bool Clusters::bridge(int element, double t_end) {
 
 void Clusters::remember() {
     std::vector<double>& last = now_.last_changes;
+    if (!last.empty() && last.back() == now_.t) return;
     if (last.size() == dwindling_events) last.erase(last.begin());
     last.push_back(now_.t);
 }
 
 bool Clusters::dwindles() const {
     const std::vector<double>& last = now_.last_changes;
-    return !options_.method.outside() && last.size() == dwindling_events && now_.t - last.front() <= chatter_time;
+    return last.size() == dwindling_events && now_.t - last.front() <= chatter_time;
 }
 
 // Twice the last one where events went on crowding right after it.

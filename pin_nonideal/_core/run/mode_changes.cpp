@@ -3,12 +3,15 @@
 #include <algorithm>
 
 #include "dynamics/evaluation.hpp"
+#include "dynamics/slip.hpp"
 #include "dynamics/step_start.hpp"
 
 namespace pn {
 
 // So many tiny steps lie at the least between two places at which modes are left that go no further.
 static constexpr double leaving_apart = 1e3;
+// Slip below this speed [m/s or rad/s] rests soon, or is about to begin.
+static constexpr double creeping = 1e-8;
 
 static bool of_modes(const Failure& failure) {
     return failure.kind == Failure::Kind::not_converged || failure.kind == Failure::Kind::paradox;
@@ -22,7 +25,6 @@ ModeChanges::ModeChanges(System& system, Progress& progress, const Options& opti
 void ModeChanges::change(FoundEvent event) {
     const RunState before = w.state;
     bool struck = false;
-    clusters_.remember();
     try {
         if (contacts_land(system_, now_.t, now_.y)) event = {FoundEvent::Kind::touch, -1, now_.t};
         struck = event.kind == FoundEvent::Kind::touch && landing_.strike(false);
@@ -35,6 +37,7 @@ void ModeChanges::change(FoundEvent event) {
         if (!step_over(failure)) throw;
         return;
     }
+    clusters_.remember();
     landing_.remember_gaps();
     if (struck) return landing_.end_bouncing(torques_.next_stop(options_.end()));
     if (std::equal(before.mode.begin(), before.mode.end(), w.state.mode.begin())) clusters_.count();
@@ -69,10 +72,21 @@ void ModeChanges::bridge(int element) {
 }
 
 bool ModeChanges::step_over(const Failure& failure) {
-    if (!of_modes(failure) || system_.ng == 0 || !clusters_.dwindles()) return false;
+    const bool no_step = failure.kind == Failure::Kind::step_size;
+    if (options_.method.outside() || system_.ne == 0 || !(of_modes(failure) || no_step)) return false;
+    if (!clusters_.dwindles() && !creeps()) return false;
     clusters_.step_over(failure.elements.empty() ? 0 : failure.elements.front(), options_.end());
     go_on_with_new_modes();
     return true;
+}
+
+// Whether all that slips is about to rest.
+bool ModeChanges::creeps() const {
+    const double least = creeping * (1.0 + system_.velocity(now_.y).cwiseAbs().maxCoeff());
+    const std::vector<int>& slipping = w.now.slipping;
+    return !slipping.empty() && std::all_of(slipping.begin(), slipping.end(), [&](int e) {
+        return slip_velocity(w.now, p.frictions[e]).norm() <= least;
+    });
 }
 
 void ModeChanges::go_on_with_new_modes() {

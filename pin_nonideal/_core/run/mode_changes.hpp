@@ -23,13 +23,15 @@ public:
     // further either. What comes next is asked as far beyond as the shortest step goes; false where nothing is found.
     bool may_end(const Failure& failure) const;
     bool leave();
-    // What is left of events that dwindle to rest is stepped over where no motion of theirs was found; whether it was.
+    // What is left of events that dwindle, or of slip that creeps, to rest is stepped over where no motion of theirs was
+    // found, or no step short enough; whether it was.
     bool step_over(const Failure& failure);
     // Where events come too thick they are bridged, and the run goes on with modes of its new state.
     void bridge(int element);
 
 private:
     void keep_last(const RunState& before, bool struck);
+    bool creeps() const;
     void go_on_with_new_modes();
 
     const Program& p;
