@@ -34,17 +34,17 @@ static void fields(Archive& a, Ways& x) {
 }
 
 static void fields(Archive& a, GapState& x) {
-    auto& [width, rate, separation, near, far, way, turn, apart, ways, ask, current, near_gaps] = x;
-    a(width, rate, separation, near, far, way, turn, apart, ask, current);
+    auto& [width, rate, separation, near, far, way, turn, apart, ways, ask, current, near_gaps, vain_since,
+           rests_until] = x;
+    a(width, rate, separation, near, far, way, turn, apart, ask, current, vain_since, rests_until);
     fields(a, ways);
     x.find_near();
 }
 
 static void fields(Archive& a, Progress& x) {
     auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, recent_events,
-           last_changes, bridged_time,
-           bridged_end, slip_at_start, pulls, gaps, left, impact_energy, several, stiff_steps, quiet_steps, rounding,
-           next_look, turning_steps] = x;
+           last_changes, bridged_time, bridged_end, slip_at_start, pulls, gaps, left, impact_energy, several, stiff_steps,
+           quiet_steps, rounding, next_look, turning_steps] = x;
     a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, bridged_time, bridged_end,
       slip_at_start, pulls, left, impact_energy, several, stiff_steps, quiet_steps, rounding, next_look, turning_steps);
     fields(a, gaps);

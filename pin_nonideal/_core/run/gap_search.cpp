@@ -214,7 +214,8 @@ std::optional<GapSearch::Touch> GapSearch::search(int gap, const Look& a, const 
     if (bends.above * length * length < rounding_ || looks_ > most_looks) {
         // Bodies that slide from one place to the next, a corner from a face on to an edge, bring the gap of the next down
         // to zero there, where it stays: nothing touches before it goes below.
-        const bool has_closed = looks_ > most_looks && !(a.separation && slides_on(gap));
+        const bool rests = stepper_.t0 < start_.rests_until[gap];
+        const bool has_closed = looks_ > most_looks && !rests && !(a.separation && slides_on(gap));
         if (a.width > 0.0 && b.width < -rounding_) return between(gap, a, b);
         if (b.width < -rounding_ || has_closed) return Touch{b.part, b.rate * stepper_.h};
         return std::nullopt;

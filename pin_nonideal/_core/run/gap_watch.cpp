@@ -10,6 +10,8 @@ namespace pn {
 
 // A gap is far from so many times the way of a step on: nearer ones would be asked again at once.
 constexpr double steps_of_far = 4.0;
+// A gap that was asked in vain is not asked again for this long [s]; then for as long as it has been in vain.
+constexpr double least_rest = 1e-4;
 
 GapWatch::GapWatch(System& system, GapState& state)
     : gaps(state), ways(system.p), system_(system), p(system.p), w(system.w) {
@@ -79,6 +81,11 @@ void GapState::keep(int gap, const GapLook& look) {
     width[gap] = look.width;
     rate[gap] = look.rate;
     if (look.separation) separation[gap] = *look.separation;
+}
+
+void GapState::ask_in_vain(int gap, double t) {
+    if (rests_until[gap] == -HUGE_VAL) vain_since[gap] = t;
+    rests_until[gap] = t + std::max(least_rest, t - vain_since[gap]);
 }
 
 void GapState::find_near() {

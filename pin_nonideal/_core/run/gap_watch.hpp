@@ -1,6 +1,8 @@
 // Gaps from step to step: how wide they are, and which of them are far, so that steps need not look at them.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "contact/separation.hpp"
@@ -30,13 +32,19 @@ struct GapState {
     double ask = 0.0;            // the scene's way at which far ones are asked again
     bool current = false;        // of the state now, or of the step that led to it
     std::vector<int> near_gaps;  // in order
+    // Of one that others hold on its plane, and that did not close when it was asked to: since when that is so, and until
+    // when it is not asked again.
+    std::vector<double> vain_since, rests_until;
 
     // `round`: whether any of so many gaps is that of round bodies.
     explicit GapState(size_t gaps = 0, bool round = false)
         : width(gaps, 0.0), rate(gaps, 0.0), separation(round ? gaps : 0), near(gaps, 0), far(gaps, 0), way(gaps, 0.0),
-          turn(gaps, 0.0), apart(gaps, 0.0) {}
+          turn(gaps, 0.0), apart(gaps, 0.0), vain_since(gaps, 0.0), rests_until(gaps, -HUGE_VAL) {}
     void keep(int gap, const GapLook& look);
     void find_near();
+    void ask_in_vain(int gap, double t);
+    // Contacts have changed: all are asked again.
+    void ask_anew() { std::fill(rests_until.begin(), rests_until.end(), -HUGE_VAL); }
 };
 
 class GapWatch {

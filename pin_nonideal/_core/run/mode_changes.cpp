@@ -38,9 +38,13 @@ void ModeChanges::change(FoundEvent event) {
         return;
     }
     clusters_.remember();
+    const bool in_vain = event.kind == FoundEvent::Kind::touch && event.index >= 0 && !struck;
+    const bool same_modes = std::equal(before.mode.begin(), before.mode.end(), w.state.mode.begin());
+    if (!same_modes || before.closed != w.state.closed) now_.gaps.ask_anew();
+    else if (in_vain && !w.state.closed[event.index]) now_.gaps.ask_in_vain(event.index, now_.t);
     landing_.remember_gaps();
     if (struck) return landing_.end_bouncing(torques_.next_stop(options_.end()));
-    if (std::equal(before.mode.begin(), before.mode.end(), w.state.mode.begin())) clusters_.count();
+    if (same_modes) clusters_.count();
     output_.configured_now();
     bridge(event.of_gap() ? 0 : event.index);
 }
