@@ -260,9 +260,10 @@ def at(place):
     return pin.SE3(np.eye(3), np.array(place))
 
 
+@pytest.mark.parametrize("method", ["moreau", "rk4"])
 @pytest.mark.parametrize("height", [-0.25, 0.0])
 @pytest.mark.parametrize("feet", [3, 6, 7, 8, 9])
-def test_feet_that_carry_nothing_slide_with_the_others(feet, height):
+def test_feet_that_carry_nothing_slide_with_the_others(feet, height, method):
     """x = a t^2 / 2 under a push beyond mu m g; of many feet in a plane some carry nothing."""
     model, mass, mu, push = empty((0.0, 0.0, -GRAVITY)), 10.0, 0.7, 90.0
     table = body(model, 0, pin.JointModelFreeFlyer(), "table", mass, inertia=0.3 * np.eye(3))
@@ -273,7 +274,7 @@ def test_feet_that_carry_nothing_slide_with_the_others(feet, height):
     contacts = [pn.PointContact(f"foot {k}", mu=mu, static_ratio=1.0) for k in range(feet)]
     scene = pn.Scene(model, contacts=contacts, forces=[pn.Wrench("pushed", [push, 0.0, 0.0, 0.0, 0.0, 0.0])])
     run = pn.simulate(
-        scene, 0.5, q=[0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0], v=np.zeros(6), method="moreau", dt=1e-3
+        scene, 0.5, q=[0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0], v=np.zeros(6), method=method, dt=1e-3
     )
     slid = 0.5 * (push / mass - mu * GRAVITY) * run.t**2
     np.testing.assert_allclose(run.q[:, 0], slid, atol=1e-3 * slid[-1])

@@ -48,6 +48,7 @@ EventLocator::EventLocator(System& system, Stepper& stepper, const std::vector<d
       search_(system, stepper, pulls, watch) {}
 
 double EventLocator::shorten_toward_rest(const VecX& rate, double size) {
+    const double least = least_shortened * size;
     for (int e : w.now.slipping) {
         const Friction& f = p.frictions[e];
         if (f.dim == 1) continue;
@@ -61,7 +62,7 @@ double EventLocator::shorten_toward_rest(const VecX& rate, double size) {
             change += along * along;
         }
         if (slip < change * size * size)
-            size = std::min(size, std::max(part_toward_rest * std::sqrt(slip / change), least_shortened * size));
+            size = std::min(size, std::max(part_toward_rest * std::sqrt(slip / change), least));
     }
     return size;
 }
