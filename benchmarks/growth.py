@@ -25,6 +25,7 @@ from .problems import Problem
 
 OURS, ABA, ODEINT, MUJOCO = "pin_nonideal", "pinocchio aba in C++", "aba + odeint in C++", "mujoco"
 MOST_NESTED = 300  # elements of XML in each other that Python writes
+MOST_CUBED = 500  # dofs of what needs room by their cube
 SWAYING = 0.2  # seconds in which a humanoid sways, and less
 LEAST_RUN, LONG_RUN = 1e-3, 0.05  # seconds of a turn
 COULOMB: dict[str, Any] = {"coulomb": 0.1}
@@ -150,7 +151,9 @@ def forward(model: Any, q: Any, v: Any) -> tuple[timing.Batch, Any] | None:
 
 
 def peers(model: Any) -> dict[str, Any]:
-    """Pinocchio's compiled side, as far as it has been built."""
+    """Pinocchio's compiled side, as far as it has been built; a `pinocchio::Data` takes 32 nv^3 bytes to make."""
+    if model.nv > MOST_CUBED:
+        return {}
     modules = {name: build_peers.load(name) for name in build_peers.NAMES}
     return {name: module.Peer(model, [], 0.0, 1) for name, module in modules.items() if module is not None}
 
