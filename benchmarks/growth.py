@@ -151,7 +151,7 @@ def forward(model: Any, q: Any, v: Any) -> tuple[timing.Batch, Any] | None:
 
 
 def peers(model: Any) -> dict[str, Any]:
-    """Pinocchio's compiled side, as far as it has been built; a `pinocchio::Data` takes 32 nv^3 bytes to make."""
+    """Pinocchio's compiled side, as far as it has been built; making its data takes 32 nv^3 bytes."""
     if model.nv > MOST_CUBED:
         return {}
     modules = {name: build_peers.load(name) for name in build_peers.NAMES}

@@ -87,7 +87,7 @@ def scaling(results: dict[str, Any]) -> Figure:
 
 def growth(results: list[dict[str, Any]]) -> Figure:
     """A panel for each case of several sizes: time over size, of everybody in every group."""
-    shown = [result for result in results if result["exponents"]]
+    shown = [result for result in results if result["exponents"] and is_curve(result["rows"])]
     rows = max(1, -(-len(shown) // COLUMNS))
     figure = Figure(figsize=(4.0 * COLUMNS, 3.0 * rows), layout="constrained")
     panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
@@ -99,10 +99,16 @@ def growth(results: list[dict[str, Any]]) -> Figure:
         for number, (name, points) in enumerate(series.items()):
             panel.loglog(*zip(*points, strict=True), label=name, **look(number, len(series)))
         label(panel, result["case"], "size", "time [ms]")
-        panel.legend(fontsize="x-small")
+        panel.legend(fontsize="x-small", framealpha=0.5)
     for panel in panels[len(shown) :]:
         panel.remove()
     return figure
+
+
+def is_curve(rows: list[dict[str, Any]]) -> bool:
+    """Whether no size comes twice in a group; what does is a list of different things."""
+    measured = [(row["group"], row["size"]) for row in rows]
+    return len(set(measured)) == len(measured)
 
 
 def label(panel: Axes, title: str, x: str, y: str) -> None:
