@@ -34,7 +34,7 @@ void ModeChanges::change(FoundEvent event) {
         }
     } catch (const Failure& failure) {
         keep_last(before, struck);
-        if (!step_over(failure)) throw;
+        if (!leads_on(failure) || !step_over(failure)) throw;
         return;
     }
     clusters_.remember();
@@ -47,6 +47,12 @@ void ModeChanges::change(FoundEvent event) {
     if (same_modes) clusters_.count();
     output_.configured_now();
     bridge(event.of_gap() ? 0 : event.index);
+}
+
+// What was shown to have no motion, or several, is what the user is told.
+bool ModeChanges::leads_on(const Failure& failure) {
+    const bool shown = failure.solutions != Failure::Solutions::not_told;
+    return failure.kind == Failure::Kind::step_size || (of_modes(failure) && !shown);
 }
 
 bool ModeChanges::may_end(const Failure& failure) const {
@@ -76,9 +82,7 @@ void ModeChanges::bridge(int element) {
 }
 
 bool ModeChanges::step_over(const Failure& failure) {
-    const bool no_step = failure.kind == Failure::Kind::step_size;
-    if (options_.method.outside() || system_.ne == 0 || !(of_modes(failure) || no_step)) return false;
-    if (!clusters_.dwindles() && !creeps()) return false;
+    if (options_.method.outside() || system_.ne == 0 || !(clusters_.dwindles() || creeps())) return false;
     clusters_.step_over(failure.elements.empty() ? 0 : failure.elements.front(), options_.end());
     go_on_with_new_modes();
     return true;

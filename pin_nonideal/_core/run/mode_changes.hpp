@@ -23,6 +23,8 @@ public:
     // further either. What comes next is asked as far beyond as the shortest step goes; false where nothing is found.
     bool may_end(const Failure& failure) const;
     bool leave();
+    // Whether no motion or no step was found, which proves nothing.
+    static bool leads_on(const Failure& failure);
     // What is left of events that dwindle, or of slip that creeps, to rest is stepped over where no motion of theirs was
     // found, or no step short enough; whether it was.
     bool step_over(const Failure& failure);

@@ -263,13 +263,15 @@ bool Simulation::leaves_rate(const Proposal& proposal) const {
 
 // Where no step is short enough other modes may lead on from where it began, or time stepping.
 bool Simulation::goes_on(const Failure& failure) {
+    const bool may_end = modes.may_end(failure), leads_on = ModeChanges::leads_on(failure);
+    if (!may_end && !leads_on) return false;
     try {
         back_to_start();
-        if (modes.may_end(failure) && modes.leave()) return true;
+        if (may_end && modes.leave()) return true;
     } catch (const Failure& at_start) {  // the motion of these modes does not even begin
         if (at_start.kind == Failure::Kind::interrupted) throw;
     }
-    return modes.step_over(failure);
+    return leads_on && modes.step_over(failure);
 }
 
 // Modes, and what hangs on them, as the step began.
