@@ -201,6 +201,8 @@ class Builder:
 
     def set_torque_table(self, times: Sequence[float], values: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> None: ...
 
+    def limit_effort(self, least: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], most: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None: ...
+
     @property
     def constraints(self) -> list[ConstraintRows]: ...
 
@@ -391,13 +393,19 @@ class EventKind(enum.Enum):
     user = 6
     """a function of the user crosses zero"""
 
-    impact = 7
+    saturate = 7
+    """a drive reaches the effort that it has"""
+
+    desaturate = 8
+    """a drive gives again what is asked of it"""
+
+    impact = 9
     """a contact strikes, with an impulse"""
 
-    touch_down = 8
+    touch_down = 10
     """a contact closes without an impulse, or its bouncing ends"""
 
-    lift_off = 9
+    lift_off = 11
     """a contact opens"""
 
 class Event:

@@ -17,6 +17,7 @@ from .errors import InputError
 from .types import Array
 
 __all__ = [
+    "EffortLimits",
     "HoldPosition",
     "SampledControl",
     "Table",
@@ -110,4 +111,45 @@ class Table:
         object.__setattr__(self, "values", array(f"{who}: values", self.values, (times.size, None)))
 
 
-Actuation = SampledControl | HoldPosition | Table | Callable[..., object] | Sequence[float] | Array
+@dataclass(frozen=True, eq=False)
+class EffortLimits:
+    """A drive that gives no more than its motors have: tau = min(max(u, -effort), effort), dof by dof.
+
+    What is asked of it (torques in place of the scene's actuation too) is cut; an event of kind "saturate"
+    tells of each joint when its drive reaches the limit, one of kind "desaturate" when it gives again what is
+    asked of it.
+
+    Args:
+        actuation: what asks for torques u: any other actuation.
+        effort: most of each dof [N m or N], a number or an array of shape (nv,), not negative; None for the
+            model's own limits (`lowerEffortLimit`, `upperEffortLimit`: those of the file), of which infinite
+            ones and the zeros of joints that state none are none.
+        name: used in messages and results.
+    """
+
+    actuation: Actuation
+    effort: Gain | None = None
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        optional_text("EffortLimits: name", self.name)
+        who = label(self)
+        if self.actuation is None or isinstance(self.actuation, EffortLimits):
+            kind = "None" if self.actuation is None else "EffortLimits"
+            raise InputError(f"{who}: actuation must ask for torques without limits of its own; got {kind}")
+        if self.effort is not None:
+            shape = () if np.ndim(np.asarray(self.effort, dtype=object)) == 0 else (None,)
+            most = array(f"{who}: effort", self.effort, shape)
+            if (most < 0.0).any():
+                raise InputError(f"{who}: effort must not be negative; got {float(most.min()):g}")
+            object.__setattr__(self, "effort", float(most) if most.ndim == 0 else most)
+
+
+Actuation = (
+    EffortLimits | SampledControl | HoldPosition | Table | Callable[..., object] | Sequence[float] | Array
+)
+
+
+def asked_by(actuation: Actuation | None) -> Actuation | None:
+    """What asks for torques, without the limits that a drive may have."""
+    return actuation.actuation if isinstance(actuation, EffortLimits) else actuation

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .compilation.failures import joint_of
 from .core import core
 from .records import LEDGER, Event, Stats
 from .scene import Scene
@@ -127,6 +128,9 @@ def _event(scene: Scene, event: core.Event, functions: Sequence[str]) -> Event:
     """An event with the name of its element or contact, or of the user's function."""
     if event.kind is core.EventKind.user:
         return Event(event.time, event.kind.name, functions[event.element])
+    if event.kind in (core.EventKind.saturate, core.EventKind.desaturate):
+        joint = scene.model.names[joint_of(scene.model, event.element)]
+        return Event(event.time, event.kind.name, str(joint))
     if not event.of_contact:
         # A cluster of events without any friction is one of contacts.
         names = scene.element_names or scene._compiled.opening_names

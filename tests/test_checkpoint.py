@@ -55,9 +55,17 @@ def driven_arm():
     return pn.Scene(scene.model, laws=scene.laws, q0=scene.q0, actuation=control, name="arm")
 
 
+def weak_arm():
+    """The arm held by motors that are asked for more than they have, again and again."""
+    scene = pn.load("panda_friction")
+    drive = pn.EffortLimits(lambda t, q, v: 60.0 * np.sin(9.0 * t + np.arange(len(v))), 40.0)
+    return pn.Scene(scene.model, laws=scene.laws, q0=scene.q0, actuation=drive, name="weak arm")
+
+
 # Every method of the core; friction that sticks and slips; loops, redundant ones too; held torques.
 RUNS = {
     "events": (cart, 1.5, {"record": ALL, "rtol": 1e-6}),
+    "effort": (weak_arm, 1.0, {"record": ALL, "rtol": 1e-6}),
     "events on a grid": (cart, 1.5, {"record": ALL, "output_dt": 0.02, "method": "dopri5"}),
     "fixed steps with events": (cart, 1.5, {"record": "energy", "method": "rk4", "dt": 0.01}),
     "time stepping": (cart, 1.5, {"record": ALL, "method": "moreau", "dt": 0.01, "output_dt": 0.03}),

@@ -98,7 +98,7 @@ def _gained(element: str, gain: float, t: float) -> RunError:
 
 
 def _stiff(model: Model, dof: int, rate: float, t: float) -> RunError:
-    joint = str(model.names[_joint_of(model, dof)])
+    joint = str(model.names[joint_of(model, dof)])
     return StiffnessError(
         f'joint "{joint}" is stiff at t = {t:.4g} s: its motion relaxes at {rate:.2g} 1/s, and an explicit '
         "method takes steps that short, too many to reach the end; look at its damping, stiffness and "
@@ -118,7 +118,7 @@ def stiff_hint(model: Model, dof: int, rate: float, decays: bool) -> str:
         rate: of that motion [1/s].
         decays: whether it decays; else it swings.
     """
-    joint = str(model.names[_joint_of(model, dof)])
+    joint = str(model.names[joint_of(model, dof)])
     if decays:
         return (
             f'joint "{joint}" is stiff: its motion relaxes at {rate:.2g} 1/s, and an explicit method takes '
@@ -130,7 +130,8 @@ def stiff_hint(model: Model, dof: int, rate: float, decays: bool) -> str:
     )
 
 
-def _joint_of(model: Model, dof: int) -> int:
+def joint_of(model: Model, dof: int) -> int:
+    """The joint that a degree of freedom belongs to."""
     return next(i for i, j in enumerate(model.joints) if i and j.idx_v <= dof < j.idx_v + j.nv)
 
 
@@ -195,7 +196,7 @@ def _inconsistent(names: Sequence[str], items: list[int], residual: float, t: fl
 
 
 def _singular(model: Model, dof: int, t: float) -> RunError:
-    joint = _joint_of(model, dof)
+    joint = joint_of(model, dof)
     bodies = [f.name for f in model.frames if f.parentJoint == joint and f.type == pin.FrameType.BODY]
     links = ", ".join(f'"{b}"' for b in bodies) or "its body"
     return SingularMassError(

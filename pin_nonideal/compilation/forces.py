@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pin_nonideal.actuation import HoldPosition, SampledControl, Table
+from pin_nonideal.actuation import EffortLimits, HoldPosition, SampledControl, Table
 from pin_nonideal.checks import array
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError
@@ -60,6 +60,10 @@ def _(f: UserForce, out: core.Builder, where: Resolution) -> None:
     out.add_user_force(checked(f.function, f"{words(f)}: function", (where.model.nv,)))
 
 
+# Pinocchio's word for no limit is the largest number.
+UNBOUNDED = 1e300
+
+
 def lower_actuation(u: Any, out: core.Builder, where: Resolution) -> None:
     """Sets the torques that drive the scene.
 
@@ -74,7 +78,11 @@ def lower_actuation(u: Any, out: core.Builder, where: Resolution) -> None:
     model, nv = where.model, where.model.nv
     if u is None:
         return
-    if isinstance(u, SampledControl):
+    if isinstance(u, EffortLimits):
+        lower_actuation(u.actuation, out, where)
+        least, most = _efforts(u, model)
+        out.limit_effort(least=least, most=most)
+    elif isinstance(u, SampledControl):
         out.set_sampled_torque(checked(u.function, f"{words(u)}: function", (nv,)), u.period)
     elif isinstance(u, HoldPosition):
         q = where.q0 if u.q is None else configuration(model, u.q, f"{words(u)}: q")
@@ -89,6 +97,19 @@ def lower_actuation(u: Any, out: core.Builder, where: Resolution) -> None:
         out.set_torque_function(checked(u, "actuation", (nv,)))
     else:
         out.set_constant_torque(tau=np.ascontiguousarray(array("actuation", u, (nv,))))
+
+
+def _efforts(u: EffortLimits, model: Model) -> tuple[Array, Array]:
+    """Least and most effort of every degree of freedom, infinite where it has no limit."""
+    if u.effort is not None:
+        shape = () if np.ndim(u.effort) == 0 else (model.nv,)
+        most = np.full(model.nv, array(f"{words(u)}: effort", u.effort, shape))
+        return -most, most
+    least, most = model.lowerEffortLimit.copy(), model.upperEffortLimit.copy()
+    unstated = least >= most
+    least[unstated | (least <= -UNBOUNDED)] = -np.inf
+    most[unstated | (most >= UNBOUNDED)] = np.inf
+    return np.ascontiguousarray(least), np.ascontiguousarray(most)
 
 
 def _gains(u: HoldPosition, key: str, model: Model) -> Array:

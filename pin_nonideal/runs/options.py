@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pin_nonideal.actuation import SampledControl
+from pin_nonideal.actuation import SampledControl, asked_by
 from pin_nonideal.checks import array, choice, count, flag, label, nonnegative, number, positive, sequence
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError
@@ -261,8 +261,9 @@ def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, fl
     end = max(abs(t0), abs(t0 + duration))
     spacing = float(np.spacing(end))
     named = {f"simulate: {key}": value for key, value in {"duration": duration, **lengths}.items()}
-    if isinstance(scene.actuation, SampledControl):
-        named[f"{label(scene.actuation)}: period"] = scene.actuation.period
+    control = asked_by(scene.actuation)
+    if isinstance(control, SampledControl):
+        named[f"{label(control)}: period"] = control.period
     for what, value in named.items():
         if not value >= LEAST_SPACINGS * spacing:  # also when the end is beyond all numbers
             raise InputError(
@@ -275,9 +276,9 @@ def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, fl
             f"simulate: {key} must leave at most {MOST_SAMPLES:g} samples; {lengths[key]:g} s leaves "
             f"{duration / lengths[key]:.2g}; set a longer {'output_dt' if key == 'dt' else key}"
         )
-    if isinstance(scene.actuation, SampledControl) and duration / scene.actuation.period > MOST_SAMPLES:
+    if isinstance(control, SampledControl) and duration / control.period > MOST_SAMPLES:
         raise InputError(
-            f"{label(scene.actuation)}: period must leave at most {MOST_SAMPLES:g} calls in a run; "
-            f"{scene.actuation.period:g} s leaves {duration / scene.actuation.period:.2g}; "
+            f"{label(control)}: period must leave at most {MOST_SAMPLES:g} calls in a run; "
+            f"{control.period:g} s leaves {duration / control.period:.2g}; "
             "set a longer period"
         )

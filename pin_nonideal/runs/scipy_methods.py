@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from pin_nonideal.actuation import SampledControl
+from pin_nonideal.actuation import SampledControl, asked_by
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, RunError, StepSizeError
 from pin_nonideal.scene import Scene
@@ -131,7 +131,7 @@ def simulate_stiff(
     """
     from scipy import integrate
 
-    if isinstance(scene.actuation, SampledControl):
+    if isinstance(asked_by(scene.actuation), SampledControl):
         raise InputError(f'simulate: SampledControl needs one of the core\'s methods; got "{options.method}"')
     run = _Run(scene, options, tick, events)
     try:

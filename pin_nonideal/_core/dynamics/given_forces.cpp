@@ -98,13 +98,14 @@ struct Torque {
 
 }  // namespace
 
-static void actuation_torque(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& tau) {
+void asked_torque(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& tau) {
     if (w.now.has_override) tau = w.now.override_torque;
     else std::visit(Torque{p, w, t, q, v, tau}, p.actuation);
 }
 
 void given_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    actuation_torque(p, w, t, q, v, w.now.tau);
+    asked_torque(p, w, t, q, v, w.now.tau);
+    if (p.limits_effort()) w.now.tau = w.now.tau.cwiseMax(p.least_effort).cwiseMin(p.most_effort);
     w.now.external.setZero();
     w.now.joint_external.setZero();
     if (p.forces.empty()) return;

@@ -49,9 +49,11 @@ struct Program {
 
     std::vector<GivenForce> forces;
     Actuation actuation;
+    VecX least_effort, most_effort;      // of the drives, by dof; empty where they give what is asked
 
     // What the scene does not need is not computed.
     bool has_laws() const { return !frictions.empty() || !laws.empty(); }
+    bool limits_effort() const { return least_effort.size() > 0; }
     bool needs_reactions = false;        // some law reads them
     bool rubs_while_closed = false;      // no law acts but friction of contacts that may open
     bool driven = false;                 // forces or actuation

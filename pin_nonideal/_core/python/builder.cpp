@@ -162,7 +162,11 @@ void bind_actuation(nb::class_<Builder>& builder) {
         }, "kp"_a, "kd"_a, "q"_a)
         .def("set_torque_table", [](Builder& b, std::vector<double> times, Array2 values) {
             b.p->actuation = TorqueTable{std::move(times), map(values).transpose()};
-        }, "times"_a, "values"_a);
+        }, "times"_a, "values"_a)
+        .def("limit_effort", [](Builder& b, Array least, Array most) {
+            b.p->least_effort = map(least);
+            b.p->most_effort = map(most);
+        }, "least"_a, "most"_a);
 }
 
 void bind_enums(nb::module_& m) {

@@ -43,9 +43,9 @@ static void fields(Archive& a, GapState& x) {
 
 static void fields(Archive& a, Progress& x) {
     auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, recent_events,
-           last_changes, bridged_time, bridged_end, slip_at_start, pulls, gaps, left, impact_energy, several, stiff_steps,
-           quiet_steps, rounding, next_look, turning_steps] = x;
-    a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, bridged_time, bridged_end,
+           last_changes, sides, bridged_time, bridged_end, slip_at_start, pulls, gaps, left, impact_energy, several,
+           stiff_steps, quiet_steps, rounding, next_look, turning_steps] = x;
+    a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, sides, bridged_time, bridged_end,
       slip_at_start, pulls, left, impact_energy, several, stiff_steps, quiet_steps, rounding, next_look, turning_steps);
     fields(a, gaps);
     a.list(recent_events);
@@ -120,8 +120,10 @@ void from_bytes(const std::string& bytes, System& system, Progress& progress, Re
     archive(a, system.w, progress, out);
     a.end();
     const int elements = static_cast<int>(std::max(system.p.frictions.size(), system.p.blocks.size()));
-    for (const Event& e : out.events)
-        a.require(static_cast<size_t>(e.kind) < std::size(event_kinds) && e.element >= 0 && e.element < elements);
+    for (const Event& e : out.events) {
+        const int known = Event::of_drive(e.kind) ? system.nv : elements;
+        a.require(static_cast<size_t>(e.kind) < std::size(event_kinds) && e.element >= 0 && e.element < known);
+    }
     a.require(progress.samples >= 0 && progress.next_period >= 0);
     try {
         evaluate_anew(system, progress, std::vector<char>(system.w.now.rows.active));

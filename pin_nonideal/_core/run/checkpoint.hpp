@@ -21,6 +21,7 @@ struct Progress {
     long next_period = 0;       // of sampled control
     std::vector<double> recent_events;  // times, for the count of those that come too thick
     std::vector<double> last_changes;   // times of the last instants at which modes changed
+    std::vector<double> sides;          // of values that tell events by their signs
     double bridged_time = 0.0, bridged_end = 0.0;  // for which a cluster of them was stepped over last, and until when
     std::vector<double> slip_at_start;  // of the step, by element
     std::vector<char> pulls;            // by contact that is kept

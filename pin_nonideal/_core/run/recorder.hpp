@@ -15,13 +15,16 @@
 namespace pn {
 
 struct Event {
-    enum class Kind { stick, slip, reverse, pull, chatter, several, user, impact, touch_down, lift_off };
+    enum class Kind {
+        stick, slip, reverse, pull, chatter, several, user, saturate, desaturate, impact, touch_down, lift_off
+    };
     double time;
     Kind kind;
-    int element;  // of friction; of a contact its block; of the user his function
+    int element;  // of friction; of a contact its block; of the user his function; of a drive its dof
     Vec3 impulse = Vec3::Zero();  // of an impact: along the normal, then the directions of slip
     double energy_change = 0.0;
     VecX v_minus = {}, v_plus = {};
+    static bool of_drive(Kind kind) { return kind == Kind::saturate || kind == Kind::desaturate; }
     static bool of_contact(Kind kind) { return kind == Kind::pull || kind >= Kind::impact; }
 };
 
@@ -38,6 +41,8 @@ constexpr EventKind event_kinds[] = {
     {Event::Kind::chatter, "chatter", "a cluster of events is bridged by time stepping"},
     {Event::Kind::several, "several", "from here on the laws allow other motions too"},
     {Event::Kind::user, "user", "a function of the user crosses zero"},
+    {Event::Kind::saturate, "saturate", "a drive reaches the effort that it has"},
+    {Event::Kind::desaturate, "desaturate", "a drive gives again what is asked of it"},
     {Event::Kind::impact, "impact", "a contact strikes, with an impulse"},
     {Event::Kind::touch_down, "touch_down", "a contact closes without an impulse, or its bouncing ends"},
     {Event::Kind::lift_off, "lift_off", "a contact opens"},

@@ -43,9 +43,9 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       floor(system, stepper, norm, *this, recording),
       watch(system, gaps), locator(system, stepper, slip_at_start, pulls, watch),
       output(system, stepper, *this, run_options, recording), notices(system, stepper, *this, recording),
-      user_events(run_options.events, system, stepper), torques(system, *this, run_options, output),
+      value_events(run_options.events, system, stepper, *this), torques(system, *this, run_options, output),
       landing(system, *this, watch, run_options, output, recording),
-      time_stepping(system, *this, run_options, torques, output, notices, user_events, recording),
+      time_stepping(system, *this, run_options, torques, output, notices, value_events, recording),
       clusters(system, *this, run_options, stiffness, time_stepping, recording),
       modes(system, *this, run_options, torques, output, landing, clusters, recording) {
     y = rate = configured_y = VecX::Zero(system.ny);
@@ -75,7 +75,7 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
     output.now();
     notices.pulls(std::nullopt);
     notices.several(false);
-    user_events.start(t, y);
+    value_events.start(t, y);
     h = options.dt;
     if (options.method.adaptive()) {
         h = norm.initial_step(options.method.order, t, y, rate, t_end - t);
@@ -233,8 +233,8 @@ void Simulation::find_event() {
     event.reset();
     if (system.has_events())
         if (const auto found = locator.locate()) event = *found;
-    if (!user_events.empty() && user_events.locate(event.has_value()))
-        event = FoundEvent{FoundEvent::Kind::user, user_events.found().front(), stepper.t0 + stepper.h};
+    if (!value_events.empty() && value_events.locate(event.has_value()))
+        event = FoundEvent{FoundEvent::Kind::user, value_events.found().front(), stepper.t0 + stepper.h};
 }
 
 bool Simulation::locate_event(const Proposal& proposal) {
@@ -257,7 +257,7 @@ bool Simulation::locate_event(const Proposal& proposal) {
 // A method with an error takes it from there; events, functions, and what is recorded beside the state ask for it.
 bool Simulation::leaves_rate(const Proposal& proposal) const {
     return stops_there && proposal.last && proposal.stop >= t_end && !options.method.adaptive() &&
-           !system.has_events() && system.nz == 0 && !p.asks_functions && user_events.empty() &&
+           !system.has_events() && system.nz == 0 && !p.asks_functions && value_events.empty() &&
            !options.record.evaluates() && !options.record.dense && !options.callback && !options.save;
 }
 
@@ -297,7 +297,7 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     output.configured_now();
     landing.remember_gaps(!event);
     output.keep_step();
-    user_events.tell(t, out.events);
+    value_events.tell(t, out.events);
     if (!event || !event->changes_modes()) notices.pulls(event);
     output.inside_step(notices.several(true));
     stepper.end_directions();
@@ -314,7 +314,7 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
 
 void Simulation::record(const std::optional<FoundEvent>& event) {
     if (event && event->changes_modes()) output.now();
-    else output.end_step(!user_events.found().empty());
+    else output.end_step(!value_events.found().empty());
 }
 
 // --- Runs -----------------------------------------------------------------------------------------------------------

@@ -51,7 +51,7 @@ protected:
     // Whether nothing asks for the acceleration at the end of this step.
     bool leaves_rate(const Proposal& proposal) const;
 
-    bool done() const { return t >= t_end || user_events.ends_run(); }
+    bool done() const { return t >= t_end || value_events.ends_run(); }
     // Whether the run goes on.
     bool between_steps();
     void save();
@@ -72,7 +72,7 @@ protected:
     EventLocator locator;
     Output output;
     Notices notices;
-    UserEvents user_events;
+    ValueEvents value_events;
     Torques torques;
     Landing landing;
     TimeStepping time_stepping;

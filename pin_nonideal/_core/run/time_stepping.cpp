@@ -30,9 +30,9 @@ bool asks_always(const Program& p, const Options& options) {
 }  // namespace
 
 TimeStepping::TimeStepping(System& system, Progress& progress, const Options& options, Torques& torques,
-                           Output& output, Notices& notices, UserEvents& user_events, Recording& out)
+                           Output& output, Notices& notices, ValueEvents& value_events, Recording& out)
     : p(system.p), w(system.w), system_(system), now_(progress), options_(options), torques_(torques),
-      output_(output), notices_(notices), user_events_(user_events), out_(out), moreau_(system),
+      output_(output), notices_(notices), value_events_(value_events), out_(out), moreau_(system),
       moreau_contacts_(system), lasts_(!may_differ(system.p, options)), asked_always_(asks_always(system.p, options)) {}
 
 double TimeStepping::end_of_step(double size, double stop, double t_end) const {
@@ -102,9 +102,9 @@ void TimeStepping::step(double size, double stop, double t_end) {
     notices_.pulls(std::nullopt);
     notices_.several(false);
     output_.keep_time_step(from, y_from);
-    user_events_.look_at_end(t, y);
-    user_events_.tell(t, out_.events);
-    if (!user_events_.found().empty()) output_.now();
+    value_events_.look_at_end(t, y);
+    value_events_.tell(t, out_.events);
+    if (!value_events_.found().empty()) output_.now();
     output_.end_time_step();
 }
 

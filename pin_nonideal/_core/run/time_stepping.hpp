@@ -6,14 +6,14 @@
 #include "run/moreau_contacts.hpp"
 #include "run/notices.hpp"
 #include "run/torques.hpp"
-#include "run/user_events.hpp"
+#include "run/value_events.hpp"
 
 namespace pn {
 
 class TimeStepping {
 public:
     TimeStepping(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
-                 Notices& notices, UserEvents& user_events, Recording& out);
+                 Notices& notices, ValueEvents& value_events, Recording& out);
 
     // One step of this size, not beyond `stop` nor the end of the run.
     void step(double size, double stop, double t_end);
@@ -34,7 +34,7 @@ private:
     Torques& torques_;
     Output& output_;
     Notices& notices_;
-    UserEvents& user_events_;
+    ValueEvents& value_events_;
     Recording& out_;
     Moreau moreau_;
     MoreauContacts moreau_contacts_;

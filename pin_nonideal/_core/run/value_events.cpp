@@ -1,9 +1,10 @@
-#include "run/user_events.hpp"
+#include "run/value_events.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "dynamics/evaluation.hpp"
+#include "dynamics/given_forces.hpp"
 #include "math/roots.hpp"
 
 namespace pn {
@@ -20,31 +21,56 @@ constexpr double same_part = 1e-12;
 // An event this near to the step's start, in spacings of the time, has happened there.
 constexpr double start_spacings = 8.0;
 
-signed char sign(double x) { return static_cast<signed char>((x > 0.0) - (x < 0.0)); }
+double sign(double x) { return (x > 0.0) - (x < 0.0); }
+
+// Those whose drives may be asked for more than they have.
+std::vector<int> bounded_drives(const Program& p) {
+    std::vector<int> dofs;
+    for (int dof = 0; p.limits_effort() && dof < p.mechanism.nv; ++dof)
+        if (p.least_effort[dof] > -HUGE_VAL || p.most_effort[dof] < HUGE_VAL) dofs.push_back(dof);
+    return dofs;
+}
 
 }  // namespace
 
-UserEvents::UserEvents(const std::vector<UserEvent>& asked, System& system, Stepper& stepper)
-    : asked_(asked), system_(system), stepper_(stepper), side_(asked.size(), 0), count_(asked.size(), 0) {}
+ValueEvents::ValueEvents(const std::vector<UserEvent>& asked, System& system, Stepper& stepper, Progress& progress)
+    : asked_(asked), system_(system), stepper_(stepper), drives_(bounded_drives(system.p)), side_(progress.sides),
+      count_(asked.size() + drives_.size(), 0), asked_y_(VecX::Zero(system.ns)), asked_torque_(VecX::Zero(system.nv)),
+      probe_(VecX::Zero(system.ny)) {
+    side_.assign(count_.size(), 0.0);
+}
 
-double UserEvents::value(int k, double t, const VecX& y) {
+double ValueEvents::value(int k, double t, const VecX& y) {
+    if (k >= users()) return effort_left(drives_[k - users()], t, y);
     system_.read(y);
     return asked_[k].function(t, system_.q, system_.v);
 }
 
-double UserEvents::value_inside(int k, double part) {
+// Negative where more is asked than the drive has. All drives are asked at once.
+double ValueEvents::effort_left(int dof, double t, const VecX& y) {
+    if (!asked_before_ || t != asked_time_ || asked_y_ != y.head(system_.ns)) {
+        asked_before_ = true;
+        asked_time_ = t;
+        asked_y_ = y.head(system_.ns);
+        system_.read(y);
+        asked_torque(system_.p, system_.w, t, system_.q, system_.v, asked_torque_);
+    }
+    return std::min(system_.p.most_effort[dof] - asked_torque_[dof], asked_torque_[dof] - system_.p.least_effort[dof]);
+}
+
+double ValueEvents::value_inside(int k, double part) {
     if (part >= 1.0) return value(k, stepper_.t0 + stepper_.h, stepper_.y1);
     stepper_.interpolate(part, probe_);
     return value(k, stepper_.t0 + part * stepper_.h, probe_);
 }
 
-void UserEvents::start(double t, const VecX& y) {
-    probe_ = y;
-    for (size_t k = 0; k < asked_.size(); ++k) side_[k] = sign(value(k, t, y));
+void ValueEvents::start(double t, const VecX& y) {
+    asked_before_ = false;
+    for (int k = 0; k < size(); ++k) side_[k] = sign(value(k, t, y));
 }
 
 // Where a value is zero at the start of a run it has no sign before it takes one, which is no event.
-double UserEvents::first_crossing(int k) {
+double ValueEvents::first_crossing(int k) {
     double before = 0.0;
     for (int i = 1; i <= looks; ++i) {
         const double part = static_cast<double>(i) / looks, here = value_inside(k, part);
@@ -64,13 +90,13 @@ double UserEvents::first_crossing(int k) {
     return beyond;
 }
 
-void UserEvents::end_step_at(double size) {
+void ValueEvents::end_step_at(double size) {
     stepper_.take(stepper_.t0, size);
     system_.project_and_evaluate(stepper_.t0 + size, stepper_.y1, stepper_.end_rate());
 }
 
 // Secants on the length of the step, from the slope that the interpolant has at the crossing.
-void UserEvents::step_onto(int k, double part) {
+void ValueEvents::step_onto(int k, double part) {
     const double full = stepper_.h, t0 = stepper_.t0;
     const double least = start_spacings * (std::nextafter(std::abs(t0), HUGE_VAL) - std::abs(t0));
     const double low = std::max(0.0, part - slope_part), high = std::min(1.0, part + slope_part);
@@ -87,35 +113,40 @@ void UserEvents::step_onto(int k, double part) {
     }
 }
 
-void UserEvents::tell(double t, std::vector<Event>& events) const {
-    for (int k : found_) events.push_back({t, Event::Kind::user, k});
+void ValueEvents::tell(double t, std::vector<Event>& events) const {
+    for (int k : found_) {
+        const Event::Kind drives = side_[k] < 0.0 ? Event::Kind::saturate : Event::Kind::desaturate;
+        if (k < users()) events.push_back({t, Event::Kind::user, k});
+        else events.push_back({t, drives, drives_[k - users()]});
+    }
 }
 
-void UserEvents::count(int k) {
-    const int after = asked_[k].direction;
-    side_[k] = static_cast<signed char>(after != 0 ? after : -side_[k]);
+void ValueEvents::count(int k) {
+    const int after = direction(k);
+    side_[k] = after != 0 ? after : -side_[k];
     found_.push_back(k);
     ++count_[k];
-    ends_run_ |= asked_[k].terminal > 0 && count_[k] >= asked_[k].terminal;
+    ends_run_ |= k < users() && asked_[k].terminal > 0 && count_[k] >= asked_[k].terminal;
 }
 
 // Events that happen together with the one that the step ends at, and signs of all others.
-void UserEvents::take_signs() {
-    for (int k = 0; k < static_cast<int>(asked_.size()); ++k) {
-        const signed char here = sign(value(k, stepper_.t0 + stepper_.h, stepper_.y1));
+void ValueEvents::take_signs() {
+    for (int k = 0; k < size(); ++k) {
+        const double here = sign(value(k, stepper_.t0 + stepper_.h, stepper_.y1));
         if (here == 0 || here == side_[k] || std::count(found_.begin(), found_.end(), k) > 0) continue;
         if (side_[k] != 0 && counts(k)) count(k);
         else side_[k] = here;
     }
 }
 
-bool UserEvents::locate(bool ends_at_event) {
+bool ValueEvents::locate(bool ends_at_event) {
     found_.clear();
     stepper_.make_interpolant();
-    const std::vector<signed char> side = side_;
+    const std::vector<double> side = side_;
+    asked_before_ = false;
     int first = -1;
     double part = beyond;
-    for (int k = 0; k < static_cast<int>(asked_.size()); ++k) {
+    for (int k = 0; k < size(); ++k) {
         const double crossing = first_crossing(k);
         if (crossing >= part) continue;
         part = crossing;
@@ -136,10 +167,11 @@ bool UserEvents::locate(bool ends_at_event) {
     return first >= 0 && !at_end;
 }
 
-void UserEvents::look_at_end(double t, const VecX& y) {
+void ValueEvents::look_at_end(double t, const VecX& y) {
     found_.clear();
-    for (int k = 0; k < static_cast<int>(asked_.size()); ++k) {
-        const signed char here = sign(value(k, t, y));
+    asked_before_ = false;
+    for (int k = 0; k < size(); ++k) {
+        const double here = sign(value(k, t, y));
         if (here == 0 || here == side_[k]) continue;
         if (side_[k] != 0 && counts(k)) count(k);
         else side_[k] = here;
