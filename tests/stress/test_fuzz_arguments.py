@@ -19,8 +19,8 @@ from pin_nonideal.errors import PinNonidealError
 from .fuzzing import few_and_many, for_all, junk, result_or_named_error
 
 DESCRIPTIONS = [
-    pn.BoxContact, pn.CapsuleContact, pn.CylinderContact, pn.Distance, pn.Drag, pn.EllipsoidContact,
-    pn.FrameAnchor, pn.GeometryContact, pn.HullContact,
+    pn.BoxContact, pn.CapsuleContact, pn.CylinderContact, pn.Distance, pn.Drag, pn.EffortLimits,
+    pn.EllipsoidContact, pn.FrameAnchor, pn.GeometryContact, pn.HullContact,
     pn.HingeAnchor, pn.HoldPosition, pn.JointCoupling, pn.JointFriction, pn.JointLimit, pn.JointSpring,
     pn.KnifeEdge, pn.LuGre, pn.PointAnchor, pn.PointContact, pn.PrescribedMotion, pn.Rolling,
     pn.SampledControl, pn.SigmoidFriction, pn.SphereContact, pn.SpringDamper, pn.Table,
@@ -76,7 +76,8 @@ def shapes(model):
 GOOD = {
     "joint": ["crank_joint"], "joint1": ["crank_joint"], "joint2": ["rocker_joint"], "frame": ["coupler_tip"],
     "frame1": ["coupler_tip"], "frame2": ["rocker_tip"], "axes": ["xz"], "axis": ["y"],
-    "ratio": [2.0], "size": [1, 2], "value": [np.ones(6)],
+    "actuation": [np.ones(3), pn.SampledControl(lambda *_: np.ones(3), 0.01)],
+    "effort": [0.1], "ratio": [2.0], "size": [1, 2], "value": [np.ones(6)],
     "function": [pn.constant(0.1), lambda *_: np.zeros(3), lambda *_: (np.zeros((1, 3)), [0.0])],
     "radius": [0.1], "coulomb": [0.1], "coefficient": [1.0], "exponent": [1.0], "stiffness": [10.0],
     "period": [0.01], "kp": [1.0], "kd": [0.1], "times": [[0.0, 1.0]], "values": [np.zeros((2, 3))],

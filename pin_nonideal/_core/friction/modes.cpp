@@ -242,13 +242,13 @@ struct Search {
     void run() {
         if (question.answered) return apply(question.modes, false);
         if (keeps_suggestion()) return;
-        unload(false);
         std::vector<Mode> modes = question.modes;
         for (int e : list) modes[e] = unloaded;
         bool found = false;
         try {
+            unload(false);
             found = take_turns(modes);
-        } catch (const Failure& failure) {  // loads that no motion has, under forces on the way
+        } catch (const Failure& failure) {  // loads of what slips, while what rests has no force yet or not its own
             if (failure.kind != Failure::Kind::paradox) throw;
         }
         if (p.needs_reactions && look_further(found, modes)) return;
