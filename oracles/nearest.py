@@ -58,3 +58,36 @@ def nearest_by_search(model, q, residual, size=1.0, starts=8, spread=0.5, unit=1
         if np.abs(phi(found)).max() < CLOSED and np.linalg.norm(found) < best:
             best, where = float(np.linalg.norm(found)), pin.integrate(model, q, scale @ found)
     return best * longest, where
+
+
+def nearest_outside(model, q, residual, gaps, size):
+    """The least distance from q to where residuals are zero and no gap is negative, from q alone.
+
+    Args:
+        model: pinocchio.Model.
+        q: where from, (nq,).
+        residual: q -> phi, (m,), m may be zero.
+        gaps: q -> gap, (k,).
+        size: of a large gap: the depth at q.
+
+    Returns:
+        The distance, and by how much of the size the place there misses.
+    """
+    scale = size * np.linalg.inv(np.linalg.cholesky(mass_matrix(model, q)).T)  # d = scale x
+
+    def at(x):
+        return pin.integrate(model, q, scale @ x)
+
+    constraints = [{"type": "ineq", "fun": lambda x: gaps(at(x)) / size}]
+    if len(residual(q)):
+        constraints.append({"type": "eq", "fun": lambda x: residual(at(x)) / size})
+    found = minimize(
+        lambda x: 0.5 * x @ x,
+        np.zeros(model.nv),
+        jac=lambda x: x,
+        constraints=constraints,
+        method="SLSQP",
+        options={"ftol": 1e-16, "maxiter": 500},
+    ).x
+    missed = max(-gaps(at(found)).min(), np.abs(residual(at(found))).max(initial=0.0)) / size
+    return size * float(np.linalg.norm(found)), missed

@@ -99,7 +99,7 @@ class States:
     def project(
         self, q: State | None = None, v: State | None = None, t: float = 0.0, *, report: bool = False
     ) -> tuple[Array, Array] | tuple[Array, Array, ProjectionReport]:
-        """Nearest consistent state: phi(q, t) = 0 and A v + phi_t = 0.
+        """Nearest consistent state: phi(q, t) = 0, A v + phi_t = 0, and no contact inside its plane.
 
         Of all configurations that satisfy the constraints it is that with the least d^T M(q) d, where d is
         the move from q in tangent coordinates and M(q) the mass matrix there; of all velocities, that with
@@ -119,8 +119,9 @@ class States:
 
         Raises:
             LoopClosureError: the constraints cannot be met from here; `gaps` names each gap.
-            InputError: wrong shapes or numbers, or a coordinate where floating-point numbers are more than
-                a millimeter or milliradian apart.
+            InputError: wrong shapes or numbers, a contact that starts deep inside its plane or has no short way
+                out of it, or a coordinate where floating-point numbers are more than a millimeter or milliradian
+                apart.
         """
         time, wanted = number("t", t), choice("report", report, (True, False))
         if q is None and v is None and time == 0.0:

@@ -81,7 +81,7 @@ class CompiledScene:
             for row, first, factor in copies:
                 builder.add_copy(row, first, factor)
             self.program = builder.finish()
-        self.projection = Projection(model, self.program, q0)
+        self.projection = Projection(model, self.program, q0, {name for name, _, _ in self.dropped})
 
     def project(self, q: Array, v: Array, t: float) -> tuple[Array, Array, ProjectionReport]:
         """Nearest state on the constraints, see `Projection.nearest`."""

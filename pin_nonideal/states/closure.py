@@ -19,6 +19,8 @@ import pinocchio as pin
 
 from pin_nonideal.types import Array, Model
 
+from .least_moves import complement, held
+
 # A gap below this part of the reach of its row is left to the core's Newton method, which squares it.
 CLOSED = 1e-9
 # A gap that stays above this part of it after projection is a loop that does not close.
@@ -26,8 +28,6 @@ CLOSURE_TOLERANCE = 1e-8
 CLOSING_STEPS, RETRACTIONS, SLIDES, HALVINGS = 300, 15, 60, 25
 # Of the steps that close: part of the mean square of a row at first, and between which it stays.
 DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-14, 1e10
-# Directions that the rows hold by less than this part of the best held ones they do not hold.
-HELD = 1e-9
 # The part of the move along the constraints at which a closure counts as stationary: rounding over gaps.
 STATIONARY = 1e-10
 # Rounding of a move, as a part of moving everything by its unit.
@@ -75,17 +75,26 @@ class Closure(NamedTuple):
     iterations: int
 
 
-class _Place(NamedTuple):
-    """What a configuration is to the search, in coordinates x in which |x| is a distance."""
+class Place(NamedTuple):
+    """What a configuration is to the search, in coordinates x in which |x| is a distance.
+
+    Attributes:
+        q: configuration, (nq,).
+        move: from the start, (nv,).
+        half: x = half dq, (nv, nv).
+        B: rows, (m, nv).
+        phi: their residuals, (m,).
+    """
 
     q: Array
-    move: Array  # from the start, (nv,)
-    half: Array  # x = half dq, (nv, nv)
-    B: Array  # rows, (m, nv)
-    phi: Array  # their residuals, (m,)
+    move: Array
+    half: Array
+    B: Array
+    phi: Array
 
     @property
     def gap(self) -> float:
+        """The largest residual."""
         return float(np.abs(self.phi).max(initial=0.0))
 
 
@@ -136,8 +145,8 @@ class Search:
             spread = longest * SPREADS[k % len(SPREADS)] * generator.standard_normal(self.model.nv)
             place = self._close(pin.integrate(self.model, self.q0, spread * self.unit) if k else self.q0)
             k += 1
-            if not place.gap <= CLOSED:
-                open_place = min(place, open_place, key=lambda p: p.gap)
+            if not self._is_closed(place):
+                open_place = min(place, open_place, key=self._lacking)
                 continue
             found = self._unwound(self._settle(place))
             if conditioning(self.mass(found.q)) <= WELL_CONDITIONED:
@@ -158,9 +167,8 @@ class Search:
             return best._replace(iterations=self.iterations), known
         if fallback is not None:
             return fallback._replace(iterations=self.iterations), fallback.settled
-        return Closure(
-            open_place.q, open_place.gap, self._distance(open_place), False, self.iterations
-        ), False
+        lacking = self._lacking(open_place)
+        return Closure(open_place.q, lacking, self._distance(open_place), False, self.iterations), False
 
     def _unwound(self, found: Closure) -> Closure:
         """The nearer one of a closure and of what it is without whole turns of joints."""
@@ -169,24 +177,32 @@ class Search:
         if not turns.any():
             return found
         place = self._close(pin.integrate(self.model, self.q0, move - TURN * turns))
-        return min(found, self._settle(place), key=lambda c: c.distance) if place.gap <= CLOSED else found
+        return min(found, self._settle(place), key=lambda c: c.distance) if self._is_closed(place) else found
+
+    def _is_closed(self, place: Place) -> bool:
+        """Whether all rows are met there, but for what the core's Newton method squares."""
+        return self._lacking(place) <= CLOSED
+
+    def _lacking(self, place: Place) -> float:
+        """The largest gap."""
+        return place.gap
 
     def _longest(self, q: Array) -> float:
         """The longest move of a coordinate [units]."""
         return float((np.abs(pin.difference(self.model, self.q0, q)) / self.unit).max(initial=0.0))
 
-    def _place(self, q: Array) -> _Place:
+    def _place(self, q: Array) -> Place:
         A, phi = self.rows(q)
         move = self.root @ pin.difference(self.model, self.q0, q)
         turned = pin.dDifference(self.model, self.q0, q, pin.ArgumentPosition.ARG1)
         half = self.root @ turned.reshape(self.root.shape)
-        return _Place(q, move, half, np.linalg.solve(half.T, A.T).T, phi)
+        return Place(q, move, half, np.linalg.solve(half.T, A.T).T, phi)
 
     @staticmethod
-    def _distance(place: _Place) -> float:
+    def _distance(place: Place) -> float:
         return float(np.linalg.norm(place.move))
 
-    def _go(self, place: _Place, x: Array, part: float = 1.0) -> Array:
+    def _go(self, place: Place, x: Array, part: float = 1.0) -> Array:
         """The configuration a move x away, which is cut to one unit."""
         dq = np.linalg.solve(place.half, x)
         longest = float((np.abs(dq) / self.unit).max(initial=0.0))
@@ -197,7 +213,7 @@ class Search:
 
     # --- onto the constraints -------------------------------------------------------------------------------
 
-    def _close(self, q: Array) -> _Place:
+    def _close(self, q: Array) -> Place:
         """Levenberg-Marquardt steps x = -B^T (B B^T + damping I)^-1 phi down to the constraints."""
         place, damping = self._place(q), DAMPING
         for _ in range(CLOSING_STEPS):
@@ -218,14 +234,14 @@ class Search:
                     break
         return place
 
-    def _retract(self, q: Array) -> _Place | None:
+    def _retract(self, q: Array) -> Place | None:
         """Back onto the constraints from nearby, by least moves."""
         place = self._place(q)
         for _ in range(RETRACTIONS):
             gap = place.gap
             if gap <= ROUNDING:
                 break
-            U, s, Vt = _held(place.B)
+            U, s, Vt = held(place.B)
             trial = self._place(self._go(place, -Vt.T @ ((U.T @ place.phi) / s)))
             if not trial.gap < gap:
                 break
@@ -234,19 +250,19 @@ class Search:
 
     # --- along the constraints ------------------------------------------------------------------------------
 
-    def _settle(self, place: _Place) -> Closure:
+    def _settle(self, place: Place) -> Closure:
         """The nearest closure downhill; its start where that is a corner, in which rows have no direction."""
         found, settled = self._slide(place)
         if not settled and self._has_corner(found):
             found = place
         return Closure(found.q, found.gap, self._distance(found), settled, self.iterations)
 
-    def _slide(self, place: _Place) -> tuple[_Place, bool]:
+    def _slide(self, place: Place) -> tuple[Place, bool]:
         """Newton's method for the Lagrangian in the open directions, and whether it ends in a minimum."""
         settled = False
         for _ in range(SLIDES):
-            U, s, Vt = _held(place.B)
-            open_directions = _complement(Vt)
+            U, s, Vt = held(place.B)
+            open_directions = complement(Vt)
             slope = open_directions.T @ place.move
             lam = -U @ ((Vt @ place.move) / s)
             flat = np.linalg.norm(slope) <= STATIONARY * self._distance(place) + ROUNDING * self.size
@@ -269,19 +285,19 @@ class Search:
             place = trial
         return place, settled
 
-    def _has_corner(self, place: _Place) -> bool:
+    def _has_corner(self, place: Place) -> bool:
         """Whether the rows change their direction at once, such as those of a disk that lies flat."""
-        _, _, Vt = _held(place.B)
+        _, _, Vt = held(place.B)
         slope = place.move - Vt.T @ (Vt @ place.move)
         x = NEAR_CORNER * self._unit_length(place, slope) * slope
         there = [self._place(self._go(place, side * x)).phi - side * (place.B @ x) for side in (1.0, -1.0)]
         return bool(max(np.abs(phi - place.phi).max(initial=0.0) for phi in there) > CORNER * NEAR_CORNER)
 
-    def _unit_length(self, place: _Place, x: Array) -> float:
+    def _unit_length(self, place: Place, x: Array) -> float:
         """How far along x some coordinate moves by its unit."""
         return 1.0 / max(float((np.abs(np.linalg.solve(place.half, x)) / self.unit).max()), TINY)
 
-    def _downhill(self, place: _Place, x: Array, slope: float) -> _Place | None:
+    def _downhill(self, place: Place, x: Array, slope: float) -> Place | None:
         """The first of ever shorter moves along x that comes nearer, or, at rounding, is less steep."""
         distance = self._distance(place)
         for k in range(HALVINGS):
@@ -295,12 +311,12 @@ class Search:
                 return trial
         return None
 
-    def _slope(self, place: _Place) -> float:
+    def _slope(self, place: Place) -> float:
         """How much of the move lies in the open directions."""
-        _, _, Vt = _held(place.B)
+        _, _, Vt = held(place.B)
         return float(np.linalg.norm(place.move - Vt.T @ (Vt @ place.move)))
 
-    def _curvature(self, place: _Place, lam: Array, open_directions: Array) -> tuple[Array, Array]:
+    def _curvature(self, place: Place, lam: Array, open_directions: Array) -> tuple[Array, Array]:
         """Second derivatives of the Lagrangian along the open directions, rising, and their directions."""
         n = open_directions.shape[1]
         if n == 0 or n > MANY_FREEDOMS:
@@ -315,24 +331,10 @@ class Search:
         return values, open_directions @ vectors
 
     @staticmethod
-    def _gradient(place: _Place, lam: Array) -> Array:
+    def _gradient(place: Place, lam: Array) -> Array:
         """Of |move|^2/2 + lam . phi, in tangent coordinates."""
         gradient: Array = place.half.T @ (place.move + place.B.T @ lam)
         return gradient
-
-
-def _held(B: Array) -> tuple[Array, Array, Array]:
-    """Singular values of the rows that hold something, with their vectors U (m, r) and V^T (r, nv)."""
-    U, s, Vt = np.linalg.svd(B, full_matrices=False)
-    rank = int(np.count_nonzero(s > HELD * s.max(initial=0.0)))
-    return U[:, :rank], s[:rank], Vt[:rank]
-
-
-def _complement(Vt: Array) -> Array:
-    """Orthonormal columns that span what the orthonormal rows leave."""
-    rank, n = Vt.shape
-    Q, _ = np.linalg.qr(Vt.T, mode="complete") if rank else (np.eye(n), None)
-    return Q[:, rank:]
 
 
 def conditioning(M: Array) -> float:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from pin_nonideal.core import core
-from pin_nonideal.errors import InconsistentConstraintsError, InputError, LoopClosureError, PinNonidealError
+from pin_nonideal.errors import PinNonidealError
 from pin_nonideal.types import Array, Model
 
-from .closure import CLOSURE_TOLERANCE, WELL_CONDITIONED, Closure, Rows, Search, conditioning
-from .rows import copies, holonomic_rows, row_slices, rows_at
+from .closure import CLOSURE_TOLERANCE, FAR, WELL_CONDITIONED, Closure, Rows, Search, conditioning
+from .extents import VANISHING, chain, coordinate, slides
+from .rows import copies, gap_rows, holonomic_rows, rows_at
+from .unmet import largest_loop_gap, lost_velocity, no_way_out, open_loops, refuse_deep_starts
+from .ways_out import SearchOutside
 
 # Rows that no velocity meets better than this part of 1 + |v| contradict each other.
 RATE_TOLERANCE = 1e-6
@@ -26,10 +30,10 @@ SURELY = 0.1  # of it, in ambient coordinates: no difference of configurations i
 NEWTON_REACH = 1e-3
 # A move of more than this part of a unit is worth a word.
 LITTLE = 1e-3
+# Part of the size of the scene by which a gap is negative by rounding.
+INSIDE = 1e-12
 # Part of the length, of one at most, by which a contact may start inside: more is no rounding of a pose.
 DEEP = 1e-2
-# Part of the largest below which a row or an axis is rounding.
-VANISHING = 1e-11
 # The inertia that a coordinate has at least in the distance where M is singular, as a part of the largest.
 LEAST_INERTIA = 1e-9
 # A search in more freedoms takes minutes: Newton's method has the first word, however large the gap.
@@ -70,18 +74,21 @@ class Projection:
         model: pinocchio.Model.
         program: the scene as the core knows it.
         q0: a configuration, (nq,), whose lengths count where the model has none.
+        idle: names of contacts that nothing moves.
 
     Attributes:
         unit: a long move of each coordinate, (nv,): a radian, or the length of the mechanism.
         length: of the mechanism [m]: the longest chain of joints and frames.
     """
 
-    def __init__(self, model: Model, program: core.Program, q0: Array) -> None:
+    def __init__(self, model: Model, program: core.Program, q0: Array, idle: Collection[str] = ()) -> None:
         self.model, self.program = model, program
-        self._slides = _slides(model)
-        self.length = _chain(model) or self._length_at(q0) or 1.0
+        self._slides = slides(model)
+        self.length = chain(model) or self._length_at(q0) or 1.0
         self.unit = np.where(self._slides, self.length, 1.0)
         self._closed = CLOSURE_TOLERANCE * min(1.0, self.length)
+        self._gaps = gap_rows(program, idle)
+        self._has_gaps = bool(self._gaps.any())
 
     def nearest(self, q: Array, v: Array, t: float) -> tuple[Array, Array, ProjectionReport]:
         """Nearest state with phi(q, t) = 0 and A v + phi_t = 0.
@@ -96,46 +103,63 @@ class Projection:
 
         Raises:
             LoopClosureError: no configuration satisfies the constraints.
+            InputError: a contact starts too deep inside its plane.
             InconsistentConstraintsError: no velocity does.
         """
         if not self.program.rows:
             return q, v, UNMOVED
         runner = self.program.runner()
-        self._refuse_deep_starts(rows_at(runner, q, v, t)[2], t)
+        phi = rows_at(runner, q, v, t)[2]
+        refuse_deep_starts(phi, self.program, DEEP * min(1.0, self.length), t)
         on, v_on, before, after, rate = runner.project(q, v, t, self._reached())
-        iterations, nearest = 0, True
-        if not (after <= self._closed and self._is_nearby(q, on)):
-            found, nearest = self._search(runner, q, t, on if after <= self._closed else None)
+        iterations, nearest, met = 0, True, after <= self._closed
+        if not (met and self._is_nearby(q, on) and self._stays_outside(runner, q, on, t)):
+            found, nearest = self._search(runner, q, t, on if met else None)
             iterations = found.iterations
-            on, v_on, _, after, rate = runner.project(found.q, v, t, np.inf)
-            if not (after <= self._closed or found.gap <= CLOSURE_TOLERANCE):
-                raise _open_loops(rows_at(runner, found.q, v_on, t)[2], self.program, t)
+            on, v_on, after, rate = self._polished(runner, found.q, v, t)
+            met = after <= self._closed or found.gap <= CLOSURE_TOLERANCE
+            self._require_met(runner, q, found.q, met, nearest, t)
         if not rate <= RATE_TOLERANCE * min(1.0, self.length) * (1.0 + _largest(v_on)):
-            raise _lost_velocity(rows_at(runner, on, v_on, t)[3], self.program, t)
+            raise lost_velocity(rows_at(runner, on, v_on, t)[3], self.program, t)
         return on, v_on, self._report(runner, q, on, before, iterations, nearest)
 
-    def _refuse_deep_starts(self, phi: Array, t: float) -> None:
-        """Raises where a contact that may open starts far inside, if the loops tell that its place is meant.
+    def _require_met(
+        self, runner: core.Runner, q: Array, found: Array, met: bool, nearest: bool, t: float
+    ) -> None:
+        """Raises where a search has ended off the constraints, or far from where contacts alone were inside.
 
         Args:
-            phi: residuals of all rows, (m,).
+            runner: a workspace of the core.
+            q: where the search began, (nq,).
+            found: where it ended, (nq,).
+            met: whether all constraints are met there.
+            nearest: whether it is known to be the nearest.
             t: time [s].
 
         Raises:
-            InputError: one does.
+            LoopClosureError: loops stay open.
+            InputError: the loops close, and a contact was found no way out of its plane, or a far one.
         """
-        kinds, slices = self.program.constraints, row_slices(self.program)
-        allowed = DEEP * min(1.0, self.length)
-        loops = [phi[slices[c.name]] for c in kinds[: self.program.first_gap] if all(c.holonomic)]
-        if any(_largest(part) > allowed for part in loops):
-            return
-        depths = {c.name: -float(phi[slices[c.name]].min()) for c in kinds[self.program.first_gap :]}
-        name = max(depths, key=lambda key: depths[key], default="")
-        if name and depths[name] > allowed:
-            raise InputError(
-                f'contact "{name}" starts {depths[name]:.3g} (m or rad) inside at t = {t:.4g} s; it must '
-                f"start open, closed, or at most {allowed:.2g} inside, which is moved out: change the start"
-            )
+        phi, now = self._residuals(runner, q, t), self._residuals(runner, found, t)
+        inside = not self._is_outside(q, phi) and largest_loop_gap(phi, self.program) <= self._closed
+        far = (np.abs(pin.difference(self.model, q, found)) > FAR * self.unit).any()
+        if inside and (not met or (far and not nearest)):
+            raise no_way_out(phi, self.program, t)
+        if not met:
+            raise open_loops(now, self.program, t)
+
+    def _polished(
+        self, runner: core.Runner, q: Array, v: Array, t: float
+    ) -> tuple[Array, Array, float, float]:
+        """What a search has found brought to rounding, the largest residual and rate there.
+
+        Where a contact would go in again by it, or other bodies far, the search has the last word.
+        """
+        on, v_on, _, after, rate = runner.project(q, v, t, np.inf)
+        stays = self._is_nearby(q, on) and self._is_outside(on, self._residuals(runner, on, t))
+        if self._has_gaps and not stays and self._is_outside(q, self._residuals(runner, q, t)):
+            on = q
+        return on, v_on, after, rate
 
     def nearest_of_each(
         self, q: Array, v: Array, t: float, threads: int, numbers: tuple[list[tuple[str, int, str]], Array]
@@ -162,11 +186,15 @@ class Projection:
         on, v_on = found_q.reshape(q.shape), found_v.reshape(v.shape)
         met = rate <= RATE_TOLERANCE * min(1.0, self.length) * (1.0 + np.abs(v_on).max(axis=1, initial=0.0))
         hardly = np.abs(on - q).max(axis=1, initial=0.0) <= SURELY * NEARBY * self.unit.min(initial=np.inf)
-        for i in map(int, np.flatnonzero(~((after <= self._closed) & met & hardly))):
-            if not (after[i] <= self._closed and met[i] and self._is_nearby(q[i], on[i])):
-                own = copy(self)
-                if names:
-                    own.program = core.with_numbers(self.program, names, values[i : i + 1])
+        sure = (after <= self._closed) & met & hardly
+        if self._has_gaps:
+            sure &= (after <= INSIDE) & (on == q).all(axis=1)
+        for i in map(int, np.flatnonzero(~sure)):
+            own = copy(self)
+            if names:
+                own.program = core.with_numbers(self.program, names, values[i : i + 1])
+            as_told = after[i] <= self._closed and met[i] and self._is_nearby(q[i], on[i])
+            if not (as_told and own._stays_outside(own.program.runner(), q[i], on[i], t)):
                 try:
                     on[i], v_on[i], _ = own.nearest(q[i], v[i], t)
                 except (PinNonidealError, core.CoreFailure) as failure:
@@ -183,39 +211,58 @@ class Projection:
         """The largest residual from which Newton's method is tried."""
         return np.inf if self.model.nv > MANY_FREEDOMS else NEWTON_REACH * self.length
 
+    def _residuals(self, runner: core.Runner, q: Array, t: float) -> Array:
+        """Of all rows, (m,)."""
+        return rows_at(runner, q, np.zeros(self.model.nv), t)[2]
+
+    def _is_outside(self, q: Array, phi: Array) -> bool:
+        """Whether no contact is inside its plane by more than rounding."""
+        away = pin.difference(self.model, pin.neutral(self.model), q)[self._slides]
+        size = max(1.0, self.length, _largest(away))
+        return bool(phi[self._gaps].min(initial=0.0) >= -INSIDE * size)
+
+    def _stays_outside(self, runner: core.Runner, q: Array, on: Array, t: float) -> bool:
+        """Whether that is so before and after a move."""
+        return not self._has_gaps or all(self._is_outside(x, self._residuals(runner, x, t)) for x in (q, on))
+
     def _is_nearby(self, q: Array, on: Array) -> bool:
         return bool((np.abs(pin.difference(self.model, q, on)) <= NEARBY * self.unit).all())
 
     def _search(self, runner: core.Runner, q: Array, t: float, newton: Array | None) -> tuple[Closure, bool]:
         """The nearest closure, and whether it is known to be; Newton's own where a search takes minutes."""
-        if newton is not None and self.model.nv > MANY_FREEDOMS:
+        if (
+            newton is not None
+            and self.model.nv > MANY_FREEDOMS
+            and self._is_outside(newton, self._residuals(runner, newton, t))
+        ):
             return Closure(newton, 0.0, 0.0, False, 0), False
         mass, unit = _mass(self.model, runner), self._unit_at(runner, q, t)
         try:
-            rows = self._rows(runner, q, t, unit)
-            search = Search(
-                self.model, rows, mass, self._metric(mass(q)), unit, np.logical_not(self._slides), q
-            )
-            return search.nearest()
+            loops = self._rows(runner, q, t, unit, holonomic_rows(self.program))
+            given = (self.model, loops, mass, self._metric(mass(q)), unit, np.logical_not(self._slides), q)
+            if not self._has_gaps:
+                return Search(*given).nearest()
+            return SearchOutside(self._rows(runner, q, t, unit, self._gaps), *given).nearest()
         except np.linalg.LinAlgError:  # numbers that ran away: no closure
             return Closure(q, np.inf, 0.0, False, 0), False
 
     def _unit_at(self, runner: core.Runner, q: Array, t: float) -> Array:
         """The units of a search: slides go as far as the gaps ask for."""
         A, _, phi, _ = rows_at(runner, q, np.zeros(self.model.nv), t)
+        phi = np.where(self._gaps, np.minimum(phi, 0.0), phi)
         slope = np.abs(A[:, self._slides]).max(axis=1, initial=0.0)
         far = np.divide(np.abs(phi), slope, out=np.zeros_like(phi), where=slope > 0.0)
         return np.where(self._slides, max(self.length, _largest(far)), 1.0)
 
-    def _rows(self, runner: core.Runner, q: Array, t: float, unit: Array) -> Rows:
-        """The holonomic rows over their reach, without copies and rows that move nothing."""
+    def _rows(self, runner: core.Runner, q: Array, t: float, unit: Array, wanted: NDArray[np.bool_]) -> Rows:
+        """The wanted rows over their reach, without copies and rows that move nothing."""
         zero, generator, samples = np.zeros(self.model.nv), np.random.default_rng(1), []
         for _ in range(3):
             away = pin.integrate(self.model, q, unit * generator.standard_normal(self.model.nv))
             samples.append(rows_at(runner, away, zero, t))
         weighted = np.hstack([A * unit for A, _, _, _ in samples])
         reach = np.abs(weighted).max(axis=1, initial=0.0)
-        used = holonomic_rows(self.program) & (reach > VANISHING * reach.max(initial=0.0))
+        used = wanted & (reach > VANISHING * reach.max(initial=0.0))
         wide = np.hstack([weighted, np.column_stack([phi for _, _, phi, _ in samples])])
         used[[row for row, _, _ in copies(wide, used, weighted.shape[1])]] = False
         scale = 1.0 / reach[used]
@@ -241,7 +288,7 @@ class Projection:
         dof = self._furthest(move)
         distance = float(np.sqrt(max(move @ _mass(self.model, runner)(q) @ move, 0.0)))
         return ProjectionReport(
-            distance, _coordinate(self.model, dof), float(move[dof]), gap, iterations, nearest
+            distance, coordinate(self.model, dof), float(move[dof]), gap, iterations, nearest
         )
 
     def _furthest(self, move: Array) -> int:
@@ -262,7 +309,7 @@ class Projection:
         unit = "m" if self._slides[dof] else "rad"
         return [
             "the initial configuration did not satisfy the constraints and was moved onto them: "
-            f'"{_coordinate(self.model, dof)}" by {move[dof]:.3g} {unit}, the others by less; '
+            f'"{coordinate(self.model, dof)}" by {move[dof]:.3g} {unit}, the others by less; '
             "Scene.project(report=True) says more"
         ]
 
@@ -292,53 +339,6 @@ def nearest_closure(
         on = projection._search(runner, q, 0.0, None)[0].q
         before, after = np.inf, _largest(rows_at(runner, on, zero, 0.0)[2])
     return (on, after) if after <= before else (q, before)
-
-
-def _chain(model: Model) -> float:
-    """The longest way from the world to a joint or frame along the tree, slides left out."""
-    way = [0.0] * model.njoints
-    for i in range(1, model.njoints):
-        way[i] = way[model.parents[i]] + float(np.linalg.norm(model.jointPlacements[i].translation))
-    ends = [way[f.parentJoint] + float(np.linalg.norm(f.placement.translation)) for f in model.frames]
-    return float(max([*way, *ends]))
-
-
-def _slides(model: Model) -> Array:
-    """Which coordinates are lengths, (nv,)."""
-    q, slides = pin.neutral(model), np.zeros(model.nv, dtype=bool)
-    for joint in list(model.joints)[1:]:
-        data = joint.createData()
-        joint.calc(data, q)
-        turning = np.asarray(data.S).reshape(6, joint.nv)[3:]
-        slides[joint.idx_v : joint.idx_v + joint.nv] = np.abs(turning).max(axis=0) < VANISHING
-    return slides
-
-
-def _coordinate(model: Model, dof: int) -> str:
-    """The name of a coordinate."""
-    i = next(i for i, j in enumerate(model.joints) if i and j.idx_v <= dof < j.idx_v + j.nv)
-    joint = model.joints[i]
-    return str(model.names[i]) if joint.nv == 1 else f"{model.names[i]}[{dof - joint.idx_v}]"
-
-
-def _open_loops(phi: Array, program: core.Program, t: float) -> LoopClosureError:
-    gaps = {name: _largest(phi[s]) for name, s in row_slices(program).items()}
-    largest = max(gaps.values())
-    open_loops = {name: gap for name, gap in gaps.items() if not gap <= min(CLOSURE_TOLERANCE, 0.5 * largest)}
-    text = "; ".join(f'loop "{name}" does not close: gap {gap:.2g}' for name, gap in open_loops.items())
-    return LoopClosureError(
-        f"{text} after several starts; check the lengths and frames, or start nearer", gaps=gaps, time=t
-    )
-
-
-def _lost_velocity(rate: Array, program: core.Program, t: float) -> InconsistentConstraintsError:
-    slices = row_slices(program)
-    worst = max(slices, key=lambda name: float(np.abs(rate[slices[name]]).max()))
-    return InconsistentConstraintsError(
-        f'no velocity satisfies the constraints at t = {t:.2f} s: "{worst}" misses its rate by '
-        f"{_largest(rate):.1e}",
-        time=t,
-    )
 
 
 def _mass(model: Model, runner: core.Runner) -> Callable[[Array], Array]:

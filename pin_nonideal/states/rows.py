@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,6 +30,19 @@ def holonomic_rows(program: core.Program) -> NDArray[np.bool_]:
     out = np.zeros(program.rows, dtype=bool)
     for c in program.constraints[: program.first_gap]:
         out[c.first : c.first + c.count] = c.holonomic
+    return out
+
+
+def gap_rows(program: core.Program, idle: Collection[str] = ()) -> NDArray[np.bool_]:
+    """Which rows are gaps of contacts that may open, (m,).
+
+    Args:
+        program: the scene as the core knows it.
+        idle: names of contacts that nothing moves, which are left out.
+    """
+    out = np.zeros(program.rows, dtype=bool)
+    for c in program.constraints[program.first_gap :]:
+        out[c.first : c.first + c.count] = c.name not in idle
     return out
 
 

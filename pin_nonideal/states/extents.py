@@ -1,0 +1,52 @@
+"""How far mechanisms reach: their lengths, and which coordinates are lengths."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pin_nonideal.types import Model
+
+# Part of the largest below which a row or an axis is rounding.
+VANISHING = 1e-11
+
+
+def chain(model: Model) -> float:
+    """The longest way from the world to a joint or frame along the tree, slides left out [m].
+
+    Args:
+        model: pinocchio.Model.
+    """
+    way = [0.0] * model.njoints
+    for i in range(1, model.njoints):
+        way[i] = way[model.parents[i]] + float(np.linalg.norm(model.jointPlacements[i].translation))
+    ends = [way[f.parentJoint] + float(np.linalg.norm(f.placement.translation)) for f in model.frames]
+    return float(max([*way, *ends]))
+
+
+def slides(model: Model) -> NDArray[np.bool_]:
+    """Which coordinates are lengths, (nv,).
+
+    Args:
+        model: pinocchio.Model.
+    """
+    q, found = pin.neutral(model), np.zeros(model.nv, dtype=bool)
+    for joint in list(model.joints)[1:]:
+        data = joint.createData()
+        joint.calc(data, q)
+        turning = np.asarray(data.S).reshape(6, joint.nv)[3:]
+        found[joint.idx_v : joint.idx_v + joint.nv] = np.abs(turning).max(axis=0) < VANISHING
+    return found
+
+
+def coordinate(model: Model, dof: int) -> str:
+    """The name of a coordinate: that of its joint, with a number from 0 on where the joint has several.
+
+    Args:
+        model: pinocchio.Model.
+        dof: its number.
+    """
+    i = next(i for i, j in enumerate(model.joints) if i and j.idx_v <= dof < j.idx_v + j.nv)
+    joint = model.joints[i]
+    return str(model.names[i]) if joint.nv == 1 else f"{model.names[i]}[{dof - joint.idx_v}]"
