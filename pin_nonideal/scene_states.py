@@ -119,9 +119,9 @@ class States:
 
         Raises:
             LoopClosureError: the constraints cannot be met from here; `gaps` names each gap.
-            InputError: wrong shapes or numbers, a contact that starts deep inside its plane or has no short way
-                out of it, or a coordinate where floating-point numbers are more than a millimeter or milliradian
-                apart.
+            InputError: wrong shapes or numbers, a contact that starts deep inside its plane or has no short
+                way out of it, or a coordinate where floating-point numbers are more than a millimeter or
+                milliradian apart.
         """
         time, wanted = number("t", t), choice("report", report, (True, False))
         if q is None and v is None and time == 0.0:
