@@ -25,7 +25,7 @@ from .constraints import Axis
 from .errors import InputError
 from .laws import static_ratio
 from .round_contacts import BoxContact, CapsuleContact, SphereContact
-from .solid_contacts import CylinderContact, EllipsoidContact, HullContact
+from .solid_contacts import CylinderContact, EllipsoidContact, HullContact, RimContact
 
 __all__ = [
     "BoxContact",
@@ -35,6 +35,7 @@ __all__ = [
     "HullContact",
     "JointLimit",
     "PointContact",
+    "RimContact",
     "SphereContact",
     "UserContact",
     "box_contacts",
@@ -232,5 +233,6 @@ Contact = (
     | EllipsoidContact
     | HullContact
     | CylinderContact
+    | RimContact
     | UserContact
 )

@@ -3,7 +3,8 @@
 A half-space meets a sphere or an ellipsoid at one point, a capsule at its two ends, a box or a convex mesh at
 its corners, a cylinder or a cone at its rims, its faces and its tip.  Spheres and capsules meet each other at
 one place.  Boxes and convex meshes meet spheres, capsules and each other with corners on faces and edges on
-edges: solids with flat faces touch in no other way.  Cylinders and cones meet spheres.
+edges: solids with flat faces touch in no other way.  Cylinders and cones meet spheres, and with their faces,
+sides, rims and tips capsules, boxes and convex meshes.
 """
 
 from __future__ import annotations
@@ -34,8 +35,9 @@ class GeometryContact:
     scene is made: a half-space with spheres, ellipsoids, capsules (both ends), boxes and convex meshes
     (corners), cylinders and cones (rims, eight points of a face, the tip); spheres and capsules with each
     other (one place); boxes and convex meshes with spheres, capsules and each other (corners on faces, edges
-    on edges); spheres with cylinders and cones.  Where edges meet edges they are rounded; the faces stay
-    where they are.
+    on edges); cylinders and cones with spheres, capsules, boxes and convex meshes (sides, rims, eight points
+    of a face and the chords between them, the tip).  Where edges meet edges they are rounded; the faces
+    stay where they are.
     Rows: 1 for each place that is closed.  lam: the normal force there [N].
 
     Args:
@@ -45,9 +47,9 @@ class GeometryContact:
         static_ratio: static over kinetic friction, at least 1.
         restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
         name: used in messages and results; several places are numbered.
-        rounding: radius to which edges are rounded where boxes and convex meshes meet each other, or how far
-            the rim of a cylinder or cone stands back behind its face on a half-space [m]; a thousandth of the
-            least edge of both, or of the radius, when None.
+        rounding: radius to which edges are rounded where boxes and convex meshes meet each other, cylinders
+            or cones, and how far the rim of a cylinder or cone stands back behind its face, but against
+            spheres [m]; a thousandth of the least edge of both, and of the radius, when None.
     """
 
     geometry1: str

@@ -10,15 +10,18 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from .checks import Vector3
 from .collision_shapes import CORNERS, Shape
 from .contacts import PointContact
 from .errors import InputError
 from .hulls import convex_hull, shrunk
 from .round_contacts import BoxContact, CapsuleContact, Segment
-from .solid_contacts import CylinderContact, EllipsoidContact, HullContact
+from .solid_contacts import CylinderContact, EllipsoidContact, HullContact, RimContact
 from .types import Array
 
-Place = PointContact | CapsuleContact | BoxContact | CylinderContact | EllipsoidContact | HullContact
+Place = (
+    PointContact | CapsuleContact | BoxContact | CylinderContact | EllipsoidContact | HullContact | RimContact
+)
 
 # Part of the least edge to which boxes and hulls are rounded where nothing else is said, and part of its
 # radius by which the rim of a cylinder stands back behind its face.
@@ -26,6 +29,9 @@ LEAST_ROUNDING = 1e-3
 # What carries a cylinder that stands on its face: so many points on this part of its radius.  The rim takes
 # over from the tilt at which it is as low as they are, 0.03 rad.
 FACE_POINTS, FACE_CIRCLE = 8, 0.97
+# Part of their rounding by which edges end before the corners that touch a cylinder or cone already, and by
+# which they are rounder for rims than for the side that they touch already.
+PASSED_ON = 0.01
 # Places of one pair beyond which it is refused: rows of all of them take room by the square of their number.
 MOST_PLACES = 1000
 
@@ -62,13 +68,15 @@ def manifold(
         if second.solid and (first.solid or first.is_round):
             found = _solid_manifold(who, first, second, rounding, more)
         elif second.ends is not None and first.kind == "Sphere":
-            found = [_on_revolved(first, second, more)]
+            found = [_on_revolved(first.points[0], first.radius, first.frame, second, more)]
+        elif second.ends is not None and (first.solid or first.is_round):
+            found = _revolved_manifold(who, first, second, rounding, more)
         else:
             raise InputError(
                 f"{who}: no contacts are known for this pair of shapes, a {first.kind} and a {second.kind}; "
                 "a half-space with any other shape is one, and so are spheres, capsules, boxes and convex "
-                "meshes with each other, and spheres with cylinders and cones: use PointContact for the "
-                "places that touch"
+                "meshes with each other and with cylinders and cones: use PointContact for the places that "
+                "touch"
             )
     return [replace(c, name=base if len(found) == 1 else f"{base} {k + 1}") for k, c in enumerate(found)]
 
@@ -92,20 +100,38 @@ def _on_half_space(
         yield EllipsoidContact(shape.frame, semiaxes, offset=xyz, rpy=rpy, **level)
     if shape.ends is None:
         return
+    back = _standing_back(who, shape, rounding)
+    for end, radius in _faces(shape):
+        for point in _face_points(shape, end, radius):
+            yield PointContact(shape.frame, offset=point, **level)
+        middle = _at(shape, 0.0, 0.0, end - np.copysign(back, end))
+        yield EllipsoidContact(shape.frame, (radius, radius, 0.0), offset=middle, rpy=rpy, **level)
+
+
+def _standing_back(who: str, shape: Shape, rounding: float | None) -> float:
+    """How far the rims of a cylinder or cone stand back behind its faces [m]."""
+    assert shape.ends is not None
     half, *radii = shape.ends
     back = LEAST_ROUNDING * max(radii) if rounding is None else rounding
     if not back < half:
         raise InputError(
             f"{who}: rounding must be less than half the length {2.0 * half:g} m; got {back:g} m"
         )
-    for end, radius in zip((-half, half), radii, strict=True):
-        if radius == 0.0:
-            continue
-        for turn in 2.0 * np.pi / FACE_POINTS * np.arange(FACE_POINTS):
-            x, y = FACE_CIRCLE * radius * np.array([np.cos(turn), np.sin(turn)])
-            yield PointContact(shape.frame, offset=_at(shape, x, y, end), **level)
-        middle = _at(shape, 0.0, 0.0, end - np.copysign(back, end))
-        yield EllipsoidContact(shape.frame, (radius, radius, 0.0), offset=middle, rpy=rpy, **level)
+    return back
+
+
+def _faces(shape: Shape) -> list[tuple[float, float]]:
+    """Where the faces of a cylinder or cone are on its axis, and their radii."""
+    assert shape.ends is not None
+    half, below, above = shape.ends
+    return [(end, radius) for end, radius in ((-half, below), (half, above)) if radius > 0.0]
+
+
+def _face_points(shape: Shape, end: float, radius: float) -> list[Vector3]:
+    """What carries a face, around it."""
+    turns = 2.0 * np.pi / FACE_POINTS * np.arange(FACE_POINTS)
+    ways = [FACE_CIRCLE * radius * np.array([np.cos(turn), np.sin(turn)]) for turn in turns]
+    return [_at(shape, x, y, end) for x, y in ways]
 
 
 def _at(shape: Shape, x: float, y: float, z: float) -> tuple[float, float, float]:
@@ -113,57 +139,145 @@ def _at(shape: Shape, x: float, y: float, z: float) -> tuple[float, float, float
     return a, b, c
 
 
-def _on_revolved(ball: Shape, solid: Shape, more: dict[str, Any]) -> CylinderContact:
-    """A sphere on a cylinder or cone."""
+def _on_revolved(at: Array, radius: float, frame: str, solid: Shape, more: dict[str, Any]) -> CylinderContact:
+    """A sphere, or a rounded corner, on a cylinder or cone."""
     assert solid.ends is not None
     half, below, above = solid.ends
     return CylinderContact(
-        ball.frame,
+        frame,
         solid.frame,
         2.0 * half,
         below,
-        ball.radius,
+        radius,
         above,
-        offset=tuple(ball.points[0].tolist()),
+        offset=tuple(at.tolist()),
         xyz=tuple(solid.place.translation.tolist()),
         rpy=tuple(pin.rpy.matrixToRpy(solid.place.rotation).tolist()),
         **more,
     )
 
 
+def _revolved_manifold(
+    who: str, other: Shape, solid: Shape, rounding: float | None, more: dict[str, Any]
+) -> list[Place]:
+    """A capsule, box or convex mesh with a cylinder or cone, place by place so that no two touch at one.
+
+    Edges, and a capsule's middle line, on the solid whose faces stand back and on the chords between the
+    points that carry these; corners, which edges end shortly before, on the whole solid; a capsule's ends on
+    its faces.  Those points, the tip and the rims on the faces of a box or mesh, further rounded for rims.
+    """
+    back = _standing_back(who, solid, rounding)
+    radius = _edge_radius(who, [other], rounding) if other.solid else other.radius
+    core = _core(who, other, radius)
+    lines = _edges(other, core)
+    faces = [_face_points(solid, *face) for face in _faces(solid)]
+    chords = [ends for points in faces for ends in zip(points, points[1:] + points[:1], strict=True)]
+    tips = [*solid.points.tolist(), *(point for points in faces for point in points)]
+    count = len(core) + len(lines) * (1 + len(chords)) + other.solid * (len(tips) + len(faces))
+    _check_count(who, count, f"{len(lines)} edges by {1 + len(chords)}")
+    inner, carried = _stood_back(solid, back), solid if other.solid else _carrying(solid)
+    found: list[Place] = [_on_revolved(at, radius, other.frame, carried, more) for at in core]
+    for line in lines:
+        first, last = _shortened(line, PASSED_ON * radius if other.solid else 0.0)
+        found.append(replace(_on_revolved(first, radius, other.frame, inner, more), end=tuple(last.tolist())))
+    for line, chord in product(lines, chords):
+        found.append(CapsuleContact(other.frame, solid.frame, line, chord, radius, 0.0, **more))
+    if not other.solid:
+        return found
+    found += [_on_solid(solid, np.array(at), other, core, 0.0, radius, more) for at in tips]
+    rounder = radius + PASSED_ON * min(radius, 0.5 * _least_edge(other) - radius)
+    points, rpy = _rows(_core(who, other, rounder)), tuple(pin.rpy.matrixToRpy(inner.place.rotation).tolist())
+    for end, rim in _faces(inner):
+        middle = _at(inner, 0.0, 0.0, end)
+        found.append(
+            RimContact(solid.frame, other.frame, points, rim, rounder, offset=middle, rpy=rpy, **more)
+        )
+    return found
+
+
+def _stood_back(solid: Shape, back: float) -> Shape:
+    """A cylinder or cone whose faces lie that much deeper; its side stays where it is."""
+    assert solid.ends is not None
+    half, below, above = solid.ends
+    return _between(solid, -half + back * (below > 0.0), half - back * (above > 0.0), 1.0)
+
+
+def _carrying(solid: Shape) -> Shape:
+    """What is left of a cylinder or cone where points carry its faces; its side and its tip lie inside."""
+    assert solid.ends is not None
+    half, below, above = solid.ends
+    low, high = -half * (1.0 if below > 0.0 else FACE_CIRCLE), half * (1.0 if above > 0.0 else FACE_CIRCLE)
+    return _between(solid, low, high, FACE_CIRCLE)
+
+
+def _between(solid: Shape, low: float, high: float, part: float) -> Shape:
+    """A part of the radii of a cylinder or cone, between two places on its axis."""
+    assert solid.ends is not None
+    half, below, above = solid.ends
+    first, last = (part * (below + (above - below) * (z + half) / (2.0 * half)) for z in (low, high))
+    place = pin.SE3(solid.place.rotation, np.array(_at(solid, 0.0, 0.0, 0.5 * (low + high))))
+    return replace(solid, place=place, ends=(0.5 * (high - low), first, last))
+
+
+def _shortened(line: Segment, by: float) -> tuple[Array, Array]:
+    first, last = np.array(line[0]), np.array(line[1])
+    step = by / float(np.linalg.norm(last - first)) * (last - first)
+    return first + step, last - step
+
+
 def _solid_manifold(
     who: str, first: Shape, solid: Shape, rounding: float | None, more: dict[str, Any]
 ) -> list[Place]:
     """A box or convex mesh with a sphere, a capsule or another one: corners on faces, then edges on edges."""
-    edge = min(_least_edge(s) for s in (first, solid) if s.solid)
-    r2 = 0.0 if not first.solid else LEAST_ROUNDING * edge if rounding is None else rounding
-    if not 2.0 * r2 < edge:
-        raise InputError(f"{who}: rounding must be less than half the least edge {edge:g} m; got {r2:g} m")
+    r2 = _edge_radius(who, [first, solid], rounding) if first.solid else 0.0
     r1 = r2 if first.solid else first.radius
     cores = _core(who, first, r1), _core(who, solid, r2)
     lines = _edges(first, cores[0]), _edges(solid, cores[1])
     count = len(cores[0]) + first.solid * len(cores[1]) + len(lines[0]) * len(lines[1])
-    if count > MOST_PLACES:
-        raise InputError(
-            f"{who}: two shapes may touch at {MOST_PLACES} places at most, and these have {count}: "
-            f"{len(lines[0])} edges by {len(lines[1])} and all corners; use simpler shapes, or PointContact"
-        )
+    _check_count(who, count, f"{len(lines[0])} edges by {len(lines[1])}")
     found: list[Place] = []
     for ball, points, target, core, radius in (
         (first, cores[0], solid, cores[1], r1),
         (solid, cores[1], first, cores[0], r2),
     ):
-        if target.half is not None:
-            found += [_on_box(ball, at, target, radius, r2, more) for at in points]
-        elif target.solid:
-            corners = tuple(tuple(corner) for corner in core.tolist())
-            found += [
-                HullContact(ball.frame, target.frame, corners, radius, r2, tuple(at.tolist()), **more)
-                for at in points
-            ]
+        if target.solid:
+            found += [_on_solid(ball, at, target, core, radius, r2, more) for at in points]
     for one, other in product(*lines):
         found.append(CapsuleContact(first.frame, solid.frame, one, other, r1, r2, **more))
     return found
+
+
+def _edge_radius(who: str, shapes: list[Shape], rounding: float | None) -> float:
+    """To which the edges of boxes and meshes are rounded [m]."""
+    edge = min(_least_edge(shape) for shape in shapes if shape.solid)
+    radius = LEAST_ROUNDING * edge if rounding is None else rounding
+    if not 2.0 * radius < edge:
+        raise InputError(
+            f"{who}: rounding must be less than half the least edge {edge:g} m; got {radius:g} m"
+        )
+    return radius
+
+
+def _check_count(who: str, count: int, edges: str) -> None:
+    if count > MOST_PLACES:
+        raise InputError(
+            f"{who}: two shapes may touch at {MOST_PLACES} places at most, and these have {count}: "
+            f"{edges} and all corners; use simpler shapes, or PointContact"
+        )
+
+
+def _rows(points: Array) -> tuple[Vector3, ...]:
+    return tuple((x, y, z) for x, y, z in points.tolist())
+
+
+def _on_solid(
+    ball: Shape, at: Array, target: Shape, core: Array, radius: float, rounding: float, more: dict[str, Any]
+) -> BoxContact | HullContact:
+    """A sphere or a point on a box or a mesh with these corners, both rounded."""
+    if target.half is not None:
+        return _on_box(ball, at, target, radius, rounding, more)
+    offset = tuple(at.tolist())
+    return HullContact(ball.frame, target.frame, _rows(core), radius, rounding, offset, **more)
 
 
 def _on_box(

@@ -12,7 +12,7 @@ from .contact_checks import check_rubbing, check_two_frames, check_vectors
 from .errors import InputError
 from .hulls import convex_hull
 
-__all__ = ["CylinderContact", "EllipsoidContact", "HullContact"]
+__all__ = ["CylinderContact", "EllipsoidContact", "HullContact", "RimContact"]
 
 
 @dataclass(frozen=True)
@@ -104,16 +104,16 @@ class HullContact:
         if self.radius1 + self.radius2 == 0.0:
             raise InputError(f"{who}: one of radius1 and radius2 must be positive; a point has no normal")
         check_vectors(self, who, "offset")
-        points = array(f"{who}: points", self.points, (None, 3))
-        convex_hull(points, f"{who}: points")
-        object.__setattr__(self, "points", tuple(tuple(point) for point in points.tolist()))
+        object.__setattr__(self, "points", hull_points(self.points, who))
 
 
 @dataclass(frozen=True)
 class CylinderContact:
-    """A sphere touches a cylinder or a cone of another body, with Coulomb friction there.
+    """A sphere or a capsule touches a cylinder or a cone of another body, with Coulomb friction there.
 
-    Gap: the distance of the sphere's middle from the solid, less its radius [m]; else as `SphereContact`.
+    Gap: the distance of the sphere's middle, or of the capsule's middle line, from the solid, less its radius
+    [m]; else as `SphereContact`.  One place touches: a capsule that lies along the solid touches in the
+    middle of what lies beside it.
     Rows: 1 while it is closed.  lam: the normal force on the body of frame1 [N], away from the solid.
 
     Args:
@@ -122,7 +122,7 @@ class CylinderContact:
         length: of the solid along its axis [m].
         below: radius of the face at the lower end of the axis [m].
         above: radius of that at the upper end [m]; `below` when None, and 0 for the tip of a cone.
-        radius1: radius of the sphere [m].
+        radius1: radius of the sphere or capsule [m].
         offset: where the sphere's middle is, in the axes of frame1 [m].
         xyz: where the middle of the axis is, in the axes of frame2 [m].
         rpy: how the solid, its axis along z, is turned against frame2, roll, pitch and yaw [rad].
@@ -130,6 +130,8 @@ class CylinderContact:
         static_ratio: static over kinetic friction, at least 1.
         restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
         name: used in messages and results.
+        end: of a capsule, whose middle line goes from offset to there, in the axes of frame1 [m]; None for a
+            sphere.
     """
 
     frame1: str
@@ -145,6 +147,7 @@ class CylinderContact:
     static_ratio: float = 1.0
     restitution: float = 0.0
     name: str | None = None
+    end: Vector3 | None = None
 
     def __post_init__(self) -> None:
         if self.above is None:
@@ -156,9 +159,71 @@ class CylinderContact:
         check_vectors(self, who, "offset", "xyz", "rpy")
         if self.below == self.above == 0.0:
             raise InputError(f"{who}: one of below and above must be positive; a line is a CapsuleContact's")
+        if self.end is not None:
+            check_vectors(self, who, "end")
+            if self.end == self.offset:
+                raise InputError(f"{who}: end and offset must differ; leave end out for a sphere")
 
 
-def core_hull(c: HullContact) -> tuple[list[float], list[float], list[int]]:
+@dataclass(frozen=True)
+class RimContact:
+    """A disk, the rim of a cylinder or cone, touches the convex hull of points of another body.
+
+    Gap: the distance of the disk from the hull, less radius2 [m]; else as `SphereContact`.  One place
+    touches: with a disk that lies on a face points of it have to carry it, a `HullContact` each.
+    Rows: 1 while it is closed.  lam: the normal force on the body of frame1 [N], away from the hull.
+
+    Args:
+        frame1: name of a frame on the body of the disk.
+        frame2: name of a frame on the body of the hull, or of the world.
+        points: in the axes of frame2 [m], (n, 3); those inside the hull of the others add nothing.
+        rim: radius of the disk [m].
+        radius2: radius around the hull [m], which rounds its edges and moves its faces outward.
+        offset: where the disk's middle is, in the axes of frame1 [m].
+        rpy: how the disk, its axis along z, is turned against frame1, roll, pitch and yaw [rad].
+        mu: kinetic coefficient of friction.
+        static_ratio: static over kinetic friction, at least 1.
+        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        name: used in messages and results.
+    """
+
+    frame1: str
+    frame2: str
+    points: tuple[Vector3, ...]
+    rim: float
+    radius2: float
+    offset: Vector3 = (0.0, 0.0, 0.0)
+    rpy: Vector3 = (0.0, 0.0, 0.0)
+    mu: float = 0.0
+    static_ratio: float = 1.0
+    restitution: float = 0.0
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        who = check_rubbing(self)
+        check_two_frames(self, who)
+        for key in ("rim", "radius2"):
+            object.__setattr__(self, key, positive(f"{who}: {key}", getattr(self, key)))
+        check_vectors(self, who, "offset", "rpy")
+        object.__setattr__(self, "points", hull_points(self.points, who))
+
+
+def hull_points(given: object, who: str) -> tuple[Vector3, ...]:
+    """Points that span a solid.
+
+    Args:
+        given: (n, 3).
+        who: words for messages.
+
+    Raises:
+        InputError: they do not, or are none.
+    """
+    points = array(f"{who}: points", given, (None, 3))
+    convex_hull(points, f"{who}: points")
+    return tuple((x, y, z) for x, y, z in points.tolist())
+
+
+def core_hull(c: HullContact | RimContact) -> tuple[list[float], list[float], list[int]]:
     """The hull in the axes of frame2 as the core takes it, one number after the other.
 
     Args:

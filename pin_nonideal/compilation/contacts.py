@@ -11,7 +11,7 @@ import numpy as np
 from pin_nonideal.contacts import BoxContact, Contact, JointLimit, PointContact, UserContact
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError
-from pin_nonideal.solid_contacts import CylinderContact, EllipsoidContact, HullContact
+from pin_nonideal.solid_contacts import CylinderContact, EllipsoidContact, HullContact, RimContact
 from pin_nonideal.types import Model
 
 from .callbacks import checked
@@ -80,8 +80,14 @@ def lower_gaps(c: Any, name: str, out: core.Builder, where: Resolution) -> list[
         axes = turned(f1, c.rpy)
         block = out.add_ellipsoid(name, axes, f2, normal=normal, semiaxes=c.semiaxes)
     elif isinstance(c, CylinderContact):
-        f1, f2, solid = where.cylinder(c, who)
-        block = out.add_revolved(name, f1, f2, solid=solid, radius=c.radius1)
+        f1, f2, solid, half1 = where.cylinder(c, who)
+        if half1 == 0.0:
+            block = out.add_revolved(name, f1, f2, solid=solid, radius=c.radius1)
+        else:
+            block = out.add_line(name, f1, f2, solid=solid, half1=half1, radius=c.radius1)
+    elif isinstance(c, RimContact):
+        f1, f2, hull = where.rim(c, who)
+        block = out.add_rim(name, f1, f2, solid=hull, rim=c.rim, radius=c.radius2)
     else:
         block = _round_gap(c, name, out, where)
     out.let_open(restitution=c.restitution)

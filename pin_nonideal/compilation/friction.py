@@ -13,7 +13,7 @@ from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.laws import JointFriction
 from pin_nonideal.round_contacts import BoxContact
-from pin_nonideal.solid_contacts import CylinderContact, EllipsoidContact, HullContact
+from pin_nonideal.solid_contacts import CylinderContact, EllipsoidContact, HullContact, RimContact
 
 from .callbacks import ReactionNames, checked, named
 from .constraints import frames_of
@@ -308,8 +308,14 @@ def _round_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list
         f1, f2, hull = where.hull(c, who)
         return [(name, out.add_hull_slip(name, f1, f2, solid=hull, radius1=c.radius1), c.mu)]
     if isinstance(c, CylinderContact):
-        f1, f2, solid = where.cylinder(c, who)
-        return [(name, out.add_revolved_slip(name, f1, f2, solid=solid, radius1=c.radius1), c.mu)]
+        f1, f2, solid, half1 = where.cylinder(c, who)
+        if half1 == 0.0:
+            return [(name, out.add_revolved_slip(name, f1, f2, solid=solid, radius1=c.radius1), c.mu)]
+        block = out.add_line_slip(name, f1, f2, solid=solid, half1=half1, radius1=c.radius1)
+        return [(name, block, c.mu)]
+    if isinstance(c, RimContact):
+        f1, f2, hull = where.rim(c, who)
+        return [(name, out.add_rim_slip(name, f1, f2, solid=hull, rim=c.rim), c.mu)]
     if isinstance(c, BoxContact):
         f1, f2, half = where.box(c, who)
         return [(name, out.add_box_slip(name, f1, f2, half=half, radius1=c.radius1), c.mu)]

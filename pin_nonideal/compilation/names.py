@@ -14,7 +14,7 @@ from pin_nonideal.contacts import PointContact
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.round_contacts import BoxContact, CapsuleContact, SphereContact, segments
-from pin_nonideal.solid_contacts import CylinderContact, EllipsoidContact, HullContact, core_hull
+from pin_nonideal.solid_contacts import CylinderContact, EllipsoidContact, HullContact, RimContact, core_hull
 from pin_nonideal.states.placements import frame_index, frame_on_joint, joint_placements
 from pin_nonideal.types import Array, Model, Placement
 
@@ -118,17 +118,10 @@ class Resolution:
 
     def capsules(self, c: SphereContact | CapsuleContact, who: str) -> tuple[Frame, Frame, float, float]:
         """Both frames in the middle of their segments, along z, and half the lengths of these [m]."""
-        ends = self._two_bodies(c, who)
-        halves = []
-        for k, (first, last) in enumerate(segments(c)):
-            half = 0.5 * float(np.linalg.norm(last - first))
-            joint, R, p = moved(ends[k], 0.5 * (first + last))
-            if half > 0.0:
-                along, across, axis = axis_triad(unit_axis(who, last - first))
-                R = (np.reshape(R, (3, 3)) @ np.column_stack([along, across, axis])).ravel().tolist()
-            ends[k] = (joint, R, p)
-            halves.append(half)
-        return ends[0], ends[1], halves[0], halves[1]
+        (first, half1), (second, half2) = (
+            along(frame, ends, who) for frame, ends in zip(self._two_bodies(c, who), segments(c), strict=True)
+        )
+        return first, second, half1, half2
 
     def box(self, c: BoxContact, who: str) -> tuple[Frame, Frame, list[float]]:
         """Frames in the middle of the sphere and of the box, and half the box without its rounding [m]."""
@@ -143,11 +136,22 @@ class Resolution:
         first, second = self._two_bodies(c, who)
         return moved(first, c.offset), second, core_hull(c)
 
-    def cylinder(self, c: CylinderContact, who: str) -> tuple[Frame, Frame, tuple[float, float, float]]:
-        """Frames in the middle of the sphere and of the axis, half the length and the radii of both faces."""
+    def cylinder(
+        self, c: CylinderContact, who: str
+    ) -> tuple[Frame, Frame, tuple[float, float, float], float]:
+        """Frames in the middle of the sphere or capsule and of the axis, the solid, and half the capsule [m].
+
+        Of the solid half the length and the radii of both faces; the capsule's frame has z along it.
+        """
         first, second = self._two_bodies(c, who)
         above = c.below if c.above is None else c.above
-        return moved(first, c.offset), turned(moved(second, c.xyz), c.rpy), (0.5 * c.length, c.below, above)
+        first, half1 = along(first, np.array([c.offset, c.offset if c.end is None else c.end]), who)
+        return first, turned(moved(second, c.xyz), c.rpy), (0.5 * c.length, c.below, above), half1
+
+    def rim(self, c: RimContact, who: str) -> tuple[Frame, Frame, tuple[list[float], list[float], list[int]]]:
+        """Frames in the middle of the disk, its axis along z, and of the hull, and the hull."""
+        first, second = self._two_bodies(c, who)
+        return turned(moved(first, c.offset), c.rpy), second, core_hull(c)
 
     def _two_bodies(self, c: Any, who: str) -> list[Frame]:
         ends = [self.frame(c.frame1, who), self.frame(c.frame2, who)]
@@ -188,6 +192,23 @@ def moved(frame: Frame, by: Any) -> Frame:
     """
     joint, R, p = frame
     return (joint, R, (np.array(p) + np.reshape(R, (3, 3)) @ np.array(by)).tolist()) if np.any(by) else frame
+
+
+def along(frame: Frame, ends: Array, who: str) -> tuple[Frame, float]:
+    """A frame in the middle of a segment, along z, and half its length [m].
+
+    Args:
+        frame: on the same body.
+        ends: of the segment in its axes [m], (2, 3).
+        who: words for messages.
+    """
+    first, last = ends
+    half = 0.5 * float(np.linalg.norm(last - first))
+    joint, R, p = moved(frame, 0.5 * (first + last))
+    if half > 0.0:
+        triad = axis_triad(unit_axis(who, last - first))
+        R = (np.reshape(R, (3, 3)) @ np.column_stack(triad)).ravel().tolist()
+    return (joint, R, p), half
 
 
 def turned(frame: Frame, rpy: Any) -> Frame:

@@ -143,16 +143,30 @@ Rows<S> rows_of(const K& kind, const Motion& m1, const Motion& m2, bool with_res
 }
 
 // Rows first_position .. end_position - 1 have a residual whose rate they are (angles are not integrals of turning).
-template <class K>
-void check(const char* name, const K& kind, int first_position, int end_position) {
+template <class K, class Apart>
+void check(const char* name, const K& kind, int first_position, int end_position, Apart apart) {
     for (int trial = 0; trial < 20; ++trial) {
         const Motion m1 = any_motion(), m2 = any_motion();
+        if (!apart(m1, m2)) continue;
         const bool positions = end_position > first_position;
         const Rows<double> plain = rows_of<double>(kind, m1, m2, positions);
         const Rows<Dual> dual = rows_of<Dual>(kind, m1, m2, positions);
         for (int k = 0; k < kind.size(); ++k) compare(name, k, dual.rate[k].d, plain.drift[k]);
         for (int k = first_position; k < end_position; ++k) compare(name, k, dual.residual[k].d, plain.rate[k]);
     }
+}
+
+template <class K>
+void check(const char* name, const K& kind, int first_position, int end_position) {
+    check(name, kind, first_position, end_position, [](const Motion&, const Motion&) { return true; });
+}
+
+// Where they do not touch: a line that passes through a solid is nearest at a kink.
+bool apart(const pn::Hull& hull, double rim, const Motion& m1, const Motion& m2) {
+    return rows_of<double>(pn::RimRow{pn::Frame(), pn::Frame(), hull, rim, 0.0}, m1, m2, true).residual[0] > 1e-9;
+}
+bool apart(const pn::Revolved& solid, double half, const Motion& m1, const Motion& m2) {
+    return rows_of<double>(pn::LineRow{pn::Frame(), pn::Frame(), solid, half, 0.0}, m1, m2, true).residual[0] > 1e-9;
 }
 
 int main() {
@@ -189,6 +203,30 @@ int main() {
             check("revolved", pn::RevolvedRow{f, f, solid, 0.1}, 0, 1);
             check("revolved slip", pn::RevolvedSlipRows{{}, f, f, solid, 0.1}, 0, 0);
         }
+    }
+    // A cube about the middle, its faces numbered by axis and side.
+    std::vector<pn::Vec3> corners;
+    std::vector<int> edges;
+    for (int i = 0; i < 8; ++i) {
+        corners.push_back({i & 1 ? 0.5 : -0.5, i & 2 ? 0.5 : -0.5, i & 4 ? 0.5 : -0.5});
+        for (int along = 0; along < 3; ++along) {
+            const int first = (along + 1) % 3, second = (along + 2) % 3;
+            if (i >> along & 1) continue;
+            for (int of : {i, i | 1 << along, 2 * first + (i >> first & 1), 2 * second + (i >> second & 1)})
+                edges.push_back(of);
+        }
+    }
+    const pn::Hull cube(corners, {-1, 0, 0, 0.5, 1, 0, 0, 0.5, 0, -1, 0, 0.5, 0, 1, 0, 0.5, 0, 0, -1, 0.5, 0, 0, 1, 0.5}, edges);
+    for (const double size : {0.1, 0.6, 2.0}) {
+        const auto apart_from_cube = [&](const auto&... m) { return apart(cube, size, m...); };
+        check("rim", pn::RimRow{f, f, cube, size, 0.1}, 0, 1, apart_from_cube);
+        check("rim slip", pn::RimSlipRows{{}, f, f, cube, size}, 0, 0, apart_from_cube);
+        for (const double half : {0.0, 0.3, 2.0})
+            for (const pn::Revolved& solid : {pn::Revolved(size, 0.4, 0.4), pn::Revolved(size, 0.4, 0.0)}) {
+                const auto apart_from_solid = [&](const auto&... m) { return apart(solid, half, m...); };
+                check("line", pn::LineRow{f, f, solid, half, 0.1}, 0, 1, apart_from_solid);
+                check("line slip", pn::LineSlipRows{{}, f, f, solid, half, 0.1}, 0, 0, apart_from_solid);
+            }
     }
     for (const double half1 : {0.0, 0.3, 1.5})
         for (const double half2 : {0.0, 0.4, 2.0}) {

@@ -27,8 +27,12 @@
 #include "constraints/kinds/hinge_slip.hpp"
 #include "constraints/kinds/knife.hpp"
 #include "constraints/kinds/limit.hpp"
+#include "constraints/kinds/line.hpp"
+#include "constraints/kinds/line_slip.hpp"
 #include "constraints/kinds/motion.hpp"
 #include "constraints/kinds/point.hpp"
+#include "constraints/kinds/rim.hpp"
+#include "constraints/kinds/rim_slip.hpp"
 #include "constraints/kinds/rolling.hpp"
 #include "constraints/kinds/solid.hpp"
 #include "constraints/kinds/solid_slip.hpp"
@@ -43,7 +47,7 @@ using Kind = std::variant<PointRows, ContactRow, CapsulesRow, BoxRow, FrameRows,
                           RollingRows, CouplingRows, MotionRows, LimitRow, UserRows, UserGapRow, DofRows,
                           HingeSlipRows, TurnSlipRows, ContactSlipRows, CapsulesSlipRows, BoxSlipRows, CouplingSlipRow,
                           UserSlipRows, EllipsoidRow, EllipsoidSlipRows, HullRow, HullSlipRows, RevolvedRow,
-                          RevolvedSlipRows>;
+                          RevolvedSlipRows, LineRow, LineSlipRows, RimRow, RimSlipRows>;
 
 // Rows of one constraint before any is left out.
 struct RowValues {

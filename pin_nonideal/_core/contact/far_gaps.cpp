@@ -24,6 +24,10 @@ std::pair<double, double> arms(const Kind& kind) {
     if (const auto* h = std::get_if<HullRow>(&kind)) return {h->frame1.p.norm(), h->frame2.p.norm() + h->solid.reach};
     if (const auto* r = std::get_if<RevolvedRow>(&kind))
         return {r->frame1.p.norm(), r->frame2.p.norm() + r->solid.reach};
+    if (const auto* l = std::get_if<LineRow>(&kind))
+        return {l->frame1.p.norm() + l->half1, l->frame2.p.norm() + l->solid.reach};
+    if (const auto* r = std::get_if<RimRow>(&kind))
+        return {r->frame1.p.norm() + r->rim, r->frame2.p.norm() + r->solid.reach};
     return {HUGE_VAL, HUGE_VAL};
 }
 

@@ -89,6 +89,21 @@ double Reach::of(const Workspace&, const CapsulesRow& kind) const {
            kind.half2 * (b.spin_rate + b.spin * b.spin);
 }
 
+double Reach::of(const Workspace&, const LineRow& kind) const {
+    return of_points(kind.frame1, kind.half1, kind.frame2, kind.solid.reach);
+}
+
+double Reach::of(const Workspace&, const RimRow& kind) const {
+    return of_points(kind.frame1, kind.rim, kind.frame2, kind.solid.reach);
+}
+
+// Of any two points that far from their frames.
+double Reach::of_points(const Frame& frame1, double reach1, const Frame& frame2, double reach2) const {
+    const Bound a = frame_bound(frame1), b = frame_bound(frame2);
+    return a.acceleration + b.acceleration + reach1 * (a.spin_rate + a.spin * a.spin) +
+           reach2 * (b.spin_rate + b.spin * b.spin);
+}
+
 double Reach::of(const Workspace&, const BoxRow& kind) const {
     const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
     return a.acceleration + b.acceleration + kind.half.norm() * (b.spin_rate + b.spin * b.spin);
@@ -112,6 +127,8 @@ double Reach::bound(const Workspace& w, int gap) const {
     if (const auto* ellipsoid = std::get_if<EllipsoidRow>(&kind)) return of(w, *ellipsoid);
     if (const auto* hull = std::get_if<HullRow>(&kind)) return of(w, *hull);
     if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return of(w, *revolved);
+    if (const auto* line = std::get_if<LineRow>(&kind)) return of(w, *line);
+    if (const auto* rim = std::get_if<RimRow>(&kind)) return of(w, *rim);
     return of(w, std::get<LimitRow>(kind));
 }
 
@@ -129,6 +146,16 @@ double Reach::speed(const EllipsoidRow& kind) const {
 double Reach::speed(const CapsulesRow& kind) const {
     const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
     return a.velocity + kind.half1 * a.spin + b.velocity + kind.half2 * b.spin;
+}
+
+double Reach::speed(const LineRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.velocity + kind.half1 * a.spin + b.velocity + kind.solid.reach * b.spin;
+}
+
+double Reach::speed(const RimRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.velocity + kind.rim * a.spin + b.velocity + kind.solid.reach * b.spin;
 }
 
 double Reach::speed(const BoxRow& kind) const {
@@ -167,6 +194,10 @@ double Reach::rise(const Workspace& w, int gap) const {
         passing = rise(0.0, hull->solid.reach, hull->frame1, hull->frame2, hull->radius);
     else if (const auto* revolved = std::get_if<RevolvedRow>(&kind))
         passing = rise(0.0, revolved->solid.reach, revolved->frame1, revolved->frame2, revolved->radius);
+    else if (const auto* line = std::get_if<LineRow>(&kind))
+        passing = rise(line->half1, line->solid.reach, line->frame1, line->frame2, line->radius);
+    else if (const auto* rim = std::get_if<RimRow>(&kind))
+        passing = rise(rim->rim, rim->solid.reach, rim->frame1, rim->frame2, rim->radius);
     return bound(w, gap) + passing;
 }
 

@@ -13,7 +13,8 @@ namespace pn {
 // Two segments, or a point and a box or another solid, at one instant.
 struct Separation {
     std::array<Vec3, 8> apart;  // from the ends or corners of the second to those of the first
-    int corners = 0;            // so many of them; of another solid none, but from its middle, and then its axes
+    int corners = 0;            // so many of them; of another solid none, but from its middle, then its axes, and then
+                                // the first one's, half a segment or across a disk
     Vec3 normal;                // from the nearest point of the second to that of the first
     double radius = 0.0;        // of both together
 
@@ -21,7 +22,8 @@ struct Separation {
     static bool has(const Program& p, int gap) {
         const Kind& kind = p.blocks[p.gaps[gap].block].kind;
         return std::holds_alternative<CapsulesRow>(kind) || std::holds_alternative<BoxRow>(kind) ||
-               std::holds_alternative<HullRow>(kind) || std::holds_alternative<RevolvedRow>(kind);
+               std::holds_alternative<HullRow>(kind) || std::holds_alternative<RevolvedRow>(kind) ||
+               std::holds_alternative<LineRow>(kind) || std::holds_alternative<RimRow>(kind);
     }
     static Separation of(const Program& p, const Workspace& w, int gap) {
         const Kind& kind = p.blocks[p.gaps[gap].block].kind;
@@ -30,6 +32,8 @@ struct Separation {
         if (const auto* box = std::get_if<BoxRow>(&kind)) return of(s, *box);
         if (const auto* hull = std::get_if<HullRow>(&kind)) return of(s, *hull);
         if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return of(s, *revolved);
+        if (const auto* line = std::get_if<LineRow>(&kind)) return of(s, *line);
+        if (const auto* rim = std::get_if<RimRow>(&kind)) return of(s, *rim);
         return of(s, std::get<CapsulesRow>(kind));
     }
     static Separation of(const Sides<Pose>& s, const CapsulesRow& kind) {
@@ -52,9 +56,20 @@ struct Separation {
     }
     template <class Solid>
     static Separation of(const Sides<Pose>& s, const SolidRow<Solid>& kind) {
-        Separation out{{}, 0, kind.nearest(s).n, kind.radius};
+        return of_middles(s, kind.nearest(s).n, kind.radius, Vec3::Zero());
+    }
+    static Separation of(const Sides<Pose>& s, const LineRow& kind) {
+        const NearestAlongLine<Sides<Pose>> nearest(s, kind.solid, kind.half1);
+        return of_middles(s, nearest.at.n, kind.radius, kind.half1 * nearest.e);
+    }
+    static Separation of(const Sides<Pose>& s, const RimRow& kind) {
+        return of_middles(s, NearestOfRim<Sides<Pose>>(s, kind.solid, kind.rim).n, kind.radius, s.a.R.col(2));
+    }
+    static Separation of_middles(const Sides<Pose>& s, const Vec3& normal, double radius, const Vec3& axis_of_first) {
+        Separation out{{}, 0, normal, radius};
         out.apart[0] = s.a.x - s.b.x;
         for (int axis = 0; axis < 3; ++axis) out.apart[1 + axis] = s.b.R.col(axis);
+        out.apart[4] = axis_of_first;
         return out;
     }
     // Least distance of both from each other along a direction.
@@ -63,8 +78,12 @@ struct Separation {
         for (int k = 1; k < corners; ++k) least = std::min(least, direction.dot(apart[k]));
         if (corners == 0) {
             const Vec3 local(direction.dot(apart[1]), direction.dot(apart[2]), direction.dot(apart[3]));
-            const auto* hull = std::get_if<HullRow>(&kind);
-            least -= hull ? hull->solid.support(local) : std::get<RevolvedRow>(kind).solid.support(local);
+            if (const auto* hull = std::get_if<HullRow>(&kind)) least -= hull->solid.support(local);
+            if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) least -= revolved->solid.support(local);
+            if (const auto* line = std::get_if<LineRow>(&kind))
+                least -= line->solid.support(local) + std::abs(direction.dot(apart[4]));
+            if (const auto* rim = std::get_if<RimRow>(&kind))
+                least -= rim->solid.support(local) + rim->rim * direction.cross(apart[4]).norm();
         }
         return least - radius;
     }

@@ -25,6 +25,8 @@ Extents extents(const Kind& kind) {
     if (const auto* ellipsoid = std::get_if<EllipsoidRow>(&kind)) return {ellipsoid->reach(), 0.0};
     if (const auto* hull = std::get_if<HullRow>(&kind)) return {0.0, hull->solid.reach};
     if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return {0.0, revolved->solid.reach};
+    if (const auto* line = std::get_if<LineRow>(&kind)) return {line->half1, line->solid.reach};
+    if (const auto* rim = std::get_if<RimRow>(&kind)) return {rim->rim, rim->solid.reach};
     return {};
 }
 

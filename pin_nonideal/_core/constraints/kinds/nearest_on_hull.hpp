@@ -53,6 +53,22 @@ struct Hull {
         return most;
     }
 
+    template <class Vec>
+    bool holds(const Vec& at) const {
+        for (const Face& face : faces)
+            if (product(face.normal, at) > face.offset) return false;
+        return true;
+    }
+    template <class Vec>
+    static PN_INLINE auto product(const Vec3& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+    // Whether a point outside a face lies over it.
+    template <class Vec>
+    static PN_INLINE bool stands_over(const Vec& at, const Face& face) {
+        for (size_t k = 0; k < face.sides.size(); ++k)
+            if (product(face.sides[k], at) > face.ends[k]) return false;
+        return true;
+    }
+
 private:
     // The other face slopes away beyond the edge, so its normal leans outward there.
     void add_side(const Edge& edge, int face, int other) {
@@ -89,7 +105,7 @@ struct NearestOnHull {
     }
 
 private:
-    static PN_INLINE Scalar product(const Vec3& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+    static PN_INLINE Scalar product(const Vec3& a, const Vec& b) { return Hull::product(a, b); }
     static PN_INLINE Vec turned(const Vec (&e)[3], const Vec& x) { return x[0] * e[0] + x[1] * e[1] + x[2] * e[2]; }
 
     // The face that the point stands over, or inside the hull the nearest one.
@@ -100,7 +116,7 @@ private:
             const Scalar over = product(hull.faces[f].normal, at) - hull.faces[f].offset;
             const bool beyond = over > 0.0;
             outside = outside || beyond;
-            if (beyond ? stands_over(at, hull.faces[f]) : !outside && (least < 0 || over > distance)) {
+            if (beyond ? Hull::stands_over(at, hull.faces[f]) : !outside && (least < 0 || over > distance)) {
                 least = static_cast<int>(f);
                 distance = over;
                 on_face = beyond;
@@ -109,11 +125,6 @@ private:
         if (outside && !on_face) return false;
         on_face = true;
         n = Vec(hull.faces[least].normal);
-        return true;
-    }
-    static PN_INLINE bool stands_over(const Vec& at, const Hull::Face& face) {
-        for (size_t k = 0; k < face.sides.size(); ++k)
-            if (product(face.sides[k], at) > face.ends[k]) return false;
         return true;
     }
     PN_INLINE void find_edge(const Vec& at, const Hull& hull) {

@@ -1,5 +1,5 @@
 // The point of a cylinder or cone that is nearest to the origin of frame 1. Its axis is z of frame 2, its middle the origin;
-// the radii of its faces may differ, and one be zero.
+// the radii of its faces may differ, and one be zero; without length it is a disk.
 #pragma once
 
 #include <algorithm>
@@ -43,7 +43,9 @@ struct NearestOnRevolved {
     PN_INLINE NearestOnRevolved(const Sides& s, const Revolved& solid)
         : axis(s.b.R * Vec3::UnitZ()), out(s.b.R * Vec3::UnitX()), n(), distance(0.0) {
         const double slope = std::hypot(2.0 * solid.half, solid.below - solid.above);
-        const double side_out = 2.0 * solid.half / slope, side_up = (solid.below - solid.above) / slope;
+        const bool disk = slope == 0.0;
+        const double side_out = disk ? 1.0 : 2.0 * solid.half / slope;
+        const double side_up = disk ? 0.0 : (solid.below - solid.above) / slope;
         const Vec apart = s.a.x - s.b.x;
         const Scalar z = axis.dot(apart);
         const Vec across = apart - z * axis;
@@ -59,7 +61,7 @@ struct NearestOnRevolved {
         } else if (inside ? under >= beside : under > 0.0 && r <= solid.below) {
             distance = under;
             n = -axis;
-        } else if (inside || (beside > 0.0 && along >= 0.0 && along <= slope)) {
+        } else if (inside || (!disk && beside > 0.0 && along >= 0.0 && along <= slope)) {
             distance = beside;
             n = side_out * out + side_up * axis;
             if (r > 0.0) turns = side_out / r;
@@ -86,7 +88,7 @@ private:
             const Scalar away = d.norm();
             if (end < 0.0 && !(away < distance)) continue;
             distance = away;
-            n = d / away;
+            n = away > 0.0 ? Vec(d / away) : out;
             turns = Scalar(1.0) / away;
             if (radius > 0.0) turns = (1.0 - radius / r) / away;
         }
