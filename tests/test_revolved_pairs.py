@@ -6,12 +6,16 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.integrate import solve_ivp
 
 import pin_nonideal as pn
 from pin_nonideal.hulls import convex_hull, shrunk
 from pin_nonideal.manifolds import FACE_CIRCLE, FACE_POINTS, LEAST_ROUNDING, PASSED_ON
 
+from .mechanisms import GRAVITY, body, empty
+from .same_run import assert_same_run
 from .test_geometry_pairs import EXACT, HALF, RADIUS, SIZE, by_coal, cloud, convex, modelled, pair, placements
+from .test_geometry_pairs import shape as any_shape
 
 REVOLVED, OTHERS = ("cylinder", "cone"), ("capsule", "box", "convex mesh")
 ROUNDING = 0.01  # [m], so that cores are apart where shapes have entered each other a little
@@ -22,6 +26,11 @@ NEAR = 1e-4
 LINE = 1e-3  # [m], radius of what Coal takes for a segment or a point
 BEHIND = 1e-4  # [m]
 HERE = pin.SE3.Identity()
+DEPTH = 1e-10  # [m], that nothing enters another
+LEDGER = 1e-5  # [J], of some 20, that step control at its default leaves
+REACH = 0.8  # [m], beyond which nothing touches
+STEP = 1e-6  # [s], of differences
+SMOOTH = 1e-10  # [m], by which a gap bends over it at the most where its slope is one
 
 
 def raised(z):
@@ -77,6 +86,17 @@ def segment(first, last):
     way = last - first
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), way).matrix()
     return coal.Capsule(LINE, float(np.linalg.norm(way))), pin.SE3(turn, 0.5 * (first + last))
+
+
+def free(thing, fixed, *, inertia=None, gravity=(0.0, 0.0, -GRAVITY), **more):
+    """A free body of 1 kg with one shape, and another shape that is fixed in the world."""
+    model, geometry = empty(gravity), pin.GeometryModel()
+    about = 0.02 * np.eye(3) if inertia is None else inertia
+    joint = body(model, 0, pin.JointModelFreeFlyer(), "free", 1.0, inertia=about)
+    geometry.addGeometryObject(pin.GeometryObject("thing", joint, HERE, thing))
+    geometry.addGeometryObject(pin.GeometryObject("block", 0, HERE, fixed))
+    contact = pn.GeometryContact("thing", "block", **more)
+    return pn.Scene(model, contacts=[contact], collision_model=geometry)
 
 
 class Modelled:
@@ -135,6 +155,181 @@ def test_gaps_beside_coal(kind, other, rounding):
             continue
         compared += 1
         worst = max(worst, abs(modelled(scene, q)[0] - exact))
-    print(compared, worst)
     assert compared > 800
     assert worst < EXACT
+
+
+@pytest.mark.parametrize("other", OTHERS)
+@pytest.mark.parametrize("kind", REVOLVED)
+def test_rows_are_differences_of_gaps(kind, other):
+    """Of every place, near and far: along a random motion, by central differences."""
+    scene, _ = pair(kind, other)
+    rng, runner, compared = np.random.default_rng(2), scene._compiled.program.runner(), 0
+    for q in placements(rng, 30):
+        v = rng.normal(size=6)
+        A, _, gaps, _ = runner.rows(q, v, 0.0)
+        before, after = (
+            runner.rows(pin.integrate(scene.model, q, by * v), v, 0.0)[2] for by in (-STEP, STEP)
+        )
+        # Where two features are as near, or Coal's solids have entered each other, the slope leaps.
+        smooth = (np.abs(before + after - 2.0 * gaps) < SMOOTH) & (gaps > 0.0)
+        rates = A.reshape(-1, 6) @ v
+        assert rates[smooth] == pytest.approx(((after - before) / (2.0 * STEP))[smooth], abs=1e-7)
+        compared += smooth.sum()
+    assert compared > 0.9 * 30 * len(gaps)
+
+
+CAN = coal.Cylinder(0.1, 0.3)
+TABLES = [coal.Box(1.0, 1.2, 0.4), convex(0.5 * CUBE * [1.0, 1.2, 0.4])]
+LYING = pin.Quaternion(pin.rpy.rpyToMatrix(0.5 * np.pi, 0.0, 0.0)).coeffs()
+LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
+# What rests on what, at which height over the middle of that and how it is turned.
+AT_REST = {
+    "can on box": (CAN, TABLES[0], 0.35, LEVEL),
+    "can on mesh": (CAN, TABLES[1], 0.35, LEVEL),
+    "cone on box": (coal.Cone(0.1, 0.3), TABLES[0], 0.35, LEVEL),
+    "box on can": (coal.Box(0.3, 0.2, 0.1), coal.Cylinder(0.5, 0.4), 0.25, LEVEL),
+    "box on narrow can": (coal.Box(0.3, 0.2, 0.1), coal.Cylinder(0.06, 0.4), 0.25, LEVEL),
+    "mesh on can": (convex(0.5 * CUBE * [0.3, 0.2, 0.1]), coal.Cylinder(0.5, 0.4), 0.25, LEVEL),
+    "capsule on can": (coal.Capsule(0.05, 0.3), coal.Cylinder(0.5, 0.4), 0.25, LYING),
+    "capsule across can": (coal.Capsule(0.05, 0.3), coal.Cylinder(0.1, 0.4), 0.25, LYING),
+    "lying can": (CAN, TABLES[0], 0.3, LYING),
+    "lying can on mesh": (CAN, TABLES[1], 0.3, LYING),
+    "lying can across box": (CAN, coal.Box(1.0, 0.1, 0.4), 0.3, LYING),
+    "can half on box": (coal.Cylinder(0.1, 0.3), coal.Box(0.23, 0.9, 0.4), 0.35, LEVEL),
+}
+
+
+@pytest.mark.parametrize("what", AT_REST)
+def test_what_rests(what):
+    """It stays where it is, with a velocity of zero, and what carries it presses with its weight."""
+    thing, fixed, height, turn = AT_REST[what]
+    run = pn.simulate(free(thing, fixed, mu=0.5), 1.0, q=[0.04, 0.02, height, *turn], record="forces")
+    assert np.abs(run.v).max() == 0.0
+    assert run.lam[-1].sum() == pytest.approx(GRAVITY, abs=1e-9)
+    assert run.lam[-1].min() >= 0.0
+    assert (run.lam[-1] > 0.0).sum() >= 2
+
+
+@pytest.mark.parametrize("fixed", TABLES, ids=["box", "mesh"])
+@pytest.mark.parametrize("beyond", [-0.02, 0.01])
+def test_a_can_over_an_edge(fixed, beyond):
+    """It stands as long as its weight points at the table, and tips over where it does not."""
+    run = pn.simulate(free(CAN, fixed, mu=0.5), 0.5, q=[0.5 + beyond, 0.1, 0.35, 0, 0, 0, 1])
+    if beyond < 0.0:
+        assert np.abs(run.v).max() == 0.0
+    else:
+        assert pin.XYZQUATToSE3(run.q[-1]).rotation[2, 2] < 0.99
+
+
+@pytest.mark.parametrize("fixed", TABLES, ids=["box", "mesh"])
+def test_a_can_lands_on_its_face(fixed):
+    run = pn.simulate(free(CAN, fixed, mu=0.5), 1.0, q=[0.1, 0.05, 0.55, 0, 0, 0, 1])
+    impact = next(event.time for event in run.events if event.kind == "impact")
+    assert impact == pytest.approx(np.sqrt(0.4 / GRAVITY), abs=1e-11)
+    assert run.q[-1] == pytest.approx([0.1, 0.05, 0.35, 0, 0, 0, 1], abs=1e-10)
+
+
+@pytest.mark.parametrize("fixed", [coal.Box(4.0, 1.0, 0.4), convex(0.5 * CUBE * [4.0, 1.0, 0.4])], ids=type)
+def test_a_can_rolls_down_a_face(fixed):
+    """Lying on it: 2/3 g sin of the slope."""
+    slope, across = 0.3, (3.0 * 0.1**2 + 0.3**2) / 12.0
+    gravity = GRAVITY * np.array([np.sin(slope), 0.0, -np.cos(slope)])
+    scene = free(CAN, fixed, mu=0.5, inertia=np.diag([across, across, 0.5 * 0.1**2]), gravity=gravity)
+    run = pn.simulate(scene, 0.8, q=[-1.0, 0.1, 0.3, *LYING])
+    assert run.q[:, 0] + 1.0 == pytest.approx(GRAVITY * np.sin(slope) / 3.0 * run.t**2, abs=1e-8)
+    assert run.q[:, [1, 2]] == pytest.approx(np.tile([0.1, 0.3], (len(run.t), 1)), abs=1e-10)
+
+
+def test_a_plank_rocks_on_a_lying_cylinder():
+    """Without slipping: the motion of a block on a cylinder, by an integration of its own."""
+    radius, thick, inertia = 0.4, 0.1, 0.03
+
+    def rate(_, y):
+        angle, spin = y
+        moment = radius**2 * angle * spin**2 + GRAVITY * (
+            radius * angle * np.cos(angle) - 0.5 * thick * np.sin(angle)
+        )
+        return [spin, -moment / (inertia + (radius * angle) ** 2 + 0.25 * thick**2)]
+
+    model, geometry = empty((0.0, 0.0, -GRAVITY)), pin.GeometryModel()
+    joint = body(model, 0, pin.JointModelFreeFlyer(), "free", 1.0, inertia=inertia * np.eye(3))
+    place = pin.SE3(pin.rpy.rpyToMatrix(0.5 * np.pi, 0.0, 0.0), np.zeros(3))
+    plank, roll = coal.Box(0.6, 0.3, thick), coal.Cylinder(radius, 2.0)
+    geometry.addGeometryObject(pin.GeometryObject("plank", joint, HERE, plank))
+    geometry.addGeometryObject(pin.GeometryObject("roll", 0, place, roll))
+    contact = pn.GeometryContact("plank", "roll", mu=2.0)
+    scene = pn.Scene(model, contacts=[contact], collision_model=geometry)
+    start = 0.2
+    turn = pin.rpy.rpyToMatrix(0.0, start, 0.0)
+    at = (radius + 0.5 * thick) * turn[:, 2] - radius * start * turn[:, 0]
+    run = pn.simulate(scene, 1.0, q=[*at, *pin.Quaternion(turn).coeffs()], rtol=1e-10, atol=1e-11)
+    exact = solve_ivp(rate, (0.0, 1.0), [start, 0.0], t_eval=[1.0], rtol=1e-11, atol=1e-12).y[0, -1]
+    turned = pin.rpy.matrixToRpy(pin.XYZQUATToSE3(run.q[-1]).rotation)
+    assert turned == pytest.approx([0.0, exact, 0.0], abs=1e-7)
+    assert {event.kind for event in run.events} <= {"stick"}
+
+
+def thrown(kind, other, seed):
+    """One at the other, either of them free, and the start."""
+    rng = np.random.default_rng(seed)
+    toward = rng.normal(size=3)
+    toward /= np.linalg.norm(toward)
+    turn = pin.Quaternion(pin.exp3(rng.normal(size=3)))
+    v = np.concatenate([turn.toRotationMatrix().T @ (6.0 * toward), rng.normal(size=3) * 8.0])
+    shapes = [any_shape(kind), any_shape(other)][:: 1 if seed % 2 else -1]
+    e, mu = float(rng.choice([0.0, 0.4])), rng.uniform(0.0, 0.8)
+    start = {"q": np.concatenate([-1.2 * toward, turn.coeffs()]), "v": v}
+    return free(*shapes, mu=mu, restitution=e), start
+
+
+@pytest.mark.parametrize("other", OTHERS)
+@pytest.mark.parametrize("kind", REVOLVED)
+@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(60), marks=pytest.mark.stress)], ids=len)
+def test_thrown_bodies_do_not_enter(kind, other, seeds):
+    """With spin: by Coal's distance, and the ledger of energy closes; the first is repeated bit by bit."""
+    struck = 0
+    for seed in seeds:
+        scene, start = thrown(kind, other, seed)
+        oracle = modelled_as(scene, other, kind)
+        run = pn.simulate(scene, 0.5, output_dt=0.002, max_steps=20000, record="energy", **start)
+        struck += any(event.kind == "impact" for event in run.events)
+        assert np.abs(run.energy["balance"]).max() < LEDGER
+        places = [pin.XYZQUATToSE3(q) for q in run.q if np.linalg.norm(q[:3]) < REACH]
+        sides = [(at, HERE) if seed % 2 == 0 else (HERE, at) for at in places]
+        assert min((oracle.apart(*both)[1] for both in sides), default=1.0) > -DEPTH
+        if seed == 0:
+            again = pn.simulate(scene, 0.5, output_dt=0.002, max_steps=20000, record="energy", **start)
+            assert_same_run(run, again)
+    assert struck > len(seeds) // 2
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: pn.RimContact("a", "b", CUBE[:4], 0.1, 0.1), "points must span a solid"),
+        (lambda: pn.RimContact("a", "b", CUBE, 0.0, 0.1), "rim must be positive; got 0"),
+        (lambda: pn.RimContact("a", "b", CUBE, 0.1, 0.0), "radius2 must be positive; got 0"),
+        (lambda: pn.RimContact("a", "a", CUBE, 0.1, 0.1), 'frame1 and frame2 must differ; both are "a"'),
+        (
+            lambda: pn.CylinderContact("a", "b", 0.1, 0.1, 0.1, end=(0.0, 0.0, 0.0)),
+            "end and offset must differ; leave end out for a sphere",
+        ),
+    ],
+)
+def test_bad_descriptions(make, message):
+    with pytest.raises(pn.InputError) as error:
+        make()
+    assert message in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("other", "rounding", "message"),
+    [
+        ("box", 0.16, "rounding must be less than half the least edge 0.3 m; got 0.16 m"),
+        ("capsule", 0.2, "rounding must be less than half the length 0.4 m; got 0.2 m"),
+    ],
+)
+def test_a_rounding_that_leaves_nothing(other, rounding, message):
+    with pytest.raises(pn.InputError, match=message):
+        pair("cylinder", other, rounding=rounding)
