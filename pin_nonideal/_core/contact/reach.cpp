@@ -169,8 +169,8 @@ double Reach::speed(const SolidRow<Solid>& kind) const {
     return a.velocity + b.velocity + kind.solid.reach * b.spin;
 }
 
-double Reach::travel(int gap) const {
-    return h_ * std::visit([&](const auto& kind) { return speed(kind); }, p.blocks[p.gaps[gap].block].kind);
+double Reach::speed(int gap) const {
+    return std::visit([&](const auto& kind) { return speed(kind); }, p.blocks[p.gaps[gap].block].kind);
 }
 
 bool Reach::knows(const Program& p, int gap) { return !p.is_users(gap); }

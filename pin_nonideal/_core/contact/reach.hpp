@@ -22,7 +22,9 @@ public:
     // And below this while the gap is open.
     double rise(const Workspace& w, int gap) const;
     // By how much the gap may change over the step at most; infinite where that is not known.
-    double travel(int gap) const;
+    double travel(int gap) const { return h_ * speed(gap); }
+    // Of its points against each other, at the most.
+    double speed(int gap) const;
 
 private:
     struct Bound {  // on a body's origin and on its turning

@@ -97,14 +97,27 @@ inline bool stays_above(double from, double to, double parabola, double least) {
     return std::abs(to - from) >= parabola || from - slope * slope / (4.0 * parabola) > least;
 }
 
+// How far points of two bodies may be from each other where a rim or a segment meets a solid; of others it is not asked.
+inline double span(const Kind& kind, const Separation& at) {
+    if (const auto* line = std::get_if<LineRow>(&kind)) return at.apart[0].norm() + line->half1 + line->solid.reach;
+    if (const auto* rim = std::get_if<RimRow>(&kind)) return at.apart[0].norm() + rim->rim + rim->solid.reach;
+    return HUGE_VAL;
+}
+
 // Along one direction the distance of any two points stays above its straight course less the parabola that accelerations
-// up to `bound` may take off over `length` [s].
-inline bool stays_apart(const Kind& kind, const Separation& a, const Separation& b, double bound, double length,
-                        double least) {
+// up to `bound` may take off over `length` [s]. Bodies that turn take their faces and edges with them: along a direction
+// that turns evenly from one normal to the other the parabola is larger by what the speed of the points against each other
+// and their distance add.
+inline bool stays_apart(const Kind& kind, const Separation& a, const Separation& b, double bound, double speed,
+                        double length, double least) {
     const double parabola = 0.5 * bound * length * length;
     for (const Vec3& direction : {a.normal, b.normal, Vec3((a.normal + b.normal).normalized())})
         if (stays_above(a.along(direction, kind), b.along(direction, kind), parabola, least)) return true;
-    return false;
+    const double far = std::min(span(kind, a), span(kind, b)) + speed * length;
+    if (!(far < HUGE_VAL)) return false;
+    const double angle = std::atan2(a.normal.cross(b.normal).norm(), a.normal.dot(b.normal));
+    const double turning = angle * (speed * length + 0.5 * angle * far);
+    return stays_above(a.along(a.normal, kind), b.along(b.normal, kind), parabola + turning, least);
 }
 
 // Whether the gap is that of one point after the other of a body over a plane, each of which stays above its own course.

@@ -142,7 +142,7 @@ bool GapSearch::stays_open(int gap, const Look& a, const Look& b, double bound) 
     if (!(a.width > least) || !(b.width > least)) return false;
     if (a.separation) {
         const Kind& kind = p.blocks[p.gaps[gap].block].kind;
-        return stays_apart(kind, *a.separation, *b.separation, bound, length, least);
+        return stays_apart(kind, *a.separation, *b.separation, bound, reach_.speed(gap), length, least);
     }
     if (has_lowest_point(p, gap)) return stays_above(a.width, b.width, 0.5 * bound * length * length, least);
     const double change = b.rate - a.rate + bound * length;  // negative: no bound at all
