@@ -121,6 +121,19 @@ Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX&
     return out;
 }
 
+const Touching& TouchingKnown::at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, double width) {
+    const bool same = known_ && t == t_ && width == width_ && q == q_ && v == v_ && same_bytes(closed_, w.state.closed);
+    if (same) return found_;
+    known_ = true;
+    t_ = t;
+    width_ = width;
+    q_ = q;
+    v_ = v;
+    closed_ = w.state.closed;
+    found_ = touching_contacts(p, w, t, q, v, width);
+    return found_;
+}
+
 // Contacts that share their load are decided together; else one by one, which tells whether the motion is the only one,
 // and together where that does not end.
 void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,

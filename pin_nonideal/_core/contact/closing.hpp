@@ -22,6 +22,19 @@ struct Touching {
 // By the widths and rates of the gaps at (t, q, v): those that are closed, or narrower than `width`, touch.
 Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, double width);
 
+// As found last: asked again where nothing has changed, it needs no look at the gaps.
+class TouchingKnown {
+public:
+    const Touching& at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, double width);
+
+private:
+    bool known_ = false;
+    double t_ = 0.0, width_ = 0.0;
+    VecX q_, v_;
+    std::vector<char> closed_;
+    Touching found_;
+};
+
 // Closes contacts out of those that rest at (t, q, v). `find_modes` finds what sticks and slips for those closed, or takes
 // it from the motion of all of them together where there is one, and leaves the workspace with the motion at v.
 void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,

@@ -13,6 +13,8 @@ constexpr double way_factor = 2.0;
 constexpr double room_ahead = 0.5, steps_ahead = 4.0;
 // A sum times this is no smaller than in exact numbers.
 constexpr double rounded_up = 1.0 + 0x1p-51;
+// The same of a sum over all joints.
+constexpr double joints_rounded_up = 1.0 + 1e-12;
 // A unit of what a stop limits counts as a meter of its body at the least.
 constexpr double lever_of_stop = 1.0;
 
@@ -39,13 +41,22 @@ bool slides(JointKind kind) { return kind != JointKind::revolute && kind != Join
 
 }  // namespace
 
+static void add(const std::vector<double>& parts, std::vector<double>& sums) {
+    for (size_t i = 0; i < sums.size(); ++i) sums[i] = (sums[i] + parts[i]) * rounded_up;
+}
+
+void Ways::add_bodies() {
+    add(body_step, body);
+    add(joint_step, joint);
+    add(turn_step, turn);
+    most = scene = (scene + scene_step) * rounded_up;
+}
+
 void Ways::go_on() {
-    for (size_t i = 0; i < body.size(); ++i) {
-        body[i] = (body[i] + body_step[i]) * rounded_up;
-        joint[i] = (joint[i] + joint_step[i]) * rounded_up;
-        turn[i] = (turn[i] + turn_step[i]) * rounded_up;
-    }
-    scene = (scene + scene_step) * rounded_up;
+    if (summed) return add_bodies();
+    add(slid_step, slid);
+    add(turned_step, turned);
+    most = (most + most_step) * rounded_up;
 }
 
 WayBound::WayBound(const Program& program)
@@ -88,7 +99,8 @@ WayBound::WayBound(const Program& program)
 }
 
 void WayBound::size(Ways& ways) const {
-    for (auto* each : {&ways.body, &ways.joint, &ways.turn, &ways.lever, &ways.body_step, &ways.joint_step, &ways.turn_step})
+    for (auto* each : {&ways.body, &ways.joint, &ways.turn, &ways.lever, &ways.slid, &ways.turned, &ways.body_step,
+                       &ways.joint_step, &ways.turn_step, &ways.slid_step, &ways.turned_step})
         each->assign(extent_.size(), 0.0);
     ways.slid_until.assign(extent_.size(), -1.0);
 }
@@ -116,7 +128,7 @@ void WayBound::set_levers(const Terms& terms, Ways& ways) const {
         const Body &own = terms.body[i], &before = terms.body[parent];
         double apart = (own.ref + own.p - before.ref - before.p).norm();
         if (slides(moved->kind)) {
-            const double room = room_ahead * apart + steps_ahead * ways.joint_step[i];
+            const double room = room_ahead * apart + steps_ahead * (ways.slid_step[i] + ways.turned_step[i]);
             ways.slid_until[i] = ways.joint[i] + room;
             apart += room;
         }
@@ -125,26 +137,50 @@ void WayBound::set_levers(const Terms& terms, Ways& ways) const {
     ways.placed = true;
 }
 
+// What was not summed up as yet goes with the levers so far.
 void WayBound::step(const Terms& terms, const VecX& speed, double h, Ways& ways) const {
     const double time = way_factor * h;
     bool far = !ways.placed;
-    for (size_t k = 0; k < moved_.size() && drift_; ++k) {
-        const int i = moved_[k].joint;
-        if (!moved_[k].drifts) continue;
-        const Speeds of = speeds(moved_[k], speed);
-        ways.joint_step[i] = time * (of.slide + of.turn);
-        far |= !(ways.joint[i] + ways.joint_step[i] <= ways.slid_until[i]);
+    for (const Moved& moved : moved_) {
+        const int i = moved.joint;
+        const Speeds of = speeds(moved, speed);
+        ways.slid_step[i] = time * of.slide;
+        ways.turned_step[i] = time * of.turn;
+        if (!moved.drifts) continue;
+        const double come = ways.joint[i] + ways.slid[i] + ways.turned[i];
+        far |= !(come + ways.slid_step[i] + ways.turned_step[i] <= ways.slid_until[i]);
     }
-    if (far) set_levers(terms, ways);
+    if (far) {
+        sum_up(ways);
+        set_levers(terms, ways);
+    }
+    ways.summed = false;
+    ways.most_step = 0.0;
+    for (const Moved& moved : moved_)
+        ways.most_step += ways.slid_step[moved.joint] + ways.turned_step[moved.joint] * ways.lever[moved.joint];
+    ways.most_step *= joints_rounded_up;
+}
+
+// Along the tree: a body comes as far as the one before it, and by what its joint does.
+void WayBound::spread(const std::vector<double>& slid, const std::vector<double>& turned, Ways& ways) const {
     ways.scene_step = 0.0;
     for (const Moved& moved : moved_) {
         const int i = moved.joint, parent = moved.parent;
-        const Speeds of = speeds(moved, speed);
-        ways.joint_step[i] = time * (of.slide + of.turn);
-        ways.turn_step[i] = ways.turn_step[parent] + time * of.turn;
-        ways.body_step[i] = ways.body_step[parent] + time * (of.slide + of.turn * ways.lever[i]);
+        ways.joint_step[i] = slid[i] + turned[i];
+        ways.turn_step[i] = ways.turn_step[parent] + turned[i];
+        ways.body_step[i] = ways.body_step[parent] + slid[i] + turned[i] * ways.lever[i];
         ways.scene_step = std::max(ways.scene_step, ways.body_step[i]);
     }
+}
+
+void WayBound::sum_up(Ways& ways) const {
+    if (ways.summed) return;
+    spread(ways.slid, ways.turned, ways);
+    ways.add_bodies();
+    std::fill(ways.slid.begin(), ways.slid.end(), 0.0);
+    std::fill(ways.turned.begin(), ways.turned.end(), 0.0);
+    spread(ways.slid_step, ways.turned_step, ways);
+    ways.summed = true;
 }
 
 double WayBound::apart(const Terms& terms, int gap) const {

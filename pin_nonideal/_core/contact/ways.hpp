@@ -16,12 +16,18 @@ struct Ways {
     // Of points on what a joint moves from its own origin [m], as long as joints that slide have not come farther.
     std::vector<double> lever, slid_until;
     bool placed = false;  // where that is known
-    // Over the step at hand.
-    std::vector<double> body_step, joint_step, turn_step;
+    // Of each joint by itself since those of the bodies were summed up: how far its body slid and turned on the one before.
+    std::vector<double> slid, turned;
+    // Over the step at hand; of bodies only where that was summed up.
+    std::vector<double> body_step, joint_step, turn_step, slid_step, turned_step;
     double scene_step = 0.0;
+    double most = 0.0, most_step = 0.0;  // no less than the scene's way, so far and over the step
+    bool summed = false;
 
     // The step is taken: its ways count.
     void go_on();
+    // Those of bodies over the step at hand.
+    void add_bodies();
 };
 
 class WayBound {
@@ -29,8 +35,10 @@ public:
     explicit WayBound(const Program& p);
 
     void size(Ways& ways) const;
-    // Over a step of length h with the largest |v| of each dof; the bodies stand at one end of it.
+    // Over a step of length h with the largest |v| of each dof; the bodies stand at one end of it. Ways of joints, and the
+    // most that the scene's may be; `sum_up` makes those of the bodies, so far and over the step.
     void step(const Terms& terms, const VecX& speed, double h, Ways& ways) const;
+    void sum_up(Ways& ways) const;
 
     // What a gap hangs on: the ways of two bodies, or of a joint.
     struct Pair {
@@ -69,6 +77,7 @@ private:
     struct Speeds { double slide, turn; };
     static Speeds speeds(const Moved& moved, const VecX& speed);
     void set_levers(const Terms& terms, Ways& ways) const;
+    void spread(const std::vector<double>& slid, const std::vector<double>& turned, Ways& ways) const;
 
     const Program& p;
     std::vector<Moved> moved_;    // each after its parent

@@ -29,8 +29,10 @@ static void fields(Archive& a, RunState& x) {
 }
 
 static void fields(Archive& a, Ways& x) {
-    auto& [body, joint, turn, scene, lever, slid_until, placed, body_step, joint_step, turn_step, scene_step] = x;
-    a(body, joint, turn, scene, lever, slid_until, placed, body_step, joint_step, turn_step, scene_step);
+    auto& [body, joint, turn, scene, lever, slid_until, placed, slid, turned, body_step, joint_step, turn_step, slid_step,
+           turned_step, scene_step, most, most_step, summed] = x;
+    a(body, joint, turn, scene, lever, slid_until, placed, slid, turned, body_step, joint_step, turn_step, slid_step,
+      turned_step, scene_step, most, most_step, summed);
 }
 
 static void fields(Archive& a, GapState& x) {

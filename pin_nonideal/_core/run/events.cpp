@@ -151,7 +151,7 @@ void close_and_find(System& system, double t, bool starts, FrictionSwitch& frict
     const double width = starts ? starting_width * scene_size(p, system.w) : touching_width;
     const bool landing = starts || event->kind == FoundEvent::Kind::touch;
     ClosingQuestion question;
-    question.rest = touching_contacts(p, system.w, t, system.q, system.v, width).rest;
+    question.rest = system.touching.at(p, system.w, t, system.q, system.v, width).rest;
     if (event && event->kind == FoundEvent::Kind::lift) question.opening = event->index;
     if (event && !event->of_gap()) question.arrived = event->index;
     question.breaking = friction.breaking();
@@ -213,13 +213,13 @@ std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, con
 bool contacts_strike(System& system, double t, const VecX& y, bool starts) {
     system.read(y);
     const double width = starts ? starting_width * scene_size(system.p, system.w) : touching_width;
-    return touching_contacts(system.p, system.w, t, system.q, system.v, width).strikes;
+    return system.touching.at(system.p, system.w, t, system.q, system.v, width).strikes;
 }
 
 bool contacts_land(System& system, double t, const VecX& y) {
     if (system.p.gaps.empty()) return false;
     system.read(y);
-    return touching_contacts(system.p, system.w, t, system.q, system.v, touching_width).lands;
+    return system.touching.at(system.p, system.w, t, system.q, system.v, touching_width).lands;
 }
 
 Strike strike_contacts(System& system, double t, VecX& y, bool starts) {
@@ -228,8 +228,8 @@ Strike strike_contacts(System& system, double t, VecX& y, bool starts) {
     const std::vector<Mode> modes = system.w.state.mode;
     system.read(y);
     const double width = starts ? starting_width * scene_size(p, system.w) : touching_width;
-    const Touching found = touching_contacts(p, system.w, t, system.q, system.v, width);
-    const Impact impact = strike(p, system.w, t, system.q, system.v, found.touch);
+    const std::vector<char>& touch = system.touching.at(p, system.w, t, system.q, system.v, width).touch;
+    const Impact impact = strike(p, system.w, t, system.q, system.v, touch);
     system.write(y);
     set_closed(p, system.w, closed);  // what changes by it is still to be found
     set_modes(p, system.w, modes);

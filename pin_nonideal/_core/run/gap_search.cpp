@@ -18,17 +18,13 @@ constexpr double between_stages = 2.0;
 constexpr int most_looks = 4000;
 // Bodies are allowed this many times their travel, for what projections add.
 constexpr double travel_factor = 2.0;
-// A far gap is looked at when so many times the way since it was, and so many steps, might close it.
-constexpr double asked_again = 2.0, steps_ahead = 4.0;
-// Part of the ways so far that rounding may leave of their difference.
-constexpr double way_rounding = 1e-15;
 constexpr double rate_rounding = 1e-12;  // part of the rates of a gap that moves evenly
 
 }  // namespace
 
 GapSearch::GapSearch(System& system, Stepper& stepper, GapWatch& watch)
-    : system_(system), stepper_(stepper), p(system.p), w(system.w), watch_(watch), start_(watch.gaps), ways_(watch.ways),
-      reach_(system.p), speed_(VecX::Zero(system.nv)), acceleration_(speed_), probe_(VecX::Zero(system.ny)) {}
+    : system_(system), stepper_(stepper), p(system.p), w(system.w), watch_(watch), start_(watch.gaps), reach_(system.p),
+      speed_(VecX::Zero(system.nv)), acceleration_(speed_), probe_(VecX::Zero(system.ny)) {}
 
 // Largest |v| and |a| of each dof over the step, from the rates at the stages.
 void GapSearch::bound_rates() {
@@ -68,57 +64,12 @@ void GapSearch::look_at_starts(const std::vector<int>& gaps) {
     kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
 }
 
-// Far gaps that the ways of their bodies may have closed by the end of this step are near from here on. Those that have used
-// up half their width are looked at at its end: they are sure to be open in it, and none has to be looked at behind.
-void GapSearch::ask_far() {
-    const Ways& ways = start_.ways;
-    unseen_.clear();
-    start_.ask = HUGE_VAL;
-    bool found = false;
-    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
-        if (!start_.far[i]) continue;
-        const WayBound::Pair& pair = ways_.pair(i);
-        const double way = ways_.way(ways, i), come = way - start_.way[i] + way_rounding * way;
-        const double turn = ways.turn[pair.second], turned = turn - start_.turn[i] + way_rounding * turn;
-        const auto is_open = [&](double times, double steps) {
-            return start_.width[i] > WayBound::change(pair, times * come + steps * ways_.way_of_step(ways, i),
-                                                      times * turned + steps * ways.turn_step[pair.second],
-                                                      start_.apart[i]);
-        };
-        if (is_open(asked_again, steps_ahead)) {
-            start_.ask = std::min(start_.ask, ways.scene + ways_.least_way(pair, start_.width[i] - come));
-            continue;
-        }
-        found = true;
-        start_.far[i] = 0;
-        start_.near[i] = is_open(1.0, 1.0) ? GapState::from_the_end : 1;
-        if (start_.near[i] == 1) unseen_.push_back(i);
-    }
-    if (!found) return;
-    if (!unseen_.empty()) look_at_starts(unseen_);
-    start_.find_near();
-}
-
-// A step that is tried again: what was to be looked at at its end has not been.
-void GapSearch::take_back() {
-    for (int i : start_.near_gaps) {
-        if (start_.near[i] != GapState::from_the_end) continue;
-        start_.near[i] = 0;
-        start_.far[i] = 1;
-        start_.ask = 0.0;
-    }
-    start_.find_near();
-}
-
 const std::vector<GapSearch::Doubt>& GapSearch::doubtful() {
     doubtful_.clear();
-    watch_.end.clear();
-    if (watch_.followed) take_back();
     bound_rates();
-    ways_.step(w.now.terms, speed_, stepper_.h, start_.ways);
-    watch_.followed = true;
+    const std::vector<int>& unseen = watch_.follow(speed_, stepper_.h);
     system_.read(stepper_.y1);
-    if (!(start_.ways.scene + steps_ahead * start_.ways.scene_step < start_.ask)) ask_far();
+    if (!unseen.empty()) look_at_starts(unseen);
     if (start_.near_gaps.empty()) return doubtful_;
     rounding_ = gap_rounding * scene_size(p, w);
     reach_.bound_bodies(w, speed_, acceleration_, stepper_.h);

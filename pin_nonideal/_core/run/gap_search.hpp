@@ -40,8 +40,6 @@ private:
     std::optional<Touch> search(int gap, const Look& a, const Look& b, const Bends& bends);
     Touch between(int gap, const Look& a, const Look& b);
     void bound_rates();
-    void ask_far();
-    void take_back();
     bool same_bodies(int gap, int other) const;
     bool slides_on(int gap) const;  // the same two bodies touch elsewhere
     void look_at_starts(const std::vector<int>& gaps);
@@ -53,10 +51,8 @@ private:
     Workspace& w;
     GapWatch& watch_;
     GapState& start_;
-    const WayBound& ways_;
     Reach reach_;
     std::vector<Doubt> doubtful_;
-    std::vector<int> unseen_;
     std::vector<int> held_;  // closed ones of round bodies: a place that the same two bodies come to next is no lower
     VecX speed_, acceleration_, probe_;
     double rounding_ = 0.0;

@@ -56,6 +56,17 @@ public:
     void look_at_all(double t);
     void go_on(double t);
 
+    // Over a step just taken, of length h with the largest |v| of each dof. Far gaps that the ways of their bodies may have
+    // closed by its end are near from here on: those returned were not looked at in the steps before.
+    const std::vector<int>& follow(const VecX& speed, double h);
+
+    // Time stepping looks once a step, at its middle: of the gaps that are near there those are far from then on that are
+    // wide. `way`: how far each dof has come since the last look, or since the state at which these steps began.
+    const std::vector<int>& come(const VecX& way);
+    void leave_far();
+    // There all are near but those that are known to be far, and wider than `least`.
+    void begin_time_steps(double least);
+
     GapState& gaps;
     const WayBound ways;
     // Each of the near ones at the end of the step at hand, where that was followed.
@@ -66,10 +77,14 @@ private:
     void look(double t, int gap);  // here
     // Far or near, by its width as just looked at.
     void place(int gap);
+    void step(const VecX& speed, double h);
+    void ask_far();
+    void take_back();
 
     System& system_;
     const Program& p;
     Workspace& w;
+    std::vector<int> unseen_;
 };
 
 }  // namespace pn

@@ -23,6 +23,7 @@ namespace {
 constexpr int load_passes = 60;           // of limits that depend on the load
 constexpr double load_tolerance = 1e-12;  // change of the limits, as a part of the largest, that is rounding
 constexpr double limit_rounding = 1e-9;   // part of its limit within which a force is at it
+constexpr double width_rounding = 1e-12;   // part of the scene's size by which what stands may find a gap less wide
 constexpr double least_response = 1e-13;  // part of a row's free response that the constraints must leave it
 // Of the velocities in play, by which a step of a body that turns may contradict itself where corners share its load; the
 // statistics tell.
@@ -30,8 +31,8 @@ constexpr double most_miss = 1e-7;
 
 }  // namespace
 
-MoreauContacts::MoreauContacts(System& system)
-    : system_(system), p(system.p), w(system.w), far_(system.p), was_closed_(system.ng, 0), closed_(system.ng, 0),
+MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
+    : system_(system), p(system.p), w(system.w), watch_(watch), was_closed_(system.ng, 0), closed_(system.ng, 0),
       open_(system.ng, 0), modes_(system.ne, unloaded), unloaded_(modes_), q_mid_(VecX::Zero(system.nq)),
       v0_(VecX::Zero(system.nv)), v1_(v0_), a_free_(v0_),
       power_(VecX::Zero(system.nw)), zero_(VecX::Zero(p.layout.rows)), force_(v0_) {
@@ -59,8 +60,16 @@ void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, dou
     force_ = 0.5 * h * v0_;
     retract(m, y.data(), force_.data(), q_mid_.data());
     const double middle = t + 0.5 * h;
-    std::copy(w.state.mode.begin(), w.state.mode.end(), modes_.begin());
-    was_closed_ = w.state.closed;
+    const bool watched = system_.watches();
+    if (watched || marked_) {
+        std::copy(w.state.mode.begin(), w.state.mode.end(), modes_.begin());
+        was_closed_ = w.state.closed;
+    }
+    marked_ |= watched;
+    if (watch_.gaps.current || q_looked_.size() == 0) {
+        q_looked_ = y.head(system_.nq);
+        watch_.begin_time_steps(width_rounding * scene_size(p, w));
+    }
     solve_free(middle);
     find_touching(middle);
     add_rows();
@@ -68,24 +77,24 @@ void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, dou
     solve(middle);
     end_velocity();
     if (system_.energy) book_work(y, moved_energy, impact_energy);
-    select(closed_, modes_);
+    select(closed_, modes_, rows_.empty());
+    marked_ = watched || !rows_.empty();
     if (system_.nz > 0) y.segment(system_.nq + system_.nv, system_.nz) += h * w.now.dz;
     force_ = 0.5 * h * v1_;
     retract(m, q_mid_.data(), force_.data(), y.data());
     y.segment(system_.nq, system_.nv) = v1_;
 }
 
-// Contacts and modes, with the rows that go with them; most of a flight nothing changes.
-void MoreauContacts::select(const std::vector<char>& closed, const std::vector<Mode>& modes) {
-    const std::vector<Mode>& now = w.state.mode;
-    const bool flies = w.now.loaded.empty() && !any_closed(w.state) && same_bytes(closed, open_) && same_bytes(now, modes);
-    if (!flies || w.now.rows.redundant || w.now.rows.orthogonal) return set_contacts(p, w, closed, modes);
-    w.now.renew();
+// Contacts and modes, with the rows that go with them; most of a flight nothing changes. `flies`: nothing is closed or rubs
+// in those asked for.
+void MoreauContacts::select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies) {
+    if (flies && !system_.watches() && !w.now.rows.redundant && !w.now.rows.orthogonal) w.now.renew();
+    else set_contacts(p, w, closed, modes);
 }
 
 // The motion without contacts and dry friction, constraints met at the step's end.
 void MoreauContacts::solve_free(double t) {
-    select(open_, unloaded_);
+    select(open_, unloaded_, true);
     begin_step(p, w, t, q_mid_, v0_);
     a_free_ = w.now.a;
     if (w.now.rows.blocks.empty()) {
@@ -99,16 +108,29 @@ void MoreauContacts::solve_free(double t) {
     unit_.setZero();
 }
 
+// By how much each dof has moved since gaps were looked at last, by projections too: where angles go round, not less than
+// by its velocity.
+const VecX& MoreauContacts::way_since_last() {
+    q_looked_ -= q_mid_;
+    ambient_to_tangent(p.mechanism, q_mid_.data(), q_looked_.data(), v1_.data());
+    force_ = v1_.cwiseAbs().cwiseMax(h_ * v0_.cwiseAbs());
+    q_looked_ = q_mid_;
+    return force_;
+}
+
 // Contacts whose gap is closed at the step's middle, and those that were closed: their loads tell whether they stay so.
 void MoreauContacts::find_touching(double t) {
     touching_.clear();
-    far_.each_near(w, [&](int i) {
+    const std::vector<int>& near = watch_.come(way_since_last());
+    const double rounding = near.empty() ? 0.0 : width_rounding * scene_size(p, w);
+    for (int i : near) {
         measure_gap(p, w, t, v0_, i);
         const double width = gap_width(p, w, i);
-        if (was_closed_[i] || width <= 0.0) touching_.push_back(i);
-        return width;
-    });
-    std::sort(touching_.begin(), touching_.end());
+        const bool touches = was_closed_[i] || width <= 0.0;
+        if (touches) touching_.push_back(i);
+        watch_.gaps.width[i] = touches ? 0.0 : width - rounding;  // that it is sure to have
+    }
+    watch_.leave_far();
     for (int i : touching_) {
         evaluate_block(p, w, t, v0_, p.gaps[i].block);
         for (int e : p.gaps[i].elements) evaluate_block(p, w, t, v0_, p.frictions[e].block);
@@ -277,8 +299,10 @@ void MoreauContacts::solve(double t) {
 void MoreauContacts::end_velocity() {
     const int n = static_cast<int>(rows_.size());
     v1_ = v0_ + h_ * w.now.a;
-    std::fill(closed_.begin(), closed_.end(), char(0));
-    std::fill(modes_.begin(), modes_.end(), unloaded);
+    if (marked_) {
+        std::fill(closed_.begin(), closed_.end(), char(0));
+        std::fill(modes_.begin(), modes_.end(), unloaded);
+    }
     if (n == 0) return;
     const double still = rest_rate(v1_), clear = limit_rounding * f_.head(n).cwiseAbs().maxCoeff();
     w1_.head(n) = w0_.head(n);

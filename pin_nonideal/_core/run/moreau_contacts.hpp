@@ -5,15 +5,14 @@
 
 #include <vector>
 
-#include "contact/far_gaps.hpp"
 #include "friction/cone_complementarity.hpp"
-#include "run/system.hpp"
+#include "run/gap_watch.hpp"
 
 namespace pn {
 
 class MoreauContacts {
 public:
-    explicit MoreauContacts(System& system);
+    MoreauContacts(System& system, GapWatch& watch);
 
     // One step of size h from y at t; the work of contacts along their normals goes into impact_energy, what the scheme
     // itself adds into moved_energy. The state is left to be projected and evaluated, with the modes of its end.
@@ -29,8 +28,9 @@ private:
         double approach = 0.0; // restitution times the rate at which its gap closed, over the step
     };
 
-    void select(const std::vector<char>& closed, const std::vector<Mode>& modes);
+    void select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies);
     void solve_free(double t);
+    const VecX& way_since_last();
     void find_touching(double t);
     void add_rows();
     void add_part(Part part, int first_block, int kept, ConeElement element);
@@ -47,17 +47,18 @@ private:
     const Program& p;
     Workspace& w;
     double h_ = 0.0;
-    FarGaps far_;
+    GapWatch& watch_;
     std::vector<int> touching_, own_;  // gaps that take part, and dry friction of no contact that may open
     std::vector<int> rubbing_;         // dry friction that takes part, but the sliding of contacts
     std::vector<char> was_closed_, closed_, open_;
     std::vector<Mode> modes_, unloaded_;
+    bool marked_ = false;  // in the flags and modes of the last step something was closed or rubbed
     std::vector<Row> rows_;
     std::vector<Part> parts_;
     std::vector<ConeElement> cones_;
     bool scaled_ = true;   // the response is a_s = R^T a
     bool presses_ = true;  // there may be percussions of the last step
-    VecX q_mid_, v0_, v1_, a_free_, lam_free_, w0_, w1_, f_, power_, unit_, zero_, force_, lam_;
+    VecX q_mid_, q_looked_, v0_, v1_, a_free_, lam_free_, w0_, w1_, f_, power_, unit_, zero_, force_, lam_;
     MatX W_, response_, multipliers_;
     ConeComplementarity solver_;
 };

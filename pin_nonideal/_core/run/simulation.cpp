@@ -45,7 +45,7 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       output(system, stepper, *this, run_options, recording), notices(system, stepper, *this, recording),
       value_events(run_options.events, system, stepper, *this), torques(system, *this, run_options, output),
       landing(system, *this, watch, run_options, output, recording),
-      time_stepping(system, *this, run_options, torques, output, notices, value_events, recording),
+      time_stepping(system, *this, watch, run_options, torques, output, notices, value_events, recording),
       clusters(system, *this, run_options, stiffness, time_stepping, recording),
       modes(system, *this, run_options, torques, output, landing, clusters, recording) {
     y = rate = configured_y = VecX::Zero(system.ny);

@@ -9,7 +9,7 @@
 // unit sphere, so the order is kept, and lengths are restored at the step's end.
 #pragma once
 
-#include "dynamics/workspace.hpp"
+#include "contact/closing.hpp"
 
 namespace pn {
 
@@ -25,6 +25,7 @@ struct System {
     double moved_energy = 0.0;    // by the last projection of a step's end, where the ledger is kept
     const int nq, nv, nz, nw, ne, ng, ns, ny;  // sizes of q, v, z, work, elements, gaps, y without watch, y
     VecX q, v;                         // of the state read last
+    TouchingKnown touching;            // as found last
 
     System(const Program& program, Workspace& workspace, bool with_energy);
 

@@ -29,11 +29,13 @@ bool asks_always(const Program& p, const Options& options) {
 
 }  // namespace
 
-TimeStepping::TimeStepping(System& system, Progress& progress, const Options& options, Torques& torques,
-                           Output& output, Notices& notices, ValueEvents& value_events, Recording& out)
+TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, const Options& options,
+                           Torques& torques, Output& output, Notices& notices, ValueEvents& value_events,
+                           Recording& out)
     : p(system.p), w(system.w), system_(system), now_(progress), options_(options), torques_(torques),
       output_(output), notices_(notices), value_events_(value_events), out_(out), moreau_(system),
-      moreau_contacts_(system), lasts_(!may_differ(system.p, options)), asked_always_(asks_always(system.p, options)) {}
+      moreau_contacts_(system, watch), lasts_(!may_differ(system.p, options)),
+      asked_always_(asks_always(system.p, options)) {}
 
 double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     double end = std::min({now_.t + size, stop, torques_.next_stop(t_end)});
@@ -59,9 +61,11 @@ void TimeStepping::take(double end, double t_end) {
     double& t = now_.t;
     VecX &y = now_.y, &y_from = y_from_;
     const bool rested = rests();
-    if (rested) y_from = y;
     Modes& before = before_step_;
-    before = w.state.mode;
+    if (rested) {
+        y_from = y;
+        before = w.state.mode;
+    }
     const double moved_from = now_.moved_energy;
     if (system_.ng > 0) moreau_contacts_.step(t, end - t, y, now_.moved_energy, now_.impact_energy);
     else moreau_.step(t, end - t, y, now_.moved_energy);
@@ -85,20 +89,23 @@ void TimeStepping::take(double end, double t_end) {
 
 void TimeStepping::step(double size, double stop, double t_end) {
     torques_.sample();
-    now_.gaps.current = false;
     double& t = now_.t;
     VecX& y = now_.y;
     const double end = end_of_step(size, stop, t_end), from = t;
-    Modes& before = before_;
-    before = w.state.mode;
-    closed_before_ = w.state.closed;
+    const bool watched = system_.watches();
+    if (watched || !open_before_) {
+        before_ = w.state.mode;
+        closed_before_ = w.state.closed;
+        open_before_ = !watched;
+    }
     const VecX y_from = options_.record.dense ? y : VecX();
     if (!stands_) take(end, t_end);
     t = end;
     ++out_.steps;
     output_.configured_now();
     remember_directions(system_, now_.slip_at_start);
-    for (const Event& change : changes_since(system_, t, closed_before_, before)) out_.events.push_back(change);
+    if (watched || system_.watches())
+        for (const Event& change : changes_since(system_, t, closed_before_, before_)) out_.events.push_back(change);
     notices_.pulls(std::nullopt);
     notices_.several(false);
     output_.keep_time_step(from, y_from);

@@ -12,8 +12,8 @@ namespace pn {
 
 class TimeStepping {
 public:
-    TimeStepping(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
-                 Notices& notices, ValueEvents& value_events, Recording& out);
+    TimeStepping(System& system, Progress& progress, GapWatch& watch, const Options& options, Torques& torques,
+                 Output& output, Notices& notices, ValueEvents& value_events, Recording& out);
 
     // One step of this size, not beyond `stop` nor the end of the run.
     void step(double size, double stop, double t_end);
@@ -44,6 +44,7 @@ private:
     VecX y_from_;
     Modes before_, before_step_;
     std::vector<char> closed_before_;
+    bool open_before_ = false;  // they say that nothing is closed or rubs
 };
 
 }  // namespace pn
