@@ -104,7 +104,7 @@ struct Search {
 Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, double width) {
     Touching out{Choice(p.gaps.size(), 0), Choice(p.gaps.size(), 0)};
     update_kinematics(p, w, t, q, v);
-    const double still = rest_rate(v);
+    std::vector<int> list;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
         if (is_bare(p, i)) continue;
         if (!w.state.closed[i] && !p.is_users(i)) {
@@ -112,11 +112,21 @@ Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX&
             if (gap_width(p, w, i) > sure_gap) continue;
         }
         evaluate_gap(p, w, t, v, i);
-        const double gap = gap_width(p, w, i), rate = gap_rate(p, w, i);
-        out.touch[i] = w.state.closed[i] || gap <= std::max(width, -rate * touching_time);
-        out.rest[i] = out.touch[i] && rate <= still;
-        out.strikes |= out.touch[i] && rate < -still;
-        out.lands |= out.touch[i] && rate < -still && !w.state.closed[i];
+        const bool touches = gap_width(p, w, i) <= std::max(width, -gap_rate(p, w, i) * touching_time);
+        if (w.state.closed[i] || touches) list.push_back(i);
+    }
+    if (list.size() > 1) {
+        for (int i : list)
+            if (p.gaps[i].sliding >= 0) evaluate_block(p, w, t, v, p.frictions[p.gaps[i].sliding].block);
+        leave_one_of_each_place(p, w, w.state.closed, list);
+    }
+    const double still = rest_rate(v);
+    for (int i : list) {
+        const double rate = gap_rate(p, w, i);
+        out.touch[i] = 1;
+        out.rest[i] = rate <= still;
+        out.strikes |= rate < -still;
+        out.lands |= rate < -still && !w.state.closed[i];
     }
     return out;
 }

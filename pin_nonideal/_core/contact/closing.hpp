@@ -19,7 +19,8 @@ struct Touching {
     bool strikes = false;
     bool lands = false;  // one of those that strike is open as yet
 };
-// By the widths and rates of the gaps at (t, q, v): those that are closed, or narrower than `width`, touch.
+// By the widths and rates of the gaps at (t, q, v): those that are closed, or narrower than `width`, touch; of those that
+// coincide one does for all.
 Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, double width);
 
 // As found last: asked again where nothing has changed, it needs no look at the gaps.

@@ -1,5 +1,6 @@
 #include "contact/gaps.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "constraints/redundancy.hpp"
@@ -9,6 +10,8 @@ namespace pn {
 
 // Part of the terms of a sum that rounding may leave of it.
 constexpr double sum_rounding = 1e-12;
+// By which lines and points of one place differ: a part of the distance from the origin, or the sine of an angle.
+constexpr double one_place = 1e-12;
 
 // The rate's own rate, and the size of its terms.
 static std::pair<double, double> rate_of_rate(const Program& p, const Workspace& w, int gap) {
@@ -28,6 +31,54 @@ double gap_acceleration(const Program& p, const Workspace& w, int gap) { return 
 
 double acceleration_rounding(const Program& p, const Workspace& w, int gap) {
     return sum_rounding * (rate_of_rate(p, w, gap).second + p.mechanism.gravity.norm());
+}
+
+namespace {
+
+struct Line { Vec3 point, along; };
+
+// Of a geometric row as a force on the body with the higher number.
+Line line_of(const Program& p, const Workspace& w, int block, int row) {
+    const Wrench& unit = w.now.values[block].wrench[row];
+    return {unit.point, p.blocks[block].joint1 > p.blocks[block].joint2 ? unit.force : -unit.force};
+}
+
+std::pair<int, int> bodies(const Block& block) { return std::minmax({block.joint1, block.joint2}); }
+
+bool rubs_the_same(const Friction& a, const Friction& b) {
+    return a.mu == b.mu && a.constant == b.constant && a.static_ratio == b.static_ratio &&
+           a.stribeck_velocity == b.stribeck_velocity && a.dim == b.dim && !a.user_limit && !b.user_limit;
+}
+
+}  // namespace
+
+bool coincide(const Program& p, const Workspace& w, int gap, int other) {
+    const Gap &a = p.gaps[gap], &b = p.gaps[other];
+    if (a.alike == b.alike) return true;
+    if (!w.now.values[a.block].geometric || !w.now.values[b.block].geometric) return false;
+    if (bodies(p.blocks[a.block]) != bodies(p.blocks[b.block]) || a.restitution != b.restitution) return false;
+    if (a.elements.size() != b.elements.size() || (a.sliding < 0) != (b.sliding < 0)) return false;
+    const Line one = line_of(p, w, a.block, 0), two = line_of(p, w, b.block, 0);
+    const double size = 1.0 + one.point.norm();
+    if ((one.along - two.along).norm() > one_place) return false;
+    if ((one.point - two.point).cross(one.along).norm() > one_place * size) return false;
+    if (a.sliding < 0) return true;
+    const Friction &rubs = p.frictions[a.sliding], &rubs_too = p.frictions[b.sliding];
+    if (!rubs_the_same(rubs, rubs_too)) return false;
+    const Vec3 apart = w.now.values[rubs.block].wrench[0].point - w.now.values[rubs_too.block].wrench[0].point;
+    return apart.norm() <= one_place * size;
+}
+
+void leave_one_of_each_place(const Program& p, const Workspace& w, const std::vector<char>& closed, std::vector<int>& list) {
+    size_t left = 0;
+    for (int gap : list) {
+        const auto end = list.begin() + static_cast<std::ptrdiff_t>(left);
+        const auto same = std::find_if(list.begin(), end, [&](int other) { return coincide(p, w, gap, other); });
+        if (same == end) list[left++] = gap;
+        else if (closed[gap] && !closed[*same]) *same = gap;
+    }
+    list.resize(left);
+    std::sort(list.begin(), list.end());
 }
 
 double load(const Program& p, Workspace& w, int gap) {

@@ -22,6 +22,12 @@ double gap_acceleration(const Program& p, const Workspace& w, int gap);
 // Part of that which may be rounding.
 double acceleration_rounding(const Program& p, const Workspace& w, int gap);
 
+// Whether two gaps are those of one place: between the same bodies along one line, and rubbing the same way at one point,
+// but for rounding. Their rows and those of their sliding are evaluated.
+bool coincide(const Program& p, const Workspace& w, int gap, int other);
+// Of those listed, which touch, leaves one of each place: one of those that are `closed`, or else the first.
+void leave_one_of_each_place(const Program& p, const Workspace& w, const std::vector<char>& closed, std::vector<int>& list);
+
 // Normal force of a closed contact in the motion at hand; among redundant rows the least-norm one of those that press.
 double load(const Program& p, Workspace& w, int gap);
 // Part of it that may be rounding.

@@ -1,6 +1,7 @@
 #include "dynamics/program.hpp"
 
 #include <algorithm>
+#include <map>
 
 namespace pn {
 
@@ -35,6 +36,52 @@ static void number_descriptions(Program& p) {
         rows[copy.row].factor = copy.factor;
     }
     p.described.finish(p.layout.rows);
+}
+
+// What a gap measures and how it rubs, as numbers; none where it says more than numbers, as a solid or a function does.
+class GapNumbers {
+public:
+    GapNumbers(const Program& p, const Gap& gap) {
+        const Kind& kind = p.blocks[gap.block].kind;
+        add(static_cast<double>(kind.index()));
+        std::visit([this](const auto& k) {
+            std::apply([&](const auto&... data) { (add(k.*data.member), ...); }, k.data());
+        }, kind);
+        add(gap.restitution);
+        for (int e : gap.elements) {
+            const Friction& f = p.frictions[e];
+            for (double x : {f.constant, f.mu, f.radius, f.axial_radius, f.static_ratio, f.stribeck_velocity}) add(x);
+            add(static_cast<double>(f.dim));
+            told_ &= !f.user_limit;
+        }
+    }
+    bool told() const { return told_; }
+    const std::vector<double>& numbers() const { return numbers_; }
+
+private:
+    void add(double x) { numbers_.push_back(x); }
+    void add(int x) { numbers_.push_back(x); }
+    void add(const Vec3& x) {
+        for (int k = 0; k < 3; ++k) add(x[k]);
+    }
+    void add(const Frame& x) {
+        add(x.joint);
+        for (int k = 0; k < 3; ++k) add(x.R.col(k));
+        add(x.p);
+    }
+    template <class Other>
+    void add(const Other&) { told_ = false; }
+
+    std::vector<double> numbers_;
+    bool told_ = true;
+};
+
+static void find_alike(Program& p) {
+    std::map<std::vector<double>, int> first;
+    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
+        const GapNumbers of(p, p.gaps[i]);
+        p.gaps[i].alike = of.told() ? first.emplace(of.numbers(), i).first->second : i;
+    }
 }
 
 VecX Program::user_multipliers(const VecX& lam) const {
@@ -79,6 +126,7 @@ void Program::finish() {
         // What resists spinning and rolling has a kind of its own.
         if (!std::holds_alternative<TurnSlipRows>(blocks[f.block].kind)) gaps[f.gap].sliding = static_cast<int>(e);
     }
+    find_alike(*this);
     for (Friction& f : frictions) {
         if (f.load != Friction::Load::multiplier) continue;
         f.row = blocks[f.anchor].user_row + f.anchor_row;

@@ -135,6 +135,7 @@ void MoreauContacts::find_touching(double t) {
         evaluate_block(p, w, t, v0_, p.gaps[i].block);
         for (int e : p.gaps[i].elements) evaluate_block(p, w, t, v0_, p.frictions[e].block);
     }
+    if (touching_.size() > 1) leave_one_of_each_place(p, w, was_closed_, touching_);
 }
 
 // The coefficient of a contact: the static one where it sticks or comes to rest.
