@@ -135,6 +135,30 @@ def test_places_that_differ_are_kept():
     assert run.lam[-1].sum() == pytest.approx(GRAVITY, rel=1e-12)
 
 
+def slider(*coefficients):
+    contacts = [pn.PointContact("middle", mu=mu, name=f"foot {k}") for k, mu in enumerate(coefficients)]
+    return free(contacts, 1, 0.1 * np.eye(3), q0=[0, 0, 0, 0, 0, 0, 1], v0=[1.0, 0, 0, 0, 0, 0])
+
+
+def test_copies_that_a_run_tells_apart():
+    """Friction given by the run: what was declared alike shares the load as what was declared so."""
+    names = slider(0.2, 0.2).contact_names
+    given = {names[1]: {"mu": [0.2, 0.4]}}
+    alike, apart = pn.rollout(slider(0.2, 0.2), None, None, 0.1, parameters=given)
+    assert alike.v[-1][0] == pytest.approx(1.0 - 0.2 * GRAVITY * 0.1, abs=1e-10)
+    declared = pn.simulate(slider(0.2, 0.4), 0.1)
+    assert apart.v[-1] == pytest.approx(declared.v[-1], abs=1e-12)
+    assert apart.closed[-1].sum() == 2
+
+
+def test_places_that_resist_spinning_otherwise_are_kept():
+    contacts = [
+        pn.PointContact("middle", mu=0.2, torsional=r, name=f"foot {r}") for r in (0.0, 0.01, 0.01, 0.03)
+    ]
+    scene = free(contacts, 1, 0.1 * np.eye(3), q0=[0, 0, 0, 0, 0, 0, 1], v0=[0, 0, 0, 0, 0, 1.0])
+    assert pn.simulate(scene, 0.01).closed[-1].sum() == 3
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_a_cube_on_a_cube(method):
     """Edges on edges, corners on faces: of all places that meet in a point one, and nothing drifts."""

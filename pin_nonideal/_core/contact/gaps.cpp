@@ -46,25 +46,37 @@ Line line_of(const Program& p, const Workspace& w, int block, int row) {
 std::pair<int, int> bodies(const Block& block) { return std::minmax({block.joint1, block.joint2}); }
 
 bool rubs_the_same(const Friction& a, const Friction& b) {
-    return a.mu == b.mu && a.constant == b.constant && a.static_ratio == b.static_ratio &&
+    return a.mu == b.mu && a.constant == b.constant && a.radius == b.radius && a.axial_radius == b.axial_radius &&
+           a.inverse_span == b.inverse_span && a.static_ratio == b.static_ratio &&
            a.stribeck_velocity == b.stribeck_velocity && a.dim == b.dim && !a.user_limit && !b.user_limit;
+}
+
+// The numbers of a program may differ by run.
+bool rub_and_bounce_the_same(const Program& p, const Gap& a, const Gap& b) {
+    return a.restitution == b.restitution && (a.sliding < 0) == (b.sliding < 0) &&
+           std::equal(a.elements.begin(), a.elements.end(), b.elements.begin(), b.elements.end(), [&](int e, int other) {
+               return rubs_the_same(p.frictions[e], p.frictions[other]);
+           });
 }
 
 }  // namespace
 
+bool are_copies(const Program& p, int gap, int other) {
+    const Gap &a = p.gaps[gap], &b = p.gaps[other];
+    return a.alike == b.alike && (gap == other || rub_and_bounce_the_same(p, a, b));
+}
+
 bool coincide(const Program& p, const Workspace& w, int gap, int other) {
     const Gap &a = p.gaps[gap], &b = p.gaps[other];
-    if (a.alike == b.alike) return true;
+    if (are_copies(p, gap, other)) return true;
     if (!w.now.values[a.block].geometric || !w.now.values[b.block].geometric) return false;
-    if (bodies(p.blocks[a.block]) != bodies(p.blocks[b.block]) || a.restitution != b.restitution) return false;
-    if (a.elements.size() != b.elements.size() || (a.sliding < 0) != (b.sliding < 0)) return false;
+    if (bodies(p.blocks[a.block]) != bodies(p.blocks[b.block]) || !rub_and_bounce_the_same(p, a, b)) return false;
     const Line one = line_of(p, w, a.block, 0), two = line_of(p, w, b.block, 0);
     const double size = 1.0 + one.point.norm();
     if ((one.along - two.along).norm() > one_place) return false;
     if ((one.point - two.point).cross(one.along).norm() > one_place * size) return false;
     if (a.sliding < 0) return true;
     const Friction &rubs = p.frictions[a.sliding], &rubs_too = p.frictions[b.sliding];
-    if (!rubs_the_same(rubs, rubs_too)) return false;
     const Vec3 apart = w.now.values[rubs.block].wrench[0].point - w.now.values[rubs_too.block].wrench[0].point;
     return apart.norm() <= one_place * size;
 }

@@ -22,6 +22,8 @@ double gap_acceleration(const Program& p, const Workspace& w, int gap);
 // Part of that which may be rounding.
 double acceleration_rounding(const Program& p, const Workspace& w, int gap);
 
+// Whether two gaps are one, declared twice.
+bool are_copies(const Program& p, int gap, int other);
 // Whether two gaps are those of one place: between the same bodies along one line, and rubbing the same way at one point,
 // but for rounding. Their rows and those of their sliding are evaluated.
 bool coincide(const Program& p, const Workspace& w, int gap, int other);

@@ -38,7 +38,7 @@ static void number_descriptions(Program& p) {
     p.described.finish(p.layout.rows);
 }
 
-// What a gap measures and how it rubs, as numbers; none where it says more than numbers, as a solid or a function does.
+// What a gap measures, as numbers; none where it says more than numbers, as a solid or a function does.
 class GapNumbers {
 public:
     GapNumbers(const Program& p, const Gap& gap) {
@@ -47,13 +47,6 @@ public:
         std::visit([this](const auto& k) {
             std::apply([&](const auto&... data) { (add(k.*data.member), ...); }, k.data());
         }, kind);
-        add(gap.restitution);
-        for (int e : gap.elements) {
-            const Friction& f = p.frictions[e];
-            for (double x : {f.constant, f.mu, f.radius, f.axial_radius, f.static_ratio, f.stribeck_velocity}) add(x);
-            add(static_cast<double>(f.dim));
-            told_ &= !f.user_limit;
-        }
     }
     bool told() const { return told_; }
     const std::vector<double>& numbers() const { return numbers_; }

@@ -19,7 +19,7 @@ struct Gap {
     double restitution = 0.0;
     std::vector<int> elements;  // of friction there
     int sliding = -1;           // of them the one along its plane, whose forces lie in Coulomb's cone
-    int alike = -1;             // the first gap that says the same, or itself
+    int alike = -1;             // the first gap that measures the same, or itself
 };
 
 // What restitution e of a contact means in an impact: of rates of its gap, or of impulses.

@@ -80,7 +80,7 @@ const std::vector<GapSearch::Doubt>& GapSearch::doubtful() {
         follow_gap(p, w, stepper_.t0 + stepper_.h, system_.v, i);
         watch_.end.push_back(Look::here(p, w, i, 1.0));
         if (start_.near[i] == GapState::from_the_end || travel_factor * reach_.travel(i) < start_.width[i]) continue;
-        if (is_held_alike(i)) continue;
+        if (has_held_copy(i)) continue;
         const Look end = above(watch_.end.back(), level_here(i, 1.0));
         const Bends bent = bends(i, end);
         if (!stays_open(i, look_at_start(i), end, bent.below)) doubtful_.push_back({i, end, bent});
@@ -109,10 +109,10 @@ bool GapSearch::same_bodies(int gap, int other) const {
     return (a.joint1 == b.joint1 && a.joint2 == b.joint2) || (a.joint1 == b.joint2 && a.joint2 == b.joint1);
 }
 
-// What says the same is closed: this one goes with it.
-bool GapSearch::is_held_alike(int gap) const {
+// A copy of it is closed: this one goes with that.
+bool GapSearch::has_held_copy(int gap) const {
     const std::vector<int>& touching = w.now.touching;
-    return std::any_of(touching.begin(), touching.end(), [&](int held) { return p.gaps[held].alike == p.gaps[gap].alike; });
+    return std::any_of(touching.begin(), touching.end(), [&](int held) { return are_copies(p, held, gap); });
 }
 
 bool GapSearch::slides_on(int gap) const {

@@ -41,7 +41,7 @@ private:
     Touch between(int gap, const Look& a, const Look& b);
     void bound_rates();
     bool same_bodies(int gap, int other) const;
-    bool is_held_alike(int gap) const;
+    bool has_held_copy(int gap) const;
     bool slides_on(int gap) const;  // the same two bodies touch elsewhere
     void look_at_starts(const std::vector<int>& gaps);
     Bends bends(int gap, const Look& end) const;
