@@ -29,8 +29,8 @@ LEAST_ROUNDING = 1e-3
 # What carries a cylinder that stands on its face: so many points on this part of its radius.  The rim takes
 # over from the tilt at which it is as low as they are, 0.03 rad.
 FACE_POINTS, FACE_CIRCLE = 8, 0.97
-# Part of their rounding by which edges end before the corners that touch a cylinder or cone already, and by
-# which they are rounder for rims than for the side that they touch already.
+# Part of the rounding of edges, or of how far rims stand back, by which the side of a cylinder does from its
+# rims and from where corners find it: no two places touch at one, and what lies along it lies on both rims.
 PASSED_ON = 0.01
 # Places of one pair beyond which it is refused: rows of all of them take room by the square of their number.
 MOST_PLACES = 1000
@@ -160,11 +160,11 @@ def _on_revolved(at: Array, radius: float, frame: str, solid: Shape, more: dict[
 def _revolved_manifold(
     who: str, other: Shape, solid: Shape, rounding: float | None, more: dict[str, Any]
 ) -> list[Place]:
-    """A capsule, box or convex mesh with a cylinder or cone, place by place so that no two touch at one.
+    """A capsule, box or convex mesh with a cylinder or cone.
 
-    Edges, and a capsule's middle line, on the solid whose faces stand back and on the chords between the
-    points that carry these; corners, which edges end shortly before, on the whole solid; a capsule's ends on
-    its faces.  Those points, the tip and the rims on the faces of a box or mesh, further rounded for rims.
+    Corners, and a capsule's ends, on the whole solid; edges, and its middle line, on a side that stands back
+    a little from these, on the rims and on the chords between the points that carry the faces; those points
+    and the tip on the faces of a box or mesh, and rims on its faces and edges.
     """
     back = _standing_back(who, solid, rounding)
     radius = _edge_radius(who, [other], rounding) if other.solid else other.radius
@@ -173,41 +173,57 @@ def _revolved_manifold(
     faces = [_face_points(solid, *face) for face in _faces(solid)]
     chords = [ends for points in faces for ends in zip(points, points[1:] + points[:1], strict=True)]
     tips = [*solid.points.tolist(), *(point for points in faces for point in points)]
-    count = len(core) + len(lines) * (1 + len(chords)) + other.solid * (len(tips) + len(faces))
+    on_faces = len(tips) if other.solid else 0
+    count = len(core) + len(lines) * (1 + len(chords)) + on_faces + len(faces)
     _check_count(who, count, f"{len(lines)} edges by {1 + len(chords)}")
-    inner, carried = _stood_back(solid, back), solid if other.solid else _carrying(solid)
-    found: list[Place] = [_on_revolved(at, radius, other.frame, carried, more) for at in core]
-    for line in lines:
-        first, last = _shortened(line, PASSED_ON * radius if other.solid else 0.0)
-        found.append(replace(_on_revolved(first, radius, other.frame, inner, more), end=tuple(last.tolist())))
+    side = _side(solid, back, PASSED_ON * (radius if other.solid else back))
+    found: list[Place] = [_on_revolved(at, radius, other.frame, solid, more) for at in core]
+    found += [_line_on_revolved(line, radius, other.frame, side, more) for line in lines]
     for line, chord in product(lines, chords):
         found.append(CapsuleContact(other.frame, solid.frame, line, chord, radius, 0.0, **more))
     if not other.solid:
-        return found
+        rims = _slices(solid, back)
+        return found + [
+            _line_on_revolved(line, radius, other.frame, rim, more) for line in lines for rim in rims
+        ]
     found += [_on_solid(solid, np.array(at), other, core, 0.0, radius, more) for at in tips]
-    rounder = radius + PASSED_ON * min(radius, 0.5 * _least_edge(other) - radius)
-    points, rpy = _rows(_core(who, other, rounder)), tuple(pin.rpy.matrixToRpy(inner.place.rotation).tolist())
+    rpy = tuple(pin.rpy.matrixToRpy(solid.place.rotation).tolist())
+    inner = _between(solid, *_heights(solid, back), 1.0)
     for end, rim in _faces(inner):
         middle = _at(inner, 0.0, 0.0, end)
         found.append(
-            RimContact(solid.frame, other.frame, points, rim, rounder, offset=middle, rpy=rpy, **more)
+            RimContact(solid.frame, other.frame, _rows(core), rim, radius, offset=middle, rpy=rpy, **more)
         )
     return found
 
 
-def _stood_back(solid: Shape, back: float) -> Shape:
-    """A cylinder or cone whose faces lie that much deeper; its side stays where it is."""
-    assert solid.ends is not None
-    half, below, above = solid.ends
-    return _between(solid, -half + back * (below > 0.0), half - back * (above > 0.0), 1.0)
+def _line_on_revolved(
+    line: Segment, radius: float, frame: str, solid: Shape, more: dict[str, Any]
+) -> CylinderContact:
+    return replace(_on_revolved(np.array(line[0]), radius, frame, solid, more), end=line[1])
 
 
-def _carrying(solid: Shape) -> Shape:
-    """What is left of a cylinder or cone where points carry its faces; its side and its tip lie inside."""
+def _heights(solid: Shape, back: float) -> tuple[float, float]:
+    """Where on its axis the faces of a cylinder or cone are when they stand back; a tip does not."""
     assert solid.ends is not None
     half, below, above = solid.ends
-    low, high = -half * (1.0 if below > 0.0 else FACE_CIRCLE), half * (1.0 if above > 0.0 else FACE_CIRCLE)
-    return _between(solid, low, high, FACE_CIRCLE)
+    return -half + back * (below > 0.0), half - back * (above > 0.0)
+
+
+def _side(solid: Shape, back: float, by: float) -> Shape:
+    """A cylinder or cone whose faces stand back, and whose side does by that much where it is widest."""
+    assert solid.ends is not None
+    return _between(solid, *_heights(solid, back), 1.0 - by / max(solid.ends[1:]))
+
+
+def _slices(solid: Shape, back: float) -> list[Shape]:
+    """Its rims where its faces stand back, thin slices of it."""
+    assert solid.ends is not None
+    low, high = _heights(solid, back)
+    _, below, above = solid.ends
+    places = [(low, low + min(back, 0.5 * (high - low)))] * (below > 0.0)
+    places += [(high - min(back, 0.5 * (high - low)), high)] * (above > 0.0)
+    return [_between(solid, *place, 1.0) for place in places]
 
 
 def _between(solid: Shape, low: float, high: float, part: float) -> Shape:
@@ -217,12 +233,6 @@ def _between(solid: Shape, low: float, high: float, part: float) -> Shape:
     first, last = (part * (below + (above - below) * (z + half) / (2.0 * half)) for z in (low, high))
     place = pin.SE3(solid.place.rotation, np.array(_at(solid, 0.0, 0.0, 0.5 * (low + high))))
     return replace(solid, place=place, ends=(0.5 * (high - low), first, last))
-
-
-def _shortened(line: Segment, by: float) -> tuple[Array, Array]:
-    first, last = np.array(line[0]), np.array(line[1])
-    step = by / float(np.linalg.norm(last - first)) * (last - first)
-    return first + step, last - step
 
 
 def _solid_manifold(
