@@ -230,7 +230,7 @@ def _between(solid: Shape, low: float, high: float, part: float) -> Shape:
     """A part of the radii of a cylinder or cone, between two places on its axis."""
     assert solid.ends is not None
     half, below, above = solid.ends
-    first, last = (part * (below + (above - below) * (z + half) / (2.0 * half)) for z in (low, high))
+    first, last = (part * (below * (half - z) + above * (half + z)) / (2.0 * half) for z in (low, high))
     place = pin.SE3(solid.place.rotation, np.array(_at(solid, 0.0, 0.0, 0.5 * (low + high))))
     return replace(solid, place=place, ends=(0.5 * (high - low), first, last))
 
