@@ -298,6 +298,88 @@ def test_a_plank_rocks_on_a_lying_cylinder():
     assert {event.kind for event in run.events} <= {"stick"}
 
 
+@pytest.mark.parametrize("mu", [0.0, 0.5])
+@pytest.mark.parametrize("turn", [0.0, 1e-9, 0.01])
+def test_a_can_falls_on_two_rails(mu, turn):
+    """Edges along its side, which carry it at its rims; all the way its energy is told."""
+    model, geometry = empty((0.0, 0.0, -GRAVITY)), pin.GeometryModel()
+    joint = body(model, 0, pin.JointModelFreeFlyer(), "free", 1.0, inertia=0.01 * np.eye(3))
+    across = pin.SE3(pin.rpy.rpyToMatrix(0.5 * np.pi, 0.0, 0.0), np.zeros(3))
+    geometry.addGeometryObject(pin.GeometryObject("can", joint, across, CAN))
+    for name, x in (("left", -0.16), ("right", 0.16)):
+        rail = pin.SE3(np.eye(3), np.array([x, 0.0, -0.1]))
+        geometry.addGeometryObject(pin.GeometryObject(name, 0, rail, coal.Box(0.2, 2.0, 0.2)))
+    contacts = [pn.GeometryContact("can", name, mu=mu) for name in ("left", "right")]
+    scene = pn.Scene(model, contacts=contacts, collision_model=geometry)
+    q = [0.0, 0.1, 0.1, *pin.Quaternion(pin.rpy.rpyToMatrix(0.0, 0.0, turn)).coeffs()]
+    run = pn.simulate(scene, 1.0, q=q, record=("energy", "forces"))
+    edge = LEAST_ROUNDING * 0.2
+    height = np.sqrt((0.1 + edge) ** 2 - (0.06 + edge) ** 2) - edge
+    assert run.q[-1, [0, 2]] == pytest.approx([0.0, height], abs=1e-9)
+    assert run.lam[-1].min() >= 0.0
+    assert (run.lam[-1] > 0.0).sum() == 4
+    assert np.abs(run.energy["balance"]).max() < 1e-9
+
+
+@pytest.mark.parametrize("length", [0.2, 0.5])
+@pytest.mark.parametrize("turn", [0.0, 1e-4])
+def test_a_capsule_falls_on_a_lying_can(length, turn):
+    """Along it, shorter and longer than it: two places carry it, its ends or the can's rims."""
+    model, geometry = empty((0.0, 0.0, -GRAVITY)), pin.GeometryModel()
+    joint = body(model, 0, pin.JointModelFreeFlyer(), "free", 1.0, inertia=0.02 * np.eye(3))
+    lying = pin.SE3(pin.rpy.rpyToMatrix(0.5 * np.pi, 0.0, 0.0), np.zeros(3))
+    geometry.addGeometryObject(pin.GeometryObject("capsule", joint, lying, coal.Capsule(0.05, length)))
+    geometry.addGeometryObject(pin.GeometryObject("can", 0, lying, CAN))
+    contact = pn.GeometryContact("capsule", "can", mu=0.5)
+    scene = pn.Scene(model, contacts=[contact], collision_model=geometry)
+    q = [0.0, 0.01, 0.151, *pin.Quaternion(pin.rpy.rpyToMatrix(0.0, 0.0, turn)).coeffs()]
+    run = pn.simulate(scene, 0.3, q=q, record=("energy", "forces"))
+    assert run.q[-1, :3] == pytest.approx([0.0, 0.01, 0.15], abs=1e-5)
+    assert (run.lam[-1] > 0.0).sum() == 2
+    assert np.abs(run.energy["balance"]).max() < 1e-9
+
+
+def test_cones_of_any_size_are_made():
+    """What is cut of one has radii that rounding does not take below zero."""
+    rng = np.random.default_rng(4)
+    for _ in range(40):
+        radius = 10.0 ** rng.uniform(-3.0, 1.0)
+        length = radius * 10.0 ** rng.uniform(-2.0, 2.0)
+        for rounding in (None, 0.01 * min(radius, length)):
+            scene = free(coal.Capsule(0.1, 0.2), coal.Cone(radius, length), rounding=rounding)
+            assert min(c.above for c in scene.contacts if isinstance(c, pn.CylinderContact)) >= 0.0
+
+
+TUBE = """<robot name="r">
+<link name="base"><collision><geometry><box size="1 1 0.2"/></geometry></collision></link>
+<link name="arm"><inertial><origin xyz="0.3 0 0"/><mass value="1"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><origin xyz="0.3 0 0" rpy="0 1.5707963267948966 0"/>
+<geometry><cylinder radius="0.05" length="0.4"/></geometry></collision></link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="arm"/><origin xyz="-0.3 0 0.4"/>
+<axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="10" velocity="10"/></joint></robot>"""
+
+
+def test_a_file_with_a_tube_that_falls_on_its_base(tmp_path):
+    """As URDF files have them: the arm comes to rest with its rim on the box; the run is saved and shown."""
+    (tmp_path / "robot.urdf").write_text(TUBE)
+    (tmp_path / "robot.yaml").write_text(
+        "contacts:\n  - GeometryContact: {geometry1: arm_0, geometry2: base_0, mu: 0.4}\n"
+    )
+    scene = pn.load(tmp_path)
+    run = pn.simulate(scene, 1.5, record="forces")
+    (angle,) = run.q[-1]
+    # The rim's lowest point, at 0.5 along the arm and 0.05 beside it, is at the height of the face.
+    reach = 0.5 - LEAST_ROUNDING * 0.05
+    assert reach * np.sin(angle) + 0.05 * np.cos(angle) == pytest.approx(0.3, abs=1e-9)
+    assert run.v[-1] == 0.0
+    run.save(tmp_path / "run.npz")
+    again = pn.Trajectory.load(tmp_path / "run.npz", scene=scene)
+    np.testing.assert_array_equal(again.lam, run.lam)
+    pn.replay(run, tmp_path / "page.html")
+    assert (tmp_path / "page.html").stat().st_size > 0
+
+
 def thrown(kind, other, seed):
     """One at the other, either of them free, and the start."""
     rng = np.random.default_rng(seed)
