@@ -71,7 +71,8 @@ void GapWatch::go_on(double t) {
 }
 
 void GapWatch::leave_far() {
-    if (gaps.near_gaps.empty()) return;
+    const auto stays = [&](int i) { return !(gaps.width[i] > 0.0) && gaps.near[i] == 1; };
+    if (std::all_of(gaps.near_gaps.begin(), gaps.near_gaps.end(), stays)) return;
     ways.sum_up(gaps.ways);
     bool leave = false;
     for (int i : gaps.near_gaps) {

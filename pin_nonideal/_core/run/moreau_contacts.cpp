@@ -121,14 +121,12 @@ const VecX& MoreauContacts::way_since_last() {
 // Contacts whose gap is closed at the step's middle, and those that were closed: their loads tell whether they stay so.
 void MoreauContacts::find_touching(double t) {
     touching_.clear();
-    const std::vector<int>& near = watch_.come(way_since_last());
-    const double rounding = near.empty() ? 0.0 : width_rounding * scene_size(p, w);
-    for (int i : near) {
+    for (int i : watch_.come(way_since_last())) {
         measure_gap(p, w, t, v0_, i);
         const double width = gap_width(p, w, i);
         const bool touches = was_closed_[i] || width <= 0.0;
         if (touches) touching_.push_back(i);
-        watch_.gaps.width[i] = touches ? 0.0 : width - rounding;  // that it is sure to have
+        watch_.gaps.width[i] = touches ? 0.0 : width - width_rounding * scene_size(p, w);  // that it is sure to have
     }
     watch_.leave_far();
     for (int i : touching_) {
