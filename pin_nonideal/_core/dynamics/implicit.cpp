@@ -159,7 +159,7 @@ struct Implicit : Unknowns {
             if (!g.head(n).allFinite()) throw Failure(Failure::Kind::not_finite, t);
             yn = g.head(n);
             if (change <= reaction_tolerance * size) return true;
-            if (it > 1 && change > good_contraction * last && change > slow_change * size) return false;
+            if (it > 1 && change > good_contraction * last && change > slow_change * size + rounding()) return false;
             if (it > 1 && change >= last) return true;  // rounding
             // The next change would be below rounding: the motion just found needs one more pass and no check.
             if (it > 0 && change * (change / last) <= reaction_tolerance * size) {

@@ -1,5 +1,6 @@
 #include "dynamics/unknowns.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "dynamics/reactions.hpp"
@@ -9,6 +10,8 @@ namespace pn {
 
 // Part of the unknowns that rounding leaves of a solution where two pieces of the loads meet.
 static constexpr double same_piece = 1e-11;
+// Part of the largest multiplier that rounding leaves of loads that are shared.
+static constexpr double shared_rounding = 1e-13;
 
 Unknowns::Unknowns(const Program& program, Workspace& workspace, double time, const VecX& q_, const VecX& v_)
     : p(program), w(workspace), t(time), q(q_), v(v_) {
@@ -53,12 +56,20 @@ void Unknowns::image(const VecX& y, VecX& g) {
     }, [&](const UserLaw& law) { g.segment(k, nv) = ask(p, law, w, t, q, v); k += nv; });
 }
 
+double Unknowns::rounding() const {
+    if (!shares_pressing(p, w)) return 0.0;
+    double factor = 0.0;
+    each([&](size_t e) { factor = std::max(factor, limit_under(p, w, static_cast<int>(e), 1.0)); }, [](const UserLaw&) {});
+    return shared_rounding * factor * reactions(p, w).lam.cwiseAbs().maxCoeff();
+}
+
 bool Unknowns::is_motion(const VecX& y) {
     if (p.gaps.empty()) return true;
     const FreeLoads free(w);
     VecX g(n);
     image(y, g);
-    return (g - y.head(n)).cwiseAbs().maxCoeff() <= same_piece * (g.cwiseAbs().maxCoeff() + y.head(n).cwiseAbs().maxCoeff());
+    const double size = g.cwiseAbs().maxCoeff() + y.head(n).cwiseAbs().maxCoeff();
+    return (g - y.head(n)).cwiseAbs().maxCoeff() <= same_piece * size + rounding();
 }
 
 void Unknowns::equation(const VecX& y, ReactionEquation& found) {

@@ -34,6 +34,9 @@ struct Unknowns {
     // g as arrays, by the motion for each unknown in turn. Steps are as large as the unknowns: g hides only lengths.
     // Where contacts share a load, it is that of the piece that is held.
     void equation(const VecX& y, ReactionEquation& found);
+    // What rounding of loads that are shared leaves of the image: a contact that carries hardly anything has its load from
+    // the same sums as those beside it that carry all.
+    double rounding() const;
     // Whether a solution of that is one of y = g(y): no contact that may open pulls, and where some share a load it lies
     // in the piece that was held.
     bool is_motion(const VecX& y);
