@@ -15,7 +15,7 @@ from pin_nonideal.errors import LoopClosureError, OutputError, RunError, RunInte
 from pin_nonideal.outcome import outcome_fields, outcome_stats
 from pin_nonideal.records import UserEventRecord
 from pin_nonideal.scene import Scene
-from pin_nonideal.states.rows import rows_at
+from pin_nonideal.states.rows import gap_rows, rows_at
 from pin_nonideal.trajectory import Trajectory, with_defaults
 from pin_nonideal.types import Table
 
@@ -60,10 +60,10 @@ def finish(
     enters = options.method == "moreau" and bool(scene._compiled.opening_names)
     if (
         not enters
-        and outcome.largest_violation > LEFT
+        and outcome.largest_violation > left_by(scene, options)
         and (stopped is None or isinstance(stopped, core.CoreFailure))
     ):
-        raise _opened(scene, shaped())
+        raise _opened(scene, shaped(), left_by(scene, options))
     if stopped is None:
         return Trajectory.later(fields, stats=stats)
     if isinstance(stopped, OutputError):
@@ -105,13 +105,28 @@ def _fields(scene: Scene, outcome: core.Outcome, options: RunOptions, notes: lis
     return {name: value for name, value in vars(run).items() if name != "stats"}
 
 
-def _opened(scene: Scene, trajectory: Trajectory) -> LoopClosureError:
+def left_by(scene: Scene, options: RunOptions) -> float:
+    """Violation beyond which a run has left its constraints [m or rad].
+
+    Contacts that land almost together are told apart to the tolerance.
+
+    Args:
+        scene: the scene.
+        options: of the run.
+    """
+    if not scene._compiled.opening_names:
+        return LEFT
+    return max(LEFT, options.rtol + float(options.atol.max(initial=0.0)))
+
+
+def _opened(scene: Scene, trajectory: Trajectory, allowed: float) -> LoopClosureError:
     """A run has left its constraints, as it must when a drive pulls a loop apart; with the samples before."""
-    k = int((trajectory.violation > LEFT).argmax())
+    k = int((trajectory.violation > allowed).argmax())
     t = float(trajectory.t[k])
     runner = scene._compiled.program.runner()
-    residual = np.abs(rows_at(runner, trajectory.q[k], trajectory.v[k], t)[2])
-    gaps = {key: float(residual[rows].max()) for key, rows in scene.constraint_slices.items()}
+    residual = rows_at(runner, trajectory.q[k], trajectory.v[k], t)[2]
+    left = np.where(gap_rows(scene._compiled.program), np.maximum(-residual, 0.0), np.abs(residual))
+    gaps = {key: float(left[rows].max()) for key, rows in scene.constraint_slices.items()}
     stopped = opened(max(gaps, key=lambda key: gaps[key]), gaps, t, f"; {KEPT}")
     stopped.trajectory = _stopped(trajectory.first(k), stopped)
     return stopped

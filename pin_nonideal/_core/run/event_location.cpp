@@ -101,12 +101,18 @@ void EventLocator::step_onto(const Crossing& crossing) {
     double rate = crossing.slope / full;
     end_step_at(std::clamp(crossing.part, 0.0, 1.0) * full);
     if (crossing.leaps) return;
-    double size = stepper_.h, here = margin_at_end(watch);
+    // Between an instant before it and one behind it: where the motion is not that of the interpolant, or where what others
+    // hold on its plane has no rate but rounding, Newton's method would lead on to the step's end, past other events.
+    double size = stepper_.h, here = margin_at_end(watch), low = 0.0, high = full;
+    const double still = of_gap ? rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff()) : 0.0;
     for (int it = 0; it < correction_passes; ++it) {
         if (of_gap) rate = gap_rate(p, w, watch.index);
         else if (known_rate) rate = slip_rate_along_mode(p, w, watch.index);
-        if (!(rate < 0.0)) return;  // it hardly dipped: from here on it moves away again, and no root lies ahead
-        const double next = std::clamp(size - here / rate, 0.0, full), change = next - size, before = here;
+        if (!(rate < -still)) return;  // it hardly dipped: from here on it moves away again, and no root lies ahead
+        (here > 0.0 ? low : high) = size;
+        double next = size - here / rate;
+        if (!(next >= low && next <= high)) next = 0.5 * (low + high);
+        const double change = next - size, before = here;
         if (std::abs(change) <= resolution || (it > 0 && std::abs(change) < corrected_width * full)) return;
         correct_end_to(next);
         size = next;

@@ -168,6 +168,7 @@ Simulation::Proposal Simulation::propose() {
 // --- Integrate ------------------------------------------------------------------------------------------------------
 
 std::optional<double> Simulation::integrate(const Proposal& proposal) {
+    opened.reset();  // of this step alone: a shorter one may fail for another reason
     watched = system.watches();
     if (watched) before_step = w.state;
     const int active = system.active();
