@@ -43,14 +43,21 @@ void Landing::end_bouncing(double stop) {
     if (options_.output_dt > 0.0) stop = std::min(stop, output_.next());
     VecX y_end = now_.y, rate_end = now_.rate;
     const RunState state = w.state;
-    const std::optional<Rest> rest = bounce_to_rest(system_, now_.t, stop, y_end, rate_end);
-    if (!rest) {
+    const auto go_back = [&] {
         set_closed(p, w, state.closed);
         w.state = state;
         select_rows(p, w);
         system_.read(now_.y);
-        return begin_step(p, w, now_.t, system_.q, system_.v);
+        begin_step(p, w, now_.t, system_.q, system_.v);
+    };
+    std::optional<Rest> rest;
+    try {
+        rest = bounce_to_rest(system_, now_.t, stop, y_end, rate_end);
+    } catch (const Failure&) {
+        go_back();
+        throw;
     }
+    if (!rest) return go_back();
     now_.t = rest->time;
     now_.y = y_end;
     now_.rate = rate_end;

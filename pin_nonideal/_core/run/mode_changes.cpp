@@ -43,10 +43,19 @@ void ModeChanges::change(FoundEvent event) {
     if (!same_modes || before.closed != w.state.closed) now_.gaps.ask_anew();
     else if (in_vain && !w.state.closed[event.index]) now_.gaps.ask_in_vain(event.index, now_.t);
     landing_.remember_gaps();
-    if (struck) return landing_.end_bouncing(torques_.next_stop(options_.end()));
+    if (struck) return end_bouncing();
     if (same_modes) clusters_.count();
     output_.configured_now();
     bridge(event.of_gap() ? 0 : event.index);
+}
+
+// Among ever lower flights as well some motion may not be found.
+void ModeChanges::end_bouncing() {
+    try {
+        landing_.end_bouncing(torques_.next_stop(options_.end()));
+    } catch (const Failure& failure) {
+        if (!leads_on(failure) || !step_over(failure)) throw;
+    }
 }
 
 // What was shown to have no motion, or several, is what the user is told.
@@ -81,11 +90,24 @@ void ModeChanges::bridge(int element) {
     if (clusters_.bridge(element, options_.end())) go_on_with_new_modes();
 }
 
+// What contacts that may open do, and was not found: of which nothing is shown.
+bool ModeChanges::undecided(const Failure& failure) const {
+    return failure.kind == Failure::Kind::not_converged && system_.ng > 0;
+}
+
 bool ModeChanges::step_over(const Failure& failure) {
-    if (options_.method.outside() || system_.ne == 0 || !(clusters_.dwindles() || creeps())) return false;
-    clusters_.step_over(failure.elements.empty() ? 0 : failure.elements.front(), options_.end());
-    go_on_with_new_modes();
-    return true;
+    if (options_.method.outside() || system_.ne == 0) return false;
+    if (!(undecided(failure) || clusters_.dwindles() || creeps())) return false;
+    for (;;) {
+        clusters_.step_over(failure.elements.empty() ? 0 : failure.elements.front(), options_.end());
+        try {
+            go_on_with_new_modes();
+            return true;
+        } catch (const Failure& again) {  // a little later it is as it was
+            if (!undecided(again)) throw;
+        }
+        if (now_.t >= options_.end()) return true;
+    }
 }
 
 // Whether all that slips is about to rest.

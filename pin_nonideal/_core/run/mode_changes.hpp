@@ -26,13 +26,15 @@ public:
     // Whether no motion or no step was found, which proves nothing.
     static bool leads_on(const Failure& failure);
     // What is left of events that dwindle, or of slip that creeps, to rest is stepped over where no motion of theirs was
-    // found, or no step short enough; whether it was.
+    // found, or no step short enough, and so is what contacts that may open do where that was not found; whether it was.
     bool step_over(const Failure& failure);
     // Where events come too thick they are bridged, and the run goes on with modes of its new state.
     void bridge(int element);
 
 private:
+    void end_bouncing();
     void keep_last(const RunState& before, bool struck);
+    bool undecided(const Failure& failure) const;
     bool creeps() const;
     void go_on_with_new_modes();
 

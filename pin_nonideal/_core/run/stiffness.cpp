@@ -155,6 +155,8 @@ void StiffnessGuard::look_ahead() {
 }
 
 void StiffnessGuard::require_time_steps(double size) {
+    // Time stepping finds which way slip goes together with its forces: slow slip turns as fast as it likes.
+    system_.w.state.seeks_directions = true;
     const FastestMode mode = fastest_mode(difference_step);
     if (!(size * mode.rate() > euler_border && mode.decays())) return;
     const double shorter = fastest_mode(shorter_step).rate();
