@@ -88,3 +88,24 @@ def test_falls(seed: int, mu: float, rtol: float) -> None:
 def test_a_corner_that_others_hold_hides_no_landing(seed: int, rtol: float) -> None:
     """Its gap is zero but for rounding, and so is its rate: the instant of its touch is any."""
     check(seed, 0.0, rtol, 0.3, kp=20.0, kd=0.4)
+
+
+def test_a_corner_slides_under_hardly_any_load() -> None:
+    """Talos leans until a corner of an edge lifts: its load is a hundred thousandth of the other's at last."""
+    talos = pn.load("talos")
+    model, contacts = talos.model, []
+    for sole in ("left_sole_link", "right_sole_link"):
+        of = model.frames[model.getFrameId(sole)]
+        for k, (x, y) in enumerate([(-0.1, -0.06), (-0.1, 0.06), (0.1, -0.06), (0.1, 0.06)]):
+            frame(
+                model, f"{sole} {k}", of.parentJoint, of.placement * pin.SE3(np.eye(3), np.array([x, y, 0.0]))
+            )
+            contacts.append(pn.PointContact(f"{sole} {k}", mu=0.7, name=f"{sole} {k}"))
+    scene = pn.Scene(model, contacts=contacts, actuation=pn.HoldPosition(kp=500.0, kd=20.0), q0=talos.q0)
+    q0 = talos.q0.copy()
+    q0[2] -= heights(scene, q0).min()
+    scene = pn.Scene(model, contacts=contacts, actuation=pn.HoldPosition(kp=500.0, kd=20.0), q0=q0)
+    bent = 0.05 * np.random.default_rng(1).standard_normal(model.nv - 6)
+    q = pin.integrate(model, q0, np.concatenate([[0.0, 0.0, 0.02, 0.05, 0.1, 0.0], bent]))
+    run = pn.simulate(scene, 0.96, q=q, v=np.zeros(model.nv), rtol=1e-4, atol=1e-6)
+    assert run.t[-1] == 0.96
