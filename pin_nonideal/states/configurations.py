@@ -117,7 +117,10 @@ def require_resolved(model: Model, q: NDArray[np.float64]) -> None:
     Raises:
         InputError: a coordinate is too large; names its joint.
     """
-    farthest = max(map(abs, q.tolist()), default=0.0) if q.ndim == 1 else float(np.abs(q).max(initial=0.0))
+    if q.ndim == 1:
+        farthest = max(map(abs, q.tolist()), default=0.0)
+    else:
+        farthest = max(float(q.max(initial=0.0)), -float(q.min(initial=0.0)))
     spacing = math.ulp(farthest)
     if spacing <= COARSEST_SPACING:
         return

@@ -1,5 +1,6 @@
 #include "python/batch.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -43,21 +44,31 @@ struct Kept {
     }
 };
 
-// Samples of all runs, by run and sample, n numbers each; not a number beyond the last of a run.
-Numbers padded(const std::vector<Kept>& all, std::vector<double> Kept::* field, size_t runs, size_t most, size_t n) {
-    std::vector<double> out;
-    out.reserve(runs * most * n);
-    for (const Kept& some : all) {
+// Numbers of all samples, n each, by run and sample. They are written by threads: the pages of a large array take longer
+// to come than what stands on them.
+struct Laid {
+    std::vector<double> Kept::* field;
+    size_t n, most;
+    double* to;
+    Numbers numbers;
+
+    Laid(std::vector<double> Kept::* field, size_t n, size_t runs, size_t most)
+        : field(field), n(n), most(most), to(new double[std::max<size_t>(1, runs * most * n)]) {
+        const nb::capsule owner(to, [](void* data) noexcept { delete[] static_cast<double*>(data); });
+        numbers = Numbers(to, {runs * most * n}, owner);
+    }
+    // Of some runs, from number `first` on; not a number beyond the last sample of a run.
+    void lay(const Kept& some, size_t first) const {
         const double* from = (some.*field).data();
+        double* at = to + first * most * n;
         for (const double samples : some.samples) {
             const size_t own = static_cast<size_t>(samples) * n;
-            out.insert(out.end(), from, from + own);
-            out.resize(out.size() + most * n - own, NAN);
+            std::fill(std::copy_n(from, own, at), at + most * n, NAN);
             from += own;
+            at += most * n;
         }
     }
-    return to_numpy(std::move(out));
-}
+};
 
 // A number of each run.
 Numbers joined(const std::vector<Kept>& all, std::vector<double> Kept::* field) {
@@ -108,16 +119,25 @@ std::vector<Kept> run_all(const Program& p, const Array2& q, const Array2& v, Op
 // t, q, v, then by run the number of samples, the largest violation and the number of steps, and what stopped which.
 nb::tuple rollout_arrays(const Program& p, const Array2& q, const Array2& v, const Options& options, int threads,
                          const std::vector<NumberTuple>& names, const Array2& values) {
-    const std::vector<Kept> all = run_all(p, q, v, options, threads, names, values);
+    std::vector<Kept> all = run_all(p, q, v, options, threads, names, values);
     size_t most = 0;
     nb::list stopped;
+    std::vector<size_t> first{0};
     for (const Kept& some : all) {
         for (const double samples : some.samples) most = std::max(most, static_cast<size_t>(samples));
         for (const Kept::Stop& each : some.stopped) stopped.append(nb::make_tuple(each.run, what_stopped(each)));
+        first.push_back(first.back() + some.samples.size());
     }
     const size_t runs = q.shape(0), nq = p.mechanism.nq, nv = p.mechanism.nv;
-    return nb::make_tuple(padded(all, &Kept::t, runs, most, 1), padded(all, &Kept::q, runs, most, nq),
-                          padded(all, &Kept::v, runs, most, nv), joined(all, &Kept::samples),
+    const Laid laid[] = {{&Kept::t, 1, runs, most}, {&Kept::q, nq, runs, most}, {&Kept::v, nv, runs, most}};
+    std::atomic<bool> interrupted{false};
+    share_out(all.size(), threads, interrupted, [&](size_t part, int) {
+        for (const Laid& each : laid) {
+            each.lay(all[part], first[part]);
+            (all[part].*each.field) = {};
+        }
+    });
+    return nb::make_tuple(laid[0].numbers, laid[1].numbers, laid[2].numbers, joined(all, &Kept::samples),
                           joined(all, &Kept::violation), joined(all, &Kept::steps), stopped);
 }
 
