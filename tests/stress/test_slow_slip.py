@@ -103,7 +103,7 @@ def test_feet_rest_as_long_as_any_forces_hold_them(seed):
 
 
 @pytest.mark.parametrize(
-    "seeds", [[330, 370, 484, 533], [652, 756, 868], pytest.param(range(300, 1300), marks=long)]
+    "seeds", [[330, 370, 484, 533], [652, 756, 868], [1131], pytest.param(range(300, 1300), marks=long)]
 )
 def test_feet_that_cannot_pull_slide_on(seeds):
     """One that passes by the center of rotation sticks again where its share allows it, and nowhere else."""
