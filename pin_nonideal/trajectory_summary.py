@@ -6,6 +6,9 @@ from typing import Any
 
 import numpy as np
 
+# Terms of the energy that are all shown; of more those that are not zero.
+FEW = 20
+
 
 def summary(run: Any) -> str:
     """The lines.
@@ -27,7 +30,8 @@ def summary(run: Any) -> str:
             f"to {s.rounding:.0e} of the largest"
         )
     if run.energy is not None and len(run.t):
-        shown = ", ".join(f"{k} {x[-1]:.6g}" for k, x in run.energy.items() if k != "balance")
+        at_end = {k: x[-1] for k, x in run.energy.items() if k != "balance"}
+        shown = ", ".join(f"{k} {x:.6g}" for k, x in at_end.items() if x != 0.0 or len(at_end) <= FEW)
         lines.append(f"  energy [J]: {shown}; balance {np.abs(run.energy['balance']).max():.1e}")
     if run.events:
         kinds = sorted({e.kind for e in run.events})

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -159,3 +160,14 @@ def test_writing_a_replay_imports_neither_meshcat_nor_its_server() -> None:
         [sys.executable, "-c", script], cwd=root, capture_output=True, text=True, check=False
     )
     assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_shapes_for_collisions_are_drawn_where_there_are_no_others() -> None:
+    model, geometry = jointed(pin.JointModelFreeFlyer()), pin.GeometryModel()
+    geometry.addGeometryObject(pin.GeometryObject("can", 1, pin.SE3.Identity(), coal.Cylinder(0.1, 0.3)))
+    geometry.addGeometryObject(pin.GeometryObject("table", 0, pin.SE3.Identity(), coal.Box(1.0, 1.0, 0.1)))
+    scene = pn.Scene(model, collision_model=geometry)
+    content = packed_runs([pn.simulate(scene, 1e-3)], ["run"], 60.0, "title", None, True)
+    header = json.loads(content[4 : 4 + int.from_bytes(content[:4], "little")])
+    assert [visual["name"] for visual in header["visuals"]] == ["can", "table"]
+    assert all(max(visual["color"][:3]) > 0.0 for visual in header["visuals"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from .between import between
 from .choices import collisions_of, inertia_box, signals_of
 from .elements import Element, elements_of
 from .forces import Arrow, arrows_of
-from .geometry import Visual, joint_axis, visuals_of
+from .geometry import LINK_COLORS, Visual, joint_axis, visuals_of
 from .given import given_arrows
 from .guides import Guide, guides_of
 from .looks import table
@@ -103,11 +104,17 @@ def packed_runs(
 
 
 def _drawn(scene: Scene, motion: Motion, ends: list[tuple[int, Array]]) -> tuple[list[Visual], bool]:
-    """What is drawn of a scene, and whether it has no shapes of its own."""
+    """What is drawn of a scene, for want of others its shapes for collisions, and whether it has none."""
     visuals = visuals_of(scene.visual_model) if scene.visual_model is not None else []
+    visuals = visuals or [_colored(shape) for shape in collisions_of(scene)]
     if visuals:
         return visuals, False
     return sticks(scene.model, ends, link_length(scene.model, ends, motion.size)), True
+
+
+def _colored(visual: Visual) -> Visual:
+    """A shape for collisions, which seldom has a color, in that of its link."""
+    return replace(visual, color=LINK_COLORS[visual.joint % len(LINK_COLORS)])
 
 
 def _other(payload: Payload, shapes: Shapes, run: Trajectory, motion: Motion, name: str) -> Table:
