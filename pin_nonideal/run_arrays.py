@@ -13,7 +13,7 @@ from .core import core
 from .errors import LoopClosureError, PinNonidealError, RunInterrupted, UserFunctionError
 from .runs.apart import roll_apart, stepped_apart
 from .runs.options import RunOptions
-from .runs.results import left_by
+from .runs.results import LEFT
 from .scene import Scene
 from .types import Array
 
@@ -76,7 +76,7 @@ def run_arrays(
     parts = [] if numbers.names else stepped_apart(scene, options)
     if parts:
         outcomes = [one for one in roll_apart(scene, parts, q0, v0, options, threads) if one is not None]
-        return _of_outcomes(scene, outcomes, options)
+        return _of_outcomes(scene, outcomes)
     numbers_of_runs = np.ascontiguousarray(numbers.values)
     t, q, v, samples, violation, steps, stopped = core.rollout_arrays(
         compiled.program, q0, v0, options, threads, numbers.names, numbers_of_runs
@@ -91,11 +91,11 @@ def run_arrays(
         steps.astype(np.int64),
         scene=scene,
     )
-    made.failures.update(_failures(scene, dict(stopped), violation, left_by(scene, options)))
+    made.failures.update(_failures(scene, dict(stopped), violation))
     return made
 
 
-def _of_outcomes(scene: Scene, outcomes: Sequence[core.Outcome], options: RunOptions) -> RunArrays:
+def _of_outcomes(scene: Scene, outcomes: Sequence[core.Outcome]) -> RunArrays:
     """The same of runs whose mechanisms took their own steps."""
     n, (nq, nv) = len(outcomes), (scene.model.nq, scene.model.nv)
     samples = np.array([len(one.t) for one in outcomes], dtype=np.int64)
@@ -108,12 +108,11 @@ def _of_outcomes(scene: Scene, outcomes: Sequence[core.Outcome], options: RunOpt
     violation = np.array([one.largest_violation for one in outcomes])
     steps = np.array([one.steps for one in outcomes], dtype=np.int64)
     stopped = {i: one.stopped for i, one in enumerate(outcomes) if one.stopped is not None}
-    failures = _failures(scene, stopped, violation, left_by(scene, options))
-    return RunArrays(t, q, v, samples, violation, steps, failures, scene)
+    return RunArrays(t, q, v, samples, violation, steps, _failures(scene, stopped, violation), scene)
 
 
 def _failures(
-    scene: Scene, stopped: dict[int, BaseException], violation: Array, allowed: float
+    scene: Scene, stopped: dict[int, BaseException], violation: Array
 ) -> dict[int, PinNonidealError]:
     """Errors by name of what stopped runs, and of runs that have left their constraints."""
     failures: dict[int, PinNonidealError] = {}
@@ -126,7 +125,7 @@ def _failures(
             failures[i] = RunInterrupted("the runs were interrupted")
         else:
             failures[i] = UserFunctionError(f"a function of the scene failed: {cause}")
-    for i in map(int, np.flatnonzero(violation > allowed)):
+    for i in map(int, np.flatnonzero(violation > LEFT)):
         gap = f"gap {violation[i]:.1e} (m or rad)"
         failures.setdefault(i, LoopClosureError(f"run {i} has left its constraints: {gap}", gaps={}))
     return failures

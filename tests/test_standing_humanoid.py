@@ -6,6 +6,8 @@ joints stick, the feet then hold that little by a millionth of their forces.
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -140,3 +142,28 @@ def test_sinks_as_friction_lets_it(seed: int) -> None:
     assert a[2] < -2.0  # it sinks
     np.testing.assert_allclose(step.v[-1] / dt, a, rtol=0, atol=1e-4 * np.abs(a).max())
     np.testing.assert_allclose(start.a[0], a, rtol=0, atol=1e-4 * np.abs(a).max())
+
+
+def test_a_jam_of_joints_is_told_as_one() -> None:
+    """Bearings as wide as the links: of 27 ways in which three joints at rest may go on none is a motion."""
+    talos = pn.load("talos")
+    model, names = talos.model, list(talos.model.names)[2:]
+    bearings = [pn.JointFriction(name, mu=0.1, radius=0.05) for name in names]
+    scene = pn.Scene(model, constraints=[pn.FrameAnchor(s) for s in SOLES], laws=bearings, q0=talos.q0)
+    bend = np.concatenate([np.zeros(6), 0.02 * np.random.default_rng(1).standard_normal(model.nv - 6)])
+    q, v = scene.project(pin.integrate(model, scene.q0, bend), np.zeros(model.nv))
+    with pytest.raises(pn.FrictionParadoxError, match="has no solution at") as told:
+        pn.simulate(scene, 1.0, q, v)
+    run = told.value.trajectory
+    joints = [model.joints[model.getJointId(name)].idx_v for name in names]
+    q, v = run.q[-1], run.v[-1]
+    resting = np.flatnonzero(np.abs(v[joints]) < 1e-8)
+    assert len(resting) == 3
+    for chosen in product((-1, 0, 1), repeat=3):
+        modes = np.sign(v[joints]).astype(int)
+        modes[resting] = chosen
+        try:
+            a = scene.solve(q, v, run.t[-1], modes=modes.tolist()).a[joints][resting]
+        except pn.FrictionParadoxError:
+            continue
+        assert (np.array(chosen) * a < -1e-3).any()  # one of them would go against its mode

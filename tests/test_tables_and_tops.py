@@ -114,6 +114,12 @@ def test_a_table_that_its_load_jerks_rattles_to_rest(draw):
         assert min(data.oMf[foot].translation[2] for foot in feet) > -ENTERED
 
 
+@pytest.mark.parametrize("draw", [504])
+def test_what_is_shown_to_have_no_motion_or_several_is_told_amid_a_cascade(draw):
+    with pytest.raises(pn.FrictionParadoxError, match=r"has (no solution|several solutions) at"):
+        pn.simulate(with_slider(draw)[0], 3.0)
+
+
 def top(m, lever, about_tip, about_axis, mu, q0, v0):
     model = empty()
     across = about_tip - m * lever**2

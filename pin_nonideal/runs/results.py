@@ -60,10 +60,10 @@ def finish(
     enters = options.method == "moreau" and bool(scene._compiled.opening_names)
     if (
         not enters
-        and outcome.largest_violation > left_by(scene, options)
+        and outcome.largest_violation > LEFT
         and (stopped is None or isinstance(stopped, core.CoreFailure))
     ):
-        raise _opened(scene, shaped(), left_by(scene, options))
+        raise _opened(scene, shaped())
     if stopped is None:
         return Trajectory.later(fields, stats=stats)
     if isinstance(stopped, OutputError):
@@ -105,23 +105,9 @@ def _fields(scene: Scene, outcome: core.Outcome, options: RunOptions, notes: lis
     return {name: value for name, value in vars(run).items() if name != "stats"}
 
 
-def left_by(scene: Scene, options: RunOptions) -> float:
-    """Violation beyond which a run has left its constraints [m or rad].
-
-    Contacts that land almost together are told apart to the tolerance.
-
-    Args:
-        scene: the scene.
-        options: of the run.
-    """
-    if not scene._compiled.opening_names:
-        return LEFT
-    return max(LEFT, options.rtol + float(options.atol.max(initial=0.0)))
-
-
-def _opened(scene: Scene, trajectory: Trajectory, allowed: float) -> LoopClosureError:
+def _opened(scene: Scene, trajectory: Trajectory) -> LoopClosureError:
     """A run has left its constraints, as it must when a drive pulls a loop apart; with the samples before."""
-    k = int((trajectory.violation > allowed).argmax())
+    k = int((trajectory.violation > LEFT).argmax())
     t = float(trajectory.t[k])
     runner = scene._compiled.program.runner()
     residual = rows_at(runner, trajectory.q[k], trajectory.v[k], t)[2]

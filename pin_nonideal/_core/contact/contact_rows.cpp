@@ -36,7 +36,7 @@ ContactRows::ContactRows(const Program& program, Workspace& workspace, const std
 void ContactRows::respond() {
     const int nv = p.mechanism.nv;
     const VecX no_drift = VecX::Zero(p.layout.rows);
-    VecX unit = no_drift, lam = no_drift, force(nv), change(nv);
+    VecX unit = no_drift, lam = no_drift, force(nv), answer(nv);
     each_row([&](int at, int block, int k) {
         const Block& own = p.blocks[block];
         velocity[at] = w.now.values[block].rate[own.kept[k]];
@@ -44,16 +44,20 @@ void ContactRows::respond() {
         unit[own.row + k] = 1.0;
         add_transpose(own, w.now.A, unit, force);
         unit[own.row + k] = 0.0;
-        solve_acceleration(p, w, force, no_drift, change, lam);
-        response.col(at) = change;
+        solve_acceleration(p, w, force, no_drift, answer, lam);
+        response.col(at) = answer;
     });
-    each_row([&](int at, int block, int k) {
-        for (int column = 0; column < W.cols(); ++column) {
-            multiply(p.blocks[block], w.now.A, response.col(column), w.scratch.r);
-            W(at, column) = w.scratch.r[p.blocks[block].row + k];
-        }
-    });
+    for (int column = 0; column < W.cols(); ++column) W.col(column) = change(response.col(column));
     W = (0.5 * (W + W.transpose())).eval();
+}
+
+VecX ContactRows::change(const VecX& dv) const {
+    VecX out(velocity.size());
+    each_row([&](int at, int block, int k) {
+        multiply(p.blocks[block], w.now.A, dv, w.scratch.r);
+        out[at] = w.scratch.r[p.blocks[block].row + k];
+    });
+    return out;
 }
 
 }  // namespace pn

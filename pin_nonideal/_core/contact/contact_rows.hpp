@@ -34,6 +34,9 @@ struct ContactRows {
         }
     }
 
+    // What a change of v adds to the velocities of the rows.
+    VecX change(const VecX& dv) const;
+
     auto of(const VecX& x, size_t i) const { return x.segment(first[i], cones[i].dim); }
 
 private:

@@ -105,10 +105,13 @@ Impact strike(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, 
     const VecX P = p.impact_law == ImpactLaw::poisson ? poisson(rows, t, velocity) : newton(rows, t, velocity);
     out.v_minus = v;
     const double before = kinetic_energy(p.mechanism, w.now.terms, v);
-    v += rows.response * P;
+    const VecX dv = rows.response * P;
+    v += dv;
     out.v_plus = v;
     out.energy_change = kinetic_energy(p.mechanism, w.now.terms, v) - before;
-    const VecX mean = rows.velocity + 0.5 * rows.W * P;
+    // Of the velocities as they are: where large percussions do little, W P is another by rounding, and the works would not
+    // add up to the change of energy.
+    const VecX mean = rows.velocity + 0.5 * rows.change(dv);
     for (size_t i = 0; i < out.gaps.size(); ++i) {
         Vec3 impulse = Vec3::Zero();
         for (int k = 0; k < rows.cones[i].dim; ++k) impulse[k] = rows.of(P, i)[k];

@@ -10,6 +10,7 @@
 #include "dynamics/solution.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/cone_program.hpp"
+#include "friction/each_choice.hpp"
 #include "friction/rest_branches.hpp"
 #include "friction/rest_problem.hpp"
 #include "friction/rest_solver.hpp"
@@ -252,8 +253,8 @@ struct Search {
             if (failure.kind != Failure::Kind::paradox) throw;
         }
         if (p.needs_reactions && look_further(found, modes)) return;
-        if (!found) throw Failure(Failure::Kind::not_converged, t, list);
-        apply(modes, false);
+        if (found) return apply(modes, false);
+        if (!take_only_choice(p, w, t, q, v, question)) throw Failure(Failure::Kind::not_converged, t, list);
     }
 
     // Turns give what slips in one of them its kinetic limit: what holds in the end may have slipped on the way.

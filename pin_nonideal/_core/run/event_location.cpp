@@ -26,6 +26,8 @@ constexpr double part_toward_rest = 0.5, least_shortened = 1e-3;
 
 // --- The step taken again
 constexpr int correction_passes = 12;
+// Gaps that close almost together change places so often, where the step taken again is not quite its interpolant.
+constexpr int most_closed_before = 4;
 constexpr double time_rounding = 2e-16, corrected_width = 1e-13;
 // Part of the step as it ends by which its end moves along the rate there, instead of the step being taken again: what
 // that leaves out is half the square of it, of the step's own change of the rate. A flight may be a millionth of the step
@@ -136,8 +138,14 @@ std::optional<FoundEvent> EventLocator::locate() {
     };
     for (auto e = w.now.slipping.rbegin(); e != w.now.slipping.rend(); ++e)
         if (has_arrived(*e)) return found(EventKind::rest_or_limit, *e);
-    const std::optional<Crossing> crossing = search_.first();
+    std::optional<Crossing> crossing = search_.first();
     if (crossing) step_onto(*crossing);
+    for (int k = 0; k < most_closed_before && crossing; ++k) {
+        const std::optional<Crossing> before = search_.entered(crossing->watch);
+        if (!before) break;
+        crossing = before;
+        step_onto(*crossing);
+    }
     if (const auto lifted = lift_together()) return lifted;  // which may come earlier
     if (!crossing) return release_together();
     const Watch& watch = crossing->watch;

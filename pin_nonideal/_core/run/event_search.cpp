@@ -4,8 +4,10 @@
 #include <cmath>
 #include <utility>
 
+#include "contact/closing.hpp"
 #include "contact/gaps.hpp"
 #include "dynamics/evaluation.hpp"
+#include "dynamics/projection.hpp"
 #include "dynamics/reactions.hpp"
 #include "dynamics/slip.hpp"
 #include "math/roots.hpp"
@@ -175,6 +177,22 @@ std::vector<Watch> EventSearch::crossed() {
             if (!is_bare(p, i) && may_pull(i)) list.push_back({Watch::Kind::load, i});
     for (const GapSearch::Doubt& doubt : gaps_.doubtful()) list.push_back({Watch::Kind::gap, doubt.gap});
     return list;
+}
+
+// Of the gaps that were in doubt over the step.
+std::optional<Crossing> EventSearch::entered(const Watch& touches) {
+    std::optional<Crossing> out;
+    if (gaps_.doubted().empty()) return out;
+    double least = -touching_width * scene_size(p, w);
+    for (const GapSearch::Doubt& doubt : gaps_.doubted()) {
+        const Watch watch{Watch::Kind::gap, doubt.gap};
+        if (touches.kind == watch.kind && touches.index == watch.index) continue;
+        const double deep = margin(watch, stepper_.t0 + stepper_.h, stepper_.y1);
+        if (!(deep < least)) continue;
+        least = deep;
+        out = Crossing{watch, 1.0, gap_rate(p, w, doubt.gap) * stepper_.h};
+    }
+    return out;
 }
 
 // --- Where it crosses -----------------------------------------------------------------------------------------------

@@ -33,6 +33,9 @@ public:
 
     // The first crossing; the workspace must be evaluated at the step's end, and is so again where there is none.
     std::optional<Crossing> first();
+    // The step has been taken again up to an event: a gap that its end is beyond, but one that touches there; the deepest.
+    // It is closed before that, where the motion is not quite that of the interpolant.
+    std::optional<Crossing> entered(const Watch& touches);
 
     // Positive before the event, zero at it. The workspace must be evaluated at the state.
     double margin(const Watch& watch, double t, const VecX& y);

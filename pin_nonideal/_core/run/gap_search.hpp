@@ -23,6 +23,7 @@ public:
         Bends bends;  // over it
     };
     const std::vector<Doubt>& doubtful();
+    const std::vector<Doubt>& doubted() const { return doubtful_; }  // as found last
     // Part of the step at which one of them closes, and its rate there over the step. Leaves the workspace elsewhere.
     struct Touch { double part, slope; };
     std::optional<Touch> first_touch(int gap);  // of them
