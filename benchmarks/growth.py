@@ -269,6 +269,7 @@ def short(sizes: tuple[int, ...]) -> Iterator[Row]:
     yield Row("short runs", 1, "simulate of one step", {OURS: timing.per_call(once)})
     many = partial(pn.rollout, scene, Q, V, dt, method=method, dt=dt, as_arrays=True)
     batches = {OURS: timing.per_call(many)}
+    by_two = {OURS: timing.per_call(partial(many, threads=2))}
     step = {OURS: timing.per_call(lambda: scene.step(q, v, None, dt))}
     if found is not None:
         import mujoco
@@ -286,6 +287,7 @@ def short(sizes: tuple[int, ...]) -> Iterator[Row]:
         batches[MUJOCO] = timing.per_call(lambda: pool.rollout(mj, [data], initial, nstep=1))
         step[MUJOCO] = timing.per_call(lambda: mujoco.mj_step(mj, data))
     yield Row("short runs", count, "a run of one step in a rollout", batches, per=float(count))
+    yield Row("short runs", count, "a run of one step in a rollout by two threads", by_two, per=float(count))
     yield Row("short runs", 1, "scene.step, mj_step", step)
 
 

@@ -117,8 +117,8 @@ def _starts(scene: Scene, q: Any, v: Any, parameters: Any) -> tuple[Array, Array
     """States of all runs: as given, or the scene's own as often as there are runs."""
     if parameters is not None and not isinstance(parameters, Mapping):
         raise InputError(f"rollout: parameters must be values by name; got {parameters!r}")
-    starts_q = None if q is None else array("rollout: q", q, (None, scene.model.nq))
-    starts_v = None if v is None else array("rollout: v", v, (None, scene.model.nv))
+    starts_q = None if q is None else array("rollout: q", q, (None, scene.model.nq), copy=False)
+    starts_v = None if v is None else array("rollout: v", v, (None, scene.model.nv), copy=False)
     given: list[Any] = [each for each in (starts_q, starts_v) if each is not None]
     for values in (parameters or {}).values():
         given += [*values.values()] if isinstance(values, Mapping) else [values]

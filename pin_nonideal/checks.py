@@ -165,14 +165,17 @@ def sequence(what: str, value: object) -> tuple[Any, ...]:
     return tuple(value)
 
 
-def floats(value: object, kinds: str = "fiu") -> tuple[NDArray[np.float64] | None, tuple[int, ...] | None]:
+def floats(
+    value: object, kinds: str = "fiu", copy: bool = True
+) -> tuple[NDArray[np.float64] | None, tuple[int, ...] | None]:
     """A copy as floats, and the place of its first entry that is not finite, None where all are.
 
     There is no copy (None) unless the type of `value` is one of `kinds`, NumPy's letters of real numbers.
+    Without `copy` it is a view where `value` is an array of floats.
     """
     try:
         given = np.asarray(value)
-        result = np.array(given, dtype=float) if given.dtype.kind in kinds else None
+        result = np.array(given, dtype=float, copy=copy or None) if given.dtype.kind in kinds else None
     except (TypeError, ValueError):  # rows of unequal length, or objects that are no numbers
         result = None
     if result is None or (result.size <= FEW and math.isfinite(sum(result.ravel().tolist()))):
@@ -182,18 +185,21 @@ def floats(value: object, kinds: str = "fiu") -> tuple[NDArray[np.float64] | Non
     return result, tuple(np.argwhere(~np.isfinite(result))[0].tolist())
 
 
-def array(what: str, value: object, shape: Sequence[int | None]) -> NDArray[np.float64]:
+def array(what: str, value: object, shape: Sequence[int | None], copy: bool = True) -> NDArray[np.float64]:
     """A finite array of the given shape, copied and read-only.
 
     Args:
         what: words for messages.
         value: anything NumPy can turn into an array of floats.
         shape: expected shape; None leaves a length free.
+        copy: False for many numbers that are read while the call lasts and no longer: not copied.
 
     Raises:
         InputError: wrong shape, not numbers, or not finite.
     """
-    result, where = floats(value)
+    result, where = floats(value, copy=copy)
+    if result is not None and not copy:
+        result = result.view()
     if result is not None and where is None and result.shape == shape:
         result.setflags(write=False)
         return result

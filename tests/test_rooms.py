@@ -49,7 +49,7 @@ given_forces law_forces solution \
 reactions split slip unknowns uniqueness implicit power evaluation projection step_start
 friction: dense_solver box_program lorentz cone_program cone_problem cone_newton cone_path cone_shares \
 cone_certificate cone_complementarity rest_equation rest_solver rest_branches problem rest_problem \
-beginning modes continuation
+beginning each_choice modes continuation
 contact: gaps reach ways separation contact_rows impact resting closing
 run: archive method step outside_step step_control runge_kutta system semi_implicit_euler error_norm \
 collocation stepper gap_watch gap_search moreau moreau_contacts dense_output recorder inside_samples \
