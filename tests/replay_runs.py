@@ -39,7 +39,9 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
         v0=np.asarray(rates[0]),
         constraint_slices=fields.pop("constraint_slices", dict.fromkeys(names, slice(0, 0))),
     )
-    scene._compiled = SimpleNamespace(program=_program(scene))
+    scene._compiled = SimpleNamespace(
+        program=_program(scene, names), described=dict(zip(names, held, strict=True))
+    )
     values: dict[str, Any] = {
         "t": t,
         "q": configurations,
@@ -60,13 +62,14 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
     return SimpleNamespace(**values | fields)
 
 
-def _program(scene: Any) -> Any:
+def _program(scene: Any, names: list[str]) -> Any:
     """What the core knows of the constraints and contacts of a scene that nobody analysed."""
     builder, where = core.Builder(scene.model), Resolution(scene.model, scene.q0)
-    for name, c in zip("abcdef", scene.constraints, strict=False):
+    for name, c in zip(names, scene.constraints, strict=False):
         lower_constraint(c, name, builder, where)
-    list(lower_contacts(list(zip("uvwxyz", scene.contacts, strict=False)), builder, where))
-    return builder
+    contacts = list(zip(names[len(scene.constraints) :], scene.contacts, strict=True))
+    list(lower_contacts(contacts, builder, where))
+    return builder.finish()
 
 
 def jointed(*joints: Any, name: str = "chain", lever: float = 0.2) -> pin.Model:

@@ -16,6 +16,7 @@ from pin_nonideal.page.forces import arrows_of
 from pin_nonideal.page.looks import MODES
 from pin_nonideal.page.marks import marks_of
 from pin_nonideal.page.motion import sample
+from pin_nonideal.page.places import touches_of
 
 from .replay_browser import Watched, headless_browser
 from .replay_runs import add_frame, jointed
@@ -36,7 +37,8 @@ def sliding() -> Any:
 
 def parts(run: Any) -> tuple[Any, Any, Any]:
     motion, marks = sample(run), marks_of(run.scene)
-    return motion, elements_of(run, motion, marks), arrows_of(run, motion, marks)
+    touches = touches_of(run, motion)
+    return motion, elements_of(run, motion, marks, touches), arrows_of(run, motion, touches)
 
 
 def test_the_force_of_a_contact_lies_on_its_cone_while_it_slides(sliding: Any) -> None:

@@ -22,6 +22,7 @@ from pin_nonideal.forces import SpringDamper
 from pin_nonideal.page.forces import arrows_of
 from pin_nonideal.page.marks import marks_of
 from pin_nonideal.page.motion import sample
+from pin_nonideal.page.places import touches_of
 from pin_nonideal.timefunctions import constant
 
 from .replay_runs import add_frame, four_bar, jointed, run_of
@@ -33,7 +34,7 @@ CLOSURE = 1e-12
 
 def arrows(run: object) -> list:
     motion = sample(run, 20.0)
-    return arrows_of(run, motion, marks_of(run.scene))
+    return arrows_of(run, motion, touches_of(run, motion))
 
 
 def frames(run: object, name: str) -> list[pin.SE3]:
@@ -140,7 +141,6 @@ def single(item: object, lam: list[float], joint: object = None, **fields: objec
     add_frame(model, "tip", 1, [0.4, 0.0, 0.0], turn=pin.utils.rotate("z", np.pi / 2.0))
     add_frame(model, "base", 0, [0.0, 0.0, 0.0], turn=pin.utils.rotate("z", np.pi / 2.0))
     name = item.name
-    contact = isinstance(item, PointContact)
     return arrows(
         run_of(
             model,
@@ -148,7 +148,7 @@ def single(item: object, lam: list[float], joint: object = None, **fields: objec
             lambda t: np.zeros(1),
             lam=np.array([lam, lam]),
             constraint_slices={name: slice(0, len(lam))},
-            **{"contacts" if contact else "constraints": [item]},
+            constraints=[item],
             **fields,
         )
     )
@@ -162,11 +162,10 @@ def single(item: object, lam: list[float], joint: object = None, **fields: objec
         (Distance("tip", "base", name="c"), [5.0], [5.0, 0.0, 0.0], [0.4, 0.0, 0.0]),
         (Rolling("center", 0.5, axis="y", name="c"), [1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [0.3, 0.0, 0.0]),
         (Rolling("center", 0.2, axis=None, name="c"), [1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [0.3, 0.0, 0.3]),
-        (PointContact("center", radius=0.5, mu=0.3, name="c"), [7.0], [0.0, 0.0, 7.0], [0.3, 0.0, 0.0]),
         (KnifeEdge("tip", axis="y", name="c"), [6.0], [-6.0, 0.0, 0.0], [0.4, 0.0, 0.0]),
         (PrescribedMotion("j0", constant(0.0), name="c"), [4.0], [4.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
     ],
-    ids=["point", "hinge", "distance", "disk", "sphere", "contact", "edge", "drive"],
+    ids=["point", "hinge", "distance", "disk", "sphere", "edge", "drive"],
 )
 def test_force_and_place_of_each_kind(item: object, lam: list, force: list, origin: list) -> None:
     (arrow,) = [found for found in single(item, lam) if found.unit == "N"]
@@ -209,6 +208,7 @@ def test_constraints_of_pinocchio_are_drawn_like_anchors() -> None:
             pin.ReferenceFrame.LOCAL,
         )
     ]
+    run.scene._compiled.described = dict(zip(["loop"], run.scene.constraints, strict=True))
     found = arrows(run)
     assert [(arrow.name, arrow.kind) for arrow in found] == [(arrow.name, arrow.kind) for arrow in expected]
     np.testing.assert_allclose(found[0].values, expected[0].values, atol=ROUNDING)

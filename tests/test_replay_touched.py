@@ -18,6 +18,7 @@ from pin_nonideal.page.given import given_arrows
 from pin_nonideal.page.looks import CLOSED, OPEN
 from pin_nonideal.page.marks import marks_of
 from pin_nonideal.page.motion import sample
+from pin_nonideal.page.places import touches_of
 from pin_nonideal.page.signals import plots_of
 from pin_nonideal.page.touched import planes_of, touched_of
 from pin_nonideal.page.view import upward, view
@@ -202,7 +203,7 @@ def test_forces_between_round_bodies_act_where_they_touch() -> None:
     height = float(np.sqrt(0.5**2 - 0.2**2))
     run = pn.simulate(pn.Scene(model, contacts=[beam], q0=[height]), 0.1, record="forces")
     motion = sample(run)
-    (arrow,) = arrows_of(run, motion, [], given_arrows(run, motion, []))
+    (arrow,) = arrows_of(run, motion, touches_of(run, motion), given_arrows(run, motion, []))
     np.testing.assert_allclose(arrow.values[:, 2], G, atol=ROUNDING)
     touching = np.array([0.0, 0.2 * 0.3 / 0.5, height - 0.3 * height / 0.5])
     np.testing.assert_allclose(arrow.origin, np.tile(touching, (len(motion.times), 1)), atol=ROUNDING)

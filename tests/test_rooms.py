@@ -32,8 +32,8 @@ trajectory_summary trajectory
 runs: options asked progress results checkpoint components joining apart scipy_methods resume
 simulation run_arrays batches sweep_points sweep_packs sweep_store sweeping
 statics: forces equilibrium rest inverse_dynamics
-page: looks figure_styles geometry bare packing tracks motion between touched view guides marks forces given \
-bands coordinates signals relations elements choices payload window
+page: looks figure_styles geometry bare packing tracks motion between touched view guides marks places \
+forces given bands coordinates signals relations elements choices payload window
 replaying plotting browser rendering commands pin_nonideal cli_runs cli
 """
 

@@ -38,6 +38,7 @@ class CompiledScene:
         program: the core's, without the rows that can never act.
         slices: rows of `lam` of each constraint and contact, by name.
         rows: the same as (first, end, whether it is a contact).
+        described: what each of them is made of, by the same name; both stops of a joint are one description.
         joints: where the values of each joint stand.
         contact_names: names of the contacts in the order of their descriptions, stops of joints one by one.
         opening_names: names of those that may open.
@@ -60,6 +61,9 @@ class CompiledScene:
         constraints = len(said.constraints)  # contacts follow
         self.rows = {
             name: (s.start, s.stop, k >= constraints) for k, (name, s) in enumerate(self.slices.items())
+        }
+        self.described = {
+            name: described[name if name in described else name.rpartition(" ")[0]] for name in self.slices
         }
         self.joints = joint_places(model)
         self.contact_names = [self.program.constraints[block].name for block in self.program.contacts]

@@ -39,12 +39,17 @@ def mode_bands(t: Array, modes: NDArray[np.int8]) -> list[Bands]:
 def bands_of(run: Trajectory) -> list[tuple[str, Bands]]:
     """Bands by name: of the elements that rub, and of the contacts without friction that open or close.
 
+    Contacts that touch nothing in the whole run have none: two boxes are 160 of them.
+
     Args:
         run: the run.
     """
     found: list[tuple[str, Bands]] = []
     if run.modes is not None:
-        found = list(zip(run.element_names, mode_bands(run.t, run.modes), strict=True))
+        met = np.any(np.asarray(run.modes) != OPEN, axis=0)
+        struck = {str(event.element) for event in run.events}
+        named = zip(run.element_names, mode_bands(run.t, run.modes), met, strict=True)
+        found = [(name, bands) for name, bands, meets in named if meets or name in struck]
     closed = getattr(run, "closed", None)
     if closed is None:
         return found

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pin_nonideal.checks import axis_triad, unit_axis
-from pin_nonideal.core import core
+from pin_nonideal.checks import unit_axis
 from pin_nonideal.states.placements import frame_on_joint
 from pin_nonideal.types import Array
 
 from .bands import bands_of
 from .geometry import joint_axis
-from .marks import Mark, constraints_of
+from .marks import Mark
 from .motion import Motion
+from .places import Touch
 from .relations import friction_joints
 
 if TYPE_CHECKING:
@@ -30,13 +31,13 @@ class Element:
         name: as the run names it.
         band: its number among the modes of the run.
         joint: index of the joint that carries its place, 0 for the world.
-        point: the place in that joint's frame [m], (3,).
-        axis: axis of the joint or normal of the contact, in the frame of `axis_joint`, (3,).
+        point: the place in that joint's frame [m], (3,), or where it moves, that at each frame, (n, 3).
+        axis: axis of the joint or normal of the contact, in the frame of `axis_joint`, in the same way.
         axis_joint: index of the joint that carries the axis.
         mu: half-opening of the friction cone, radius over height; 0 for a joint.
         share: friction over its limit at each frame, 0 to 1, (n,), or None when it was not recorded.
         normal: normal force of a contact at each frame [N], (n,), or None.
-        drop: from the place against the axis to where it touches, the radius of a sphere [m].
+        stays: whether it is drawn while its contact is open too.
     """
 
     name: str
@@ -48,33 +49,33 @@ class Element:
     mu: float = 0.0
     share: Array | None = None
     normal: Array | None = None
-    drop: float = 0.0
+    stays: bool = True
 
 
-def elements_of(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Element]:
+def elements_of(
+    run: Trajectory, motion: Motion, marks: list[Mark], touches: Sequence[Touch] = ()
+) -> list[Element]:
     """The elements of a run that have a place: friction in joints and at anchors, and contacts.
 
     Args:
         run: the run.
         motion: its motion.
         marks: of the scene.
+        touches: the contacts of the run.
     """
     joints, found = friction_joints(run), []
-    contacts = {
-        name: item
-        for name, item, shown in constraints_of(run.scene)
-        if shown == core.Shown.contact and hasattr(item, "frame")
-    }
+    contacts = {touch.name: touch for touch in touches}
     places = {mark.name: mark for mark in marks}
+    laws = dict(zip(run.element_names, run.element_laws, strict=False))
     for band, (name, _) in enumerate(bands_of(run)):
-        law = run.law_names[run.element_laws[band]] if band < len(run.element_laws) else name
-        whole = band >= len(run.element_laws) or run.element_laws.count(run.element_laws[band]) == 1
+        law = run.law_names[laws[name]] if name in laws else name
+        whole = name not in laws or run.element_laws.count(laws[name]) == 1
         if law in joints:
-            at, share = joints[law], _joint_share(run, law, joints[law], band)
+            at, share = joints[law], _joint_share(run, law, joints[law], run.element_names.index(name))
             axis, part = joint_axis(run.scene.model, at)[0], None if share is None else motion.of(share)
             found.append(Element(name, band, at, np.zeros(3), np.asarray(axis), at, share=part))
-        elif law in contacts and law in places:
-            found.append(_contact(run, motion, name, law, band, contacts[law], places[law], whole))
+        elif law in contacts:
+            found.append(_contact(run, motion, name, band, contacts[law], whole))
         elif (mark := places.get(_anchor(run, law))) is not None:
             along = _hinge_axis(run, mark.name)
             found.append(Element(name, band, mark.joint1, mark.point1, along, mark.joint1))
@@ -99,44 +100,30 @@ def _hinge_axis(run: Trajectory, anchor: str) -> Array:
     return np.asarray(place.rotation @ np.asarray(unit_axis("axis", getattr(item, "axis", "z"))))
 
 
-def _joint_share(run: Trajectory, law: str, joint: int, band: int) -> Array | None:
+def _joint_share(run: Trajectory, law: str, joint: int, element: int) -> Array | None:
     """Friction in a joint over its limit, (nt,)."""
     force, limits = run.law(law).force, run.limits
     if force is None or limits is None:
         return None
-    return _part(np.abs(force[:, run.scene.model.joints[joint].idx_v]), limits[:, band])
+    return _part(np.abs(force[:, run.scene.model.joints[joint].idx_v]), limits[:, element])
 
 
 def _part(size: Array, limit: Array) -> Array:
     return np.clip(np.divide(size, limit, out=np.zeros_like(size), where=limit > 0.0), 0.0, 1.0)
 
 
-def _contact(
-    run: Trajectory,
-    motion: Motion,
-    name: str,
-    law: str,
-    band: int,
-    item: object,
-    mark: Mark,
-    whole: bool,
-) -> Element:
-    """A contact with its cone, and how much of it the force needs where reactions were recorded."""
-    frame, direction = getattr(item, "plane", None), unit_axis("normal", getattr(item, "normal", "z"))
-    normal = np.array(axis_triad(direction)[2])
-    at = 0
-    if frame is not None:
-        at, place = frame_on_joint(run.scene.model, frame)
-        normal = place.rotation @ normal
-    rows, share, pressing = run.scene.constraint_slices[law], None, None
-    if run.lam is not None:
-        pressing = motion.of(run.lam[:, rows.stop - 1])
-    mu = float(getattr(item, "mu", 0.0)) if whole or name == law else 0.0
-    if run.reactions is not None and law in run.reactions and mu > 0.0:
-        force = motion.of(run.reaction(law, axes="world")[:, :3])
-        up = motion.rotation(at) @ normal
-        along = np.sum(force * up, axis=1)
-        across = np.linalg.norm(force - along[:, None] * up, axis=1)
-        share = _part(across, mu * np.abs(along))
-    drop = float(getattr(item, "radius", 0.0))
-    return Element(name, band, mark.joint1, mark.point1, normal, at, mu, share, pressing, drop)
+def _contact(run: Trajectory, motion: Motion, name: str, band: int, touch: Touch, whole: bool) -> Element:
+    """A contact with its cone, and how much of it the force needs where forces were recorded."""
+    share = pressing = None
+    mu = float(getattr(touch.item, "mu", 0.0)) if whole or name == touch.name else 0.0
+    forces = getattr(run, "contact_forces", None) or {}
+    if touch.name in forces:
+        force = motion.of(forces[touch.name])
+        pressing = np.sum(force * touch.normal, axis=1)
+        across = np.linalg.norm(force - pressing[:, None] * touch.normal, axis=1)
+        if mu > 0.0:
+            share = _part(across, mu * np.abs(pressing))
+    point, axis = motion.local(touch.joint, touch.place), motion.along(touch.other, touch.normal)
+    return Element(
+        name, band, touch.joint, point, axis, touch.other, mu, share, pressing, stays=touch.on_plane
+    )

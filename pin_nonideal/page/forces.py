@@ -3,25 +3,29 @@
 The arrow at an anchor is the reaction on the body of frame1, from the anchor's rows of `lam`, split by
 `lam_ideal` into its ideal and its nonideal part, its moment an arc beside it.  `F_nonideal` is drawn at the
 joints, and so are the torques `tau` of the actuation; `F_ideal` is when no constraint has a place of its own
-(those of a user have none).
+(those of a user have none).  The arrow of a contact is all that presses and rubs there, on the body that it
+presses, at the place where it touches; what opens a gap of the user's is drawn at the joints.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.checks import axis_triad, unit_axis
+from pin_nonideal.contacts import UserContact
 from pin_nonideal.core import core
+from pin_nonideal.states.rows import rows_at
 from pin_nonideal.types import Array
 
 from .geometry import joint_axis
-from .marks import Mark, Side, constraints_of, side_of, sides_of
+from .marks import Side, constraints_of, side_of, sides_of
 from .motion import Motion
+from .places import Touch
 
 if TYPE_CHECKING:
     from pin_nonideal.scene import Scene
@@ -61,16 +65,23 @@ class Arrow:
         return float(np.abs(sizes).max(initial=0.0))
 
 
-def arrows_of(run: Trajectory, motion: Motion, marks: list[Mark], more: Sequence[Arrow] = ()) -> list[Arrow]:
+def arrows_of(
+    run: Trajectory, motion: Motion, touches: Sequence[Touch], more: Sequence[Arrow] = ()
+) -> list[Arrow]:
     """Arrows of the forces that the run recorded, as far as they are more than rounding.
 
     Args:
         run: the run; without record "forces" it has none of constraints.
         motion: its motion.
-        marks: of the scene.
+        touches: the contacts of the run.
         more: arrows of other forces.
     """
-    arrows: list[Arrow] = []
+    forces = getattr(run, "contact_forces", None) or {}
+    arrows = [
+        Arrow(touch.name, "total", "N", motion.of(forces[touch.name]), touch.joint, touch.place)
+        for touch in touches
+        if touch.name in forces
+    ]
     if run.lam is not None:
         for name, item, shown in constraints_of(run.scene):
             rows = run.scene.constraint_slices[name]
@@ -80,14 +91,13 @@ def arrows_of(run: Trajectory, motion: Motion, marks: list[Mark], more: Sequence
                 rest = parts["total"] - ideal
                 acts = np.abs(rest).max(initial=0.0) > SMALLEST * np.abs(ideal).max(initial=0.0)
                 parts = {"ideal": ideal} | ({"nonideal": rest} if acts else {})
-            touches = shown == core.Shown.contact and hasattr(item, "frame")
-            if touches and run.reactions is not None and name in run.reactions:
-                arrows.append(_touching(run, motion, name, item))
+            if isinstance(item, UserContact):
+                arrows += _opening_the_gap(run, motion, name, motion.of(run.lam[:, rows]))
                 continue
             for kind, lam in parts.items():
                 arrows += _reaction(run.scene, motion, name, kind, item, shown, lam)
     # What rubs in contacts alone is part of the forces drawn there.
-    touching = {arrow.name for arrow in [*arrows, *more] if arrow.kind == "total"}
+    touching = {*forces, *(arrow.name for arrow in [*arrows, *more] if arrow.kind == "total")}
     drawn = [] if run.law_names and touching.issuperset(run.law_names) else [("nonideal", run.F_nonideal)]
     if not arrows and not touching:
         drawn.append(("ideal", run.F_ideal))
@@ -117,9 +127,9 @@ def _reaction(
         return along(model, motion, name, kind, model.getJointId(item.joint), way * lam[:, 0])
     if shown in (core.Shown.anchor, core.Shown.rod):
         return _between(scene, motion, name, kind, item, shown, lam)
-    if shown in (core.Shown.rolling, core.Shown.contact):
+    if shown == core.Shown.rolling:
         body = side_of(model, item.frame)
-        force, place = _on_plane(model, motion, item, lam)
+        force, place = _rolling(model, motion, item, lam)
         return [Arrow(name, kind, "N", force, body.joint, place)]
     if shown == core.Shown.edge:
         edge = side_of(model, item.frame)
@@ -134,11 +144,14 @@ def _reaction(
     return []
 
 
-def _touching(run: Trajectory, motion: Motion, name: str, item: Any) -> Arrow:
-    """The force in a contact, friction included, from the recorded reactions."""
-    body = side_of(run.scene.model, item.frame)
-    _, place = _on_plane(run.scene.model, motion, item, np.zeros((len(motion.times), 1)))
-    return Arrow(name, "total", "N", motion.of(run.reaction(name, axes="world")[:, :3]), body.joint, place)
+def _opening_the_gap(run: Trajectory, motion: Motion, name: str, lam: Array) -> list[Arrow]:
+    """The generalized force A^T lam on a gap of the user's, at the joints."""
+    scene, runner = run.scene, run.scene._compiled.program.runner()
+    states = zip(motion.q, motion.of(run.v), motion.times, lam, strict=True)
+    rows = scene.constraint_slices[name]
+    force = np.array([rows_at(runner, q, v, float(t))[0][rows].T @ own for q, v, t, own in states])
+    found = _at_joints(scene.model, motion, "total", force)
+    return [replace(arrow, name=f"{name}, {arrow.name}") for arrow in found]
 
 
 def _between(
@@ -163,22 +176,17 @@ def _between(
     return arrows
 
 
-def _on_plane(model: pin.Model, motion: Motion, item: Any, lam: Array) -> tuple[Array, Array]:
-    """Force on what touches a plane, and the place where it touches, (n, 3) each."""
+def _rolling(model: pin.Model, motion: Motion, item: Any, lam: Array) -> tuple[Array, Array]:
+    """Force on a sphere or disk that rolls on a plane, and the place where it touches, (n, 3) each."""
     t1, t2, normal = (np.array(axis) for axis in axis_triad(unit_axis("normal", item.normal)))
-    local = lam[:, -1:] * normal
-    if lam.shape[1] == 3:
-        local = local + lam[:, :1] * t1 + lam[:, 1:2] * t2
+    local = lam @ np.array([t1, t2, normal])
     body = side_of(model, item.frame)
     plane = Side(0, pin.SE3.Identity()) if item.plane is None else side_of(model, item.plane)
     up = plane.turned(motion, np.tile(normal, (len(lam), 1)))
-    if getattr(item, "axis", None) is not None:  # a disk: its lowest point
+    if item.axis is not None:  # a disk: its lowest point
         axis = body.turned(motion, np.tile(unit_axis("axis", item.axis), (len(lam), 1)))
         up = _unit(up - np.sum(up * axis, axis=1, keepdims=True) * axis)
-    middle = motion.point(
-        body.joint, body.point + np.asarray(body.placement.rotation) @ getattr(item, "offset", np.zeros(3))
-    )
-    return plane.turned(motion, local), middle - item.radius * up
+    return plane.turned(motion, local), motion.point(body.joint, body.point) - item.radius * up
 
 
 def _unit(vectors: Array) -> Array:

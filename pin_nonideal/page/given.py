@@ -1,4 +1,4 @@
-"""Arrows of what acts where it is said: springs, wrenches, drag, and round bodies on each other."""
+"""Arrows of what acts where it is said: springs, wrenches and drag."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import pinocchio as pin
 
 from pin_nonideal.forces import JointSpring, SpringDamper, Wrench
 from pin_nonideal.laws import Drag
-from pin_nonideal.round_contacts import CapsuleContact, SphereContact, segments
 from pin_nonideal.states.placements import frame_on_joint
 from pin_nonideal.types import Array
 
 from .forces import Arrow, along
-from .marks import Mark, constraints_of
+from .marks import Mark
 from .motion import Motion
 
 if TYPE_CHECKING:
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def given_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]:
-    """Arrows of the springs, wrenches, laws of drag and round contacts of a scene, where they act.
+    """Arrows of the springs, wrenches and laws of drag of a scene, where they act.
 
     Args:
         run: the run.
@@ -30,7 +29,7 @@ def given_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arr
         marks: of the scene, for the ends of springs.
     """
     ends = {mark.name: mark for mark in marks if mark.kind == "spring"}
-    found = _rounds(run, motion)
+    found: list[Arrow] = []
     for item in run.scene.forces:
         if isinstance(item, SpringDamper):
             found.append(_spring(run, motion, item, ends[item.name or f"spring {item.frame1}"]))
@@ -70,41 +69,6 @@ def _spring(run: Trajectory, motion: Motion, item: SpringDamper, mark: Mark) -> 
         rate * way, axis=1, keepdims=True
     )
     return Arrow(mark.name, "spring", "N", -size * way, mark.joint1, first)
-
-
-def _rounds(run: Trajectory, motion: Motion) -> list[Arrow]:
-    """The forces between spheres and capsules, on the body of the first, where they touch."""
-    found, forces = [], getattr(run, "contact_forces", None) or {}
-    for name, item, _ in constraints_of(run.scene):
-        if isinstance(item, SphereContact | CapsuleContact) and name in forces:
-            joints, ends = [], []
-            for frame, segment in zip((item.frame1, item.frame2), segments(item), strict=True):
-                joint, place = frame_on_joint(run.scene.model, frame)
-                joints.append(joint)
-                ends.append([motion.point(joint, place.act(end)) for end in segment])
-            first, second = _nearest(*ends[0], *ends[1])
-            way = second - first
-            length = np.linalg.norm(way, axis=1, keepdims=True)
-            place = first + item.radius1 * np.divide(way, length, out=np.zeros_like(way), where=length > 0.0)
-            force = motion.of(forces[name])
-            found.append(Arrow(name, "total", "N", force, joints[0], place))
-    return found
-
-
-def _nearest(a0: Array, a1: Array, b0: Array, b1: Array) -> tuple[Array, Array]:
-    """The nearest points of two segments, (n, 3) each [Ericson, Real-Time Collision Detection, 5.1.9]."""
-    u, w, between = a1 - a0, b1 - b0, a0 - b0
-    uu, ww, uw = (np.sum(x * y, axis=1) for x, y in ((u, u), (w, w), (u, w)))
-    ub, wb = np.sum(u * between, axis=1), np.sum(w * between, axis=1)
-    across = uu * ww - uw * uw
-
-    def part(value: Array, over: Array) -> Array:
-        return np.clip(np.divide(value, over, out=np.zeros_like(value), where=over > 0.0), 0.0, 1.0)
-
-    s = part(uw * wb - ub * ww, across)
-    t = part(uw * s + wb, ww)
-    s = part(uw * t - ub, uu)
-    return a0 + s[:, None] * u, b0 + t[:, None] * w
 
 
 def _wrench(run: Trajectory, motion: Motion, item: Wrench) -> list[Arrow]:

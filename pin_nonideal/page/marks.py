@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
+from pin_nonideal.contacts import PointContact
 from pin_nonideal.core import core
 from pin_nonideal.forces import SpringDamper
 from pin_nonideal.states.placements import frame_on_joint, joint_placements
@@ -31,6 +33,10 @@ class Mark:
         joint2: index of the joint that carries the second point.
         point2: the second point [m], (3,).
         axes: unit vectors in the second joint's frame along which the points must coincide, (k, 3).
+        path: of a place that moves over its body, where it is in the first joint's frame at each frame of the
+            replay [m], (n, 3); None of one that stays.
+        closed: while what is drawn, of a contact whose place means nothing while it is open, (n,); None for
+            always.
     """
 
     name: str
@@ -40,6 +46,8 @@ class Mark:
     joint2: int
     point2: Array
     axes: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    path: Array | None = None
+    closed: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True)
@@ -71,18 +79,16 @@ class Side:
 
 
 def marks_of(scene: Scene) -> list[Mark]:
-    """Marks of all anchors, rods, contacts and springs of a scene.
+    """Marks of all anchors, rods, points and spheres on planes, and springs of a scene.
 
     Args:
         scene: the scene.
     """
     marks = []
     for name, item, shown in constraints_of(scene):
-        if not hasattr(item, "frame") and hasattr(item, "lower"):
-            continue
-        if shown == core.Shown.contact:
+        if isinstance(item, PointContact):
             side = side_of(scene.model, item.frame)
-            point = side.point + np.asarray(side.placement.rotation) @ getattr(item, "offset", np.zeros(3))
+            point = side.placement.act(np.array(item.offset))
             marks.append(Mark(name, "contact", side.joint, point, side.joint, point))
         elif shown in (core.Shown.anchor, core.Shown.rod):
             marks.append(_tie(scene, name, shown.name, item))
@@ -104,14 +110,9 @@ def constraints_of(scene: Scene) -> list[tuple[str, Any, core.Shown]]:
     Args:
         scene: the scene.
     """
-    known = [c.shown for c in scene._compiled.program.constraints]
-    contacts: list[Any] = []
-    for item in scene.contacts:  # a stop of a joint has rows of its own at each of its ends
-        ends = [end for end in ("lower", "upper") if hasattr(item, end)]
-        own = [name for name in scene.constraint_slices if any(name.endswith(f" {end}") for end in ends)]
-        named = [name for name in own if name.rpartition(" ")[0] == (item.name or item.joint)] if ends else []
-        contacts += [item] * (len(named) or 1)
-    return list(zip(scene.constraint_slices, [*scene.constraints, *contacts], known, strict=False))
+    compiled = scene._compiled
+    shown = {c.name: c.shown for c in compiled.program.constraints}
+    return [(name, compiled.described[name], shown[name]) for name in scene.constraint_slices]
 
 
 def side_of(model: pin.Model, frame: str) -> Side:

@@ -87,10 +87,13 @@ class Motion:
         moved = np.broadcast_to(np.asarray(local, dtype=float), (len(self.times), 3))
         return np.asarray(self.poses[:, joint, :3] + turned(self.poses[:, joint, 3:], moved))
 
+    def along(self, joint: int, vectors: Array) -> Array:
+        """Vectors in world axes (n, 3) in the axes of a joint, (n, 3)."""
+        return turned(self.poses[:, joint, 3:] * np.array([-1.0, -1.0, -1.0, 1.0]), np.asarray(vectors))
+
     def local(self, joint: int, points: Array) -> Array:
         """Points of the world (n, 3) as a joint carries them [m], (n, 3)."""
-        back = self.poses[:, joint, 3:] * np.array([-1.0, -1.0, -1.0, 1.0])
-        return turned(back, np.asarray(points) - self.poses[:, joint, :3])
+        return self.along(joint, np.asarray(points) - self.poses[:, joint, :3])
 
 
 def sample(run: Trajectory, fps: float | None = None, share: int = 1) -> Motion:

@@ -21,9 +21,10 @@ from .geometry import LINK_COLORS, Visual, joint_axis, visuals_of
 from .given import given_arrows
 from .guides import Guide, guides_of
 from .looks import table
-from .marks import marks_of
+from .marks import Mark, marks_of
 from .motion import Motion, sample
 from .packing import Payload, Shapes
+from .places import touches_of, touching_marks
 from .signals import Chosen, Plot, plots_of, usual_plots, wanted
 from .touched import touched_of
 from .tracks import Tracks
@@ -67,7 +68,8 @@ def packed_runs(
     shapes = Shapes(payload)
     looking = view(scene, motion, visuals, ends, np.vstack([np.zeros((0, 3)), *(g.points for g in guides)]))
     drawn = shapes.add(visuals)
-    arrows = arrows_of(finer, motion, marks, given_arrows(finer, motion, marks)) if forces else []
+    touches = touches_of(finer, motion)
+    arrows = arrows_of(finer, motion, touches, given_arrows(finer, motion, marks)) if forces else []
     for number, spacing in treads(motion, visuals, _sliding_axes(model)).items():
         drawn[number]["wrap"] = spacing
     header = {
@@ -84,14 +86,19 @@ def packed_runs(
         "others": [
             _other(payload, shapes, *other) for other in zip(runs[1:], motions[1:], names[1:], strict=True)
         ],
-        "marks": [_plain(mark) for mark in marks],
+        "marks": [
+            _stored_mark(payload, motion, mark) for mark in [*marks, *touching_marks(touches, motion, marks)]
+        ],
         "guides": [_stored_guide(payload, guide) for guide in guides],
         "trails": [{"joint": j, "point": point} for j, point in _trails(model, guides, bare)],
         "arrows": [_stored_arrow(payload, motion, arrow) for arrow in arrows],
         "plots": _plots(payload, runs, [one for one, _ in known], names, plots),
         "events": _events(payload, run),
         "modes": _modes(payload, run),
-        "elements": [_stored_element(payload, element) for element in elements_of(finer, motion, marks)],
+        "elements": [
+            _stored_element(payload, motion, element)
+            for element in elements_of(finer, motion, marks, touches)
+        ],
         "view": _plain(looking),
         "collisions": shapes.add(collisions_of(scene)),
         "signals": [
@@ -256,14 +263,26 @@ def _stored_arrow(payload: Payload, motion: Motion, arrow: Arrow) -> Table:
     stored = _plain(arrow)
     stored["values"] = payload.add(arrow.values)
     if arrow.origin is not None:
-        local = motion.local(arrow.joint, arrow.origin)
-        fixed = np.abs(local - local[0]).max() < 1e-9 * motion.size
-        stored["origin"] = payload.add(local[:1] if fixed else local)
+        stored["origin"] = payload.add(_once(motion.local(arrow.joint, arrow.origin), motion.size))
     return stored
 
 
-def _stored_element(payload: Payload, element: Element) -> Table:
+def _once(vectors: Array, size: float) -> Array:
+    """Vectors at all frames, (n, 3), or the one that they all are, (1, 3)."""
+    return vectors[:1] if np.abs(vectors - vectors[0]).max() < 1e-9 * size else vectors
+
+
+def _stored_mark(payload: Payload, motion: Motion, mark: Mark) -> Table:
+    stored = _plain(mark)
+    stored["path"] = None if mark.path is None else payload.add(_once(mark.path, motion.size))
+    stored["closed"] = None if mark.closed is None else payload.add(mark.closed, "u1")
+    return stored
+
+
+def _stored_element(payload: Payload, motion: Motion, element: Element) -> Table:
     stored = _plain(element)
+    for key, size in (("point", motion.size), ("axis", 1.0)):
+        stored[key] = payload.add(_once(np.atleast_2d(getattr(element, key)), size))
     for key in ("share", "normal"):
         if stored[key] is not None:
             stored[key] = payload.add(getattr(element, key))

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.checks import axis_triad, unit_axis
+from pin_nonideal.contacts import JointLimit
 from pin_nonideal.round_contacts import CapsuleContact, SphereContact, segments
 from pin_nonideal.states.placements import frame_on_joint
 from pin_nonideal.types import Array
@@ -151,19 +152,14 @@ def _stops(run: Trajectory, motion: Motion) -> list[Visual]:
     """Stops of joints that were struck: where the body points at the end of a turning joint, or a plate."""
     struck = {str(event.element) for event in run.events if event.kind in ("impact", "touch_down")}
     found = []
-    for item in run.scene.contacts:
-        if hasattr(item, "frame") or not hasattr(item, "lower"):
-            continue
-        joint = run.scene.model.getJointId(item.joint)
-        for end, limits in (
-            ("lower", run.scene.model.lowerPositionLimit),
-            ("upper", run.scene.model.upperPositionLimit),
-        ):
-            name = f"{item.name or f'JointLimit({item.joint})'} {end}"
-            if name in struck and run.scene.model.joints[joint].nq == 1:
-                given = getattr(item, end)
-                at = float(limits[run.scene.model.joints[joint].idx_q] if given is None else given)
-                found.append(_stop(run.scene.model, motion, name, joint, at))
+    model = run.scene.model
+    limits = {"lower": model.lowerPositionLimit, "upper": model.upperPositionLimit}
+    for name, item in run.scene._compiled.described.items():
+        if isinstance(item, JointLimit) and name in struck:
+            joint, end = model.getJointId(item.joint), name.rpartition(" ")[2]
+            given = getattr(item, end)
+            at = float(limits[end][model.joints[joint].idx_q] if given is None else given)
+            found.append(_stop(model, motion, name, joint, at))
     return found
 
 

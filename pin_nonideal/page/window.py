@@ -11,8 +11,8 @@ from pin_nonideal.types import Array
 
 from .forces import Arrow, arrows_of
 from .looks import FORCES
-from .marks import marks_of
 from .motion import Motion, sample
+from .places import touches_of
 from .view import link_length
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def show(run: Trajectory, viewer: Any, name: str, forces: bool) -> Any:
     length = float(run.t[-1] - run.t[0])
     count = int(np.clip(RATE * length, 2, RATE * LONGEST)) if length > 0.0 else 1
     motion = sample(run, (count - 1) / length if length > 0.0 else 1.0)
-    arrows = [a for a in arrows_of(run, motion, marks_of(scene)) if a.unit == "N"] if forces else []
+    arrows = [a for a in arrows_of(run, motion, touches_of(run, motion)) if a.unit == "N"] if forces else []
     scale = _add_arrows(viewer[name]["forces"], arrows, 0.3 * link_length(scene.model, [], motion.size))
     animation = meshcat.animation.Animation(default_framerate=RATE)
     for frame in range(len(motion.times)):

@@ -55,6 +55,9 @@ struct Runner {
     std::tuple<Numbers, Numbers, Numbers, Numbers> rows(const Array& q_in, const Array& v_in, double t);
     // Directions along which frictional elements slip: rows of all, whose rates are slip velocities.
     Numbers slip_rows(const Array& q_in, const Array& v_in, double t);
+    // Of each contact between two frames a point of the line along which it presses, and the normal that its row pushes
+    // the body of frame 1 along, in world axes: six numbers each.
+    Numbers pressing_lines(const Array& q_in, const Array& v_in, double t);
     // M (dense, by rows) and the bias forces.
     std::pair<Numbers, Numbers> terms(const Array& q_in, const Array& v_in);
     // Kinetic energy, and potential energy in gravity [J].
@@ -74,6 +77,8 @@ private:
 
     // What does not fit is refused here and explained in Python.
     void set(const Array& q_in, const Array& v_in, const std::optional<Array>& tau);
+    // All rows of all constraints and contacts, at one state.
+    void place_rows(const Array& q_in, const Array& v_in, double t);
     // Modes by velocity, and at rest by the complementarity problem; or the ones given.
     void choose_modes(double t, const std::optional<std::vector<Mode>>& modes);
     void choose_contacts(double t, const std::optional<std::vector<Mode>>& modes);

@@ -40,17 +40,15 @@ class Arrows {
 
   /** Values and places at a time, before they are drawn. */
   place(at) {
-    const blend = (values, i, width) => (1 - at.part) * values[width * at.k + i] + at.part * values[width * at.next + i];
     for (const arrow of this.items) {
-      const world = this.kinematics.drawn(arrow.joint), { origin } = arrow;
-      if (!origin) arrow.place.setFromMatrixPosition(world);
-      else if (origin.length === 3) arrow.place.set(...origin).applyMatrix4(world);
-      else arrow.place.set(blend(origin, 0, 3), blend(origin, 1, 3), blend(origin, 2, 3)).applyMatrix4(world);
+      const world = this.kinematics.drawn(arrow.joint);
+      if (!arrow.origin) arrow.place.setFromMatrixPosition(world);
+      else arrow.place.set(...threeAt(arrow.origin, at)).applyMatrix4(world);
       if (arrow.axis) {
-        arrow.value = blend(arrow.values, 0, 1);
+        arrow.value = (1 - at.part) * arrow.values[at.k] + at.part * arrow.values[at.next];
         arrow.vector.set(...arrow.axis).transformDirection(world).multiplyScalar(arrow.value);
       } else {
-        arrow.vector.set(blend(arrow.values, 0, 3), blend(arrow.values, 1, 3), blend(arrow.values, 2, 3));
+        arrow.vector.set(...threeAt(arrow.values, at));
         arrow.value = arrow.vector.length();
       }
       arrow.share = arrow.vector.length() / this.largest[arrow.unit];

@@ -12,6 +12,8 @@ function door(player) {
     pictures: (type, times) => times.map((time) => { player.seek(time); return player.capture.still().toDataURL(type, 0.95).split(",")[1]; }),
     video: async (rate) => base64(new Uint8Array(await (await player.capture.record(rate)).arrayBuffer())),
     ringColors: (i) => player.stage.elements.ringColors(i),
+    get forces() { return player.stage.arrows.items.filter((arrow) => arrow.drawn).map(({ name, value }) => ({ name, value })); },
+    get flashes() { return player.stage.elements.flashing; },
     showForces: (shown) => { if (player.stage.arrows.shown !== shown) player.toggleForces(); },
     resetView: () => { player.resize(); player.stage.resetView(); },
     get runs() { return player.stage.ghosts.items.length + 1; },

@@ -28,13 +28,13 @@ class Elements {
     const { THREE, run } = this, z = new THREE.Vector3(0, 0, 1), blend = (values) => (1 - at.part) * values[at.k] + at.part * values[at.next];
     this.items.forEach((item, i) => {
       const mode = this.mode(item, time), look = run.looks.modes[mode] || run.looks.no_mode, color = linearColor(THREE, look.color), rest = linearColor(THREE, "#d7dee8");
-      const place = new THREE.Vector3(...item.point).applyMatrix4(this.groups[item.joint].matrixWorld);
-      const axis = new THREE.Vector3(...item.axis).transformDirection(this.groups[item.axis_joint].matrixWorld);
-      place.addScaledVector(axis, -item.drop);
+      const place = new THREE.Vector3(...threeAt(item.point, at)).applyMatrix4(this.groups[item.joint].matrixWorld);
+      const axis = new THREE.Vector3(...threeAt(item.axis, at)).transformDirection(this.groups[item.axis_joint].matrixWorld);
+      const shown = item.shown && (item.stays || mode !== 2);
       const turn = new THREE.Quaternion().setFromUnitVectors(z, axis), filled = item.share ? Math.max(blend(item.share), 1 / RING) : 1;
-      this.drawRing(i, item.shown, place, turn, radius, (k) => ((k + 0.5) / RING < filled ? color : rest));
+      this.drawRing(i, shown, place, turn, radius, (k) => ((k + 0.5) / RING < filled ? color : rest));
       const height = item.normal && item.mu && arrows.shown ? reach * arrows.scale * Math.min(Math.max(blend(item.normal), 0) / (arrows.largest.N || 1), 1.6) : 0;
-      if (!item.shown || !(height > 0) || mode === 2) { this.cones.hide(i); return; }
+      if (!shown || !(height > 0) || mode === 2) { this.cones.hide(i); return; }
       this.cones.color(i, color);
       this.cones.set(i, new THREE.Matrix4().compose(place, turn, new THREE.Vector3(item.mu * height, item.mu * height, height)));
     });
@@ -60,12 +60,14 @@ class Elements {
 
   /** Impacts of the last instants as spheres that shrink, the harder the larger. */
   drawFlashes(time, radius) {
+    this.flashing = 0;
     if (!this.flashes.count) return;
     const { THREE, run } = this, lasting = 0.02 * (run.times[run.times.length - 1] - run.times[0]);
     const near = this.impacts.filter((event) => event.time <= time && time - event.time < lasting).slice(-FLASHES);
     for (let k = 0; k < FLASHES; k++) {
       const mark = near[k] && this.marks.items.find((item) => item.name === near[k].name);
       if (!mark) { this.flashes.hide(k); continue; }
+      this.flashing += 1;
       const size = 2.5 * radius * (1 - (time - near[k].time) / lasting) * Math.max(Math.sqrt(near[k].impulse / this.hardest), 0.25);
       this.flashes.set(k, new THREE.Matrix4().compose(mark.places[0], new THREE.Quaternion(), new THREE.Vector3(size, size, size)));
     }

@@ -21,9 +21,12 @@ class Marks {
     });
   }
 
-  /** Places of both ends of all marks at the shown time. */
-  place() {
-    for (const { joint1, joint2, points, places } of this.items) {
+  /** Places of both ends of all marks between two frames, and which of them mean nothing there. */
+  place(at) {
+    for (const item of this.items) {
+      const { joint1, joint2, points, places, path, closed } = item;
+      if (path) for (const point of points) point.set(...threeAt(path, at));
+      item.apart = Boolean(closed && !closed[at.k]);
       places[0].copy(points[0]).applyMatrix4(this.groups[joint1].matrixWorld);
       places[1].copy(points[1]).applyMatrix4(this.groups[joint2].matrixWorld);
     }
@@ -46,7 +49,7 @@ class Marks {
       const size = radius * (item.link === null ? 1 : 0.65);
       item.places.forEach((place, side) => {
         const twin = side === 1 && item.kind === "contact";
-        if (item.shown && !twin) this.balls.set(2 * i + side, matrix.compose(place, flat, new THREE.Vector3(size, size, size)));
+        if (item.shown && !item.apart && !twin) this.balls.set(2 * i + side, matrix.compose(place, flat, new THREE.Vector3(size, size, size)));
         else this.balls.hide(2 * i + side);
       });
       if (item.link === null) return;

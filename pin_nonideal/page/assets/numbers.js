@@ -32,6 +32,12 @@ function bracket(values, x) {
   return { k, next, part: length > 0 ? Math.min(Math.max((x - values[k]) / length, 0), 1) : 0 };
 }
 
+/** Three numbers between two frames, of an array that holds them for each frame, or once for all. */
+function threeAt(values, at) {
+  if (values.length === 3) return values;
+  return [0, 1, 2].map((i) => (1 - at.part) * values[3 * at.k + i] + at.part * values[3 * at.next + i]);
+}
+
 /** Fixed digits that tell a thousandth part of a span. */
 function digitsFor(span) {
   return span > 0 ? Math.max(0, Math.min(9, Math.ceil(3 - Math.log10(span)))) : 3;

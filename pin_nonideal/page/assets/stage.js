@@ -71,7 +71,7 @@ class Stage {
     this.at = this.kinematics.at(time);
     this.kinematics.pose(this.at);
     this.ghosts.pose(time);
-    this.marks.place();
+    this.marks.place(this.at);
     this.arrows.place(this.at);
     const center = this.kinematics.center(this.followed);
     if (this.following && this.center) { this.orbit.target.add(center).sub(this.center); this.orbit.place(); }
@@ -198,7 +198,7 @@ class Stage {
       const at = this.onScreen(place), distance = at ? Math.hypot(at[0] - x, at[1] - y) : Infinity;
       if (distance < closest) { closest = distance; best = text; }
     };
-    for (const mark of this.marks.items) look(`${mark.kind} ${mark.name}`, mark.places[0]);
+    for (const mark of this.marks.items.filter((item) => !item.apart)) look(`${mark.kind} ${mark.name}`, mark.places[0]);
     this.kinematics.groups.slice(1).forEach((joint) => look(`joint ${joint.name}`, new this.THREE.Vector3().setFromMatrixPosition(joint.matrixWorld)));
     return best;
   }

@@ -15,7 +15,7 @@ struct EllipsoidRow {
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
-    static constexpr Shown shown = Shown::nothing;
+    static constexpr Shown shown = Shown::contact;
 
     Frame frame1, frame2;
     Vec3 normal, semiaxes;
