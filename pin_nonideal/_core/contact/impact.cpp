@@ -94,7 +94,8 @@ void clean(const ContactRows& rows, double speed, VecX& w0) {
 
 double rest_rate(const VecX& v) { return rest_speed * (1.0 + v.cwiseAbs().maxCoeff()); }
 
-Impact strike(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, const std::vector<char>& touching) {
+Impact strike(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, const std::vector<char>& touching,
+              bool bounces) {
     Impact out;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i)
         if (touching[i]) out.gaps.push_back(i);
@@ -102,7 +103,9 @@ Impact strike(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, 
     const ContactRows rows(p, w, out.gaps);
     VecX velocity = rows.velocity;
     clean(rows, v.cwiseAbs().maxCoeff(), velocity);
-    const VecX P = p.impact_law == ImpactLaw::poisson ? poisson(rows, t, velocity) : newton(rows, t, velocity);
+    const VecX P = !bounces                              ? percussions(rows, t, rows.W, velocity, rows.cones)
+                   : p.impact_law == ImpactLaw::poisson ? poisson(rows, t, velocity)
+                                                        : newton(rows, t, velocity);
     out.v_minus = v;
     const double before = kinetic_energy(p.mechanism, w.now.terms, v);
     const VecX dv = rows.response * P;

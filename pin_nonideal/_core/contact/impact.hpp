@@ -21,7 +21,9 @@ struct Impact {
 double rest_rate(const VecX& v);
 
 // The impact of contacts `touching` (by gap) at (t, q, v), v becomes the velocity after it. Friction of joints has a
-// finite limit and gives no impulse. The contacts are left closed, their modes open.
-Impact strike(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, const std::vector<char>& touching);
+// finite limit and gives no impulse. The contacts are left closed, their modes open. Without restitution, where what they
+// would give back is not to be told from rest.
+Impact strike(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, const std::vector<char>& touching,
+              bool bounces = true);
 
 }  // namespace pn

@@ -1,7 +1,7 @@
 // The end of bouncing. Flights too low to be told from rounding are not searched for touches: gaps fly as parabolas under
 // the acceleration at hand, and strike again, until none of them approaches or leaves any more, or one that flies higher
 // lands. Their number is finite, the last ones are lost in rounding, and the instants add up to the limit of the
-// accumulation.
+// accumulation. Flights that do not die out, with restitution of 1, end as well: what they hold is no more than rounding.
 #pragma once
 
 #include "run/events.hpp"

@@ -222,14 +222,14 @@ bool contacts_land(System& system, double t, const VecX& y) {
     return system.touching.at(system.p, system.w, t, system.q, system.v, touching_width).lands;
 }
 
-Strike strike_contacts(System& system, double t, VecX& y, bool starts) {
+Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool bounces) {
     const Program& p = system.p;
     const std::vector<char> closed = system.w.state.closed;
     const std::vector<Mode> modes = system.w.state.mode;
     system.read(y);
     const double width = starts ? starting_width * scene_size(p, system.w) : touching_width;
     const std::vector<char>& touch = system.touching.at(p, system.w, t, system.q, system.v, width).touch;
-    const Impact impact = strike(p, system.w, t, system.q, system.v, touch);
+    const Impact impact = strike(p, system.w, t, system.q, system.v, touch, bounces);
     system.write(y);
     set_closed(p, system.w, closed);  // what changes by it is still to be found
     set_modes(p, system.w, modes);

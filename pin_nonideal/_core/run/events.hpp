@@ -29,7 +29,7 @@ struct Strike {
     std::vector<Event> events;
     double work = 0.0, work_of_constraints = 0.0;
 };
-Strike strike_contacts(System& system, double t, VecX& y, bool starts);
+Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool bounces = true);
 
 // Whether some element of several directions slips.
 bool turning(const System& system);
