@@ -17,8 +17,6 @@ namespace {
 
 // Part of the largest response to a percussion that is none, and of the speed that is rounding of a velocity.
 constexpr double no_response = 1e-12, velocity_rounding = 1e-14;
-// Impulses below this part of the largest are rounding.
-constexpr double impulse_rounding = 1e-14;
 
 // Bodies are driven into each other, or no percussions were found.
 [[noreturn]] void refuse(const Program& p, double t, const std::vector<int>& gaps, ConeStatus status) {
@@ -32,7 +30,9 @@ constexpr double impulse_rounding = 1e-14;
 VecX percussions(const ContactRows& rows, double t, const MatX& W, const VecX& w0,
                  const std::vector<ConeElement>& elements) {
     VecX P = VecX::Zero(w0.size());
-    const ConeStatus status = ConeComplementarity().solve(W, w0, elements, false, P);
+    ConeComplementarity solver;
+    solver.share_alike(rows.gaps.size() > 1);  // a face that lands strikes with all its corners
+    const ConeStatus status = solver.solve(W, w0, elements, false, P);
     if (status != ConeStatus::solved) refuse(rows.p, t, rows.gaps, status);
     return P;
 }

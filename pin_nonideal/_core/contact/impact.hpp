@@ -17,6 +17,9 @@ struct Impact {
     double energy_change = 0.0;   // of the whole, works of moving constraints included
 };
 
+// Impulses below this part of the largest of an impact are rounding.
+constexpr double impulse_rounding = 1e-14;
+
 // Rates of gaps slower than this are rest [m/s or rad/s].
 double rest_rate(const VecX& v);
 

@@ -21,6 +21,7 @@ constexpr double relaxation = 0.7;
 // Compliance of contacts and joints beside their own response: it halves from the first to the last.
 constexpr double first_compliance = 1e-2, least_compliance = 1e-9;
 constexpr int most_approaches = 40;
+constexpr double softer = 0.1;  // from one to the next, where the limit is all that is asked for
 // A miss is of what no forces change where it lasts as elements stiffen: what shares a load, such as the corners of a foot
 // that turns, has velocities that contradict each other by that much of those in play. So small a one is not searched
 // further where any is taken.
@@ -43,6 +44,7 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
     ConeStatus status = found ? ConeStatus::solved : find_certificate(problem_, certificate_);
     if (status == ConeStatus::jammed) found = grow_friction(x);  // a solution may be there all the same
     if (status == ConeStatus::failed) found = grow_friction(x) || scatter(x) || take_nearest(x);
+    if (found && shares_alike_) stiffen(x);
     unique_shares_ = newton_.regular();
     const bool as_it_was = warm && may_keep_shares && newton_.steps() == steps;
     if (found && !unique_shares_ && !as_it_was) {
@@ -113,6 +115,28 @@ bool ConeComplementarity::approach(Eigen::Ref<VecX> f) {
         before = error;
     }
     return least_miss_ <= unchangeable && take_nearest(f);
+}
+
+// To elements that give way by ever less of their whole force; f stays where that leads to no solution.
+bool ConeComplementarity::stiffen(Eigen::Ref<VecX> f) {
+    grown_ = problem_;
+    auto there = x_.vector(problem_.n);
+    there.setZero();
+    for (double compliance = first_compliance; compliance >= least_compliance; compliance *= softer) {
+        grown_.W() = problem_.W();
+        grown_.W().diagonal().array() += compliance;
+        if (newton_.solve(grown_, there, more_steps) <= solved) continue;
+        path_.follow(grown_, there, ConePath::Slip::follows);
+        if (!there.allFinite() || !(newton_.solve(grown_, there, more_steps) <= solved)) return false;
+    }
+    const double error = error_;
+    f_.vector(problem_.n) = there;
+    there = f;
+    f = f_.vector(problem_.n);
+    if (polish(f, few_steps)) return true;
+    f = there;
+    error_ = error;
+    return false;
 }
 
 // Of the forces that were approached those that miss least, where they may miss as much.

@@ -35,6 +35,11 @@ public:
     // for those who tell by how much; none by default.
     void take_misses(double most) { most_miss_ = most; }
 
+    // Where friction follows shares of a load that W does not tell, several motions may solve the problem. The one that is
+    // taken from now on is that of elements which all give way a little alike, in the limit of stiff ones, in whatever order
+    // they come.
+    void share_alike(bool on) { shares_alike_ = on; }
+
     double error() const { return error_; }             // of the equations, as part of what is in play
     bool unique_shares() const { return unique_shares_; }  // whether it was shown that W tells all of f
     const VecX& certificate() const { return certificate_; }
@@ -46,6 +51,7 @@ private:
     bool polish(Eigen::Ref<VecX> f, int most_steps);
     bool approach(Eigen::Ref<VecX> f);
     bool take_nearest(Eigen::Ref<VecX> f);
+    bool stiffen(Eigen::Ref<VecX> f);
     bool take_turns(Eigen::Ref<VecX> f);
     bool relax(Eigen::Ref<VecX> f);
     bool grow_friction(Eigen::Ref<VecX> f);
@@ -59,7 +65,7 @@ private:
     Buffer even_, x_, f_, w_, nearest_;
     VecX certificate_;
     double error_ = 0.0, least_miss_ = 0.0, most_miss_ = 0.0;
-    bool unique_shares_ = false;
+    bool unique_shares_ = false, shares_alike_ = false;
 };
 
 }  // namespace pn

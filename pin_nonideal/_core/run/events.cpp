@@ -234,11 +234,13 @@ Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool boun
     set_closed(p, system.w, closed);  // what changes by it is still to be found
     set_modes(p, system.w, modes);
     Strike out;
+    double largest = 0.0;
+    for (const Vec3& impulse : impact.impulse) largest = std::max(largest, impulse.norm());
     for (size_t i = 0; i < impact.gaps.size(); ++i) {
-        if (!(impact.impulse[i].norm() > 0.0)) continue;
+        out.work += impact.work[i];
+        if (!(impact.impulse[i].norm() > impulse_rounding * largest)) continue;
         out.events.push_back({t, Event::Kind::impact, p.gaps[impact.gaps[i]].block, impact.impulse[i], impact.work[i],
                               impact.v_minus, impact.v_plus});
-        out.work += impact.work[i];
     }
     out.work_of_constraints = impact.energy_change - out.work;
     return out;
