@@ -111,9 +111,10 @@ struct RestingProblem {
 
     double in_play() const { return w0.cwiseAbs().maxCoeff() + (W.cwiseAbs() * f.cwiseAbs()).maxCoeff(); }
 
+    // Of contacts that share a load one may carry none but rounding.
     bool at_its_limit(size_t i) const {
-        const double most = cones[i].bound * f[first[i]];
-        return f.segment(first[i] + 1, cones[i].dim - 1).norm() >= most * (1.0 - at_limit);
+        const double most = cones[i].bound * f[first[i]], rounding = none * f.cwiseAbs().maxCoeff();
+        return f.segment(first[i] + 1, cones[i].dim - 1).norm() >= most * (1.0 - at_limit) - rounding;
     }
 
     // What slips from rest has its kinetic limit from then on. Returns whether something just did.
@@ -188,14 +189,44 @@ struct RestingProblem {
             if (cones[i].dim == 1 || !at_its_limit(i) || !(slip.norm() > least)) continue;
             // Where slip begins slowly its force tells the way better than what is left of an acceleration.
             const VecX friction = f.segment(first[i] + 1, slip.size());
-            const VecX way = friction.norm() > 0.0 ? VecX(-friction.normalized()) : VecX(slip.normalized());
+            const VecX way = friction.norm() > none * f.cwiseAbs().maxCoeff() ? VecX(-friction.normalized()) : VecX(slip.normalized());
             for (int k = 0; k < slip.size(); ++k) out.direction[e][k] = way[k];
             out.modes[e] = p.frictions[e].dim > 1 || way[0] > 0.0 ? slip_plus : slip_minus;
+        }
+        find_rest(out);
+    }
+
+    bool tied(size_t i, size_t j) const {
+        const auto both = [&](const MatX& M) { return M.block(first[i], first[j], cones[i].dim, cones[j].dim); };
+        return !both(W).isZero(0.0) || !both(dragging).isZero(0.0);
+    }
+
+    // What slips takes along what is tied to it, and what is tied to that.
+    void find_rest(RestingMotion& out) const {
+        const auto element = [&](size_t i) { return p.gaps[rows.gaps[i]].sliding; };
+        std::vector<size_t> moved;
+        for (size_t i = 0; i < cones.size(); ++i) {
+            const int e = element(i);
+            const bool holds = e >= 0 && out.modes[e] == sticking;
+            if (holds) out.rests[e] = 1;
+            else moved.push_back(i);
+        }
+        for (size_t k = 0; k < moved.size(); ++k) {
+            for (size_t i = 0; i < cones.size(); ++i) {
+                const int e = element(i);
+                if (e < 0 || !out.rests[e] || !tied(i, moved[k])) continue;
+                out.rests[e] = 0;
+                moved.push_back(i);
+            }
         }
     }
 };
 
 }  // namespace
+
+bool RestingMotion::begins() const {
+    return std::any_of(modes.begin(), modes.end(), [](Mode mode) { return slips(mode); });
+}
 
 void RestingMotion::answer(const Program& p, Workspace& w, ModeQuestion& question) const {
     for (int e : question.at_rest) {
@@ -213,7 +244,8 @@ std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, doub
     if (gaps.empty() || !fits(p)) return std::nullopt;
     const RunState before = w.state;
     RestingMotion out{std::vector<char>(p.gaps.size(), 0), std::vector<Mode>(p.frictions.size(), unloaded),
-                      std::vector<Vec3>(p.frictions.size(), Vec3::Zero())};
+                      std::vector<Vec3>(p.frictions.size(), Vec3::Zero()), false, false,
+                      std::vector<char>(p.frictions.size(), 0)};
     bool found = false;
     try {
         release_contacts(p, w, t, q, v, question.rest);

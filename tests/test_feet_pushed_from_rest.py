@@ -1,0 +1,118 @@
+"""Bodies on several feet that rest and are pushed beyond what friction holds: what they begin to do.
+
+The oracle asks only for the law: some loads that press, with friction against the slip that begins at each foot that
+slips and within the cone of each that sticks, must give the acceleration (non-negative least squares over the
+generators of these forces).
+"""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.optimize import nnls
+
+import pin_nonideal as pn
+
+DRAWS = 40
+FACETS = 256  # of the cone of a foot that sticks: inside the circle by 8e-5 of it
+MASS, INERTIA, GRAVITY = 10.0, 0.3, 9.81
+
+
+def table(places, mu, pushed, push):
+    """A body on feet, with a constant wrench at a point of it."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "table")
+    model.appendBodyToJoint(joint, pin.Inertia(MASS, np.zeros(3), INERTIA * np.eye(3)), pin.SE3.Identity())
+    for name, place in [*((f"foot {k}", x) for k, x in enumerate(places)), ("pushed", pushed)]:
+        model.addFrame(
+            pin.Frame(name, joint, 0, pin.SE3(np.eye(3), np.asarray(place, float)), pin.FrameType.OP_FRAME)
+        )
+    q0 = pin.neutral(model)
+    q0[2] = -places[0][2]
+    contacts = [pn.PointContact(f"foot {k}", mu=mu) for k in range(len(places))]
+    return pn.Scene(model, contacts=contacts, forces=[pn.Wrench("pushed", push)], q0=q0)
+
+
+def drawn(seed):
+    rng = np.random.default_rng(seed)
+    feet = int(rng.integers(3, 9))
+    turn = 2.0 * np.pi * (np.arange(feet) / feet + rng.uniform(-0.02, 0.02, feet))
+    radius = rng.uniform(0.25, 0.4, feet) if rng.random() < 0.5 else np.full(feet, 0.3)
+    height = rng.uniform(0.05, 0.3)
+    places = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full(feet, -height)])
+    mu = rng.uniform(0.2, 0.8)
+    pushed = np.array([rng.uniform(-0.1, 0.1), rng.uniform(-0.1, 0.1), -0.9 * height])
+    way = rng.uniform(0.0, 2.0 * np.pi)
+    force = rng.uniform(0.9, 1.5) * mu * MASS * GRAVITY
+    push = [force * np.cos(way), force * np.sin(way), 0.0, 0.0, 0.0, rng.uniform(-10.0, 10.0)]
+    return table(places, mu, pushed, push), places, mu, pushed, np.array(push)
+
+
+def lack(places, mu, pushed, push, a, modes):
+    """What the law's forces lack to give the acceleration, as part of the weight."""
+    sides = 2.0 * np.pi * np.arange(FACETS) / FACETS
+    columns = []
+    for place, mode in zip(places, modes, strict=True):
+        begins = (a[:3] + np.cross(a[3:], place))[:2]
+        if mode == 0:
+            assert np.linalg.norm(begins) < 1e-9
+            rubs = np.column_stack([np.cos(sides), np.sin(sides)])
+        else:
+            assert np.linalg.norm(begins) > 1e-9
+            rubs = [-begins / np.linalg.norm(begins)]
+        for rub in rubs:
+            force = np.array([mu * rub[0], mu * rub[1], 1.0])
+            columns.append(np.concatenate([force, np.cross(place, force)]))
+    needed = np.concatenate([MASS * a[:3] + [0.0, 0.0, MASS * GRAVITY] - push[:3], INERTIA * a[3:]])
+    needed[3:] -= push[3:] + np.cross(pushed, push[:3])
+    return nnls(np.column_stack(columns), needed)[1] / (MASS * GRAVITY)
+
+
+@pytest.mark.parametrize("seed", range(DRAWS))
+def test_what_begins_keeps_the_law_of_coulomb(seed):
+    scene, *rest, push = drawn(seed)
+    solution = scene.solve(*scene.project(), 0.0)
+    assert lack(*rest, push, solution.a, solution.modes) < 1e-8
+
+
+@pytest.mark.parametrize("seed", range(0, DRAWS, 4))
+def test_the_motion_goes_on_as_it_begins(seed):
+    scene, *_ = drawn(seed)
+    begun = scene.solve(*scene.project(), 0.0)
+    run = pn.simulate(scene, 1e-6, output_dt=1e-6)
+    assert np.abs(run.v[-1] / 1e-6 - begun.a).max() < 1e-4 * np.abs(begun.a).max()
+
+
+def test_six_feet_begin_to_slip_in_one_step():
+    turn = np.pi / 3.0 * np.arange(6)
+    places = np.column_stack([0.3 * np.cos(turn), 0.3 * np.sin(turn), np.full(6, -0.3)])
+    scene = table(places, 0.7, [0.05, 0.02, -0.25], [90.0, 20.0, 0.0, 0.0, 0.0, 5.0])
+    run = pn.simulate(scene, 0.5)
+    assert not run.events
+    assert run.stats.evaluations < 400
+
+
+def test_a_table_rests_beside_one_that_begins_to_slip():
+    """Spun by a moment near what any loads of its six feet can hold, more than their least-norm loads do."""
+    turn = np.pi / 3.0 * np.arange(6)
+    inner = np.where(np.arange(6) % 2 == 0, 0.3, 0.1)
+    places = np.column_stack([inner * np.cos(turn), inner * np.sin(turn), np.full(6, -0.3)])
+    most = 0.5 * MASS * GRAVITY * 0.3  # all of the weight on the three outer feet
+    least = 0.5 * MASS * GRAVITY * inner.mean()  # evenly
+    model = pin.Model()
+    for body in ("held", "slips"):
+        joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), body)
+        model.appendBodyToJoint(joint, pin.Inertia(MASS, np.zeros(3), INERTIA * np.eye(3)), pin.SE3.Identity())
+        for k, place in enumerate([*places, np.zeros(3)]):
+            placement = pin.SE3(np.eye(3), place)
+            model.addFrame(pin.Frame(f"{body} {k}", joint, 0, placement, pin.FrameType.OP_FRAME))
+    q0 = pin.neutral(model)
+    q0[[2, 9]], q0[7] = 0.3, 5.0
+    contacts = [pn.PointContact(f"{body} {k}", mu=0.5) for body in ("held", "slips") for k in range(6)]
+    moment = 0.5 * (most + least)
+    forces = [
+        pn.Wrench("held 6", [0.0, 0.0, 0.0, 0.0, 0.0, moment]),
+        pn.Wrench("slips 6", [0.0, 0.0, 0.0, 0.0, 0.0, 1.1 * most]),
+    ]
+    solution = pn.Scene(model, contacts=contacts, forces=forces, q0=q0).solve(q0, np.zeros(12), 0.0)
+    assert np.abs(solution.a[:6]).max() < 1e-9
+    assert solution.a[11] > 1.0
