@@ -147,15 +147,15 @@ static bool is_balanced(const Program& p, Workspace& w) {
 
 // What laws leave where none acts.
 static void leave_laws(Workspace& w) {
-    w.now.C.setZero();
-    w.now.C_smooth.setZero();
+    std::fill_n(w.now.C.data(), w.now.C.size(), 0.0);
+    std::fill_n(w.now.C_smooth.data(), w.now.C_smooth.size(), 0.0);
     w.now.determinant = 1.0;
     w.state.unique = Uniqueness::shown;
 }
 
 void solve_dynamics(const Program& p, Workspace& w, double t, const VecX& v) {
     if (p.has_laws()) {
-        w.now.v = v;
+        std::copy_n(v.data(), v.size(), w.now.v.data());
         w.now.speed = 0.0;
         for (int k = 0; k < v.size(); ++k) w.now.speed = std::max(w.now.speed, std::abs(v[k]));
     }

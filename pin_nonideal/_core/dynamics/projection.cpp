@@ -176,8 +176,13 @@ static double velocity_floor(const Workspace& w, const VecX& v) {
     return rounding_part(w) * std::max(1.0, v.cwiseAbs().maxCoeff());
 }
 
+// No move has closed the position. Open contacts have rows here too: hundreds of numbers in each step.
+static void forget_closing(Workspace& w) {
+    std::fill_n(w.now.closing_lam.data(), w.now.closing_lam.size(), 0.0);
+}
+
 bool is_on_constraints(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    w.now.closing_lam.setZero();
+    forget_closing(w);
     if (p.constraints == 0) return true;
     evaluate_residuals(p, w, t, q, v);
     if (gather_residuals(p, w) > position_floor(p, w)) return false;
@@ -188,7 +193,7 @@ bool is_on_constraints(const Program& p, Workspace& w, double t, const VecX& q, 
 
 bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v, bool configured,
                       bool keeps_factors) {
-    w.now.closing_lam.setZero();
+    forget_closing(w);
     double largest = 0.0, floor = 0.0;
     if (!w.now.rows.blocks.empty()) {
         if (!configured) evaluate_residuals(p, w, t, q, v);
@@ -291,7 +296,7 @@ static void stop_locked(const Program& p, const Workspace& w, VecX& v) {
 bool keeps_to_rows(const Program& p, Workspace& w, double t, const VecX& q, VecX& v) {
     stop_locked(p, w, v);
     if (w.now.rows.blocks.empty()) return true;
-    w.now.closing_lam.setZero();
+    forget_closing(w);
     const double fastest = v.cwiseAbs().maxCoeff();
     if (!p.affine_rates || fastest > slow_speed) return false;
     // Whether nothing can move is for the rows to tell that are independent.

@@ -134,7 +134,7 @@ void set_closed(const Program& p, Workspace& w, const std::vector<char>& closed)
 void set_contacts(const Program& p, Workspace& w, const std::vector<char>& closed, const std::vector<Mode>& modes) {
     for (size_t i = 0; i < closed.size(); ++i) {
         const Block& block = p.blocks[p.gaps[i].block];
-        if (!closed[i]) w.now.lam.segment(block.row, block.kept.size()).setZero();
+        if (!closed[i]) std::fill_n(w.now.lam.data() + block.row, block.kept.size(), 0.0);
     }
     w.state.closed = closed;
     set_modes(p, w, modes);
