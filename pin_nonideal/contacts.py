@@ -25,7 +25,7 @@ from .constraints import Axis
 from .errors import InputError
 from .laws import static_ratio
 from .round_contacts import BoxContact, CapsuleContact, SphereContact
-from .solid_contacts import CylinderContact, EllipsoidContact, HullContact, RimContact
+from .solid_contacts import CylinderContact, EllipsoidContact, HullContact, RevolvedContact, RimContact
 
 __all__ = [
     "BoxContact",
@@ -35,6 +35,7 @@ __all__ = [
     "HullContact",
     "JointLimit",
     "PointContact",
+    "RevolvedContact",
     "RimContact",
     "SphereContact",
     "UserContact",
@@ -234,5 +235,6 @@ Contact = (
     | HullContact
     | CylinderContact
     | RimContact
+    | RevolvedContact
     | UserContact
 )

@@ -15,23 +15,36 @@ from .collision_shapes import CORNERS, Shape
 from .contacts import PointContact
 from .errors import InputError
 from .hulls import convex_hull, shrunk
+from .revolved_manifolds import two_revolved
+from .revolved_shapes import (
+    LEAST_ROUNDING,
+    PASSED_ON,
+    at_place,
+    between,
+    face_points,
+    faces,
+    heights,
+    line_on_revolved,
+    on_revolved,
+    side_of,
+    slices,
+    standing_back,
+)
 from .round_contacts import BoxContact, CapsuleContact, Segment
-from .solid_contacts import CylinderContact, EllipsoidContact, HullContact, RimContact
+from .solid_contacts import CylinderContact, EllipsoidContact, HullContact, RevolvedContact, RimContact
 from .types import Array
 
 Place = (
-    PointContact | CapsuleContact | BoxContact | CylinderContact | EllipsoidContact | HullContact | RimContact
+    PointContact
+    | CapsuleContact
+    | BoxContact
+    | CylinderContact
+    | EllipsoidContact
+    | HullContact
+    | RimContact
+    | RevolvedContact
 )
 
-# Part of the least edge to which boxes and hulls are rounded where nothing else is said, and part of its
-# radius by which the rim of a cylinder stands back behind its face.
-LEAST_ROUNDING = 1e-3
-# What carries a cylinder that stands on its face: so many points on this part of its radius.  The rim takes
-# over from the tilt at which it is as low as they are, 0.03 rad.
-FACE_POINTS, FACE_CIRCLE = 8, 0.97
-# Part of the rounding of edges, or of how far rims stand back, by which the side of a cylinder does from its
-# rims and from where corners find it: no two places touch at one, and what lies along it lies on both rims.
-PASSED_ON = 0.01
 # Places of one pair beyond which it is refused: rows of all of them take room by the square of their number.
 MOST_PLACES = 1000
 
@@ -68,15 +81,16 @@ def manifold(
         if second.solid and (first.solid or first.is_round):
             found = _solid_manifold(who, first, second, rounding, more)
         elif second.ends is not None and first.kind == "Sphere":
-            found = [_on_revolved(first.points[0], first.radius, first.frame, second, more)]
+            found = [on_revolved(first.points[0], first.radius, first.frame, second, more)]
         elif second.ends is not None and (first.solid or first.is_round):
             found = _revolved_manifold(who, first, second, rounding, more)
+        elif first.ends is not None and second.ends is not None:
+            found = two_revolved(who, first, second, rounding, more)
         else:
             raise InputError(
                 f"{who}: no contacts are known for this pair of shapes, a {first.kind} and a {second.kind}; "
-                "a half-space with any other shape is one, and so are spheres, capsules, boxes and convex "
-                "meshes with each other and with cylinders and cones: use PointContact for the places that "
-                "touch"
+                "a half-space with any other shape is one, and so are spheres, capsules, boxes, convex "
+                "meshes, cylinders and cones with each other: use PointContact for the places that touch"
             )
     return [replace(c, name=base if len(found) == 1 else f"{base} {k + 1}") for k, c in enumerate(found)]
 
@@ -100,61 +114,12 @@ def _on_half_space(
         yield EllipsoidContact(shape.frame, semiaxes, offset=xyz, rpy=rpy, **level)
     if shape.ends is None:
         return
-    back = _standing_back(who, shape, rounding)
-    for end, radius in _faces(shape):
-        for point in _face_points(shape, end, radius):
+    back = standing_back(who, shape, rounding)
+    for end, radius in faces(shape):
+        for point in face_points(shape, end, radius):
             yield PointContact(shape.frame, offset=point, **level)
-        middle = _at(shape, 0.0, 0.0, end - np.copysign(back, end))
+        middle = at_place(shape, 0.0, 0.0, end - np.copysign(back, end))
         yield EllipsoidContact(shape.frame, (radius, radius, 0.0), offset=middle, rpy=rpy, **level)
-
-
-def _standing_back(who: str, shape: Shape, rounding: float | None) -> float:
-    """How far the rims of a cylinder or cone stand back behind its faces [m]."""
-    assert shape.ends is not None
-    half, *radii = shape.ends
-    back = LEAST_ROUNDING * max(radii) if rounding is None else rounding
-    if not back < half:
-        raise InputError(
-            f"{who}: rounding must be less than half the length {2.0 * half:g} m; got {back:g} m"
-        )
-    return back
-
-
-def _faces(shape: Shape) -> list[tuple[float, float]]:
-    """Where the faces of a cylinder or cone are on its axis, and their radii."""
-    assert shape.ends is not None
-    half, below, above = shape.ends
-    return [(end, radius) for end, radius in ((-half, below), (half, above)) if radius > 0.0]
-
-
-def _face_points(shape: Shape, end: float, radius: float) -> list[Vector3]:
-    """What carries a face, around it."""
-    turns = 2.0 * np.pi / FACE_POINTS * np.arange(FACE_POINTS)
-    ways = [FACE_CIRCLE * radius * np.array([np.cos(turn), np.sin(turn)]) for turn in turns]
-    return [_at(shape, x, y, end) for x, y in ways]
-
-
-def _at(shape: Shape, x: float, y: float, z: float) -> tuple[float, float, float]:
-    a, b, c = shape.place.act(np.array([x, y, z])).tolist()
-    return a, b, c
-
-
-def _on_revolved(at: Array, radius: float, frame: str, solid: Shape, more: dict[str, Any]) -> CylinderContact:
-    """A sphere, or a rounded corner, on a cylinder or cone."""
-    assert solid.ends is not None
-    half, below, above = solid.ends
-    return CylinderContact(
-        frame,
-        solid.frame,
-        2.0 * half,
-        below,
-        radius,
-        above,
-        offset=tuple(at.tolist()),
-        xyz=tuple(solid.place.translation.tolist()),
-        rpy=tuple(pin.rpy.matrixToRpy(solid.place.rotation).tolist()),
-        **more,
-    )
 
 
 def _revolved_manifold(
@@ -166,73 +131,35 @@ def _revolved_manifold(
     a little from these, on the rims and on the chords between the points that carry the faces; those points
     and the tip on the faces of a box or mesh, and rims on its faces and edges.
     """
-    back = _standing_back(who, solid, rounding)
+    back = standing_back(who, solid, rounding)
     radius = _edge_radius(who, [other], rounding) if other.solid else other.radius
     core = _core(who, other, radius)
     lines = _edges(other, core)
-    faces = [_face_points(solid, *face) for face in _faces(solid)]
-    chords = [ends for points in faces for ends in zip(points, points[1:] + points[:1], strict=True)]
-    tips = [*solid.points.tolist(), *(point for points in faces for point in points)]
+    rings = [face_points(solid, *face) for face in faces(solid)]
+    chords = [ends for points in rings for ends in zip(points, points[1:] + points[:1], strict=True)]
+    tips = [*solid.points.tolist(), *(point for points in rings for point in points)]
     on_faces = len(tips) if other.solid else 0
-    count = len(core) + len(lines) * (1 + len(chords)) + on_faces + len(faces)
+    count = len(core) + len(lines) * (1 + len(chords)) + on_faces + len(rings)
     _check_count(who, count, f"{len(lines)} edges by {1 + len(chords)}")
-    side = _side(solid, back, PASSED_ON * (radius if other.solid else back))
-    found: list[Place] = [_on_revolved(at, radius, other.frame, solid, more) for at in core]
-    found += [_line_on_revolved(line, radius, other.frame, side, more) for line in lines]
+    side = side_of(solid, back, PASSED_ON * (radius if other.solid else back))
+    found: list[Place] = [on_revolved(at, radius, other.frame, solid, more) for at in core]
+    found += [line_on_revolved(line, radius, other.frame, side, more) for line in lines]
     for line, chord in product(lines, chords):
         found.append(CapsuleContact(other.frame, solid.frame, line, chord, radius, 0.0, **more))
     if not other.solid:
-        rims = _slices(solid, back)
+        rims = slices(solid, back)
         return found + [
-            _line_on_revolved(line, radius, other.frame, rim, more) for line in lines for rim in rims
+            line_on_revolved(line, radius, other.frame, rim, more) for line in lines for rim in rims
         ]
     found += [_on_solid(solid, np.array(at), other, core, 0.0, radius, more) for at in tips]
     rpy = tuple(pin.rpy.matrixToRpy(solid.place.rotation).tolist())
-    inner = _between(solid, *_heights(solid, back), 1.0)
-    for end, rim in _faces(inner):
-        middle = _at(inner, 0.0, 0.0, end)
+    inner = between(solid, *heights(solid, back), 1.0)
+    for end, rim in faces(inner):
+        middle = at_place(inner, 0.0, 0.0, end)
         found.append(
             RimContact(solid.frame, other.frame, _rows(core), rim, radius, offset=middle, rpy=rpy, **more)
         )
     return found
-
-
-def _line_on_revolved(
-    line: Segment, radius: float, frame: str, solid: Shape, more: dict[str, Any]
-) -> CylinderContact:
-    return replace(_on_revolved(np.array(line[0]), radius, frame, solid, more), end=line[1])
-
-
-def _heights(solid: Shape, back: float) -> tuple[float, float]:
-    """Where on its axis the faces of a cylinder or cone are when they stand back; a tip does not."""
-    assert solid.ends is not None
-    half, below, above = solid.ends
-    return -half + back * (below > 0.0), half - back * (above > 0.0)
-
-
-def _side(solid: Shape, back: float, by: float) -> Shape:
-    """A cylinder or cone whose faces stand back, and whose side does by that much where it is widest."""
-    assert solid.ends is not None
-    return _between(solid, *_heights(solid, back), 1.0 - by / max(solid.ends[1:]))
-
-
-def _slices(solid: Shape, back: float) -> list[Shape]:
-    """Its rims where its faces stand back, thin slices of it."""
-    assert solid.ends is not None
-    low, high = _heights(solid, back)
-    _, below, above = solid.ends
-    places = [(low, low + min(back, 0.5 * (high - low)))] * (below > 0.0)
-    places += [(high - min(back, 0.5 * (high - low)), high)] * (above > 0.0)
-    return [_between(solid, *place, 1.0) for place in places]
-
-
-def _between(solid: Shape, low: float, high: float, part: float) -> Shape:
-    """A part of the radii of a cylinder or cone, between two places on its axis."""
-    assert solid.ends is not None
-    half, below, above = solid.ends
-    first, last = (part * (below * (half - z) + above * (half + z)) / (2.0 * half) for z in (low, high))
-    place = pin.SE3(solid.place.rotation, np.array(_at(solid, 0.0, 0.0, 0.5 * (low + high))))
-    return replace(solid, place=place, ends=(0.5 * (high - low), first, last))
 
 
 def _solid_manifold(

@@ -6,13 +6,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .checks import Vector3, array, label, number, optional_text, positive, text, unit_axis
+from .checks import (
+    Vector3,
+    array,
+    label,
+    nonnegative,
+    number,
+    optional_text,
+    positive,
+    text,
+    unit_axis,
+)
 from .constraints import Axis
 from .contact_checks import check_rubbing, check_two_frames, check_vectors
 from .errors import InputError
 from .hulls import convex_hull
 
-__all__ = ["CylinderContact", "EllipsoidContact", "HullContact", "RimContact"]
+__all__ = ["CylinderContact", "EllipsoidContact", "HullContact", "RevolvedContact", "RimContact"]
 
 
 @dataclass(frozen=True)
@@ -111,7 +121,7 @@ class HullContact:
 class CylinderContact:
     """A sphere or a capsule touches a cylinder or a cone of another body, with Coulomb friction there.
 
-    Gap: the distance of the sphere's middle, or of the capsule's middle line, from the solid, less its radius
+    Gap: the distance of the sphere's middle, or of the capsule's middle line, from the solid, less both radii
     [m]; else as `SphereContact`.  One place touches: a capsule that lies along the solid touches in the
     middle of what lies beside it.
     Rows: 1 while it is closed.  lam: the normal force on the body of frame1 [N], away from the solid.
@@ -122,7 +132,7 @@ class CylinderContact:
         length: of the solid along its axis [m].
         below: radius of the face at the lower end of the axis [m].
         above: radius of that at the upper end [m]; `below` when None, and 0 for the tip of a cone.
-        radius1: radius of the sphere or capsule [m].
+        radius1: radius of the sphere or capsule [m]; 0 for a point or a line.
         offset: where the sphere's middle is, in the axes of frame1 [m].
         xyz: where the middle of the axis is, in the axes of frame2 [m].
         rpy: how the solid, its axis along z, is turned against frame2, roll, pitch and yaw [rad].
@@ -132,6 +142,7 @@ class CylinderContact:
         name: used in messages and results.
         end: of a capsule, whose middle line goes from offset to there, in the axes of frame1 [m]; None for a
             sphere.
+        radius2: radius around the solid [m], which rounds its rims and moves its faces and side outward.
     """
 
     frame1: str
@@ -148,14 +159,16 @@ class CylinderContact:
     restitution: float = 0.0
     name: str | None = None
     end: Vector3 | None = None
+    radius2: float = 0.0
 
     def __post_init__(self) -> None:
         if self.above is None:
             object.__setattr__(self, "above", self.below)
-        who = check_rubbing(self, "below", "above")
+        who = check_rubbing(self, "below", "above", "radius2")
         check_two_frames(self, who)
-        for key in ("length", "radius1"):
-            object.__setattr__(self, key, positive(f"{who}: {key}", getattr(self, key)))
+        object.__setattr__(self, "length", positive(f"{who}: length", self.length))
+        around = nonnegative if self.radius2 > 0.0 else positive
+        object.__setattr__(self, "radius1", around(f"{who}: radius1", self.radius1))
         check_vectors(self, who, "offset", "xyz", "rpy")
         if self.below == self.above == 0.0:
             raise InputError(f"{who}: one of below and above must be positive; a line is a CapsuleContact's")
@@ -206,6 +219,62 @@ class RimContact:
             object.__setattr__(self, key, positive(f"{who}: {key}", getattr(self, key)))
         check_vectors(self, who, "offset", "rpy")
         object.__setattr__(self, "points", hull_points(self.points, who))
+
+
+@dataclass(frozen=True)
+class RevolvedContact:
+    """Two cylinders, cones or disks touch, each with a radius around it, with Coulomb friction there.
+
+    Gap: the distance of both, less both radii [m]; else as `SphereContact`.  One place touches: where two
+    lie along each other or face on face, points of them have to carry them as well.
+    Rows: 1 while it is closed.  lam: the normal force on the body of frame1 [N], away from the other.
+
+    Args:
+        frame1: name of a frame on the body of the first.
+        frame2: name of a frame on the body of the second, or of the world.
+        solid1: length along its axis and radii of the faces at its lower and upper end [m], (3,); one radius
+            may be 0, the tip of a cone, and without length both are that of a disk.
+        solid2: the same of the second.
+        radius1: radius around the first [m], which rounds its rims and moves its faces and side outward.
+        radius2: radius around the second [m].
+        xyz1: where the middle of the first one's axis is, in the axes of frame1 [m].
+        rpy1: how the first, its axis along z, is turned against frame1, roll, pitch and yaw [rad].
+        xyz2: where the middle of the second one's axis is, in the axes of frame2 [m].
+        rpy2: how the second is turned against frame2 [rad].
+        mu: kinetic coefficient of friction.
+        static_ratio: static over kinetic friction, at least 1.
+        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        name: used in messages and results.
+    """
+
+    frame1: str
+    frame2: str
+    solid1: Vector3
+    solid2: Vector3
+    radius1: float
+    radius2: float = 0.0
+    xyz1: Vector3 = (0.0, 0.0, 0.0)
+    rpy1: Vector3 = (0.0, 0.0, 0.0)
+    xyz2: Vector3 = (0.0, 0.0, 0.0)
+    rpy2: Vector3 = (0.0, 0.0, 0.0)
+    mu: float = 0.0
+    static_ratio: float = 1.0
+    restitution: float = 0.0
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        who = check_rubbing(self, "radius2")
+        check_two_frames(self, who)
+        object.__setattr__(self, "radius1", positive(f"{who}: radius1", self.radius1))
+        check_vectors(self, who, "solid1", "solid2", "xyz1", "rpy1", "xyz2", "rpy2")
+        for key in ("solid1", "solid2"):
+            length, below, above = solid = getattr(self, key)
+            disk = length == 0.0 and below == above
+            if not (min(solid) >= 0.0 < max(below, above) and (disk or length > 0.0)):
+                raise InputError(
+                    f"{who}: {key} must be a length and two radii, none negative and one radius positive; "
+                    f"without a length both must be one; got {list(solid)}"
+                )
 
 
 def hull_points(given: object, who: str) -> tuple[Vector3, ...]:

@@ -99,7 +99,8 @@ MISFITS = {
     "contact": (
         {"contacts": [pn.KnifeEdge("j0 tip")]},
         "a contact must be one of PointContact, JointLimit, SphereContact, CapsuleContact, BoxContact, "
-        "EllipsoidContact, HullContact, CylinderContact, RimContact, UserContact; "
+        "EllipsoidContact, HullContact, CylinderContact, RimContact, RevolvedContact, "
+        "UserContact; "
         "got KnifeEdge(frame='j0 tip', axis=(0.0, 1.0, 0.0), name=None)",
     ),
     "force": ({"forces": [3]}, "a force must be SpringDamper, JointSpring, Wrench or UserForce; got 3"),

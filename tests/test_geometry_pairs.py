@@ -25,7 +25,9 @@ SOLIDS = ("sphere", "capsule", "box", "convex mesh")
 KNOWN = {(shape, "half-space") for shape in SHAPES[:-1]} | set(combinations_with_replacement(SOLIDS, 2))
 KNOWN |= {("sphere", "cylinder"), ("sphere", "cone")}
 # What these stand for is compared part by part in test_revolved_pairs.py.
-IN_PARTS = {(shape, revolved) for shape in SOLIDS[1:] for revolved in ("cylinder", "cone")}
+IN_PARTS = {
+    (shape, revolved) for shape in (*SOLIDS[1:], "cylinder", "cone") for revolved in ("cylinder", "cone")
+}
 
 
 def convex(points, scale=1.0):

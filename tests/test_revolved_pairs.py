@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 
 import pin_nonideal as pn
 from pin_nonideal.hulls import shrunk
-from pin_nonideal.manifolds import FACE_CIRCLE, FACE_POINTS, LEAST_ROUNDING, PASSED_ON
+from pin_nonideal.revolved_shapes import FACE_CIRCLE, FACE_POINTS, LEAST_ROUNDING, PASSED_ON
 
 from .mechanisms import GRAVITY, body, empty
 from .same_run import assert_same_run

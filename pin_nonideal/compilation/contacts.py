@@ -11,7 +11,13 @@ import numpy as np
 from pin_nonideal.contacts import BoxContact, Contact, JointLimit, PointContact, UserContact
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError
-from pin_nonideal.solid_contacts import CylinderContact, EllipsoidContact, HullContact, RimContact
+from pin_nonideal.solid_contacts import (
+    CylinderContact,
+    EllipsoidContact,
+    HullContact,
+    RevolvedContact,
+    RimContact,
+)
 from pin_nonideal.types import Model
 
 from .callbacks import checked
@@ -82,9 +88,10 @@ def lower_gaps(c: Any, name: str, out: core.Builder, where: Resolution) -> list[
     elif isinstance(c, CylinderContact):
         f1, f2, solid, half1 = where.cylinder(c, who)
         if half1 == 0.0:
-            block = out.add_revolved(name, f1, f2, solid=solid, radius=c.radius1)
+            block = out.add_revolved(name, f1, f2, solid=solid, radius=c.radius1 + c.radius2)
         else:
-            block = out.add_line(name, f1, f2, solid=solid, half1=half1, radius=c.radius1)
+            radius = c.radius1 + c.radius2
+            block = out.add_line(name, f1, f2, solid=solid, half1=half1, radius=radius)
     elif isinstance(c, RimContact):
         f1, f2, hull = where.rim(c, who)
         block = out.add_rim(name, f1, f2, solid=hull, rim=c.rim, radius=c.radius2)
@@ -103,6 +110,9 @@ def _round_gap(c: Any, name: str, out: core.Builder, where: Resolution) -> int:
     if isinstance(c, BoxContact):
         f1, f2, half = where.box(c, who)
         return out.add_box(name, f1, f2, half=half, radius=radius)
+    if isinstance(c, RevolvedContact):
+        f1, f2, one, other = where.rims(c, who)
+        return out.add_rims(name, f1, f2, first=one, second=other, radius=radius)
     f1, f2, half1, half2 = where.capsules(c, who)
     return out.add_capsules(name, f1, f2, half1=half1, half2=half2, radius=radius)
 

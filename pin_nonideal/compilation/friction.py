@@ -13,7 +13,13 @@ from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.laws import JointFriction
 from pin_nonideal.round_contacts import BoxContact
-from pin_nonideal.solid_contacts import CylinderContact, EllipsoidContact, HullContact, RimContact
+from pin_nonideal.solid_contacts import (
+    CylinderContact,
+    EllipsoidContact,
+    HullContact,
+    RevolvedContact,
+    RimContact,
+)
 
 from .callbacks import ReactionNames, checked, named
 from .constraints import frames_of
@@ -316,6 +322,10 @@ def _round_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list
     if isinstance(c, RimContact):
         f1, f2, hull = where.rim(c, who)
         return [(name, out.add_rim_slip(name, f1, f2, solid=hull, rim=c.rim), c.mu)]
+    if isinstance(c, RevolvedContact):
+        f1, f2, one, other = where.rims(c, who)
+        around = {"radius1": c.radius1, "radius2": c.radius2}
+        return [(name, out.add_rims_slip(name, f1, f2, first=one, second=other, **around), c.mu)]
     if isinstance(c, BoxContact):
         f1, f2, half = where.box(c, who)
         return [(name, out.add_box_slip(name, f1, f2, half=half, radius1=c.radius1), c.mu)]

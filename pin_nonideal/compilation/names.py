@@ -14,7 +14,14 @@ from pin_nonideal.contacts import PointContact
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.round_contacts import BoxContact, CapsuleContact, SphereContact, segments
-from pin_nonideal.solid_contacts import CylinderContact, EllipsoidContact, HullContact, RimContact, core_hull
+from pin_nonideal.solid_contacts import (
+    CylinderContact,
+    EllipsoidContact,
+    HullContact,
+    RevolvedContact,
+    RimContact,
+    core_hull,
+)
 from pin_nonideal.states.placements import frame_index, frame_on_joint, joint_placements
 from pin_nonideal.types import Array, Model, Placement
 
@@ -152,6 +159,13 @@ class Resolution:
         """Frames in the middle of the disk, its axis along z, and of the hull, and the hull."""
         first, second = self._two_bodies(c, who)
         return turned(moved(first, c.offset), c.rpy), second, core_hull(c)
+
+    def rims(self, c: RevolvedContact, who: str) -> tuple[Frame, Frame, Vector3, Vector3]:
+        """Frames in the middle of both, along z, and half the length and both radii of each [m]."""
+        first, second = self._two_bodies(c, who)
+        (length1, *radii1), (length2, *radii2) = c.solid1, c.solid2
+        first, second = turned(moved(first, c.xyz1), c.rpy1), turned(moved(second, c.xyz2), c.rpy2)
+        return first, second, (0.5 * length1, *radii1), (0.5 * length2, *radii2)
 
     def _two_bodies(self, c: Any, who: str) -> list[Frame]:
         ends = [self.frame(c.frame1, who), self.frame(c.frame2, who)]

@@ -169,6 +169,13 @@ bool apart(const pn::Revolved& solid, double half, const Motion& m1, const Motio
     return rows_of<double>(pn::LineRow{pn::Frame(), pn::Frame(), solid, half, 0.0}, m1, m2, true).residual[0] > 1e-9;
 }
 
+bool apart(const pn::Revolved& first, const pn::Revolved& second, const Motion& m1, const Motion& m2) {
+    const Vec<double> n = rows_of<double>(pn::RimsRow{pn::Frame(), pn::Frame(), first, second, 0.0}, m1, m2, true)
+                              .wrench[0].force, e1 = m1.R.c[2], e2 = m2.R.c[2];
+    return n.dot(m1.x - m2.x) - first.support(-n.dot(e1), n.cross(e1).norm()) -
+           second.support(n.dot(e2), n.cross(e2).norm()) > 1e-9;
+}
+
 int main() {
     const pn::Frame f;
     const pn::Vec3 x = pn::Vec3::UnitX(), y = pn::Vec3::UnitY(), z = pn::Vec3::UnitZ();
@@ -228,6 +235,13 @@ int main() {
                 check("line slip", pn::LineSlipRows{{}, f, f, solid, half, 0.1}, 0, 0, apart_from_solid);
             }
     }
+    const pn::Revolved turned[] = {{0.0, 0.7, 0.7}, {0.6, 0.4, 0.4}, {2.0, 0.3, 0.3}, {0.6, 0.4, 0.0}, {1.0, 0.3, 0.6}};
+    for (const pn::Revolved& first : turned)
+        for (const pn::Revolved& second : turned) {
+            const auto apart_from_other = [&](const auto&... m) { return apart(first, second, m...); };
+            check("rims", pn::RimsRow{f, f, first, second, 0.1}, 0, 1, apart_from_other);
+            check("rims slip", pn::RimsSlipRows{{}, f, f, first, second, 0.04, 0.06}, 0, 0, apart_from_other);
+        }
     for (const double half1 : {0.0, 0.3, 1.5})
         for (const double half2 : {0.0, 0.4, 2.0}) {
             check("capsules", pn::CapsulesRow{f, f, half1, half2, 0.1}, 0, 1);

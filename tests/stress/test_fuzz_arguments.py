@@ -22,7 +22,8 @@ DESCRIPTIONS = [
     pn.BoxContact, pn.CapsuleContact, pn.CylinderContact, pn.Distance, pn.Drag, pn.EffortLimits,
     pn.EllipsoidContact, pn.FrameAnchor, pn.GeometryContact, pn.HullContact,
     pn.HingeAnchor, pn.HoldPosition, pn.JointCoupling, pn.JointFriction, pn.JointLimit, pn.JointSpring,
-    pn.KnifeEdge, pn.LuGre, pn.PointAnchor, pn.PointContact, pn.PrescribedMotion, pn.RimContact, pn.Rolling,
+    pn.KnifeEdge, pn.LuGre, pn.PointAnchor, pn.PointContact, pn.PrescribedMotion, pn.RevolvedContact,
+    pn.RimContact, pn.Rolling,
     pn.SampledControl, pn.SigmoidFriction, pn.SphereContact, pn.SpringDamper, pn.Table,
     pn.UserConstraint, pn.UserContact, pn.UserForce, pn.UserFriction, pn.UserLaw, pn.Wrench,
     pn.box_contacts,
@@ -35,7 +36,7 @@ PLACES = {
     "laws": ("Drag", "JointFriction", "LuGre", "SigmoidFriction", "UserFriction", "UserLaw"),
     "contacts": ("GeometryContact", "JointLimit", "PointContact", "SphereContact",
                  "BoxContact", "CapsuleContact", "CylinderContact", "EllipsoidContact", "HullContact",
-                 "RimContact", "UserContact", "box_contacts"),
+                 "RevolvedContact", "RimContact", "UserContact", "box_contacts"),
     "forces": ("JointSpring", "SpringDamper", "UserForce", "Wrench"),
 }  # fmt: skip
 
@@ -87,7 +88,7 @@ GOOD = {
     "segment1": [((0.0, 0.0, 0.0), (0.0, 0.0, 0.1))], "segment2": [((0.0, 0.0, 0.0), (0.1, 0.0, 0.1))],
     "geometry1": ["ball"], "geometry2": ["ground"], "mu": [0.3], "restitution": [0.5], "lower": [-50.0],
     "semiaxes": [(0.1, 0.1, 0.0)], "points": [np.vstack([np.zeros(3), 0.01 * np.eye(3)])], "below": [0.1],
-    "rim": [0.01],
+    "rim": [0.01], "solid1": [(0.01, 0.01, 0.01)], "solid2": [(0.0, 0.02, 0.02)],
 }  # fmt: skip
 ROW = {"function": [lambda *_: (np.zeros((1, 3)), [0.0])], "size": [1]}
 GAP = {

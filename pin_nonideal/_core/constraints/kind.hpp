@@ -33,6 +33,8 @@
 #include "constraints/kinds/point.hpp"
 #include "constraints/kinds/rim.hpp"
 #include "constraints/kinds/rim_slip.hpp"
+#include "constraints/kinds/rims.hpp"
+#include "constraints/kinds/rims_slip.hpp"
 #include "constraints/kinds/rolling.hpp"
 #include "constraints/kinds/solid.hpp"
 #include "constraints/kinds/solid_slip.hpp"
@@ -47,7 +49,8 @@ using Kind = std::variant<PointRows, ContactRow, CapsulesRow, BoxRow, FrameRows,
                           RollingRows, CouplingRows, MotionRows, LimitRow, UserRows, UserGapRow, DofRows,
                           HingeSlipRows, TurnSlipRows, ContactSlipRows, CapsulesSlipRows, BoxSlipRows, CouplingSlipRow,
                           UserSlipRows, EllipsoidRow, EllipsoidSlipRows, HullRow, HullSlipRows, RevolvedRow,
-                          RevolvedSlipRows, LineRow, LineSlipRows, RimRow, RimSlipRows>;
+                          RevolvedSlipRows, LineRow, LineSlipRows, RimRow, RimSlipRows, RimsRow,
+                          RimsSlipRows>;
 
 // Rows of one constraint before any is left out.
 struct RowValues {

@@ -97,6 +97,10 @@ double Reach::of(const Workspace&, const RimRow& kind) const {
     return of_points(kind.frame1, kind.rim, kind.frame2, kind.solid.reach);
 }
 
+double Reach::of(const Workspace&, const RimsRow& kind) const {
+    return of_points(kind.frame1, kind.first.reach, kind.frame2, kind.second.reach);
+}
+
 // Of any two points that far from their frames.
 double Reach::of_points(const Frame& frame1, double reach1, const Frame& frame2, double reach2) const {
     const Bound a = frame_bound(frame1), b = frame_bound(frame2);
@@ -129,6 +133,7 @@ double Reach::bound(const Workspace& w, int gap) const {
     if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return of(w, *revolved);
     if (const auto* line = std::get_if<LineRow>(&kind)) return of(w, *line);
     if (const auto* rim = std::get_if<RimRow>(&kind)) return of(w, *rim);
+    if (const auto* rims = std::get_if<RimsRow>(&kind)) return of(w, *rims);
     return of(w, std::get<LimitRow>(kind));
 }
 
@@ -156,6 +161,11 @@ double Reach::speed(const LineRow& kind) const {
 double Reach::speed(const RimRow& kind) const {
     const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
     return a.velocity + kind.rim * a.spin + b.velocity + kind.solid.reach * b.spin;
+}
+
+double Reach::speed(const RimsRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.velocity + kind.first.reach * a.spin + b.velocity + kind.second.reach * b.spin;
 }
 
 double Reach::speed(const BoxRow& kind) const {
@@ -198,6 +208,8 @@ double Reach::rise(const Workspace& w, int gap) const {
         passing = rise(line->half1, line->solid.reach, line->frame1, line->frame2, line->radius);
     else if (const auto* rim = std::get_if<RimRow>(&kind))
         passing = rise(rim->rim, rim->solid.reach, rim->frame1, rim->frame2, rim->radius);
+    else if (const auto* rims = std::get_if<RimsRow>(&kind))
+        passing = rise(rims->first.reach, rims->second.reach, rims->frame1, rims->frame2, rims->radius);
     return bound(w, gap) + passing;
 }
 

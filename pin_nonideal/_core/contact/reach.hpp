@@ -38,6 +38,7 @@ private:
     double of(const Workspace& w, const BoxRow& kind) const;
     double of(const Workspace& w, const LineRow& kind) const;
     double of(const Workspace& w, const RimRow& kind) const;
+    double of(const Workspace& w, const RimsRow& kind) const;
     template <class Solid> double of(const Workspace& w, const SolidRow<Solid>& kind) const;
     double of(const Workspace& w, const LimitRow& kind) const;
     double of_points(const Frame& frame1, double reach1, const Frame& frame2, double reach2) const;
@@ -48,6 +49,7 @@ private:
     double speed(const BoxRow& kind) const;
     double speed(const LineRow& kind) const;
     double speed(const RimRow& kind) const;
+    double speed(const RimsRow& kind) const;
     template <class Solid> double speed(const SolidRow<Solid>& kind) const;
     double speed(const LimitRow& kind) const { return speed_[p.mechanism.joints[kind.joint].iv]; }
     template <class K> double speed(const K&) const { return HUGE_VAL; }

@@ -23,7 +23,8 @@ struct Separation {
         const Kind& kind = p.blocks[p.gaps[gap].block].kind;
         return std::holds_alternative<CapsulesRow>(kind) || std::holds_alternative<BoxRow>(kind) ||
                std::holds_alternative<HullRow>(kind) || std::holds_alternative<RevolvedRow>(kind) ||
-               std::holds_alternative<LineRow>(kind) || std::holds_alternative<RimRow>(kind);
+               std::holds_alternative<LineRow>(kind) || std::holds_alternative<RimRow>(kind) ||
+               std::holds_alternative<RimsRow>(kind);
     }
     static Separation of(const Program& p, const Workspace& w, int gap) {
         const Kind& kind = p.blocks[p.gaps[gap].block].kind;
@@ -34,6 +35,7 @@ struct Separation {
         if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return of(s, *revolved);
         if (const auto* line = std::get_if<LineRow>(&kind)) return of(s, *line);
         if (const auto* rim = std::get_if<RimRow>(&kind)) return of(s, *rim);
+        if (const auto* rims = std::get_if<RimsRow>(&kind)) return of(s, *rims);
         return of(s, std::get<CapsulesRow>(kind));
     }
     static Separation of(const Sides<Pose>& s, const CapsulesRow& kind) {
@@ -65,6 +67,9 @@ struct Separation {
     static Separation of(const Sides<Pose>& s, const RimRow& kind) {
         return of_middles(s, NearestOfRim<Sides<Pose>>(s, kind.solid, kind.rim).n, kind.radius, s.a.R.col(2));
     }
+    static Separation of(const Sides<Pose>& s, const RimsRow& kind) {
+        return of_middles(s, NearestOfRims<Sides<Pose>>(s, kind.first, kind.second).n, kind.radius, s.a.R.col(2));
+    }
     static Separation of_middles(const Sides<Pose>& s, const Vec3& normal, double radius, const Vec3& axis_of_first) {
         Separation out{{}, 0, normal, radius};
         out.apart[0] = s.a.x - s.b.x;
@@ -84,6 +89,9 @@ struct Separation {
                 least -= line->solid.support(local) + std::abs(direction.dot(apart[4]));
             if (const auto* rim = std::get_if<RimRow>(&kind))
                 least -= rim->solid.support(local) + rim->rim * direction.cross(apart[4]).norm();
+            if (const auto* rims = std::get_if<RimsRow>(&kind))
+                least -= rims->second.support(local) +
+                         rims->first.support(-direction.dot(apart[4]), direction.cross(apart[4]).norm());
         }
         return least - radius;
     }
@@ -97,10 +105,11 @@ inline bool stays_above(double from, double to, double parabola, double least) {
     return std::abs(to - from) >= parabola || from - slope * slope / (4.0 * parabola) > least;
 }
 
-// How far points of two bodies may be from each other where a rim or a segment meets a solid; of others it is not asked.
+// How far points of two bodies may be from each other where a rim or a segment meets a solid, or two of them meet; of others it is not asked.
 inline double span(const Kind& kind, const Separation& at) {
     if (const auto* line = std::get_if<LineRow>(&kind)) return at.apart[0].norm() + line->half1 + line->solid.reach;
     if (const auto* rim = std::get_if<RimRow>(&kind)) return at.apart[0].norm() + rim->rim + rim->solid.reach;
+    if (const auto* rims = std::get_if<RimsRow>(&kind)) return at.apart[0].norm() + rims->first.reach + rims->second.reach;
     return HUGE_VAL;
 }
 

@@ -29,6 +29,7 @@ Extents extents(const Kind& kind) {
     if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return {0.0, revolved->solid.reach};
     if (const auto* line = std::get_if<LineRow>(&kind)) return {line->half1, line->solid.reach};
     if (const auto* rim = std::get_if<RimRow>(&kind)) return {rim->rim, rim->solid.reach};
+    if (const auto* rims = std::get_if<RimsRow>(&kind)) return {rims->first.reach, rims->second.reach};
     return {};
 }
 

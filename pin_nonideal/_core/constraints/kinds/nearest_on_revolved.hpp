@@ -25,9 +25,19 @@ struct Revolved {
           reach(std::hypot(half, std::max(below, above))) {}
     // Largest component of its points along a direction in its axes.
     double support(const Vec3& direction) const {
-        const double across = std::hypot(direction[0], direction[1]);
-        return std::max(half * direction[2] + above * across, -half * direction[2] + below * across);
+        return support(direction[2], std::hypot(direction[0], direction[1]));
     }
+    // The same of one with a component along the axis, and the rest across it.
+    template <class Scalar>
+    PN_INLINE Scalar support(const Scalar& along, const Scalar& across) const {
+        const Scalar high = half * along + above * across, low = below * across - half * along;
+        return high > low ? high : low;
+    }
+    // Of a side: components of its normal away from the axis and along it, radius in the middle, growth along the axis.
+    double side_out() const { return 2.0 * half / std::hypot(2.0 * half, below - above); }
+    double side_up() const { return (below - above) / std::hypot(2.0 * half, below - above); }
+    double middle() const { return 0.5 * (below + above); }
+    double widening() const { return 0.5 * (above - below) / half; }
 };
 
 template <class Sides>
