@@ -91,15 +91,14 @@ def test_six_feet_begin_to_slip_in_one_step():
     assert run.stats.evaluations < 400
 
 
-def test_a_table_rests_beside_one_that_begins_to_slip():
-    """Spun by a moment near what any loads of its six feet can hold, more than their least-norm loads do."""
+@pytest.mark.parametrize("moment", [9.0, 10.0])
+def test_tables_side_by_side_begin_as_each_alone(moment):
+    """Both spun by moments, the second beyond what its feet hold; the loads of the feet are even."""
     turn = np.pi / 3.0 * np.arange(6)
-    inner = np.where(np.arange(6) % 2 == 0, 0.3, 0.1)
-    places = np.column_stack([inner * np.cos(turn), inner * np.sin(turn), np.full(6, -0.3)])
-    most = 0.5 * MASS * GRAVITY * 0.3  # all of the weight on the three outer feet
-    least = 0.5 * MASS * GRAVITY * inner.mean()  # evenly
+    radius = np.where(np.arange(6) % 2 == 0, 0.3, 0.1)
+    places = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full(6, -0.3)])
     model = pin.Model()
-    for body in ("held", "slips"):
+    for body in ("first", "second"):
         joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), body)
         model.appendBodyToJoint(joint, pin.Inertia(MASS, np.zeros(3), INERTIA * np.eye(3)), pin.SE3.Identity())
         for k, place in enumerate([*places, np.zeros(3)]):
@@ -107,12 +106,12 @@ def test_a_table_rests_beside_one_that_begins_to_slip():
             model.addFrame(pin.Frame(f"{body} {k}", joint, 0, placement, pin.FrameType.OP_FRAME))
     q0 = pin.neutral(model)
     q0[[2, 9]], q0[7] = 0.3, 5.0
-    contacts = [pn.PointContact(f"{body} {k}", mu=0.5) for body in ("held", "slips") for k in range(6)]
-    moment = 0.5 * (most + least)
-    forces = [
-        pn.Wrench("held 6", [0.0, 0.0, 0.0, 0.0, 0.0, moment]),
-        pn.Wrench("slips 6", [0.0, 0.0, 0.0, 0.0, 0.0, 1.1 * most]),
-    ]
-    solution = pn.Scene(model, contacts=contacts, forces=forces, q0=q0).solve(q0, np.zeros(12), 0.0)
-    assert np.abs(solution.a[:6]).max() < 1e-9
-    assert solution.a[11] > 1.0
+    contacts = [pn.PointContact(f"{body} {k}", mu=0.5) for body in ("first", "second") for k in range(6)]
+    forces = [pn.Wrench("first 6", [0.0] * 5 + [moment]), pn.Wrench("second 6", [0.0] * 5 + [16.0])]
+    scene = pn.Scene(model, contacts=contacts, forces=forces, q0=q0)
+    held = 0.5 * MASS * GRAVITY * radius.mean()
+    begun = scene.solve(q0, np.zeros(12), 0.0).a
+    assert begun[5] == pytest.approx(max(moment - held, 0.0) / INERTIA, abs=1e-9)
+    assert begun[11] == pytest.approx((16.0 - held) / INERTIA, abs=1e-9)
+    run = pn.simulate(scene, 1e-3, output_dt=1e-3)
+    assert np.abs(run.v[-1] - 1e-3 * begun).max() < 1e-9

@@ -99,12 +99,6 @@ struct Search {
     }
 };
 
-bool lets_go(const std::vector<char>& rests, const std::vector<Mode>& modes) {
-    for (size_t e = 0; e < rests.size(); ++e)
-        if (rests[e] && slips(modes[e])) return true;
-    return false;
-}
-
 }  // namespace
 
 Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, double width) {
@@ -169,12 +163,11 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
         if (search.failure) throw *search.failure;
         throw Failure(Failure::Kind::not_converged, t);
     };
-    // What slides, or begins to, rubs by shares of its own law, which friction follows and cones do not; what rests by any
-    // shares goes on resting.
-    const auto decides_alone = [&](const RestingMotion& answer) {
+    // What slides, or begins to, rubs by the shares of loads that friction follows, and which cones do not.
+    const auto decides_alone = [&](const Choice& closed) {
         try {
-            close(answer.closed, nullptr);
-            if (!lets_go(answer.rests, w.state.mode)) return true;
+            close(closed, nullptr);
+            return true;
         } catch (const Failure& failure) {
             if (failure.kind != Failure::Kind::not_converged && failure.kind != Failure::Kind::paradox) throw;
         }
@@ -186,7 +179,7 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
     const bool many = std::count(question.rest.begin(), question.rest.end(), char(1)) >= may_share;
     if (many && question.breaking.empty()) {
         const std::optional<RestingMotion> answer = together();
-        if (answer && answer->shared && (answer->drags || answer->begins()) && decides_alone(*answer)) return;
+        if (answer && answer->shared && answer->slides() && decides_alone(answer->closed)) return;
         if (answer && answer->shared) return close(answer->closed, &*answer);
     }
     try {

@@ -189,42 +189,17 @@ struct RestingProblem {
             if (cones[i].dim == 1 || !at_its_limit(i) || !(slip.norm() > least)) continue;
             // Where slip begins slowly its force tells the way better than what is left of an acceleration.
             const VecX friction = f.segment(first[i] + 1, slip.size());
-            const VecX way = friction.norm() > none * f.cwiseAbs().maxCoeff() ? VecX(-friction.normalized()) : VecX(slip.normalized());
+            const bool tells = friction.norm() > none * f.cwiseAbs().maxCoeff();
+            const VecX way = tells ? VecX(-friction.normalized()) : VecX(slip.normalized());
             for (int k = 0; k < slip.size(); ++k) out.direction[e][k] = way[k];
             out.modes[e] = p.frictions[e].dim > 1 || way[0] > 0.0 ? slip_plus : slip_minus;
-        }
-        find_rest(out);
-    }
-
-    bool tied(size_t i, size_t j) const {
-        const auto both = [&](const MatX& M) { return M.block(first[i], first[j], cones[i].dim, cones[j].dim); };
-        return !both(W).isZero(0.0) || !both(dragging).isZero(0.0);
-    }
-
-    // What slips takes along what is tied to it, and what is tied to that.
-    void find_rest(RestingMotion& out) const {
-        const auto element = [&](size_t i) { return p.gaps[rows.gaps[i]].sliding; };
-        std::vector<size_t> moved;
-        for (size_t i = 0; i < cones.size(); ++i) {
-            const int e = element(i);
-            const bool holds = e >= 0 && out.modes[e] == sticking;
-            if (holds) out.rests[e] = 1;
-            else moved.push_back(i);
-        }
-        for (size_t k = 0; k < moved.size(); ++k) {
-            for (size_t i = 0; i < cones.size(); ++i) {
-                const int e = element(i);
-                if (e < 0 || !out.rests[e] || !tied(i, moved[k])) continue;
-                out.rests[e] = 0;
-                moved.push_back(i);
-            }
         }
     }
 };
 
 }  // namespace
 
-bool RestingMotion::begins() const {
+bool RestingMotion::slides() const {
     return std::any_of(modes.begin(), modes.end(), [](Mode mode) { return slips(mode); });
 }
 
@@ -244,15 +219,13 @@ std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, doub
     if (gaps.empty() || !fits(p)) return std::nullopt;
     const RunState before = w.state;
     RestingMotion out{std::vector<char>(p.gaps.size(), 0), std::vector<Mode>(p.frictions.size(), unloaded),
-                      std::vector<Vec3>(p.frictions.size(), Vec3::Zero()), false, false,
-                      std::vector<char>(p.frictions.size(), 0)};
+                      std::vector<Vec3>(p.frictions.size(), Vec3::Zero())};
     bool found = false;
     try {
         release_contacts(p, w, t, q, v, question.rest);
         RestingProblem problem(p, w, v, gaps, question, before);
         found = problem.solve(out.shared);
         if (found) problem.read(out);
-        out.drags = std::count(problem.slides.begin(), problem.slides.end(), char(1)) > 0;
     } catch (const Failure& failure) {  // what other rows say is found again, and told, by those who ask for the motion
         if (failure.kind == Failure::Kind::interrupted) throw;
     }

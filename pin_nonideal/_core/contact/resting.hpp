@@ -14,10 +14,8 @@ struct RestingMotion {
     std::vector<Mode> modes;      // of all elements
     std::vector<Vec3> direction;  // of the slip of those that begin to slip
     bool shared = false;          // contacts share their load in several ways
-    bool drags = false;           // some slide already
-    std::vector<char> rests;      // elements that stick, none of which is tied to one that slips
 
-    bool begins() const;  // some slip, which hold no more or slide already
+    bool slides() const;  // some slip already, or begin to
     // The modes of elements at rest, with the directions in which they begin to slip.
     void answer(const Program& p, Workspace& w, ModeQuestion& question) const;
 };
