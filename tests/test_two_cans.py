@@ -1,4 +1,4 @@
-"""Cylinders and cones with each other: gaps with a proof and beside Coal's, what rests, rolls and is thrown."""
+"""Cylinders and cones with each other: gaps with a proof and beside Coal's, what rests, rolls and flies."""
 
 from __future__ import annotations
 
