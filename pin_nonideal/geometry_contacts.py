@@ -4,7 +4,7 @@ A half-space meets a sphere or an ellipsoid at one point, a capsule at its two e
 its corners, a cylinder or a cone at its rims, its faces and its tip.  Spheres and capsules meet each other at
 one place.  Boxes and convex meshes meet spheres, capsules and each other with corners on faces and edges on
 edges: solids with flat faces touch in no other way.  Cylinders and cones meet spheres, and with their faces,
-sides, rims and tips capsules, boxes and convex meshes.
+sides, rims and tips capsules, boxes, convex meshes and each other.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class GeometryContact:
     scene is made: a half-space with spheres, ellipsoids, capsules (both ends), boxes and convex meshes
     (corners), cylinders and cones (rims, eight points of a face, the tip); spheres and capsules with each
     other (one place); boxes and convex meshes with spheres, capsules and each other (corners on faces, edges
-    on edges); cylinders and cones with spheres, capsules, boxes and convex meshes (sides, rims, eight points
-    of a face and the chords between them, the tip).  Where edges meet edges they are rounded; the faces
+    on edges); cylinders and cones with all of these and each other (sides, rims, eight points of a face and
+    the chords between them, the tip).  Where edges meet edges they are rounded; the faces
     stay where they are.
     Rows: 1 for each place that is closed.  lam: the normal force there [N].
 
@@ -48,8 +48,9 @@ class GeometryContact:
         restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
         name: used in messages and results; several places are numbered.
         rounding: radius to which edges are rounded where boxes and convex meshes meet each other, cylinders
-            or cones, and how far the rim of a cylinder or cone stands back behind its face, but against
-            spheres [m]; a thousandth of the least edge of both, and of the radius, when None.
+            or cones, and rims where these meet each other, and how far the rim of a cylinder or cone stands
+            back behind its face, but against spheres [m]; a thousandth of the least edge of both, of the
+            radius, and of the largest ball inside two cylinders or cones, when None.
     """
 
     geometry1: str

@@ -116,6 +116,11 @@ FLAT = {
         lambda q: q[2] - 0.3,
         below(0.09),
     ),
+    contacts.RevolvedContact: Case(  # the tip of a cone on the face of a cylinder
+        pn.RevolvedContact("body", "base", (0.18, 0.0, 0.1), (0.4, 1.0, 1.0), 0.01, name="it", **RUBS),
+        lambda q: q[2] - 0.3,
+        below(0.1),
+    ),
     contacts.JointLimit: Case(
         pn.JointLimit("z", lower=0.3, restitution=0.3, name="it"),
         lambda q: q[2] - 0.3,

@@ -17,7 +17,7 @@ PACKAGE = ROOT / "pin_nonideal"
 ORDER = """
 version errors types checks files equation
 timefunctions constraints laws contact_checks round_contacts hulls solid_contacts contacts collision_shapes \
-manifolds geometry_contacts forces actuation
+revolved_shapes revolved_manifolds manifolds geometry_contacts forces actuation
 _core core cones
 states: placements configurations orders named rows extents least_moves closure ways_out unmet projection
 compilation: failures callbacks names constraints contacts friction laws forces lowering analysis scene \

@@ -164,8 +164,8 @@ class Resolution:
         """Frames in the middle of both, along z, and half the length and both radii of each [m]."""
         first, second = self._two_bodies(c, who)
         (length1, *radii1), (length2, *radii2) = c.solid1, c.solid2
-        first, second = turned(moved(first, c.xyz1), c.rpy1), turned(moved(second, c.xyz2), c.rpy2)
-        return first, second, (0.5 * length1, *radii1), (0.5 * length2, *radii2)
+        one, other = (0.5 * length1, radii1[0], radii1[1]), (0.5 * length2, radii2[0], radii2[1])
+        return turned(moved(first, c.xyz1), c.rpy1), turned(moved(second, c.xyz2), c.rpy2), one, other
 
     def _two_bodies(self, c: Any, who: str) -> list[Frame]:
         ends = [self.frame(c.frame1, who), self.frame(c.frame2, who)]

@@ -105,7 +105,8 @@ inline bool stays_above(double from, double to, double parabola, double least) {
     return std::abs(to - from) >= parabola || from - slope * slope / (4.0 * parabola) > least;
 }
 
-// How far points of two bodies may be from each other where a rim or a segment meets a solid, or two of them meet; of others it is not asked.
+// How far points of two bodies may be from each other where a rim or a segment meets a solid, or two of them meet; of
+// others it is not asked.
 inline double span(const Kind& kind, const Separation& at) {
     if (const auto* line = std::get_if<LineRow>(&kind)) return at.apart[0].norm() + line->half1 + line->solid.reach;
     if (const auto* rim = std::get_if<RimRow>(&kind)) return at.apart[0].norm() + rim->rim + rim->solid.reach;

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "constraints/geometry.hpp"
+#include "constraints/kinds/nearest_along_line.hpp"
 #include "constraints/kinds/nearest_on_revolved.hpp"
 #include "constraints/kinds/segments.hpp"
 
@@ -24,9 +25,12 @@ constexpr double rim_kink = 1e-9;
 constexpr double shown_nearest = 1e-14;
 // A search that only halves ends after so many looks; one of Newton's takes three to eight.
 constexpr int most_rim_looks = 80;
+// Chords of a disk, halved each time, and the angle around what they find in which Newton's steps go on.
+constexpr int most_chords = 40;
+constexpr double beside_chords = 1e-3;
 
-// A place on body 1 and the nearest one of a solid on body 2. As body 1 moves the place slides along `along` so that it stays
-// the nearest: around a rim, along a side too, or not at all. bend: of the distance along them.
+// A place on body 1 and the nearest one of a solid on body 2. As body 1 moves the place slides along `along` so that it
+// stays the nearest: around a rim, along a side too, or not at all. bend: of the distance along them.
 template <class Sides>
 struct NearestToRevolved {
     using Vec = typename Sides::Vec;
@@ -60,39 +64,32 @@ struct NearestAroundRim {
         : ex(s.a.R * Vec3::UnitX()), ey(s.a.R * Vec3::UnitY()), middle(s.a.x + s.a.R * Vec3(0.0, 0.0, height)),
           radius(rim) {}
 
+    // From a place inside the rim or on it the distance only grows up its slope: the nearest place of the whole disk lies in
+    // the other half of the plane. So an arc of the rim closes in, first half of it, and Newton's steps go on inside it;
+    // where two arcs are left, chords of the disk tell which.
     PN_INLINE NearestToRevolved<Sides> find(const Sides& s, const Revolved& solid) const {
         NearestToRevolved<Sides> out(s, middle, solid);
         if (radius == 0.0) return out;
-        Way now = start(s, out.at), low = now, high = now;
-        bool between = false;
+        Way now = start(s, out.at);
+        Arc arc{{now.y, -now.x}, {-now.y, now.x}};
         Scalar steepest = HUGE_VAL;
         for (int look = 0; look < most_rim_looks; ++look) {
-            out.at = OnSolid(NearestToRevolved<Sides>::there(s, place(now)), solid);
-            const Way slope{out.at.n.dot(ex), out.at.n.dot(ey)};
-            const Scalar steep2 = dot(slope, slope);
-            if (!(steep2 > level_rim * level_rim)) break;  // the solid lies below the whole of it
-            const Way down = unit({-slope.x, -slope.y});
-            const Scalar around = cross(now, slope), outward = dot(now, slope);
-            if (!between && outward > 0.0 && look < most_rim_looks / 2) {
-                if (!(cross(now, down) > level_rim) && !(cross(now, down) < -level_rim) && look > 0) break;
-                now = down;
+            const OnSolid at = nearest(s, solid, now);
+            const Way slope = slope_of(at);
+            if (!(dot(slope, slope) > level_rim * level_rim)) break;  // the solid lies below the whole of it
+            const Scalar around = cross(now, slope), outward = dot(now, slope), steep = around < 0.0 ? -around : around;
+            if (!(steep > level_rim) && !(outward > 0.0)) break;
+            if (!cut(arc, now, slope)) {
+                now = of_chords(s, solid, now);
+                arc = {turned(now, Scalar(-beside_chords)), turned(now, Scalar(beside_chords))};
                 continue;
             }
-            const Scalar steep = around < 0.0 ? -around : around;
-            if (!(steep > level_rim)) break;
-            // No place nearer to the solid lies up the slope: only as far as the other end of the chord across it.
-            const Scalar part = 2.0 * dot(now, down);
-            const Way across = unit({part * down.x - now.x, part * down.y - now.y});
-            Way &behind = around < 0.0 ? low : high, &ahead = around < 0.0 ? high : low;
-            behind = now;
-            if (!between || within(low, across, high)) ahead = across;
-            between = true;
-            const Scalar bend = radius * curvature(out.at, now) - outward;
+            const Scalar bend = radius * curvature(at, now) - outward;
             const bool fast = steep < 0.5 * steepest && bend > 0.0;
             steepest = steep;
             const Way newton = turned(now, fast ? Scalar(-around / bend) : Scalar(0.0));
-            const Way next = fast && within(low, newton, high) ? newton : half_way(low, high);
-            if (!within(low, next, high)) break;
+            const Way next = fast && arc.holds(newton) ? newton : arc.middle();
+            if (!arc.holds(next)) break;
             now = next;
         }
         polish(s, solid, now, out);
@@ -108,17 +105,48 @@ private:
         return {a.x / length, a.y / length};
     }
     static PN_INLINE Way turned(const Way& a, const Scalar& by) { return unit({a.x - by * a.y, a.y + by * a.x}); }
-    // Inside the arc from low to high, counted around the axis.
-    static PN_INLINE bool within(const Way& low, const Way& a, const Way& high) {
-        const bool after = cross(low, a) > 0.0, before = cross(a, high) > 0.0;
-        return cross(low, high) >= 0.0 ? after && before : after || before;
+    // Counted around the axis, of no more than half the rim.
+    struct Arc {
+        Way low, high;
+        PN_INLINE bool holds(const Way& way) const { return cross(low, way) > 0.0 && cross(way, high) > 0.0; }
+        PN_INLINE Way middle() const {
+            const Way sum{low.x + high.x, low.y + high.y};
+            return dot(sum, sum) > level_rim ? unit(sum) : Way{-low.y, low.x};
+        }
+    };
+    // Along the chord from a place of the arc; false where that would leave a piece at either end.
+    static PN_INLINE bool cut(Arc& arc, const Way& now, const Way& slope) {
+        const Way down = unit({-slope.x, -slope.y});
+        const Scalar part = 2.0 * dot(now, down);
+        const Way across = unit({part * down.x - now.x, part * down.y - now.y});
+        const bool ahead = cross(now, slope) < 0.0;
+        const Arc behind{arc.low, now}, before{now, arc.high}, kept = ahead ? before : behind;
+        const Arc rest = ahead ? behind : before;
+        if (dot(now, slope) > 0.0 && rest.holds(across)) return false;
+        arc = kept;
+        if (arc.holds(across)) (ahead ? arc.high : arc.low) = across;
+        return true;
     }
-    static PN_INLINE Way half_way(const Way& low, const Way& high) {
-        const Way sum{low.x + high.x, low.y + high.y};
-        if (!(dot(sum, sum) > 0.0)) return {-low.y, low.x};
-        const Way middle = unit(sum);
-        return cross(low, high) >= 0.0 ? middle : Way{-middle.x, -middle.y};
+    // The nearest place of the whole disk, chord after chord along a way: the least distance of these is convex across it.
+    PN_INLINE Way of_chords(const Sides& s, const Revolved& solid, const Way& way) const {
+        const Vec along = out(way), beside = around(way);
+        Way found = way;
+        double low = -1.0, high = 1.0;
+        for (int look = 0; look < most_chords; ++look) {
+            const double part = 0.5 * (low + high), half = radius * std::sqrt(1.0 - part * part);
+            const NearestAlongLine<Sides> line(s, solid, middle + radius * part * beside, along, half);
+            const bool inside = half > line.part && -half < line.part;
+            const Scalar ahead = line.part / radius, far = inside ? Scalar(0.0) : Scalar(part / ahead);
+            // The ends of chords lie on the rim, and recede along it.
+            (line.at.n.dot(beside) - far * line.at.n.dot(along) > 0.0 ? high : low) = part;
+            found = {ahead * way.x - part * way.y, ahead * way.y + part * way.x};
+        }
+        return dot(found, found) > 0.0 ? unit(found) : way;
     }
+    PN_INLINE OnSolid nearest(const Sides& s, const Revolved& solid, const Way& way) const {
+        return OnSolid(NearestToRevolved<Sides>::there(s, place(way)), solid);
+    }
+    PN_INLINE Way slope_of(const OnSolid& at) const { return {at.n.dot(ex), at.n.dot(ey)}; }
     PN_INLINE Vec place(const Way& way) const { return middle + radius * out(way); }
     PN_INLINE Vec out(const Way& way) const { return way.x * ex + way.y * ey; }
     PN_INLINE Vec around(const Way& way) const { return way.x * ey - way.y * ex; }
@@ -128,7 +156,7 @@ private:
     }
     // Down the slope at the middle; over a face toward the middle of the solid.
     PN_INLINE Way start(const Sides& s, const OnSolid& at) const {
-        const Way slope{at.n.dot(ex), at.n.dot(ey)};
+        const Way slope = slope_of(at);
         if (dot(slope, slope) > level_rim) return unit({-slope.x, -slope.y});
         const Vec toward = s.b.x - middle;
         const Way there{toward.dot(ex), toward.dot(ey)};
@@ -138,7 +166,7 @@ private:
         for (int step = 0; step < 2; ++step) {
             out.place = place(now);
             out.along[0] = around(now);
-            out.at = OnSolid(NearestToRevolved<Sides>::there(s, out.place), solid);
+            out.at = nearest(s, solid, now);
             out.bend[0] = curvature(out.at, now) - this->out(now).dot(out.at.n) / radius;
             const Scalar slope = out.at.n.dot(out.along[0]);
             out.free = out.bend[0] * radius > straight_rim && slope * slope < rim_kink * rim_kink ? 1 : 0;
@@ -211,7 +239,8 @@ private:
         const Scalar root = sqrt(left), across = w.dot(apart) < 0.0 ? Scalar(-root) : root;
         const Vec normal = part1 * e1 + part2 * e2 + across * w;
         // Lines from the middles of both sides.
-        const Vec out1 = (up1 * e1 - normal) / Scalar(first.side_out()), out2 = (normal - up2 * e2) / Scalar(second.side_out());
+        const Vec out1 = (up1 * e1 - normal) / Scalar(first.side_out());
+        const Vec out2 = (normal - up2 * e2) / Scalar(second.side_out());
         const Vec line1 = e1 + first.widening() * out1, line2 = e2 + second.widening() * out2;
         const Vec from = apart + first.middle() * out1 - second.middle() * out2;
         const Scalar a = line1.dot(line1), b = line1.dot(line2), c = line2.dot(line2);
