@@ -12,7 +12,9 @@ from scipy.optimize import nnls
 
 import pin_nonideal as pn
 
-DRAWS = 40
+DRAWS = range(40)
+# One of their feet has to pull where all stay closed; they lift then.
+LIFTING = [1594, 2437, 2789, 3003, 3273, 3401, 3448, 3772, 4478]
 FACETS = 256  # of the cone of a foot that sticks: inside the circle by 8e-5 of it
 MASS, INERTIA, GRAVITY = 10.0, 0.3, 9.81
 
@@ -77,7 +79,7 @@ def lack(places, mu, pushed, push, solution):
     )
 
 
-@pytest.mark.parametrize("seed", range(DRAWS))
+@pytest.mark.parametrize("seed", [*DRAWS, *LIFTING])
 def test_what_begins_keeps_the_law_of_coulomb(seed):
     scene, *rest = drawn(seed)
     assert lack(*rest, scene.solve(*scene.project(), 0.0)) < 1e-8
@@ -91,7 +93,7 @@ def test_what_begins_keeps_it_in_many_draws(first):
         assert lack(*rest, scene.solve(*scene.project(), 0.0)) < 1e-8, seed
 
 
-@pytest.mark.parametrize("seed", range(DRAWS))
+@pytest.mark.parametrize("seed", [*DRAWS, *LIFTING])
 def test_the_motion_goes_on_as_it_begins(seed):
     scene, *_ = drawn(seed)
     begun = scene.solve(*scene.project(), 0.0)

@@ -1,12 +1,15 @@
 #include "contact/closing.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "contact/gaps.hpp"
 #include "contact/impact.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
+#include "dynamics/slip.hpp"
+#include "friction/modes.hpp"
 
 namespace pn {
 
@@ -16,10 +19,37 @@ using Choice = std::vector<char>;  // of closed gaps
 
 // All choices of so many contacts are looked through where steps from one to the next do not lead to the right one.
 constexpr int most_enumerated = 12;
+// The same of those in which what begins to slip goes its way: without, there is a motion to go on by.
+constexpr int most_aligned = 8;
 // What would close a wider gap [m or rad] within `touching_time` outruns light.
 constexpr double sure_gap = 1e-3;
 // Contacts of which some may share a load in several ways.
 constexpr int may_share = 3;
+
+// Part of the accelerations in play below which slip begins so slowly that they do not tell its way, and by how much
+// another way differs.
+constexpr double slow = 1e-4, astray = 1e-6;
+
+// Whether all that begins to slip from rest goes against its friction. Where a contact would have to pull the others may
+// rub in ways that are none of theirs, and hide it.
+bool goes_its_way(const Program& p, Workspace& w, const VecX& v) {
+    const double least = slow * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
+        const Friction& f = p.frictions[e];
+        if (f.dim == 1 || f.gap < 0 || is_open(p, w, e) || !slips(w.state.mode[e]) || !at_rest(p, w, e, v)) continue;
+        const Block& block = p.blocks[f.block];
+        multiply(block, w.now.A, w.now.a, w.scratch.r);
+        double size = 0.0, along = 0.0;
+        for (int k = 0; k < f.dim; ++k) {
+            const double begins = w.scratch.r[block.row + k] - w.now.b[block.row + k];
+            size += begins * begins;
+            along += begins * w.state.slip_direction[e][k];
+        }
+        size = std::sqrt(size);
+        if (size > least && along < (1.0 - astray) * size) return false;
+    }
+    return true;
+}
 
 // The choices tried at one state, as the right one is sought.
 struct Search {
@@ -30,6 +60,7 @@ struct Search {
     const Choice& rest;
     const std::function<void(const RestingMotion*)>& find_modes;
     const RestingMotion* together = nullptr;
+    bool aligned = false;  // what begins to slip is asked to go its way
     std::vector<Choice> tried;
     std::optional<Failure> failure;  // of the first choice that had no motion
 
@@ -45,6 +76,7 @@ struct Search {
             if (!failure) failure = thrown;
             return std::nullopt;
         }
+        if (aligned && !goes_its_way(p, w, v)) return std::nullopt;
         Choice next = choice;
         int change = pulling_contact(p, w);
         if (change < 0) change = approaching(choice);
@@ -85,7 +117,7 @@ struct Search {
         std::vector<int> list;
         for (int i = 0; i < static_cast<int>(rest.size()); ++i)
             if (rest[i]) list.push_back(i);
-        if (static_cast<int>(list.size()) > most_enumerated) return false;
+        if (static_cast<int>(list.size()) > (aligned ? most_aligned : most_enumerated)) return false;
         std::vector<unsigned> order(1u << list.size());
         for (unsigned k = 0; k < order.size(); ++k) order[k] = k;
         const auto count = [](unsigned bits) { return __builtin_popcount(bits); };
@@ -156,9 +188,12 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
         return resting_motion(p, w, t, q, v, question);
     };
     const auto close = [&](const Choice& start, const RestingMotion* answer) {
-        Search search{p, w, t, v, question.rest, find_modes, answer, {}, {}};
         Choice first = start;
         if (question.opening >= 0) first[question.opening] = 0;
+        Search search{p, w, t, v, question.rest, find_modes, answer, true, {}, {}};
+        if (search.walk(first) || search.enumerate()) return;
+        search.aligned = false;
+        search.tried.clear();
         if (search.walk(first) || search.enumerate()) return;
         if (search.failure) throw *search.failure;
         throw Failure(Failure::Kind::not_converged, t);
