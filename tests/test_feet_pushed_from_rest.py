@@ -46,8 +46,8 @@ def drawn(seed):
     pushed = np.array([*rng.uniform(-0.2, 0.2, 2), rng.uniform(-height, height)])
     way = rng.uniform(0.0, 2.0 * np.pi)
     force = rng.uniform(0.5, 2.0) * mu * MASS * GRAVITY
-    moments = [*rng.uniform(-3.0, 3.0, 2), rng.uniform(-15.0, 15.0)]
-    push = [force * np.cos(way), force * np.sin(way), rng.uniform(-50.0, 50.0), *moments]
+    lift, moments = rng.uniform(-50.0, 50.0), rng.uniform([-3.0, -3.0, -15.0], [3.0, 3.0, 15.0])
+    push = [force * np.cos(way), force * np.sin(way), lift, *moments]
     return table(places, mu, pushed, push), places, mu, pushed, np.array(push)
 
 
