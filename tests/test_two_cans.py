@@ -14,7 +14,17 @@ from pin_nonideal.revolved_shapes import FACE_CIRCLE, LEAST_ROUNDING, PASSED_ON
 from .mechanisms import GRAVITY, body, empty
 from .same_run import assert_same_run
 from .test_geometry_pairs import EXACT, by_coal, pair, placements, shape
-from .test_revolved_pairs import CAN, HERE, LEVEL, LYING, distance, free, point, segment
+from .test_revolved_pairs import (
+    CAN,
+    HERE,
+    LEVEL,
+    LYING,
+    assert_rows_are_differences_of_gaps,
+    distance,
+    free,
+    point,
+    segment,
+)
 
 PAIRS = [("cylinder", "cylinder"), ("cylinder", "cone"), ("cone", "cone")]
 ROUNDING = 0.01  # [m]
@@ -26,7 +36,6 @@ THIN = 1e-12  # [m]
 # Radii of rounding by which the shapes as they are may be nearer than their contacts: rims stand back and are
 # rounded, 1.3 at a right angle, and the tip by 1 / sin of half its angle, on both bodies.
 ROUNDED_OFF = 6.0
-STEP, SMOOTH = 1e-6, 1e-10  # [s] of differences; [m] by which a gap bends over it where its slope is one
 DEPTH = 1e-10  # [m], that nothing enters another
 LEDGER = 1e-5  # [J], of some 20, that step control at its default leaves
 CONE = coal.Cone(0.1, 0.3)
@@ -141,21 +150,7 @@ def test_nothing_is_left_out(kinds):
 
 @pytest.mark.parametrize("kinds", PAIRS)
 def test_rows_are_differences_of_gaps(kinds):
-    """Of every place, near and far: along a random motion, by central differences."""
-    scene, _ = pair(*kinds)
-    rng, runner, compared = np.random.default_rng(2), scene._compiled.program.runner(), 0
-    for q in placements(rng, 30):
-        v = rng.normal(size=6)
-        A, _, gaps, _ = runner.rows(q, v, 0.0)
-        before, after = (
-            runner.rows(pin.integrate(scene.model, q, by * v), v, 0.0)[2] for by in (-STEP, STEP)
-        )
-        # Where two features are as near, or what stands back has been entered, the slope leaps.
-        smooth = (np.abs(before + after - 2.0 * gaps) < SMOOTH) & (gaps > 0.0)
-        rates = A.reshape(-1, 6) @ v
-        assert rates[smooth] == pytest.approx(((after - before) / (2.0 * STEP))[smooth], abs=1e-7)
-        compared += smooth.sum()
-    assert compared > 0.9 * 30 * len(gaps)
+    assert_rows_are_differences_of_gaps(pair(*kinds)[0])
 
 
 def turned(x=0.0, y=0.0, z=0.0):
