@@ -30,8 +30,8 @@ constexpr int may_share = 3;
 // another way differs.
 constexpr double slow = 1e-4, astray = 1e-6;
 
-// Whether all that begins to slip from rest goes against its friction. Where a contact would have to pull the others may
-// rub in ways that are none of theirs, and hide it.
+}  // namespace
+
 bool goes_its_way(const Program& p, Workspace& w, const VecX& v) {
     const double least = slow * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
@@ -50,6 +50,8 @@ bool goes_its_way(const Program& p, Workspace& w, const VecX& v) {
     }
     return true;
 }
+
+namespace {
 
 // The choices tried at one state, as the right one is sought.
 struct Search {
@@ -70,7 +72,7 @@ struct Search {
         tried.push_back(choice);
         set_closed(p, w, choice);
         try {
-            find_modes(together && together->closed == choice ? together : nullptr);
+            find_modes(together && (together->is_near || together->closed == choice) ? together : nullptr);
         } catch (const Failure& thrown) {
             if (thrown.kind == Failure::Kind::interrupted || thrown.kind == Failure::Kind::not_finite) throw;
             if (!failure) failure = thrown;
@@ -199,9 +201,10 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
         throw Failure(Failure::Kind::not_converged, t);
     };
     // What slides, or begins to, rubs by the shares of loads that friction follows, and which cones do not.
-    const auto decides_alone = [&](const Choice& closed) {
+    const auto decides_alone = [&](RestingMotion near) {
+        near.is_near = true;
         try {
-            close(closed, nullptr);
+            close(near.closed, &near);
             return true;
         } catch (const Failure& failure) {
             if (failure.kind != Failure::Kind::not_converged && failure.kind != Failure::Kind::paradox) throw;
@@ -214,7 +217,7 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
     const bool many = std::count(question.rest.begin(), question.rest.end(), char(1)) >= may_share;
     if (many && question.breaking.empty()) {
         const std::optional<RestingMotion> answer = together();
-        if (answer && answer->shared && answer->slides() && decides_alone(answer->closed)) return;
+        if (answer && answer->shared && answer->slides() && decides_alone(*answer)) return;
         if (answer && answer->shared) return close(answer->closed, &*answer);
     }
     try {

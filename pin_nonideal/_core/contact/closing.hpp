@@ -36,8 +36,13 @@ private:
     Touching found_;
 };
 
+// Whether all that begins to slip from rest goes against its friction. Where a contact would have to pull the others may
+// rub in ways that are none of theirs, and hide it.
+bool goes_its_way(const Program& p, Workspace& w, const VecX& v);
+
 // Closes contacts out of those that rest at (t, q, v). `find_modes` finds what sticks and slips for those closed, or takes
-// it from the motion of all of them together where there is one, and leaves the workspace with the motion at v.
+// it from the motion of all of them together where there is one, and leaves the workspace with the motion at v. Where no
+// other is found it is one in which some of what begins to slip does not go its way yet, as steps make it do.
 void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                     const ClosingQuestion& question, const std::function<void(const RestingMotion*)>& find_modes);
 

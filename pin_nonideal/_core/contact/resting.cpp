@@ -185,6 +185,7 @@ struct RestingProblem {
                 continue;
             }
             out.modes[e] = sticking;
+            for (int k = 1; k < cones[i].dim; ++k) out.friction[e][k - 1] = f[first[i] + k];
             const auto slip = a.segment(first[i] + 1, cones[i].dim - 1);
             if (cones[i].dim == 1 || !at_its_limit(i) || !(slip.norm() > least)) continue;
             // Where slip begins slowly its force tells the way better than what is left of an acceleration.
@@ -204,6 +205,10 @@ bool RestingMotion::slides() const {
 }
 
 void RestingMotion::answer(const Program& p, Workspace& w, ModeQuestion& question) const {
+    if (is_near) {
+        question.near = friction;
+        return;
+    }
     for (int e : question.at_rest) {
         question.modes[e] = modes[e];
         if (p.frictions[e].dim > 1 && slips(modes[e])) w.state.slip_direction[e] = w.state.last_direction[e] = direction[e];
@@ -219,7 +224,8 @@ std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, doub
     if (gaps.empty() || !fits(p)) return std::nullopt;
     const RunState before = w.state;
     RestingMotion out{std::vector<char>(p.gaps.size(), 0), std::vector<Mode>(p.frictions.size(), unloaded),
-                      std::vector<Vec3>(p.frictions.size(), Vec3::Zero())};
+                      std::vector<Vec3>(p.frictions.size(), Vec3::Zero()), {}};
+    out.friction = out.direction;
     bool found = false;
     try {
         release_contacts(p, w, t, q, v, question.rest);

@@ -13,10 +13,12 @@ struct RestingMotion {
     std::vector<char> closed;     // of all gaps
     std::vector<Mode> modes;      // of all elements
     std::vector<Vec3> direction;  // of the slip of those that begin to slip
+    std::vector<Vec3> friction;   // of each element, along its directions
     bool shared = false;          // contacts share their load in several ways
+    bool is_near = false;         // not the motion that is asked for, but one from which to look for it
 
     bool slides() const;  // some slip already, or begin to
-    // The modes of elements at rest, with the directions in which they begin to slip.
+    // The modes of elements at rest, with the directions in which they begin to slip; of a near one its friction.
     void answer(const Program& p, Workspace& w, ModeQuestion& question) const;
 };
 

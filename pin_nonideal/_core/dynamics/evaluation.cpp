@@ -198,6 +198,10 @@ void measure_gap(const Program& p, Workspace& w, double t, const VecX& v, int ga
 
 void follow_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) {
     measure_gap(p, w, t, v, gap);
+    move_gap(p, w, t, v, gap);
+}
+
+void move_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) {
     if (p.is_users(gap)) return;
     const int i = p.gaps[gap].block;
     evaluate(p.blocks[i].kind, State{p.mechanism, w.now.terms, t, w.now.terms.q, v}, Part::motion, w.now.values[i]);

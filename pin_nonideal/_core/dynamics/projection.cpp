@@ -168,7 +168,9 @@ void follow_constraints(const Program& p, Workspace& w, double h, VecX& move) {
     move += w.scratch.scaled;
 }
 
-void learn_third_order(Workspace& w, double h) { w.state.third_order_lam += w.now.closing_lam / (h * h * h); }
+void learn_third_order(Workspace& w, double h) {
+    if (w.now.has_closing) w.state.third_order_lam += w.now.closing_lam / (h * h * h);
+}
 
 static double position_floor(const Program& p, const Workspace& w) { return rounding_part(w) * scene_size(p, w); }
 
@@ -178,7 +180,8 @@ static double velocity_floor(const Workspace& w, const VecX& v) {
 
 // No move has closed the position. Open contacts have rows here too: hundreds of numbers in each step.
 static void forget_closing(Workspace& w) {
-    std::fill_n(w.now.closing_lam.data(), w.now.closing_lam.size(), 0.0);
+    if (w.now.has_closing) w.now.closing_lam.setZero();
+    w.now.has_closing = false;
 }
 
 bool is_on_constraints(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
@@ -212,6 +215,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
         broyden_step(p, w, count);
         w.scratch.position_lam += w.scratch.position_lam_steps[count];
         w.now.closing_lam += w.scratch.position_lam_steps[count++];
+        w.now.has_closing = true;
         // One that goes on falling so, and ends below rounding, is evaluated where the step's end is configured.
         configured = count > 1 && largest * rate < trusted_part * floor;
         double now = largest;

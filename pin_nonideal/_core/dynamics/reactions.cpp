@@ -209,7 +209,7 @@ Force carried_wrench(const Program& p, Workspace& w, int index) {
     const Body& body = now.terms.body[frame.joint];
     WrenchAbout wrench{now, body.ref + body.p + body.R * frame.p};
     for (int k = 0; k < own.total; ++k) wrench.add(index, k, p.share(own, k, r.lam));
-    for (size_t e = 0; e < p.frictions.size(); ++e) {
+    for (int e : now.loaded) {
         const Friction& f = p.frictions[e];
         if (f.anchor != index) continue;
         for (int k = 0; k < f.dim; ++k)

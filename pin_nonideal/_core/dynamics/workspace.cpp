@@ -8,7 +8,7 @@ namespace pn {
 static void size(const Program& p, RunState& state) {
     const size_t elements = p.frictions.size();
     state.mode = Modes(elements);
-    state.closed.assign(p.gaps.size(), 1);
+    state.closed.assign(p.gaps.size(), 0);
     state.slip_direction.assign(elements, Vec3::UnitX());
     state.last_direction = state.slip_direction;
     state.lingers.assign(p.frictions.size(), 0);
@@ -30,6 +30,7 @@ static void size(const Program& p, Evaluation& now) {
     now.values.resize(p.blocks.size());
     for (size_t i = 0; i < p.blocks.size(); ++i) now.values[i].resize(p.blocks[i].kind, nv);
     now.idle.assign(p.blocks.size(), 0);
+    now.selected.assign(p.gaps.size(), 1);
     now.awake.reserve(p.blocks.size());
     now.touching.reserve(p.gaps.size());
     now.loaded.reserve(elements);
@@ -71,19 +72,26 @@ Workspace::Workspace(const Program& p) {
     set_modes(p, *this, state.mode);
 }
 
+// Thousands of contacts may be open: of those that stay so no more is looked at than that.
+static void select_contacts(const Program& p, Workspace& w) {
+    w.now.touching.clear();
+    for (size_t i = 0; i < p.gaps.size(); ++i) {
+        const char closed = w.state.closed[i];
+        if (closed) w.now.touching.push_back(static_cast<int>(i));
+        if (closed == w.now.selected[i]) continue;
+        w.now.selected[i] = closed;
+        w.now.idle[p.gaps[i].block] = !closed;
+        for (int e : p.gaps[i].elements) w.now.idle[p.frictions[e].block] = !closed;
+    }
+}
+
 void select_rows(const Program& p, Workspace& w) {
     const int before_gaps = p.gaps.empty() ? p.constraint_rows() : p.blocks[p.first_gap].row;
     std::fill(w.now.rows.required.begin(), w.now.rows.required.end(), char(0));
     std::fill_n(w.now.rows.required.begin(), before_gaps, char(1));
-    w.now.touching.clear();
-    for (size_t i = 0; i < p.gaps.size(); ++i) {
-        const Gap& gap = p.gaps[i];
-        const char open = !w.state.closed[i];
-        w.now.idle[gap.block] = open;
-        for (int e : gap.elements) w.now.idle[p.frictions[e].block] = open;
-        if (open) continue;
-        const Block& block = p.blocks[gap.block];
-        w.now.touching.push_back(static_cast<int>(i));
+    select_contacts(p, w);
+    for (int i : w.now.touching) {
+        const Block& block = p.blocks[p.gaps[i].block];
         std::fill_n(w.now.rows.required.begin() + block.row, block.kept.size(), char(1));
     }
     w.now.awake.clear();
@@ -112,11 +120,10 @@ void select_rows(const Program& p, Workspace& w) {
 
 void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes) {
     w.state.mode.values_ = modes;
-    for (size_t i = 0; i < p.gaps.size(); ++i)
-        if (!w.state.closed[i])
-            for (int e : p.gaps[i].elements) w.state.mode.values_[e] = unloaded;
-    for (size_t e = 0; e < modes.size(); ++e)
+    for (size_t e = 0; e < modes.size(); ++e) {
+        if (modes[e] != unloaded && is_open(p, w, static_cast<int>(e))) w.state.mode.values_[e] = unloaded;
         if (w.state.mode[e] == unloaded) w.now.slip_force[e] = Vec3::Zero();
+    }
     w.state.steps_since = never_decided;
     w.now.renew();
     select_rows(p, w);
@@ -132,7 +139,7 @@ void set_closed(const Program& p, Workspace& w, const std::vector<char>& closed)
 }
 
 void set_contacts(const Program& p, Workspace& w, const std::vector<char>& closed, const std::vector<Mode>& modes) {
-    for (size_t i = 0; i < closed.size(); ++i) {
+    for (int i : w.now.touching) {
         const Block& block = p.blocks[p.gaps[i].block];
         if (!closed[i]) std::fill_n(w.now.lam.data() + block.row, block.kept.size(), 0.0);
     }

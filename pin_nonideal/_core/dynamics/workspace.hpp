@@ -67,11 +67,13 @@ struct Evaluation {
     std::vector<char> idle;  // blocks of open contacts, which are no rows and are not evaluated
     std::vector<int> awake;              // the other blocks
     std::vector<int> touching;           // gaps that are closed
+    std::vector<char> selected;          // the same by gap, as the rows were selected last
     std::vector<int> loaded, slipping;   // elements that rub, at rest or not; those that slip
     std::vector<double> A, B;
     RowSystem rows, ideal_rows;  // ideal: of the constraints without what sticks; IdealMotion swaps them in
     VecX b, lam;  // by kept row
     VecX closing_lam;  // multipliers of the move that closed the position last
+    bool has_closing = false;  // they may differ from zero
     VecX tau, external, F, C, C_smooth, base_C, a;  // generalized forces and acceleration
     // F as the solution takes it, where trees are deep: their bias and the given forces on their bodies are wrenches.
     VecX joint_F, joint_external;

@@ -18,6 +18,7 @@ struct ModeQuestion {
     std::vector<int> breaking;  // of those at rest: stuck until now and has just reached its limit, so that it slips as
                                 // soon as its force is at the limit, though its acceleration is still zero
     bool answered = false;      // `modes` are those of a motion that was found with all contacts together
+    std::vector<Vec3> near;     // friction of all elements in a motion that is near, where one is known
 };
 // Under forces f of a program for these limits. Directions of slip stay in the workspace.
 std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const FrictionProblem& problem, const VecX& f,

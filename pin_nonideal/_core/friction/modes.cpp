@@ -107,6 +107,16 @@ struct Search {
         return false;
     }
 
+    // Newton's method alone, near a solution.
+    bool refine_in_pieces(RestProblem& problem, VecX& x) {
+        for (int turn = 0; turn < most_pieces; ++turn) {
+            if (problem.has_pieces()) problem.enter_piece(x);
+            if (!refine_rest(problem.equation, x)) return false;
+            if (!problem.has_pieces() || problem.is_motion(x)) return true;
+        }
+        return false;
+    }
+
     // Whether forces within their limits hold all that rests, where those of the turns let it slip, in any piece of the
     // loads that contacts share.
     bool rests(RestProblem& problem, VecX& x) {
@@ -230,6 +240,14 @@ struct Search {
         return false;
     }
 
+    // Forces of the elements at rest in the motion that is near.
+    VecX near(const RestEquation& equation) const {
+        VecX x = VecX::Zero(equation.n);
+        for (size_t i = 0; i < list.size(); ++i)
+            for (int k = 0; k < equation.elements[i].dim; ++k) x[equation.elements[i].row + k] = question.near[list[i]][k];
+        return x;
+    }
+
     // Elements at rest without friction; `all`: those that slip under a load of their own as well.
     void unload(bool all) {
         std::vector<Mode> modes = question.modes;
@@ -249,6 +267,7 @@ struct Search {
         try {
             unload(false);
             found = take_turns(modes);
+            presses = !found || reactions(p, w).presses;
         } catch (const Failure& failure) {  // loads of what slips, while what rests has no force yet or not its own
             if (failure.kind != Failure::Kind::paradox) throw;
         }
@@ -268,7 +287,7 @@ struct Search {
     // Where loads may leave several motions or none, or where turns found none to be trusted. Returns whether it knows
     // better.
     bool look_further(bool found, const std::vector<Mode>& turned) {
-        const bool trusted = found && !released_early(turned);
+        const bool trusted = found && presses && !released_early(turned);
         const bool slid = !found || std::any_of(list.begin(), list.end(), [&](int e) { return turned[e] != sticking; });
         unload(true);
         RestProblem problem(p, w, t, q, v, list, slipping);
@@ -291,6 +310,10 @@ struct Search {
         if (trusted && !is_searched(equation)) return false;
         x = VecX::Zero(equation.n);
         bool solved = find_in_pieces(problem, x), one_limit = true;
+        if (!solved && !question.near.empty()) {
+            x = near(equation);
+            solved = refine_in_pieces(problem, x);
+        }
         if (!solved && release(problem, equation, std::vector<Mode>(p.frictions.size(), slip_plus))) {
             one_limit = false;  // some stick by one limit and slip by another: the search had not all of these motions
             solved = find_in_pieces(problem, x);
@@ -303,6 +326,7 @@ struct Search {
         return solved;
     }
 
+    bool presses = true;  // the loads of the turns' motion: it is one
     bool proven = false;  // that there is no motion, or which there are
 };
 

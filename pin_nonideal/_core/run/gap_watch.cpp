@@ -54,8 +54,13 @@ void GapWatch::look_at_all(double t) {
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
         gaps.near[i] = gaps.far[i] = 0;
         if (is_bare(p, i)) continue;
-        look(t, i);
+        measure_gap(p, w, t, system_.v, i);
+        gaps.width[i] = gap_width(p, w, i);
+        gaps.rate[i] = 0.0;
         if (!w.state.closed[i]) place(i);
+        if (gaps.far[i]) continue;
+        move_gap(p, w, t, system_.v, i);
+        gaps.keep(i, GapLook::here(p, w, i, 0.0));
     }
     gaps.find_near();
 }
