@@ -43,6 +43,8 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const std
 
 }  // namespace
 
+// Of the friction of what slips and its acceleration, which are opposite, the one that is larger beside its rounding tells
+// the way.
 std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const FrictionProblem& problem, const VecX& f,
                            const VecX& limits) {
     const VecX alpha = problem.alpha0 + problem.W * f;
@@ -59,7 +61,9 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const Fri
                                     : broken && !slides;
         if (slowly && onset.size() == 0)
             onset = onset_accelerations(problem.W, problem.alpha0, problem.dims, limits);
-        const VecX begins = slowly ? VecX(onset.segment(at, dim)) : slip;
+        const double response = problem.W.diagonal().segment(at, dim).sum() / dim;
+        const bool by_force = slides && force.norm() * response > slip.norm();
+        const VecX begins = slowly ? VecX(onset.segment(at, dim)) : by_force ? VecX(-force) : slip;
         all.push_back({force, begins, slides, (slides || slowly) && begins.norm() > noise, broken});
     }
     return modes_of(w, question, all);
@@ -80,7 +84,8 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const Res
         const bool slides = !e.may_stick || (at_its_limit && e.rho * slip.norm() > noise * in_play);
         const bool slowly = broken && !slides;
         if (slowly && onset.size() == 0) onset = onset_accelerations(equation, x);
-        const VecX begins = slowly ? VecX(onset.segment(e.row, e.dim)) : slip;
+        const bool by_force = slides && e.may_stick && force.norm() > e.rho * slip.norm();
+        const VecX begins = slowly ? VecX(onset.segment(e.row, e.dim)) : by_force ? VecX(-force) : slip;
         const bool told = slides || (slowly && e.rho * begins.norm() > no_acceleration * in_play);
         all.push_back({force, begins, slides, told, broken});
     }
