@@ -183,3 +183,25 @@ def test_no_rebound_where_another_contact_is_in_the_way():
         pn.simulate(between_plates("newton"), 0.1)
     run = pn.simulate(between_plates("poisson"), 0.1)
     assert run.v[-1][0] == 0.0
+
+
+@pytest.mark.parametrize("e", [0.5, 0.8, 1.0])
+def test_struck_onto_a_plane_that_it_was_leaving(e):
+    """A mass leaves the floor by 2e-12 m as a heavier one strikes it: it is back within a picosecond."""
+    model = empty((0.0, 0.0, 0.0))
+    for name, mass in (("lower", 1.0), ("upper", 10.0)):
+        frame(model, name, body(model, 0, pin.JointModelPZ(), f"{name} slide", mass))
+    contacts = [
+        pn.PointContact("lower", restitution=e, name="floor"),
+        pn.SphereContact("upper", "lower", 0.1, name="between"),
+    ]
+    later = 2e-12
+    q0, v0 = [1.0, 0.1 + later * e + 5.0 * (1.0 + later)], [-1.0, -5.0]
+    run = pn.simulate(pn.Scene(model, contacts=contacts, q0=q0, v0=v0), 1.0 + 1e-6, record="energy")
+    together = (e - 50.0) / 11.0
+    first = [event for event in run.events if event.kind == "impact" and event.time > 1.0 - 1e-9]
+    lost = sum(event.energy_change for event in first)
+    assert np.abs(run.energy["balance"]).max() < ROUNDING * 125.5
+    np.testing.assert_allclose(lost, run.energy["impacts"][-1], rtol=ROUNDING)
+    if e > 0.5:  # else the floor's rebound is stopped short of it
+        np.testing.assert_allclose(run.v[-1], [-e * together] * 2, rtol=ROUNDING)

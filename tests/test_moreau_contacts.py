@@ -26,6 +26,9 @@ UNCHANGEABLE = 1e-7
 # Part of an impulse that is summed up from samples of a force, one a step.
 STEPPED = 0.05
 
+# Feet, friction, and levers of resistance to spinning and to rolling [m].
+TURNED = [(2, 0.7, 0.05, 0.02), (3, 0.3, 0.0, 0.002), (3, 0.7, 0.005, 0.002), (4, 0.7, 0.005, 0.002)]
+
 ON_PLANE = [0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]
 
 
@@ -279,3 +282,22 @@ def test_feet_that_carry_nothing_slide_with_the_others(feet, height, method):
     slid = 0.5 * (push / mass - mu * GRAVITY) * run.t**2
     np.testing.assert_allclose(run.q[:, 0], slid, atol=1e-3 * slid[-1])
     assert run.q[:, 2] == pytest.approx(0.3, abs=1e-9)
+
+
+@pytest.mark.parametrize("dt", [1e-3, 5e-4, 2.5e-4])
+@pytest.mark.parametrize(("feet", "mu", "torsional", "rolling"), TURNED)
+def test_feet_that_resist_turning_come_to_rest(feet, mu, torsional, rolling, dt):
+    """A table that slides, turns and drops onto a foot or two: what resists follows the loads."""
+    model = empty()
+    joint = body(model, 0, pin.JointModelFreeFlyer(), "table", 2.0, inertia=0.05 * np.eye(3))
+    resists = {"mu": mu, "torsional": torsional, "rolling": rolling}
+    contacts = []
+    for k, angle in enumerate(2.0 * np.pi * np.arange(feet) / feet):
+        place = np.array([0.3 * np.cos(angle), 0.3 * np.sin(angle), -0.05])
+        frame(model, f"f{k}", joint, pin.SE3(np.eye(3), place))
+        contacts.append(pn.PointContact(f"f{k}", **resists))
+    scene = pn.Scene(model, contacts=contacts, q0=[0, 0, 0.05, 0, 0, 0, 1], v0=[0.3, 0.2, 0, 0.1, 0.2, 1.0])
+    run = pn.simulate(scene, 0.5, method="moreau", dt=dt)
+    assert np.abs(run.v[-1]).max() == 0.0
+    for miss in (run.stats.signorini, run.stats.coulomb, run.stats.dissipation):
+        assert miss < UNCHANGEABLE

@@ -162,6 +162,8 @@ std::optional<FoundEvent> EventLocator::locate() {
 std::optional<double> EventLocator::release_rate(double t, const VecX& y, const std::vector<Mode>& modes,
                                                  ModeQuestion& asked) {
     system_.read(y);
+    // What has just come to rest may be found to slip the other way: the step has its own directions, taken again or not.
+    const std::vector<Vec3> directions = w.state.slip_direction, last_directions = w.state.last_direction;
     asked = {modes, {}, {}};
     for (int e = 0; e < system_.ne; ++e)
         if (!is_open(p, w, e) && at_rest(p, w, e, system_.v)) asked.at_rest.push_back(e);
@@ -177,6 +179,8 @@ std::optional<double> EventLocator::release_rate(double t, const VecX& y, const 
     }
     const double noise = no_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     set_modes(p, w, modes);
+    w.state.slip_direction = directions;
+    w.state.last_direction = last_directions;
     begin_step(p, w, t, system_.q, system_.v);
     if (rate <= noise) return std::nullopt;  // what the others hold does not move, whatever its force
     return rate;

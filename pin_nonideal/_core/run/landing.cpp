@@ -13,6 +13,8 @@ namespace {
 
 // Part of the works of an impact that rounding may make a gain of.
 constexpr double gain_rounding = 1e-12;
+// Impacts at one instant, of which each throws others onto their planes that had been leaving them.
+constexpr int most_at_once = 100;
 
 }  // namespace
 
@@ -22,6 +24,12 @@ Landing::Landing(System& system, Progress& progress, GapWatch& watch, const Opti
       out_(out) {}
 
 bool Landing::strike(bool starts) {
+    int count = 0;
+    while (count < most_at_once && strike_once(starts)) ++count;
+    return count > 0;
+}
+
+bool Landing::strike_once(bool starts) {
     if (system_.ng == 0 || !contacts_strike(system_, now_.t, now_.y, starts)) return false;
     output_.before_jump();
     const Strike found = strike_contacts(system_, now_.t, now_.y, starts);

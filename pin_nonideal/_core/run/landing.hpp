@@ -10,7 +10,7 @@ class Landing {
 public:
     Landing(System& system, Progress& progress, GapWatch& watch, const Options& options, Output& output, Recording& out);
 
-    // An impact of contacts that touch and approach each other; whether there was one.
+    // Impacts of contacts that touch and approach each other, until none does; whether there was one.
     bool strike(bool starts);
     // The end of bouncing behind a strike, not beyond `stop` nor the next sample; where there is none the state stays.
     void end_bouncing(double stop);
@@ -19,6 +19,8 @@ public:
     void remember_gaps(bool whole_step = false);
 
 private:
+    bool strike_once(bool starts);
+
     const Program& p;
     Workspace& w;
     System& system_;

@@ -22,11 +22,14 @@ namespace {
 
 constexpr int load_passes = 60;           // of limits that depend on the load
 constexpr double load_tolerance = 1e-12;  // change of the limits, as a part of the largest, that is rounding
+// Limits that change no less from pass to pass follow what the cones leave open of the forces: where slip is slow, its
+// direction.
+constexpr double contracting = 0.5;
 constexpr double limit_rounding = 1e-9;   // part of its limit within which a force is at it
 constexpr double width_rounding = 1e-12;   // part of the scene's size by which what stands may find a gap less wide
 constexpr double least_response = 1e-13;  // part of a row's free response that the constraints must leave it
-// Of the velocities in play, by which a step of a body that turns may contradict itself where corners share its load; the
-// statistics tell.
+// Of the velocities in play, by which a step of a body that turns may contradict itself where corners share its load, and
+// of the forces in play, by which a limit may miss its load; the statistics tell.
 constexpr double most_miss = 1e-7;
 
 }  // namespace
@@ -267,13 +270,18 @@ bool MoreauContacts::limits_settle(double t) {
         largest = std::max(largest, limit);
         cones_[e].bound = std::max(0.0, limit);
     }
-    return change <= load_tolerance * largest;
+    const bool settles = change <= load_tolerance * largest ||
+                         (change > contracting * last_change_ &&
+                          change <= most_miss * f_.head(static_cast<int>(rows_.size())).cwiseAbs().maxCoeff());
+    last_change_ = change;
+    return settles;
 }
 
 void MoreauContacts::solve(double t) {
     const int n = static_cast<int>(rows_.size());
     const auto W = W_.topLeftCorner(n, n);
     const bool loads = n > 0 && cones_.back().is(ConeElement::Kind::box);  // limits that may depend on the motion
+    last_change_ = HUGE_VAL;
     for (int pass = 0; n > 0; ++pass) {
         if (loads || pass > 0) apply();
         if (limits_settle(t) && pass > 0) break;

@@ -46,7 +46,7 @@ private:
     System& system_;
     const Program& p;
     Workspace& w;
-    double h_ = 0.0;
+    double h_ = 0.0, last_change_ = 0.0;  // the second: of the limits, from pass to pass
     GapWatch& watch_;
     std::vector<int> touching_, own_;  // gaps that take part, and dry friction of no contact that may open
     std::vector<int> rubbing_;         // dry friction that takes part, but the sliding of contacts
