@@ -17,6 +17,7 @@ DRAWS = range(40)
 LIFTING = [1594, 2437, 2789, 3003, 3273, 3401, 3448, 3772, 4478]
 FACETS = 256  # of the cone of a foot that sticks
 INSIDE = 1.0 - np.cos(np.pi / FACETS)  # part by which they are inside of it
+SETTLED = 1e-12  # part of the forces to which limits and loads are turned
 MASS, INERTIA, GRAVITY = 10.0, 0.3, 9.81
 
 
@@ -80,6 +81,16 @@ def lack(places, mu, pushed, push, solution):
     )
 
 
+def slowness(places, solution):
+    """Accelerations in play over the least that begins a slip: its way is known so much worse."""
+    slips = [
+        np.linalg.norm((solution.a[:3] + np.cross(solution.a[3:], place))[:2])
+        for place, mode in zip(places, solution.modes, strict=True)
+        if mode == 1
+    ]
+    return (np.abs(solution.a).max() + GRAVITY) / min(slips, default=GRAVITY)
+
+
 @pytest.mark.parametrize("seed", [*DRAWS, *LIFTING])
 def test_what_begins_keeps_the_law_of_coulomb(seed):
     scene, *rest = drawn(seed)
@@ -94,11 +105,12 @@ def test_what_begins_keeps_it_in_many_draws(first):
         scene, *rest = drawn(seed)
         try:
             solution = scene.solve(*scene.project(), 0.0)
-        except pn.FrictionParadoxError:  # whether it is one is not asked here
+        except (pn.FrictionParadoxError, pn.FrictionConvergenceError):  # whether it is one is not asked here
             refused += 1
             continue
         sticks = (solution.modes == 0).any()
-        assert lack(*rest, solution) < (INSIDE if sticks else 1e-8), seed
+        exact = max(1e-8, 2.0 * SETTLED * slowness(rest[0], solution))
+        assert lack(*rest, solution) < (INSIDE if sticks else exact), seed
     assert refused <= 1
 
 
