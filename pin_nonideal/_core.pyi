@@ -404,22 +404,25 @@ class EventKind(enum.Enum):
     several = 5
     """from here on the laws allow other motions too"""
 
-    user = 6
+    paradox = 6
+    """from here on time stepping goes through modes that allow no motion"""
+
+    user = 7
     """a function of the user crosses zero"""
 
-    saturate = 7
+    saturate = 8
     """a drive reaches the effort that it has"""
 
-    desaturate = 8
+    desaturate = 9
     """a drive gives again what is asked of it"""
 
-    impact = 9
+    impact = 10
     """a contact strikes, with an impulse"""
 
-    touch_down = 10
+    touch_down = 11
     """a contact closes without an impulse, or its bouncing ends"""
 
-    lift_off = 11
+    lift_off = 12
     """a contact opens"""
 
 class Event:

@@ -21,10 +21,11 @@ class Event:
         time: when [s].
         kind: "stick", "slip" or "reverse" of a frictional element, "pull" of a contact or wheel that must
             pull from now on, however it shares its load with others, "chatter" where a cluster of events was
-            bridged by time stepping, "several" from where on the laws allow other motions too; of contacts
-            that may open "impact" with an impulse, "touch_down" where one closes without, or its bouncing
-            ends, and "lift_off" where one opens; of joints with `EffortLimits` "saturate" where a drive is
-            asked for more than it has, and "desaturate" where it gives again what is asked.
+            bridged by time stepping, "several" from where on the laws allow other motions too, "paradox" from
+            where on "moreau" goes through modes that allow none; of contacts that may open "impact" with an
+            impulse, "touch_down" where one closes without, or its bouncing ends, and "lift_off" where one
+            opens; of joints with `EffortLimits` "saturate" where a drive is asked for more than it has, and
+            "desaturate" where it gives again what is asked.
         element: name of the law, contact or joint.
         impulse: of an impact [N s], (3,): along the contact's normal, then along its directions of slip.
         energy_change: kinetic energy that an impact gave at this contact [J], negative for a loss.

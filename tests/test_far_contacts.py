@@ -197,3 +197,28 @@ def test_the_first_of_many_touches(seed):
     if touch is not None:
         assert not below[touch - INSTANT > TIMES].any()
         assert np.abs(widths([touch])).min() < ALIKE
+
+
+def tied(away):
+    """Two bodies on slides, a rod between them, so far from the origin; a foot on one of them."""
+    model = empty()
+    for name, x in (("foot", 0.0), ("head", 0.5)):
+        here = pin.SE3(np.eye(3), np.array([away + x, 0.0, 0.0]))
+        joint = body(model, 0, pin.JointModelPZ(), f"slide of {name}", 1.0, place=here)
+        frame(model, name, joint, pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.6 * x])))
+    rod = pn.Distance("foot", "head", length=float(np.hypot(0.5, 0.3)))
+    return pn.Scene(model, constraints=[rod], contacts=[pn.PointContact("foot")])
+
+
+@pytest.mark.parametrize("speed", [0.0, -0.5])
+@pytest.mark.parametrize("away", [0.0, 100.0])
+def test_what_touches_at_the_start_does_not_depend_on_runs_before(away, speed):
+    """A gap within 1e-10 of the loop's distance from the origin is closed at the start, whoever asks."""
+    gap = 0.5e-10 * max(1.0, away)
+    scene = tied(away)
+    assert scene.solve([gap, gap], [0.0, 0.0]).closed.all()
+    first, again = (pn.simulate(scene, 0.1, q=[gap, gap], v=[speed, speed]) for _ in range(2))
+    assert_same_run(first, again)
+    assert_same_run(first, pn.simulate(tied(away), 0.1, q=[gap, gap], v=[speed, speed]))
+    assert first.closed[-1].all()
+    assert [(e.time, e.kind) for e in first.events] == [(0.0, "impact")] * (speed < 0.0)

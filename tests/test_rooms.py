@@ -50,7 +50,7 @@ reactions split slip unknowns uniqueness implicit power evaluation projection st
 friction: dense_solver box_program lorentz cone_program cone_problem cone_newton cone_path cone_shares \
 cone_certificate cone_complementarity rest_equation rest_solver rest_branches problem rest_problem \
 beginning each_choice modes continuation
-contact: gaps reach ways separation contact_rows impact resting closing
+contact: gaps reach ways separation contact_rows impact resting closing moving_out
 run: archive method step outside_step step_control runge_kutta system semi_implicit_euler error_norm \
 collocation stepper gap_watch gap_search moreau moreau_contacts dense_output recorder inside_samples \
 checkpoint options output stiffness rounding event_search event_location events stepper_choice bouncing \

@@ -13,6 +13,7 @@ EVENTS = {
     "lift_off": ("#0369a1", "opens"),
     "chatter": ("#0891b2", "a cluster of events, stepped over in time"),
     "several": ("#db2777", "the laws allow several motions from here on"),
+    "paradox": ("#9d174d", "the laws allow no motion at a step's end"),
     "saturate": ("#a16207", "a drive reaches its limit of effort"),
     "desaturate": ("#ca8a04", "a drive gives again what is asked of it"),
     "user": ("#65a30d", "a condition of the user's"),

@@ -135,9 +135,10 @@ struct Search {
 
 }  // namespace
 
-Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, double width) {
+Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts) {
     Touching out{Choice(p.gaps.size(), 0), Choice(p.gaps.size(), 0)};
     update_kinematics(p, w, t, q, v);
+    const double width = starts ? starting_width * scene_size(p, w) : touching_width;
     std::vector<int> list;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
         if (is_bare(p, i)) continue;
@@ -165,16 +166,16 @@ Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX&
     return out;
 }
 
-const Touching& TouchingKnown::at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, double width) {
-    const bool same = known_ && t == t_ && width == width_ && q == q_ && v == v_ && same_bytes(closed_, w.state.closed);
+const Touching& TouchingKnown::at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts) {
+    const bool same = known_ && t == t_ && starts == starts_ && q == q_ && v == v_ && same_bytes(closed_, w.state.closed);
     if (same) return found_;
     known_ = true;
     t_ = t;
-    width_ = width;
+    starts_ = starts;
     q_ = q;
     v_ = v;
     closed_ = w.state.closed;
-    found_ = touching_contacts(p, w, t, q, v, width);
+    found_ = touching_contacts(p, w, t, q, v, starts);
     return found_;
 }
 

@@ -19,18 +19,18 @@ struct Touching {
     bool strikes = false;
     bool lands = false;  // one of those that strike is open as yet
 };
-// By the widths and rates of the gaps at (t, q, v): those that are closed, or narrower than `width`, touch; of those that
-// coincide one does for all.
-Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, double width);
+// By the widths and rates of the gaps at (t, q, v): those that are closed, or so narrow, touch; of those that coincide one
+// does for all.
+Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts);
 
 // As found last: asked again where nothing has changed, it needs no look at the gaps.
 class TouchingKnown {
 public:
-    const Touching& at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, double width);
+    const Touching& at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts);
 
 private:
-    bool known_ = false;
-    double t_ = 0.0, width_ = 0.0;
+    bool known_ = false, starts_ = false;
+    double t_ = 0.0;
     VecX q_, v_;
     std::vector<char> closed_;
     Touching found_;

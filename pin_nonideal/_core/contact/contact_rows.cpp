@@ -6,22 +6,26 @@
 
 namespace pn {
 
-void release_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                      const std::vector<char>& touching) {
+void free_contacts(const Program& p, Workspace& w, const std::vector<char>& touching) {
     set_closed(p, w, touching);
     set_modes(p, w, std::vector<Mode>(p.frictions.size(), unloaded));
     for (const Gap& gap : p.gaps)
         for (size_t k = 0; k < p.blocks[gap.block].kept.size(); ++k)
             w.now.rows.required[p.blocks[gap.block].row + k] = 0;
     w.now.rows.use_required(p.blocks);
+}
+
+void release_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                      const std::vector<char>& touching) {
+    free_contacts(p, w, touching);
     begin_step(p, w, t, q, v);
 }
 
-ContactRows::ContactRows(const Program& program, Workspace& workspace, const std::vector<int>& list)
+ContactRows::ContactRows(const Program& program, Workspace& workspace, const std::vector<int>& list, bool rub)
     : p(program), w(workspace), gaps(list) {
     int rows = 0;
     for (int gap : gaps) {
-        const int sliding = p.gaps[gap].sliding;
+        const int sliding = rub ? p.gaps[gap].sliding : -1;
         const int slips = sliding < 0 ? 0 : static_cast<int>(p.blocks[p.frictions[sliding].block].kept.size());
         first.push_back(rows);
         cones.push_back(ConeElement::contact(1 + slips, sliding < 0 ? 0.0 : p.frictions[sliding].mu));

@@ -7,6 +7,8 @@
 namespace pn {
 
 // Contacts that touch are rows that move but hold nothing, and without friction; `touching` by gap.
+void free_contacts(const Program& p, Workspace& w, const std::vector<char>& touching);
+// The same, with the motion at (t, q, v) then.
 void release_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                       const std::vector<char>& touching);
 
@@ -21,8 +23,8 @@ struct ContactRows {
     MatX W, response;        // of the rows' velocities, and of v, to a unit of each force or percussion
     VecX velocity;           // of the rows
 
-    // Of these gaps, which release_contacts has left free.
-    ContactRows(const Program& p, Workspace& w, const std::vector<int>& gaps);
+    // Of these gaps, which are free; of their normals alone where they do not rub.
+    ContactRows(const Program& p, Workspace& w, const std::vector<int>& gaps, bool rub = true);
 
     // Calls act(row of W, block, kept row of it).
     template <class Act>

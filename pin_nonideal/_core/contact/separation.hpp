@@ -130,6 +130,16 @@ inline bool stays_apart(const Kind& kind, const Separation& a, const Separation&
     return stays_above(a.along(a.normal, kind), b.along(b.normal, kind), parabola + turning, least);
 }
 
+// How deep segments, rims and sides may have entered each other and still tell which way is out: less than both are rounded.
+// Points in solids and over planes tell it at any depth.
+inline double rounded_by(const Kind& kind) {
+    if (const auto* capsules = std::get_if<CapsulesRow>(&kind)) return capsules->radius;
+    if (const auto* line = std::get_if<LineRow>(&kind)) return line->radius;
+    if (const auto* rim = std::get_if<RimRow>(&kind)) return rim->radius;
+    if (const auto* rims = std::get_if<RimsRow>(&kind)) return rims->radius;
+    return HUGE_VAL;
+}
+
 // Whether the gap is that of one point after the other of a body over a plane, each of which stays above its own course.
 inline bool has_lowest_point(const Program& p, int gap) {
     return std::holds_alternative<EllipsoidRow>(p.blocks[p.gaps[gap].block].kind);

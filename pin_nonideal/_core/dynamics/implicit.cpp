@@ -242,4 +242,14 @@ void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, co
     w.state.warm = true;
 }
 
+void solve_with_step_friction(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    Unknowns unknowns{p, w, t, q, v};
+    for (int e : unknowns.elements()) {
+        const Block& block = p.blocks[p.frictions[e].block];
+        w.now.limit[e] = w.state.percussion.segment(block.row, static_cast<Eigen::Index>(block.kept.size())).norm();
+    }
+    unknowns.motion();
+    w.state.unique = Uniqueness::not_shown;
+}
+
 }  // namespace pn

@@ -18,5 +18,8 @@ inline bool laws_act(const Program& p, const Workspace& w) {
 void find_known_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 // C, a and lam for the forces F, what is known of C (the laws that read no reactions), and the laws that do.
 void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const VecX& known);
+// The same where what slips rubs as it did in the step of time stepping that has led here, by its percussions over its
+// length; with the workspace as a failure of the above has left it.
+void solve_with_step_friction(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 
 }  // namespace pn

@@ -134,18 +134,33 @@ static double row_size(const Workspace& w, const Block& block, int row) {
     return size;
 }
 
+double opening(const Program& p, const Workspace& w, int block, double allowed) {
+    double largest = 0.0;
+    for (int k = 0; k < w.now.values[block].rows; ++k) {
+        const double gap = std::abs(w.now.values[block].residual[k]);
+        if (gap <= allowed || gap <= allowed * row_size(w, p.blocks[block], k) || gap < largest) continue;
+        largest = gap;
+    }
+    return largest;
+}
+
 void require_closed(const Program& p, const Workspace& w, double t) {
     const double allowed = open_gap * scene_size(p, w);
     double largest = 0.0;
     int worst = -1;
-    for (int i : w.now.awake)
-        for (int k = 0; i < p.constraints && k < w.now.values[i].rows; ++k) {
-            const double gap = std::abs(w.now.values[i].residual[k]);
-            if (gap <= allowed || gap <= allowed * row_size(w, p.blocks[i], k) || gap < largest) continue;
-            largest = gap;
-            worst = i;
-        }
+    for (int i : w.now.awake) {
+        const double gap = i < p.constraints ? opening(p, w, i, allowed) : 0.0;
+        if (gap == 0.0 || gap < largest) continue;
+        largest = gap;
+        worst = i;
+    }
     if (worst >= 0) throw Failure(Failure::Kind::closure, t, {worst}, largest);
+}
+
+double closing_distance(const Program& p, Workspace& w) {
+    w.scratch.scaled.setZero();
+    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.now.closing_lam, w.scratch.scaled);
+    return w.scratch.scaled.norm();
 }
 
 void follow_constraints(const Program& p, Workspace& w, double h, VecX& move) {

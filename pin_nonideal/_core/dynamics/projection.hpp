@@ -71,6 +71,10 @@ void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 struct Closure { double before, after, rate; };
 Closure close(const Program& p, Workspace& w, double t, VecX& q, VecX& v, double far);
 
+// Largest residual of a block, as last evaluated, that is beyond what is allowed of rows of length one; zero where none is.
+double opening(const Program& p, const Workspace& w, int block, double allowed);
+// Length, in the metric of M, of the move that closed the position last.
+double closing_distance(const Program& p, Workspace& w);
 // Throws where a row's residual, as last evaluated, is open.
 void require_closed(const Program& p, const Workspace& w, double t);
 

@@ -90,7 +90,8 @@ struct Evaluation {
     VecX v;                           // velocity, where laws act
     double speed = 0.0;               // largest of it
     bool several = false;             // what was at rest might slip as well as stick
-    int several_element = 0;          // whose friction differs most between several motions
+    bool no_motion = false;           // the modes at the end of a step of time stepping allow none
+    int several_element = 0;          // whose friction differs most between several motions, or leaves none
     double determinant = 1.0;         // of the implicit reaction equation
     std::vector<Force> body_force;    // given forces on bodies
     VecX override_torque;

@@ -50,7 +50,7 @@ void Runner::choose_modes(double t, const std::optional<std::vector<Mode>>& mode
 void Runner::choose_contacts(double t, const std::optional<std::vector<Mode>>& modes) {
     set_closed(*p, *w, std::vector<char>(p->gaps.size(), 0));
     ClosingQuestion question;
-    question.rest = touching_contacts(*p, *w, t, q, v, starting_width * scene_size(*p, *w)).rest;
+    question.rest = touching_contacts(*p, *w, t, q, v, true).rest;
     question.struck = true;
     close_contacts(*p, *w, t, q, v, question, [&](const RestingMotion* together) {
         update_kinematics(*p, *w, t, q, v);

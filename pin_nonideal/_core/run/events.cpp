@@ -148,10 +148,9 @@ void rest(System& system, double t) {
 void close_and_find(System& system, double t, bool starts, FrictionSwitch& friction) {
     const Program& p = system.p;
     const auto& event = friction.event;
-    const double width = starts ? starting_width * scene_size(p, system.w) : touching_width;
     const bool landing = starts || event->kind == FoundEvent::Kind::touch;
     ClosingQuestion question;
-    question.rest = system.touching.at(p, system.w, t, system.q, system.v, width).rest;
+    question.rest = system.touching.at(p, system.w, t, system.q, system.v, starts).rest;
     if (event && event->kind == FoundEvent::Kind::lift) question.opening = event->index;
     if (event && !event->of_gap()) question.arrived = event->index;
     question.breaking = friction.breaking();
@@ -212,14 +211,13 @@ std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, con
 
 bool contacts_strike(System& system, double t, const VecX& y, bool starts) {
     system.read(y);
-    const double width = starts ? starting_width * scene_size(system.p, system.w) : touching_width;
-    return system.touching.at(system.p, system.w, t, system.q, system.v, width).strikes;
+    return system.touching.at(system.p, system.w, t, system.q, system.v, starts).strikes;
 }
 
 bool contacts_land(System& system, double t, const VecX& y) {
     if (system.p.gaps.empty()) return false;
     system.read(y);
-    return system.touching.at(system.p, system.w, t, system.q, system.v, touching_width).lands;
+    return system.touching.at(system.p, system.w, t, system.q, system.v, false).lands;
 }
 
 Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool bounces) {
@@ -227,8 +225,7 @@ Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool boun
     const std::vector<char> closed = system.w.state.closed;
     const std::vector<Mode> modes = system.w.state.mode;
     system.read(y);
-    const double width = starts ? starting_width * scene_size(p, system.w) : touching_width;
-    const std::vector<char>& touch = system.touching.at(p, system.w, t, system.q, system.v, width).touch;
+    const std::vector<char>& touch = system.touching.at(p, system.w, t, system.q, system.v, starts).touch;
     const Impact impact = strike(p, system.w, t, system.q, system.v, touch, bounces);
     system.write(y);
     set_closed(p, system.w, closed);  // what changes by it is still to be found

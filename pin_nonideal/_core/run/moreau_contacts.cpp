@@ -15,6 +15,7 @@
 #include "run/moreau.hpp"
 #include "tree/factor.hpp"
 #include "tree/liegroup.hpp"
+#include "tree/terms.hpp"
 
 namespace pn {
 
@@ -41,6 +42,8 @@ MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
       power_(VecX::Zero(system.nw)), zero_(VecX::Zero(p.layout.rows)), force_(v0_) {
     if (system.ng == 0) return;
     solver_.take_misses(most_miss);
+    for (const Gap& gap : p.gaps) rounded_by_.push_back(rounded_by(p.blocks[gap.block].kind));
+    rounded_ = std::any_of(rounded_by_.begin(), rounded_by_.end(), [](double r) { return r < HUGE_VAL; });
     for (int e = 0; e < system.ne; ++e)
         if (p.frictions[e].gap < 0) own_.push_back(e);
     const int most = p.layout.rows;
@@ -54,6 +57,26 @@ MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
     rows_.reserve(most);
     parts_.reserve(most);
     cones_.reserve(most);
+}
+
+double MoreauContacts::allowed(double t, double h, const VecX& y) {
+    if (!rounded_) return h;
+    bool placed = false;
+    double shortest = h;
+    for (int i : watch_.gaps.near_gaps) {
+        if (!(rounded_by_[i] < HUGE_VAL) || w.state.closed[i]) continue;
+        if (!placed) {
+            system_.read(y);
+            kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
+            placed = true;
+        }
+        follow_gap(p, w, t, system_.v, i);
+        const double width = gap_width(p, w, i), rate = gap_rate(p, w, i);
+        if (!(rate < 0.0) || !tells_way_out(i, width)) continue;
+        const double reach = width + (width > 0.0 ? 0.5 : 1.0) * rounded_by_[i];
+        shortest = std::min(shortest, reach / -rate);
+    }
+    return shortest;
 }
 
 void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, double& impact_energy) {
@@ -127,7 +150,7 @@ void MoreauContacts::find_touching(double t) {
     for (int i : watch_.come(way_since_last())) {
         measure_gap(p, w, t, v0_, i);
         const double width = gap_width(p, w, i);
-        const bool touches = was_closed_[i] || width <= 0.0;
+        const bool touches = was_closed_[i] || (width <= 0.0 && tells_way_out(i, width));
         if (touches) touching_.push_back(i);
         watch_.gaps.width[i] = touches ? 0.0 : width - width_rounding * scene_size(p, w);  // that it is sure to have
     }

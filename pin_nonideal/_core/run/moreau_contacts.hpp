@@ -10,10 +10,17 @@
 
 namespace pn {
 
+// Part of what they are rounded by that edges and rims may have entered each other for normals to be found.
+constexpr double nearly_all = 0.999;
+
 class MoreauContacts {
 public:
     MoreauContacts(System& system, GapWatch& watch);
 
+    // How long a step from y at t may be, up to h: what edges and rims that come at each other are rounded by is entered by
+    // no more than half of it, and by half of what is left where they are inside. Deeper they tell no way out, and may be
+    // behind each other.
+    double allowed(double t, double h, const VecX& y);
     // One step of size h from y at t; the work of contacts along their normals goes into impact_energy, what the scheme
     // itself adds into moved_energy. The state is left to be projected and evaluated, with the modes of its end.
     void step(double t, double h, VecX& y, double& moved_energy, double& impact_energy);
@@ -28,6 +35,7 @@ private:
         double approach = 0.0; // restitution times the rate at which its gap closed, over the step
     };
 
+    bool tells_way_out(int gap, double width) const { return width > -nearly_all * rounded_by_[gap]; }
     void select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies);
     void solve_free(double t);
     const VecX& way_since_last();
@@ -52,6 +60,8 @@ private:
     std::vector<int> rubbing_;         // dry friction that takes part, but the sliding of contacts
     std::vector<char> was_closed_, closed_, open_;
     std::vector<Mode> modes_, unloaded_;
+    std::vector<double> rounded_by_;   // of gaps
+    bool rounded_ = false;             // some are
     bool marked_ = false;  // in the flags and modes of the last step something was closed or rubbed
     std::vector<Row> rows_;
     std::vector<Part> parts_;

@@ -33,7 +33,7 @@ void Notices::tell_pulls(const std::optional<FoundEvent>& event) {
 std::optional<double> Notices::begin_several(bool after_step) {
     const int element = w.now.several_element;
     const double at = after_step && w.state.unique == Uniqueness::several ? last_unique() : progress_.t;
-    out_.events.push_back({at, Event::Kind::several, element});
+    out_.events.push_back({at, w.now.no_motion ? Event::Kind::paradox : Event::Kind::several, element});
     return at;
 }
 

@@ -17,11 +17,11 @@ public:
     void pulls(const std::optional<FoundEvent>& event) {
         if (!p.contacts.empty()) tell_pulls(event);
     }
-    // Where the laws begin to allow other motions too, told once each time; returns when, where that lies inside the
-    // step.
+    // Where the laws begin to allow other motions too, or none at the end of a step of time stepping, told once each time;
+    // returns when, where that lies inside the step.
     std::optional<double> several(bool after_step) {
         const bool before = progress_.several;
-        progress_.several = w.state.unique == Uniqueness::several || w.now.several;
+        progress_.several = w.state.unique == Uniqueness::several || w.now.several || w.now.no_motion;
         if (before || !progress_.several) return std::nullopt;
         return begin_several(after_step);
     }

@@ -16,7 +16,7 @@ namespace pn {
 
 struct Event {
     enum class Kind {
-        stick, slip, reverse, pull, chatter, several, user, saturate, desaturate, impact, touch_down, lift_off
+        stick, slip, reverse, pull, chatter, several, paradox, user, saturate, desaturate, impact, touch_down, lift_off
     };
     double time;
     Kind kind;
@@ -40,6 +40,7 @@ constexpr EventKind event_kinds[] = {
     {Event::Kind::pull, "pull", "the normal force of a contact turns negative"},
     {Event::Kind::chatter, "chatter", "a cluster of events is bridged by time stepping"},
     {Event::Kind::several, "several", "from here on the laws allow other motions too"},
+    {Event::Kind::paradox, "paradox", "from here on time stepping goes through modes that allow no motion"},
     {Event::Kind::user, "user", "a function of the user crosses zero"},
     {Event::Kind::saturate, "saturate", "a drive reaches the effort that it has"},
     {Event::Kind::desaturate, "desaturate", "a drive gives again what is asked of it"},

@@ -105,7 +105,7 @@ void Simulation::run() {
     }
     if (t < t_end) {  // ended by the user, with a last sample here
         system.read(y);
-        evaluate(p, w, t, system.q, system.v);
+        if (!w.now.no_motion) evaluate(p, w, t, system.q, system.v);
         output.now();
     }
     if (options.save) save();

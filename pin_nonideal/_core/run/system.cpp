@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include "contact/moving_out.hpp"
 #include "dynamics/evaluation.hpp"
+#include "dynamics/implicit.hpp"
 #include "dynamics/power.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/reactions.hpp"
@@ -21,7 +23,7 @@ System::System(const Program& program, Workspace& workspace, bool with_energy)
     : p(program), w(workspace), energy(with_energy), nq(p.mechanism.nq), nv(p.mechanism.nv), nz(p.states),
       nw(with_energy ? power_count(p) : 0), ne(static_cast<int>(p.frictions.size())),
       ng(static_cast<int>(p.gaps.size())), ns(nq + nv + nz + nw), ny(ns + 2 * ne + ng),
-      q(VecX::Zero(nq)), v(VecX::Zero(nv)) {}
+      q(VecX::Zero(nq)), v(VecX::Zero(nv)), q_before_(q) {}
 
 void System::read(const VecX& y) {
     std::copy_n(y.data(), nq, q.data());
@@ -110,10 +112,24 @@ void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
         kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms) - before;
 }
 
-void System::settle(double t, VecX& y, VecX& dy, bool evaluates) {
+bool System::settle_velocity(double t, bool chosen, bool evaluates, bool goes_through) {
+    try {
+        return begin_step_on_rates(p, w, t, v, chosen, evaluates);
+    } catch (const Failure& failure) {
+        const bool of_modes = failure.kind == Failure::Kind::paradox || failure.kind == Failure::Kind::not_converged;
+        if (!goes_through || !of_modes) throw;
+        w.now.no_motion = true;
+        w.now.several_element = failure.elements.empty() ? 0 : failure.elements.front();
+        solve_with_step_friction(p, w, t, q, v);
+        return true;
+    }
+}
+
+void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_through) {
     read(y);
     read_law_states(y);
     moved_energy = 0.0;
+    w.now.no_motion = false;
     if (!evaluates && keeps_to_rows(p, w, t, q, v)) return write(y);
     const auto total = [&] {
         return kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms);
@@ -121,12 +137,20 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates) {
     // Factors of the new modes: what sticks must not move as the rest is projected.
     bool chosen = begin_rows(p, w, t, q, v);
     const double before = energy && !w.now.rows.blocks.empty() ? total() : 0.0;
+    const double longest_single = longest_single_move(p, w);
+    if (longest_single > 0.0) q_before_ = q;
     bool moved = project_position(p, w, t, q, v, true, !evaluates);
+    if (longest_single > 0.0 && strays_from_planes(p, w, longest_single)) {
+        q = q_before_;
+        chosen = move_out(p, w, t, q, v);
+        project_position(p, w, t, q, v, true, !evaluates);
+        moved = true;
+    }
     const bool past_sticking = project_past_sticking(p, w, t, q, v);
     require_closed(p, w, t);
     if (past_sticking || (moved && evaluates)) chosen = configure_step(p, w);
     moved |= past_sticking;
-    moved |= begin_step_on_rates(p, w, t, v, chosen, evaluates);
+    moved |= settle_velocity(t, chosen, evaluates, goes_through);
     write(y);
     if (evaluates) write_rate(t, dy);
     if (moved && energy) moved_energy = total() - before;

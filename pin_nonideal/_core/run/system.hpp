@@ -57,7 +57,8 @@ struct System {
     // Brings a step's end onto the constraints and evaluates there, as the next step begins.
     void project_and_evaluate(double t, VecX& y, VecX& dy);
     // The same of a step of time stepping, whose modes have just been set; evaluated only where that is asked for.
-    void settle(double t, VecX& y, VecX& dy, bool evaluates);
+    // `goes_through`: where these modes have no motion, what slips rubs on as it did in the step.
+    void settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_through);
     // Whether y needs no projection; all that a sample of it tells is evaluated then, and no more.
     bool is_on_constraints(double t, const VecX& y);
     void normalize(VecX& y) const;
@@ -68,6 +69,9 @@ private:
     void watch(double t, VecX& dy);
     void watch_loads(VecX& dy);
     double energy_at(const VecX& y);
+    bool settle_velocity(double t, bool chosen, bool evaluates, bool goes_through);
+
+    VecX q_before_;
 };
 
 }  // namespace pn

@@ -13,6 +13,8 @@ namespace {
 
 // Part of a step that is not worth one of its own.
 constexpr double least_part = 1e-9;
+// Of a step at the least, where edges come at each other.
+constexpr double least_cut = 1e-3;
 
 // Whether another step from the same state may go elsewhere: by time, by the user, or where steps of another method lie
 // between those of time stepping.
@@ -45,7 +47,7 @@ double TimeStepping::end_of_step(double size, double stop, double t_end) const {
 
 // Whether nothing moves, and what sticks leaves no freedom.
 bool TimeStepping::rests() const {
-    return lasts_ && system_.ng == 0 && (system_.velocity(now_.y).array() == 0.0).all() && is_immobile(p, w);
+    return lasts_ && (system_.velocity(now_.y).array() == 0.0).all() && is_immobile(p, w);
 }
 
 // Whether anything asks for the accelerations and forces at the step's end: a sample, what follows the run, or slip
@@ -57,8 +59,25 @@ bool TimeStepping::asks_for_motion(double end, double t_end) const {
     });
 }
 
+// With contacts that may open: of a step to `end` as much as edges that come at each other allow.
+void TimeStepping::take_part(double end, double t_end, double least) {
+    double& t = now_.t;
+    const double left = end - t, h = std::max(moreau_contacts_.allowed(t, left, now_.y), least);
+    const bool whole = h >= (1.0 - least_part) * left;
+    moreau_contacts_.step(t, whole ? left : h, now_.y, now_.moved_energy, now_.impact_energy);
+    t = whole ? end : t + h;
+    const bool goes_through = options_.method.scheme == Method::Scheme::moreau;
+    system_.settle(t, now_.y, now_.rate, whole && asks_for_motion(end, t_end), goes_through);
+    now_.moved_energy += system_.moved_energy;
+}
+
 void TimeStepping::take(double end, double t_end) {
     double& t = now_.t;
+    if (system_.ng > 0) {
+        const double least = least_cut * (end - t);
+        while (t < end) take_part(end, t_end, least);
+        return;
+    }
     VecX &y = now_.y, &y_from = y_from_;
     const bool rested = rests();
     Modes& before = before_step_;
@@ -67,12 +86,11 @@ void TimeStepping::take(double end, double t_end) {
         before = w.state.mode;
     }
     const double moved_from = now_.moved_energy;
-    if (system_.ng > 0) moreau_contacts_.step(t, end - t, y, now_.moved_energy, now_.impact_energy);
-    else moreau_.step(t, end - t, y, now_.moved_energy);
+    moreau_.step(t, end - t, y, now_.moved_energy);
     t = end;
     const bool held = rested && std::equal(before.begin(), before.end(), w.state.mode.begin());
     if (!held) {
-        system_.settle(t, y, now_.rate, asks_for_motion(end, t_end));
+        system_.settle(t, y, now_.rate, asks_for_motion(end, t_end), false);
         now_.moved_energy += system_.moved_energy;
         return;
     }

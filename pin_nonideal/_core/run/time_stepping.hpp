@@ -23,6 +23,7 @@ public:
 private:
     bool rests() const;
     void take(double end, double t_end);
+    void take_part(double end, double t_end, double least);
     bool asks_for_motion(double end, double t_end) const;
     double end_of_step(double size, double stop, double t_end) const;
 
