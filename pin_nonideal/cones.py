@@ -101,7 +101,8 @@ def cone_complementarity(
     Returns:
         The `ConeSolution`.  Newton's method on the modes after Alart and Curnier; where it does not come to
         rest, an interior-point method on second-order cones first, with de Saxce's correction mu |w_t|
-        inside Newton's equations or held in turn.
+        inside Newton's equations or held in turn.  Contacts are scaled by their own response; one below
+        1e-14 of the largest counts as none.
 
     Raises:
         InputError: a shape does not fit, a value is not finite, or a coefficient or limit is negative.

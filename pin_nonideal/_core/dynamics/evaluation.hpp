@@ -25,8 +25,8 @@ void place_rows(const Program& p, Workspace& w, double t, const VecX& v);
 void evaluate_rows(const Program& p, Workspace& w, double t, const VecX& v);
 void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 
-// The row of a gap, open or closed: its residual, for bodies that are placed; its rate and drift, for bodies in motion; both;
-// and these with A. A function of the user's gives them all at once.
+// The row of a gap, open or closed: its residual, for bodies that are placed; its rate and drift, for bodies in motion;
+// both; and these with A. A function of the user's gives them all at once.
 void measure_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
 void move_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
 void follow_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);

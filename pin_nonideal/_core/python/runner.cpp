@@ -157,11 +157,11 @@ std::tuple<Numbers, Numbers, Numbers, Numbers> Runner::rows(const Array& q_in, c
 Numbers Runner::slip_rows(const Array& q_in, const Array& v_in, double t) {
     set(q_in, v_in, {});
     kinematics(p->mechanism, w->now.terms, q, v);
-    evaluate_rows(*p, *w, t, v);
     const int nv = p->mechanism.nv;
     std::vector<double> rows;
     for (const Friction& f : p->frictions) {
         const Block& block = p->blocks[f.block];
+        evaluate_block(*p, *w, t, v, f.block);  // of open contacts too
         std::vector<double> local(block.support.size() * f.dim);
         fill_A(block, p->mechanism, w->now.terms, w->now.values[f.block], local.data());
         for (int k = 0; k < f.dim; ++k) {
