@@ -35,8 +35,9 @@ constexpr double slow = 1e-4, astray = 1e-6;
 bool goes_its_way(const Program& p, Workspace& w, const VecX& v) {
     const double least = slow * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
+        if (!slips(w.state.mode[e])) continue;
         const Friction& f = p.frictions[e];
-        if (f.dim == 1 || f.gap < 0 || is_open(p, w, e) || !slips(w.state.mode[e]) || !at_rest(p, w, e, v)) continue;
+        if (f.dim == 1 || f.gap < 0 || is_open(p, w, e) || !at_rest(p, w, e, v)) continue;
         const Block& block = p.blocks[f.block];
         multiply(block, w.now.A, w.now.a, w.scratch.r);
         double size = 0.0, along = 0.0;
