@@ -75,10 +75,14 @@ bool move_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) 
         const VecX from = q;
         retract(p.mechanism, from.data(), step.data(), q.data());
     }
+    if (!outside) {  // the next step finds them inside, and stops what enters
+        q = start;
+        begin_rows(p, w, t, q, v);
+        project_position(p, w, t, q, v, true);
+        width = widths(p, w, t, v, gaps);
+    }
     std::vector<char> touch = closed;
-    if (outside)
-        for (size_t k = 0; k < gaps.size(); ++k) touch[gaps[k]] = width[k] <= rounding;
-    else q = start;
+    for (size_t k = 0; k < gaps.size(); ++k) touch[gaps[k]] = std::abs(width[k]) <= rounding;
     set_contacts(p, w, touch, modes);
     return begin_rows(p, w, t, q, v);
 }

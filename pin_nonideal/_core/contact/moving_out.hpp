@@ -13,8 +13,9 @@ double longest_single_move(const Program& p, const Workspace& w);
 bool strays_from_planes(const Program& p, Workspace& w, double longest_single);
 
 // Moves q by the least move in the metric of M to where the constraints hold and no closed contact is inside its plane:
-// gap >= 0, complementary to multipliers that press. Those that do not touch there are opened. Leaves the workspace
-// configured at q, with the rows that are independent there; returns whether they were chosen.
+// gap >= 0, complementary to multipliers that press. Those that do not touch there are opened, and
+// where no such place is found those that are off their planes where q was. Leaves the workspace configured at q, with the
+// rows that are independent there; returns whether they were chosen.
 bool move_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 
 }  // namespace pn
