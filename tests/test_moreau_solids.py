@@ -97,7 +97,7 @@ def test_many_random_solids():
 
 
 @pytest.mark.parametrize("ratio", [1.0, 1e2, 1e6])
-@pytest.mark.parametrize("seed", [2, 3, 5])
+@pytest.mark.parametrize("seed", [2, 3])
 def test_a_heavy_box_falls_on_a_light_one(seed, ratio):
     """Which stands on the floor; where the modes of a step's end allow no motion an event says so."""
     rng, q, height = np.random.default_rng(seed), [], 0.0

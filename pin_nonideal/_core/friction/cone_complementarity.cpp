@@ -43,7 +43,7 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
     bool found = search(x, warm);
     ConeStatus status = found ? ConeStatus::solved : find_certificate(problem_, certificate_);
     if (status == ConeStatus::jammed) found = grow_friction(x);  // a solution may be there all the same
-    if (status == ConeStatus::failed) found = grow_friction(x) || take_nearest(x) || scatter(x);
+    if (status == ConeStatus::failed) found = grow_friction(x) || scatter(x) || take_nearest(x);
     if (found && shares_alike_) stiffen(x);
     unique_shares_ = newton_.regular();
     const bool as_it_was = warm && may_keep_shares && newton_.steps() == steps;
@@ -81,21 +81,6 @@ bool ConeComplementarity::search(Eigen::Ref<VecX> f, bool warm) {
     return polish(f, more_steps) || approach(f) || take_turns(f) || relax(f);
 }
 
-// The problem at hand on the way to the one that is posed: by Newton's method, and where that does not come to rest from
-// ends of the central path, with slip that follows and then with slip that stands, in turn. Returns the error.
-double ConeComplementarity::solve_on_way(Eigen::Ref<VecX> there) {
-    double error = newton_.solve(grown_, there, more_steps);
-    for (int turn = 0; turn < few_turns && !(error <= solved); ++turn) {
-        path_.follow(grown_, there, turn == 0 ? ConePath::Slip::follows : ConePath::Slip::stands);
-        if (!there.allFinite()) break;
-        auto end = f_.vector(problem_.n);
-        end = there;
-        error = newton_.solve(grown_, end, more_steps);
-        if (error <= solved) there = end;
-    }
-    return error;
-}
-
 // Each element gives way by a little of what its force has changed, which makes every problem on the way a regular one,
 // however many elements share a load; forces that change no more give no way (the proximal point algorithm: Rockafellar,
 // SIAM J. Control Optim. 14, 1976).
@@ -104,8 +89,7 @@ bool ConeComplementarity::approach(Eigen::Ref<VecX> f) {
     auto last = x_.vector(problem_.n), nearest = nearest_.vector(problem_.n);
     last.setZero();
     double compliance = first_compliance, before = HUGE_VAL;
-    bool stays = false;
-    for (int turn = 0; turn < most_approaches && !stays; ++turn) {
+    for (int turn = 0; turn < most_approaches && !(least_miss_ <= unchangeable); ++turn) {
         grown_.W() = problem_.W();
         grown_.W().diagonal().array() += compliance;
         grown_.w0() = problem_.w0() - compliance * last;
@@ -113,21 +97,24 @@ bool ConeComplementarity::approach(Eigen::Ref<VecX> f) {
         double error = newton_.solve(grown_, f, more_steps);
         if (!(error <= solved)) {
             f.setZero();
-            error = solve_on_way(f);
+            error = newton_.solve(grown_, f, more_steps);
+        }
+        if (!(error <= solved)) {
+            path_.follow(grown_, f, ConePath::Slip::follows);
+            if (f.allFinite()) error = newton_.solve(grown_, f, more_steps);
         }
         compliance = std::max(least_compliance, 0.5 * compliance);
         if (!(error <= solved) || f.cwiseAbs().maxCoeff() > no_force) continue;
         last = f;
         if (polish(f, few_steps)) return true;
         error = newton_.error(problem_, f);
-        stays = error <= unchangeable && error > lasts * before;
-        if (error < least_miss_) {
+        if (error > lasts * before && error < least_miss_) {
             nearest = f;
             least_miss_ = error;
         }
         before = error;
     }
-    return stays && take_nearest(f);
+    return least_miss_ <= unchangeable && take_nearest(f);
 }
 
 // To elements that give way by ever less of their whole force; f stays where that leads to no solution.
@@ -221,7 +208,16 @@ bool ConeComplementarity::grow_friction(Eigen::Ref<VecX> f) {
         const double next = std::min(1.0, reached + stretch);
         for (int e = 0; e < problem_.size(); ++e) grown_.elements[e].bound = next * problem_.elements[e].bound;
         there = f;
-        if (!(solve_on_way(there) <= solved)) {
+        double error = newton_.solve(grown_, there, more_steps);
+        for (int turn = 0; turn < few_turns && !(error <= solved); ++turn) {
+            path_.follow(grown_, there, turn == 0 ? ConePath::Slip::follows : ConePath::Slip::stands);
+            if (!there.allFinite()) break;
+            auto end = f_.vector(problem_.n);
+            end = there;
+            error = newton_.solve(grown_, end, more_steps);
+            if (error <= solved) there = end;
+        }
+        if (!(error <= solved)) {
             stretch *= 0.3;
             continue;
         }

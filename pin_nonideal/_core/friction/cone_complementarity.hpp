@@ -49,7 +49,6 @@ public:
 private:
     bool search(Eigen::Ref<VecX> f, bool warm);
     bool polish(Eigen::Ref<VecX> f, int most_steps);
-    double solve_on_way(Eigen::Ref<VecX> there);
     bool approach(Eigen::Ref<VecX> f);
     bool take_nearest(Eigen::Ref<VecX> f);
     bool stiffen(Eigen::Ref<VecX> f);
