@@ -2,6 +2,7 @@
 #include "dynamics/workspace.hpp"
 
 #include <algorithm>
+#include <numeric>
 
 namespace pn {
 
@@ -31,8 +32,10 @@ static void size(const Program& p, Evaluation& now) {
     for (size_t i = 0; i < p.blocks.size(); ++i) now.values[i].resize(p.blocks[i].kind, nv);
     now.idle.assign(p.blocks.size(), 0);
     now.selected.assign(p.gaps.size(), 1);
-    now.awake.reserve(p.blocks.size());
-    now.touching.reserve(p.gaps.size());
+    now.awake.resize(p.blocks.size());
+    now.touching.resize(p.gaps.size());
+    std::iota(now.awake.begin(), now.awake.end(), 0);
+    std::iota(now.touching.begin(), now.touching.end(), 0);
     now.loaded.reserve(elements);
     now.slipping.reserve(elements);
     now.A.assign(p.entries, 0.0);
@@ -74,6 +77,7 @@ Workspace::Workspace(const Program& p) {
 
 // Thousands of contacts may be open: of those that stay so no more is looked at than that.
 static void select_contacts(const Program& p, Workspace& w) {
+    if (same_bytes(w.state.closed, w.now.selected)) return;
     w.now.touching.clear();
     for (size_t i = 0; i < p.gaps.size(); ++i) {
         const char closed = w.state.closed[i];
@@ -83,6 +87,9 @@ static void select_contacts(const Program& p, Workspace& w) {
         w.now.idle[p.gaps[i].block] = !closed;
         for (int e : p.gaps[i].elements) w.now.idle[p.frictions[e].block] = !closed;
     }
+    w.now.awake.clear();
+    for (size_t i = 0; i < p.blocks.size(); ++i)
+        if (!w.now.idle[i]) w.now.awake.push_back(static_cast<int>(i));
 }
 
 void select_rows(const Program& p, Workspace& w) {
@@ -94,9 +101,6 @@ void select_rows(const Program& p, Workspace& w) {
         const Block& block = p.blocks[p.gaps[i].block];
         std::fill_n(w.now.rows.required.begin() + block.row, block.kept.size(), char(1));
     }
-    w.now.awake.clear();
-    for (size_t i = 0; i < p.blocks.size(); ++i)
-        if (!w.now.idle[i]) w.now.awake.push_back(static_cast<int>(i));
     w.now.loaded.clear();
     w.now.slipping.clear();
     std::fill(w.now.terms.locked.begin(), w.now.terms.locked.end(), char(0));

@@ -81,7 +81,7 @@ void Recorder::sample(double t, const VecX& y, const Jumps& jumps, bool evaluate
     out.violation.push_back(position);
     out.violation_rate.push_back(velocity);
     if (system.nz > 0) append(out.z, y.segment(system.nq + system.nv, system.nz));
-    for (size_t e = 0; e < p.frictions.size(); ++e) out.modes.push_back(w.state.mode[e]);
+    out.modes.insert(out.modes.end(), w.state.mode.begin(), w.state.mode.end());
     append_closed(p, w, out.closed);
     if (options.a) append(out.a, w.now.a);
     if (options.tau) append(out.tau, w.now.tau);
