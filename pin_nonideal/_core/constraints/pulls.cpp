@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "math/factorizations.hpp"
 #include "math/nonnegative.hpp"
 
 namespace pn {
@@ -40,7 +41,9 @@ MatX free_described(const RowLayout& layout, const std::vector<Block>& blocks, c
         if (first[r] >= 0) Z.row(first[r]) = -C.col(r).transpose();
     for (int k = 0; k < n; ++k) Z(others[k], k) = 1.0;
     const MatX S = MatX::Identity(n, n) + C * C.transpose();
-    return S.llt().matrixL().solve(Z.transpose()).transpose();
+    Cholesky factor;
+    factor.compute(S);
+    return factor.solve_lower(Z.transpose()).transpose();
 }
 
 // What the pressing rows have of these multipliers.

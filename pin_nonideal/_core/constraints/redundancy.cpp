@@ -1,5 +1,7 @@
 #include "constraints/redundancy.hpp"
 
+#include "math/factorizations.hpp"
+
 namespace pn {
 
 // Weights of rows come from products of rows, which square their condition: what a first solution leaves of the dependent
@@ -60,7 +62,7 @@ void share_multipliers(const RowLayout& layout, const std::vector<Block>& blocks
     const VecX inverse = all.weight.cwiseInverse();
     MatX S = W * inverse.asDiagonal() * W.transpose();
     for (size_t k = 0; k < dependent.size(); ++k) S(k, k) += inverse[dependent[k]];
-    const VecX y = S.ldlt().solve(W * inverse.cwiseProduct(lam));
+    const VecX y = solve_semidefinite(S, W * inverse.cwiseProduct(lam));
     shared -= W.transpose() * y;
     for (size_t k = 0; k < dependent.size(); ++k) shared[dependent[k]] = y[k];
 }
@@ -71,7 +73,9 @@ MatX free_multipliers(const RowLayout& layout, const std::vector<Block>& blocks,
     MatX free = -dependence(layout, blocks, B, s, dependent).transpose();
     for (size_t k = 0; k < dependent.size(); ++k) free(dependent[k], static_cast<Eigen::Index>(k)) = 1.0;
     const MatX S = free.transpose() * all.weight.cwiseInverse().asDiagonal() * free;
-    return S.llt().matrixL().solve(free.transpose()).transpose();
+    Cholesky factor;
+    factor.compute(S);
+    return factor.solve_lower(free.transpose()).transpose();
 }
 
 }  // namespace pn

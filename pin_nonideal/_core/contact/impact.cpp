@@ -4,12 +4,11 @@
 #include <cmath>
 #include <numeric>
 
-#include <Eigen/Eigenvalues>
-
 #include "contact/contact_rows.hpp"
 #include "dynamics/evaluation.hpp"
 #include "friction/cone_complementarity.hpp"
 #include "friction/modes.hpp"
+#include "math/factorizations.hpp"
 
 namespace pn {
 
@@ -82,11 +81,11 @@ VecX poisson(const ContactRows& rows, double t, const VecX& velocity) {
 // Velocities that no percussion can change are zero but for rounding, where constraints or other contacts hold them:
 // what is left of them would let contacts slip that stick.
 void clean(const ContactRows& rows, double speed, VecX& w0) {
-    const Eigen::SelfAdjointEigenSolver<MatX> modes(rows.W);
-    const VecX& response = modes.eigenvalues();
+    const Spectrum modes = symmetric_spectrum(rows.W);
+    const VecX& response = modes.values;
     for (int i = 0; i < w0.size() && response[i] <= no_response * response[w0.size() - 1]; ++i) {
-        const double held = modes.eigenvectors().col(i).dot(w0);
-        if (std::abs(held) <= velocity_rounding * (1.0 + speed)) w0 -= held * modes.eigenvectors().col(i);
+        const double held = modes.vectors.col(i).dot(w0);
+        if (std::abs(held) <= velocity_rounding * (1.0 + speed)) w0 -= held * modes.vectors.col(i);
     }
 }
 

@@ -113,7 +113,7 @@ struct Implicit : Unknowns {
             const double error = newton.residual.cwiseAbs().maxCoeff();
             if (error <= reaction_tolerance * y.cwiseAbs().maxCoeff() || error >= last) return;
             last = error;
-            newton.step = newton.factor.solve(newton.residual);
+            newton.factor.solve(newton.residual, newton.step);
             y += newton.step;
         }
     }

@@ -73,7 +73,7 @@ bool ReactionNewton::solve(const ReactionEquation& equation, VecX& y) {
         if (error <= newton_rounding * size || (error >= last && error <= stalled * size)) return true;
         last = error;
         factorize(equation, y);
-        step = factor.solve(residual);
+        factor.solve(residual, step);
         if (!step.allFinite()) return false;
         y += step;
     }

@@ -6,9 +6,7 @@
 
 #include <vector>
 
-#include <Eigen/LU>
-
-#include "math/spatial.hpp"
+#include "math/factorizations.hpp"
 
 namespace pn {
 
@@ -41,7 +39,7 @@ struct ReactionEquation {
 // Newton's method on the arrays; the storage is kept.
 struct ReactionNewton {
     MatX matrix;  // I - dg/dy
-    Eigen::PartialPivLU<MatX> factor;
+    LU factor;
     VecX image, residual, step;
 
     // At a point; returns the determinant.

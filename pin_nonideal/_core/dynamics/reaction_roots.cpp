@@ -98,7 +98,7 @@ void Search::divide() {
         following_.erase(following_.begin() + best);
     }
     const int m = static_cast<int>(following_.size());
-    spread_ = (MatX::Identity(m, m) - among(L_, following_, following_)).inverse();
+    spread_ = pn::inverse(MatX::Identity(m, m) - among(L_, following_, following_));
 }
 
 // The unknowns that follow, for those that are halved in z; from where z has them. False where that does not end.
@@ -231,7 +231,7 @@ bool Search::settled(const Part& part) {
     r.array() = r.array() * (1.0 + margin) + rounding * terms(z, s);
     const VecX residual = g - z;
     if (((residual.cwiseAbs() - (A.cwiseAbs() + D) * r).array() > 0.0).any()) return true;
-    const MatX inverse = A.inverse();
+    const MatX inverse = pn::inverse(A);
     if (!inverse.allFinite()) return false;
     const VecX step = (inverse * residual).cwiseAbs(), bound = inverse.cwiseAbs() * (D * r);
     if (((step - bound - r).array() > 0.0).any()) return true;

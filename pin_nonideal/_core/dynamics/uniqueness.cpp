@@ -66,7 +66,8 @@ bool refine(Unknowns& u, const ReactionEquation& equation, VecX& y) {
         const VecX miss = g - y;
         if (!(miss.cwiseAbs().maxCoeff() <= near_motion * y.cwiseAbs().maxCoeff())) return false;
         newton.factorize(equation, y);
-        y += newton.factor.solve(miss);
+        newton.factor.solve(miss, newton.step);
+        y += newton.step;
     }
     return true;
 }

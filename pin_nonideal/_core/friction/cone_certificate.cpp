@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/QR>
+#include "math/factorizations.hpp"
 
 namespace pn {
 
 namespace {
 
-using Kind = ConeElement::Kind;
+using ConeKind = ConeElement::Kind;
 
 constexpr double clearly = 1e-7;   // part of |y| |w0| that y . w0 must come below zero by
 constexpr double shown = 1e-9;     // rounding that what must vanish may have
@@ -27,11 +27,11 @@ bool no_forces(const ConeProblem& p, VecX& y) {
     std::vector<int> rows;
     std::vector<ConeElement> elements = p.elements;
     for (int e = 0; e < p.size(); ++e) {
-        const bool equality = p.elements[e].is(Kind::equality);
-        if (p.elements[e].is(Kind::box)) continue;
+        const bool equality = p.elements[e].is(ConeKind::equality);
+        if (p.elements[e].is(ConeKind::box)) continue;
         for (int k = 0; k < (equality ? p.elements[e].dim : 1); ++k) {
             rows.push_back(p.at[e] + k);
-            elements.push_back(equality ? ConeElement{Kind::equality, 1, 0.0} : ConeElement::contact(1, 0.0));
+            elements.push_back(equality ? ConeElement{ConeKind::equality, 1, 0.0} : ConeElement::contact(1, 0.0));
         }
     }
     const int n = p.n, m = static_cast<int>(rows.size());
@@ -57,9 +57,9 @@ bool no_forces(const ConeProblem& p, VecX& y) {
     for (int e = 0; e < p.size(); ++e) {
         const ConeElement& element = p.elements[e];
         const auto ue = u.segment(p.at[e], element.dim);
-        if (element.is(Kind::contact) && (outside_dual(element, ue) > shown || y[p.at[e]] < 0.0)) return false;
-        if (element.is(Kind::equality) && ue.cwiseAbs().maxCoeff() > shown) return false;
-        if (element.is(Kind::box)) margin -= element.bound * ue.norm();
+        if (element.is(ConeKind::contact) && (outside_dual(element, ue) > shown || y[p.at[e]] < 0.0)) return false;
+        if (element.is(ConeKind::equality) && ue.cwiseAbs().maxCoeff() > shown) return false;
+        if (element.is(ConeKind::box)) margin -= element.bound * ue.norm();
     }
     return margin > clearly;
 }
@@ -78,7 +78,7 @@ void sharpen(const ConeProblem& p, const MatX& E, double near_edge, VecX& y) {
             const int i = p.at[e], d = element.dim, row = rank + 3 * e;
             J.middleRows(row, 3).setZero();
             const double length = element.slides() ? y.segment(i + 1, d - 1).norm() : 0.0;
-            const bool empty = !element.is(Kind::contact) || y[i] <= none;
+            const bool empty = !element.is(ConeKind::contact) || y[i] <= none;
             if (empty) J.block(row, i, d, d).setIdentity();
             else if (element.bound == 0.0) J.block(row, i + 1, d - 1, d - 1).setIdentity();
             else if (element.slides() && length >= element.bound * y[i] - none) {
@@ -87,10 +87,7 @@ void sharpen(const ConeProblem& p, const MatX& E, double near_edge, VecX& y) {
             }
             miss.segment(row, 3) = J.middleRows(row, 3) * y;
         }
-        Eigen::CompleteOrthogonalDecomposition<MatX> cod(J.rows(), J.cols());
-        cod.setThreshold(dependent);
-        cod.compute(J);
-        y -= cod.solve(miss);
+        y -= least_squares(J, miss, dependent);
     }
 }
 
@@ -101,7 +98,7 @@ bool squeezes(const ConeProblem& p, VecX& y) {
     if ((p.W().transpose() * y).cwiseAbs().maxCoeff() > shown || -y.dot(p.w0()) < clearly) return false;
     for (int e = 0; e < p.size(); ++e) {
         const int i = p.at[e], tails = p.elements[e].dim - 1;
-        if (!p.elements[e].is(Kind::contact)) continue;
+        if (!p.elements[e].is(ConeKind::contact)) continue;
         if (y[i] < -shown || y.segment(i + 1, tails).norm() > p.elements[e].bound * y[i] + shown) return false;
     }
     return true;
@@ -120,9 +117,9 @@ bool squeezed(const ConeProblem& p, VecX& y) {
     M.bottomLeftCorner(n, rank) = E;
     VecX r = VecX::Zero(rank + n), f = r;
     r.tail(n) = p.w0();
-    std::vector<ConeElement> elements(rank, ConeElement{Kind::equality, 1, 0.0});
+    std::vector<ConeElement> elements(rank, ConeElement{ConeKind::equality, 1, 0.0});
     for (ConeElement e : p.elements) {
-        if (e.is(Kind::box)) e.bound = 0.0;
+        if (e.is(ConeKind::box)) e.bound = 0.0;
         elements.push_back(e);
     }
     ConeProblem nearest;

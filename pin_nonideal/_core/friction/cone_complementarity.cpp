@@ -9,7 +9,7 @@ namespace pn {
 
 namespace {
 
-using Kind = ConeElement::Kind;
+using ConeKind = ConeElement::Kind;
 
 constexpr double solved = 1e-11;     // error that is a solution
 constexpr double no_force = 1e10;    // forces beyond this, in the problem's units, only squeeze
@@ -151,8 +151,8 @@ bool ConeComplementarity::take_nearest(Eigen::Ref<VecX> f) {
 void ConeComplementarity::tidy(Eigen::Ref<VecX> f) const {
     for (int e = 0; e < problem_.size(); ++e) {
         const ConeElement& element = problem_.elements[e];
-        const int i = problem_.at[e], head = element.is(Kind::contact);
-        if (element.is(Kind::equality)) continue;
+        const int i = problem_.at[e], head = element.is(ConeKind::contact);
+        if (element.is(ConeKind::equality)) continue;
         if (head && !(f[i] > 0.0)) f[i] = 0.0;
         auto tail = f.segment(i + head, element.dim - head);
         const double limit = element.bound * (head ? f[i] : 1.0), length = tail.norm();
@@ -181,14 +181,14 @@ bool ConeComplementarity::relax(Eigen::Ref<VecX> f) {
         for (int sweep = 0; sweep < sweeps; ++sweep)
             for (int e = 0; e < problem_.size(); ++e) {
                 const ConeElement& element = problem_.elements[e];
-                const int i = problem_.at[e], d = element.dim, head = element.is(Kind::contact);
+                const int i = problem_.at[e], d = element.dim, head = element.is(ConeKind::contact);
                 auto fe = f.segment(i, d);
                 auto before = x.head(d);
                 before = fe;
                 fe -= relaxation * problem_.stiffness(e) * w.segment(i, d);
                 if (head) fe[0] = std::max(fe[0], 0.0);
                 const double length = fe.tail(d - head).norm(), limit = element.bound * (head ? fe[0] : 1.0);
-                if (!element.is(Kind::equality) && length > limit) fe.tail(d - head) *= limit / length;
+                if (!element.is(ConeKind::equality) && length > limit) fe.tail(d - head) *= limit / length;
                 before -= fe;
                 for (int k = 0; k < d; ++k) w -= before[k] * problem_.W().col(i + k);
             }
@@ -235,7 +235,7 @@ bool ConeComplementarity::scatter(Eigen::Ref<VecX> f) {
     for (int start = 0; start < most_starts; ++start) {
         for (int i = 0; i < problem_.n; ++i) f[i] = 4.0 * (lot() / double(std::minstd_rand::max()) - 0.5);
         for (int e = 0; e < problem_.size(); ++e)
-            if (problem_.elements[e].is(Kind::contact)) f[problem_.at[e]] = 2.0 * std::abs(f[problem_.at[e]]);
+            if (problem_.elements[e].is(ConeKind::contact)) f[problem_.at[e]] = 2.0 * std::abs(f[problem_.at[e]]);
         if (polish(f, more_steps)) return true;
         path_.follow(problem_, f, ConePath::Slip::stands);
         if (f.allFinite() && polish(f, more_steps)) return true;
@@ -252,7 +252,7 @@ ConeResiduals ConeComplementarity::residuals(const Eigen::Ref<const MatX>& W, co
     const double force = std::max(f.cwiseAbs().maxCoeff(), least);
     int i = 0;
     for (const ConeElement& e : elements) {
-        const int head = e.is(Kind::contact), d = e.dim;
+        const int head = e.is(ConeKind::contact), d = e.dim;
         Eigen::Vector3d w = Eigen::Vector3d::Zero(), ft = w, wt = w;
         double speed = std::max(w0.cwiseAbs().maxCoeff(), least), limit = e.bound;
         for (int k = 0; k < d; ++k) {
@@ -268,7 +268,7 @@ ConeResiduals ConeComplementarity::residuals(const Eigen::Ref<const MatX>& W, co
             ft[k] = f[i + k];
             wt[k] = w[k];
         }
-        if (e.is(Kind::equality)) {
+        if (e.is(ConeKind::equality)) {
             out.signorini = std::max(out.signorini, wt.norm() / speed);
         } else {
             out.coulomb = std::max(out.coulomb, (ft.norm() - limit) / force);

@@ -7,7 +7,7 @@ namespace pn {
 
 namespace {
 
-using Kind = ConeElement::Kind;
+using ConeKind = ConeElement::Kind;
 using Eigen::Vector3d;
 
 constexpr double rounding = 1e-15, nearly = 1e-11;  // errors that end it; the second where steps gain no more
@@ -27,7 +27,7 @@ struct Disk {
 Disk disk_of(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& f, const Eigen::Ref<const VecX>& w) {
     const ConeElement& element = p.elements[e];
     const double rho = p.stiffness(e);
-    const bool contact = element.is(Kind::contact);
+    const bool contact = element.is(ConeKind::contact);
     Disk disk;
     disk.first = p.at[e] + contact;
     disk.dim = element.dim - contact;
@@ -47,11 +47,11 @@ double ConeNewton::evaluate(const ConeProblem& p, const Eigen::Ref<const VecX>& 
         const ConeElement& element = p.elements[e];
         const double rho = p.stiffness(e);
         const int i = p.at[e];
-        if (element.is(Kind::equality)) {
+        if (element.is(ConeKind::equality)) {
             F.segment(i, element.dim) = rho * w.segment(i, element.dim);
             continue;
         }
-        if (element.is(Kind::contact)) F[i] = std::min(f[i], rho * w[i]);
+        if (element.is(ConeKind::contact)) F[i] = std::min(f[i], rho * w[i]);
         const Disk disk = disk_of(p, e, f, w);
         if (disk.sticks() && disk.radius > 0.0) F.segment(disk.first, disk.dim) = rho * w.segment(disk.first, disk.dim);
         else if (disk.dim > 0)
@@ -88,11 +88,11 @@ void ConeNewton::differentiate(const ConeProblem& p, const Eigen::Ref<const VecX
         const ConeElement& element = p.elements[e];
         const double rho = p.stiffness(e);
         const int i = p.at[e], d = element.dim;
-        if (element.is(Kind::equality)) {
+        if (element.is(ConeKind::equality)) {
             J.middleRows(i, d) = rho * W.middleRows(i, d);
             continue;
         }
-        const bool contact = element.is(Kind::contact), closed = contact && f[i] > rho * w[i];
+        const bool contact = element.is(ConeKind::contact), closed = contact && f[i] > rho * w[i];
         if (closed) J.row(i) = rho * W.row(i);
         else if (contact) J(i, i) = 1.0;
         const Disk disk = disk_of(p, e, f, w);
@@ -145,9 +145,9 @@ bool ConeNewton::changes_piece(const ConeProblem& p, const Eigen::Ref<const VecX
     for (int e = 0; e < p.size(); ++e) {
         const ConeElement& element = p.elements[e];
         signed char now = 0;
-        if (!element.is(Kind::equality)) {
+        if (!element.is(ConeKind::equality)) {
             const int i = p.at[e];
-            const bool closed = element.is(Kind::contact) && f[i] > p.stiffness(e) * w[i];
+            const bool closed = element.is(ConeKind::contact) && f[i] > p.stiffness(e) * w[i];
             const Disk disk = disk_of(p, e, f, w);
             const bool sticks = disk.sticks() && disk.radius > 0.0;
             now = disk.dim == 0 || sticks || disk.radius == 0.0 ? static_cast<signed char>(1 + 2 * closed + sticks) : curved;

@@ -7,7 +7,7 @@ namespace pn {
 
 namespace {
 
-using Kind = ConeElement::Kind;
+using ConeKind = ConeElement::Kind;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
@@ -18,11 +18,11 @@ constexpr double smooth_speed = 1e-12;  // below it a slip has no direction
 
 // Units that make a circular cone of the one |f_t| <= mu f_n: forces (root f_n, f_t / root), velocities the other way.
 double root_of(const ConeElement& e) { return e.slides() && e.bound > 0.0 ? std::sqrt(e.bound) : 1.0; }
-bool in_path(const ConeElement& e) { return !e.is(Kind::equality); }
-int head_rows(const ConeElement& e) { return e.is(Kind::contact) ? 1 : 0; }
+bool in_path(const ConeElement& e) { return !e.is(ConeKind::equality); }
+int head_rows(const ConeElement& e) { return e.is(ConeKind::contact) ? 1 : 0; }
 // Tangential rows that may carry a force.
 int tail_rows(const ConeElement& e) {
-    return e.is(Kind::box) ? (e.bound > 0.0 ? e.dim : 0) : e.bound > 0.0 ? e.dim - 1 : 0;
+    return e.is(ConeKind::box) ? (e.bound > 0.0 ? e.dim : 0) : e.bound > 0.0 ? e.dim - 1 : 0;
 }
 
 }  // namespace
@@ -37,7 +37,7 @@ Vector3d ConePath::tail(const ConeProblem& p, int e, const Eigen::Ref<const VecX
 // Element e of a force or of a change of it, whose head a box has given.
 Cone ConePath::force(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& f, double head) const {
     const double root = root_of(p.elements[e]);
-    if (p.elements[e].is(Kind::contact)) head = root * f[p.at[e]];
+    if (p.elements[e].is(ConeKind::contact)) head = root * f[p.at[e]];
     return {head, tail(p, e, f) / root};
 }
 
@@ -54,8 +54,8 @@ void ConePath::start(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
     }
     f.setZero();
     for (int e = 0; e < p.size(); ++e) {
-        if (p.elements[e].is(Kind::box)) states_[e].z.head = p.elements[e].bound;
-        if (p.elements[e].is(Kind::contact)) f[p.at[e]] = 1.0 / root_of(p.elements[e]);
+        if (p.elements[e].is(ConeKind::box)) states_[e].z.head = p.elements[e].bound;
+        if (p.elements[e].is(ConeKind::contact)) f[p.at[e]] = 1.0 / root_of(p.elements[e]);
     }
 }
 
@@ -76,7 +76,7 @@ void ConePath::update(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
             s.slip = slip / s.speed;
         }
         miss.segment(first, rows) -= s.y.tail.head(rows) / root;
-        if (element.is(Kind::contact)) miss[p.at[e]] += (rows > 0 ? element.bound * s.speed : 0.0) - s.y.head * root;
+        if (element.is(ConeKind::contact)) miss[p.at[e]] += (rows > 0 ? element.bound * s.speed : 0.0) - s.y.head * root;
         if (rows < element.dim - head_rows(element)) miss.segment(first, element.dim - head_rows(element)).setZero();
     }
 }
@@ -93,14 +93,14 @@ bool ConePath::factorize(const ConeProblem& p) {
         if (idle > 0) {  // tangential rows without friction
             K.middleRows(first, idle).setZero();
             K.block(first, first, idle, idle).setIdentity();
-            if (element.is(Kind::box)) continue;
+            if (element.is(ConeKind::box)) continue;
         }
         s.scaling = Scaling(s.z, s.y);
         const Scaling& T = s.scaling;
         const double root = root_of(element), inverse = 1.0 / (T.root * T.root);
         const Matrix3d block = inverse / (root * root) * (2.0 * T.w.tail * T.w.tail.transpose() + Matrix3d::Identity());
         K.block(first, first, rows, rows) += block.topLeftCorner(rows, rows);
-        if (element.is(Kind::box)) continue;
+        if (element.is(ConeKind::box)) continue;
         K(i, i) += root * root * inverse * (2.0 * T.w.head * T.w.head - 1.0);
         const Vector3d cross = -2.0 * inverse * T.w.head * T.w.tail;
         K.block(first, i, rows, 1) += cross.head(rows);
@@ -119,19 +119,19 @@ void ConePath::direction(const ConeProblem& p, double target, double keep) {
     for (int e = 0; e < p.size(); ++e) {
         const ConeElement& element = p.elements[e];
         State& s = states_[e];
-        if (!in_path(element) || (element.is(Kind::box) && tail_rows(element) == 0)) continue;
+        if (!in_path(element) || (element.is(ConeKind::box) && tail_rows(element) == 0)) continue;
         Cone d = product(s.scaling.scaled, s.scaling.scaled) * -1.0 - s.second;
         d.head += target;
         s.dy = s.scaling.back(quotient(d, s.scaling.scaled));
         const int rows = tail_rows(element), first = p.at[e] + head_rows(element);
         const double root = root_of(element);
         rhs.segment(first, rows) += s.dy.tail.head(rows) / root;
-        if (element.is(Kind::contact)) rhs[p.at[e]] += root * s.dy.head;
+        if (element.is(ConeKind::contact)) rhs[p.at[e]] += root * s.dy.head;
     }
     solver_.solve(rhs, step);
     for (int e = 0; e < p.size(); ++e) {
         State& s = states_[e];
-        if (!in_path(p.elements[e]) || (p.elements[e].is(Kind::box) && tail_rows(p.elements[e]) == 0)) continue;
+        if (!in_path(p.elements[e]) || (p.elements[e].is(ConeKind::box) && tail_rows(p.elements[e]) == 0)) continue;
         s.dy = s.dy - s.scaling.back(s.scaling.back(force(p, e, step, 0.0)));
     }
 }
@@ -140,7 +140,7 @@ double ConePath::length(const ConeProblem& p) const {
     double least = HUGE_VAL;
     const Eigen::Map<const VecX> step = step_.vector(p.n);
     for (int e = 0; e < p.size(); ++e) {
-        if (!in_path(p.elements[e]) || (p.elements[e].is(Kind::box) && tail_rows(p.elements[e]) == 0)) continue;
+        if (!in_path(p.elements[e]) || (p.elements[e].is(ConeKind::box) && tail_rows(p.elements[e]) == 0)) continue;
         least = std::min({least, room(states_[e].z, force(p, e, step, 0.0)), room(states_[e].y, states_[e].dy)});
     }
     return least;
@@ -150,7 +150,7 @@ double ConePath::gap(const ConeProblem& p) const {
     double sum = 0.0;
     int count = 0;
     for (int e = 0; e < p.size(); ++e) {
-        if (!in_path(p.elements[e]) || (p.elements[e].is(Kind::box) && tail_rows(p.elements[e]) == 0)) continue;
+        if (!in_path(p.elements[e]) || (p.elements[e].is(ConeKind::box) && tail_rows(p.elements[e]) == 0)) continue;
         sum += states_[e].z.dot(states_[e].y);
         ++count;
     }
@@ -179,7 +179,7 @@ void ConePath::follow(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
         f += a * step;
         bool inside = true;
         for (int e = 0; e < p.size(); ++e) {
-            if (!in_path(p.elements[e]) || (p.elements[e].is(Kind::box) && tail_rows(p.elements[e]) == 0)) continue;
+            if (!in_path(p.elements[e]) || (p.elements[e].is(ConeKind::box) && tail_rows(p.elements[e]) == 0)) continue;
             State& s = states_[e];
             s.z = force(p, e, f, s.z.head);
             s.y = s.y + s.dy * a;

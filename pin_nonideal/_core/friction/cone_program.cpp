@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
-
 #include "friction/lorentz.hpp"
+#include "math/factorizations.hpp"
 
 namespace pn {
 
@@ -39,7 +37,7 @@ struct ConeProgram {
     VecX r0, x;
     std::vector<Cone> y;
     std::vector<Scaling> scalings;
-    Eigen::LLT<MatX> factor;
+    Cholesky factor;
 
     ConeProgram(const MatX& W_, const VecX& alpha0_, const std::vector<int>& dims_, const VecX& s_)
         : W(W_), alpha0(alpha0_), dims(dims_), s(s_), n(static_cast<int>(alpha0_.size())),
@@ -83,8 +81,7 @@ struct ConeProgram {
                 s[e] / (T.root * T.root) * (2.0 * T.w.tail * T.w.tail.transpose() + Matrix3d::Identity());
             K.block(at[e], at[e], dims[e], dims[e]) += block.topLeftCorner(dims[e], dims[e]);
         }
-        factor.compute(K);
-        return factor.info() == Eigen::Success;
+        return factor.compute(K);
     }
 
     // Step to z o y = target, with the second-order terms of the step before.
@@ -97,7 +94,7 @@ struct ConeProgram {
             dy[e] = T.back(quotient(d, T.scaled));
             rhs.segment(at[e], dims[e]) = s[e] * dy[e].tail.head(dims[e]);
         }
-        dx = factor.solve(rhs);
+        factor.solve(rhs, dx);
         for (int e = 0; e < elements; ++e) dy[e] = dy[e] - scalings[e].back(scalings[e].back({0.0, tail(dx, e)}));
     }
 
@@ -169,10 +166,7 @@ struct ConeProgram {
             const bool done = error <= newton_tolerance || (error < condition && error >= last);
             last = error;
             if (done) break;
-            Eigen::CompleteOrthogonalDecomposition<MatX> cod(n + elements, n + elements);
-            cod.setThreshold(rank_threshold);
-            cod.compute(J);
-            const VecX step = cod.solve(residual);
+            const VecX step = least_squares(J, residual, rank_threshold);
             there -= step.head(n);
             m -= step.tail(elements);
         }

@@ -7,7 +7,7 @@ namespace pn {
 
 namespace {
 
-using Kind = ConeElement::Kind;
+using ConeKind = ConeElement::Kind;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
@@ -53,8 +53,8 @@ Nearest of_ball(const Vector3d& z, double radius) {
 
 // What the modes of w leave to element e, whose forces are z before that; `given` where it is at its limit.
 Nearest nearest(const ConeElement& element, const Vector3d& z, const Vector3d& w, const Vector3d& given) {
-    if (element.is(Kind::equality)) return {z, Matrix3d::Identity()};
-    if (element.is(Kind::box))
+    if (element.is(ConeKind::equality)) return {z, Matrix3d::Identity()};
+    if (element.is(ConeKind::box))
         return w.norm() > at_rest ? Nearest{given, Matrix3d::Zero()} : of_ball(z, element.bound);
     if (w[0] > at_rest) return {};
     Vector3d slip(0.0, w[1], w[2]);
@@ -89,7 +89,7 @@ void ConeShares::project(const ConeProblem& p, const Eigen::Ref<const VecX>& z, 
     for (int e = 0; e < p.size(); ++e) {
         ConeElement element = p.elements[e];
         const int i = p.at[e], d = element.dim;
-        if (element.is(Kind::box)) element.bound *= p.scale()[i];
+        if (element.is(ConeKind::box)) element.bound *= p.scale()[i];
         Vector3d ze = Vector3d::Zero(), we = ze, ge = ze;
         ze.head(d) = z.segment(i, d);
         we.head(d) = w.segment(i, d);

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 
 #include "friction/rest_solver.hpp"
+#include "math/factorizations.hpp"
 
 namespace pn {
 
@@ -296,9 +296,10 @@ struct Search {
 
 bool is_searched(const RestEquation& equation) {
     if (equation.ask || equation.n > most_searched) return false;
-    const Eigen::LLT<MatX> cholesky(equation.W);  // redundant elements share in ways without number
-    const auto pivots = cholesky.matrixLLT().diagonal().array().square();
-    return cholesky.info() == Eigen::Success && (pivots > least_pivot * equation.W.diagonal().array()).all();
+    Cholesky cholesky;
+    if (!cholesky.compute(equation.W)) return false;  // redundant elements share in ways without number
+    const auto pivots = cholesky.factor().diagonal().array().square();
+    return (pivots > least_pivot * equation.W.diagonal().array()).all();
 }
 
 AllMotions all_motions(const RestEquation& equation) {

@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-
 #include "friction/box_program.hpp"
+#include "math/factorizations.hpp"
 
 namespace pn {
 
@@ -27,20 +25,20 @@ auto part(const VecX& x, const RestElement& e) { return x.segment(e.row, e.dim);
 // G with W = G G^T, and the loads' derivatives times G^-T; false where forces that move nothing change a load.
 bool energy_factor(const RestEquation& equation, MatX& G, MatX& loads) {
     const MatX& W = equation.W;
-    const Eigen::LLT<MatX> cholesky(W);
-    if (cholesky.info() == Eigen::Success) {
-        G = cholesky.matrixL();
+    Cholesky cholesky;
+    if (cholesky.compute(W)) {
+        G = cholesky.factor().triangularView<Eigen::Lower>();
         if ((G.diagonal().array().square() > safe_pivot * W.diagonal().array()).all()) {
-            loads = cholesky.matrixL().solve(equation.loads.transpose()).transpose();
+            loads = cholesky.solve_lower(equation.loads.transpose()).transpose();
             return true;
         }
     }
-    const Eigen::SelfAdjointEigenSolver<MatX> eigen(W);
-    const double least = null_response * eigen.eigenvalues().cwiseAbs().maxCoeff();
-    const int null = static_cast<int>((eigen.eigenvalues().array() <= least).count()), n = equation.n;
-    const MatX along = eigen.eigenvectors().rightCols(n - null);
-    const VecX root = eigen.eigenvalues().tail(n - null).cwiseSqrt();
-    const MatX unmoving = equation.loads * eigen.eigenvectors().leftCols(null);
+    const Spectrum spectrum = symmetric_spectrum(W);
+    const double least = null_response * spectrum.values.cwiseAbs().maxCoeff();
+    const int null = static_cast<int>((spectrum.values.array() <= least).count()), n = equation.n;
+    const MatX along = spectrum.vectors.rightCols(n - null);
+    const VecX root = spectrum.values.tail(n - null).cwiseSqrt();
+    const MatX unmoving = equation.loads * spectrum.vectors.leftCols(null);
     if (unmoving.size() > 0 && unmoving.cwiseAbs().maxCoeff() > unmoved * equation.loads.cwiseAbs().maxCoeff())
         return false;
     G = along * root.asDiagonal();

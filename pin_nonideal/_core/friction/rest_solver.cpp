@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/QR>
-
 #include "friction/cone_program.hpp"
+#include "math/factorizations.hpp"
 
 namespace pn {
 
@@ -78,12 +77,12 @@ struct Turns {
 
 VecX newton_step(const RestEquation& equation, const VecX& x, const VecX& lack) {
     const MatX J = equation.jacobian(x);
-    const Eigen::PartialPivLU<MatX> lu(J);
-    if (lu.rcond() > rank_threshold) return lu.solve(lack);
-    Eigen::CompleteOrthogonalDecomposition<MatX> cod(J.rows(), J.cols());
-    cod.setThreshold(rank_threshold);
-    cod.compute(J);
-    return cod.solve(lack);
+    LU lu;
+    lu.compute(J);
+    if (!(lu.reciprocal_condition() > rank_threshold)) return least_squares(J, lack, rank_threshold);
+    VecX step;
+    lu.solve(lack, step);
+    return step;
 }
 
 bool follow_path(const RestEquation& equation, VecX& x) {
@@ -160,10 +159,7 @@ bool hold_at_rest(const RestEquation& equation, VecX& x) {
         VecX alpha, limits;
         equation.respond(x, alpha, limits);
         if (lack.cwiseAbs().maxCoeff() <= within * largest_force_in_play(equation, x, limits)) return true;
-        Eigen::CompleteOrthogonalDecomposition<MatX> cod(J.rows(), J.cols());
-        cod.setThreshold(rank_threshold);
-        cod.compute(J);
-        const VecX step = cod.solve(lack);
+        const VecX step = least_squares(J, lack, rank_threshold);
         const double now = lack.norm();
         double length = 1.0;
         bool gains = false;

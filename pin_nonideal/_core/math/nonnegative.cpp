@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "math/factorizations.hpp"
+
 namespace pn {
 
 namespace {
@@ -25,7 +27,7 @@ constexpr int most_cuts = 50;  // of the bound on the largest least number, each
 VecX solve_over(const MatX& A, const VecX& b, const std::vector<int>& columns) {
     MatX part(A.rows(), static_cast<Eigen::Index>(columns.size()));
     for (size_t k = 0; k < columns.size(); ++k) part.col(k) = A.col(columns[k]);
-    return part.colPivHouseholderQr().solve(b);
+    return basic_least_squares(part, b);
 }
 
 double largest(const VecX& x) { return x.size() > 0 ? x.cwiseAbs().maxCoeff() : 0.0; }
@@ -34,9 +36,7 @@ double largest(const VecX& x) { return x.size() > 0 ? x.cwiseAbs().maxCoeff() : 
 MatX complement_of(const MatX& Z) {
     const Eigen::Index n = Z.rows();
     if (Z.cols() == 0) return MatX::Identity(n, n);
-    Eigen::ColPivHouseholderQR<MatX> factor(Z);
-    factor.setThreshold(spanned);
-    const MatX Q = MatX(factor.householderQ() * MatX::Identity(n, n)).rightCols(n - factor.rank());
+    const MatX Q = orthogonal_complement(Z, spanned);
     return Q * Q.transpose();
 }
 
@@ -97,10 +97,7 @@ VecX shortest_with_zeros(const MatX& Z, const VecX& N, const std::vector<char>& 
     VecX numbers(count);
     for (int i = 0, k = 0; i < N.size(); ++i)
         if (zero[i]) { rows.row(k) = Z.row(i); numbers[k++] = N[i]; }
-    Eigen::CompleteOrthogonalDecomposition<MatX> factor(rows.rows(), rows.cols());
-    factor.setThreshold(spanned);
-    factor.compute(rows);
-    return -factor.solve(numbers);
+    return -least_squares(rows, numbers, spanned);
 }
 
 // Which numbers bind in the shortest z with N + Z z >= 0, as weights, none where that has no solution: with

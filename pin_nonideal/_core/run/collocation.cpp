@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/LU>
-#include <Eigen/QR>
-
 #include "dynamics/evaluation.hpp"
 #include "dynamics/slip.hpp"
+#include "math/factorizations.hpp"
 #include "math/radau.hpp"
 #include "run/step_control.hpp"
 #include "tree/liegroup.hpp"
@@ -183,12 +181,13 @@ void Collocation::solve_turns() {
         }
     }
     if (!at_rest) {
-        turn_ = -K_.partialPivLu().solve(residual_);
+        LU factor;
+        factor.compute(K_);
+        factor.solve(residual_, turn_);
+        turn_ = -turn_;
         return;
     }
-    Eigen::CompleteOrthogonalDecomposition<MatX> factor(K_.rows(), K_.cols());
-    factor.setThreshold(rank_threshold);
-    turn_ = -factor.compute(K_).solve(residual_);
+    turn_ = -least_squares(K_, residual_, rank_threshold);
 }
 
 // Turns the directions, and the accelerations with them.
@@ -303,10 +302,8 @@ double Collocation::error() {
             const int row = elements_[at].tangent + k;
             K(row, row) -= std::max(0.0, speed[at]);
         }
-    Eigen::CompleteOrthogonalDecomposition<MatX> factor(K.rows(), K.cols());
-    factor.setThreshold(rank_threshold);
     const VecX across = P_[0] * error_.segment(nq, nv);
-    error_.segment(nq, nv) -= part * (Q_[0] * factor.compute(K).solve(across));
+    error_.segment(nq, nv) -= part * (Q_[0] * least_squares(K, across, rank_threshold));
     norm_.set_tolerances(step_.y0, step_.y1, step_.h);
     return norm_(error_, step_.y0);
 }

@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include <pinocchio/multibody.hpp>
-#include <pinocchio/multibody/visitor.hpp>
+#include <pinocchio/algorithm/joint-configuration.hpp>
+
+#include "tree/lone_joint.hpp"
 
 namespace pn {
 
@@ -94,11 +95,10 @@ void add_charts(const Model::JointModel& joint, std::vector<Chart>& charts) {
     }
 }
 
-// Numbers of a joint and of its body; `neutral` is any configuration that the joint can have.
-Joint read_joint(const Model& model, int i, const VecX& neutral) {
+// Numbers of a joint and of its body.
+Joint read_joint(const Model& model, int i) {
     const auto& joint = model.joints[i];
-    auto data = joint.createData();
-    pinocchio::calc_first_order(joint, data, neutral, VecX::Zero(model.nv).eval());
+    LoneJoint lone(joint);
     Joint j;
     j.name = model.names[i];
     j.parent = static_cast<int>(model.parents[i]);
@@ -108,7 +108,7 @@ Joint read_joint(const Model& model, int i, const VecX& neutral) {
     j.R0 = model.jointPlacements[i].rotation();
     j.aligned = model.jointPlacements[i].rotation() == Eigen::Matrix3d::Identity();
     j.p0 = model.jointPlacements[i].translation();
-    classify(joint, data, j);
+    classify(joint, lone.move(pinocchio::neutral(lone.model()), VecX::Zero(j.nv)), j);
     const auto& Y = model.inertias[i];
     j.mass = Y.mass();
     j.com = Y.lever();
@@ -202,9 +202,8 @@ Mechanism read_mechanism(const void* opaque, Provider provider) {
     m.joints.resize(model->njoints);
     m.joints[0].name = "universe";
     for (int i = 1; i < model->njoints; ++i) require_motion(model->joints[i], model->names[i]);
-    const VecX neutral = pinocchio::neutral(*model);
     for (int i = 1; i < model->njoints; ++i) {
-        m.joints[i] = read_joint(*model, i, neutral);
+        m.joints[i] = read_joint(*model, i);
         find_reference(m.joints, i);
         const Joint& j = m.joints[i];
         if ((j.kind == JointKind::revolute || j.kind == JointKind::helical) && !j.unbounded)

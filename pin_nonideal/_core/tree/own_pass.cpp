@@ -165,7 +165,7 @@ OwnPass::OwnPass(const Mechanism& m) : cos_sin(m.joints.size()), others(m), rest
 template <bool some_deep>
 static PN_INLINE void place_body(const Mechanism& m, OwnPass& pass, BodyTerms& terms, int i, Vec3& shift) {
     const Joint& j = m.joints[i];
-    if (j.kind == JointKind::other) pass.others.evaluate(i, terms.q, pass.rest, pass.motion);
+    if (j.kind == JointKind::other) pass.others.evaluate(m, i, terms.q, pass.rest, pass.motion);
     Body& b = terms.body[i];
     place(j, terms.body[j.parent], terms.q, pass.cos_sin[i], b, pass.motion);
     if (j.recenters) recenter(m, i, terms);
@@ -233,7 +233,7 @@ static PN_INLINE void move_all(const Mechanism& m, OwnPass& pass, BodyTerms& ter
         b.v += r;
         b.a += cross(b.v, r);
         if (j.kind == JointKind::other) {
-            pass.others.evaluate(i, terms.q, v, pass.motion);
+            pass.others.evaluate(m, i, terms.q, v, pass.motion);
             b.a += in_world(b, pass.motion.bias);
         }
     }

@@ -6,6 +6,7 @@
 #include <pinocchio/algorithm/kinematics.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
 
+#include "tree/lone_joint.hpp"
 
 namespace pn {
 
@@ -46,24 +47,24 @@ void place_deep(const pinocchio::Data& data, BodyTerms& terms, const Joint& j, s
 }  // namespace
 
 struct PinocchioJoints::Data {
-    std::shared_ptr<const void> owner;
-    const Model& model;
-    std::vector<Model::JointData> joints;  // by joint; empty ones where the core has a formula
+    std::vector<std::unique_ptr<LoneJoint>> joints;  // by joint; none where the core has a formula
 };
 
 PinocchioJoints::PinocchioJoints() = default;
 PinocchioJoints::PinocchioJoints(PinocchioJoints&&) noexcept = default;
 PinocchioJoints::~PinocchioJoints() = default;
 
-PinocchioJoints::PinocchioJoints(const Mechanism& m) : data_(new Data{m.model, model_of(m), {}}) {
+PinocchioJoints::PinocchioJoints(const Mechanism& m) : data_(new Data) {
     data_->joints.resize(m.joints.size());
     for (size_t i = 1; i < m.joints.size(); ++i)
-        if (m.joints[i].kind == JointKind::other) data_->joints[i] = data_->model.joints[i].createData();
+        if (m.joints[i].kind == JointKind::other)
+            data_->joints[i] = std::make_unique<LoneJoint>(model_of(m).joints[i]);
 }
 
-void PinocchioJoints::evaluate(int i, const VecX& q, const VecX& v, JointMotion& out) {
-    Model::JointData& data = data_->joints[i];
-    pinocchio::calc_first_order(data_->model.joints[i], data, q, v);
+void PinocchioJoints::evaluate(const Mechanism& m, int i, const VecX& q, const VecX& v, JointMotion& out) {
+    LoneJoint& joint = *data_->joints[i];
+    const pinocchio::JointData& data =
+        joint.move(q.segment(m.joints[i].iq, joint.model().nq), v.segment(m.joints[i].iv, joint.model().nv));
     const auto placement = pinocchio::joint_transform(data);
     out.R = placement.rotation();
     out.p = placement.translation();

@@ -24,7 +24,7 @@ public:
     PinocchioJoints(PinocchioJoints&&) noexcept;
     ~PinocchioJoints();
     // `out.S` has room for the dofs of any of them.
-    void evaluate(int joint, const VecX& q, const VecX& v, JointMotion& out);
+    void evaluate(const Mechanism& m, int joint, const VecX& q, const VecX& v, JointMotion& out);
 
 private:
     struct Data;

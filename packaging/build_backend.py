@@ -1,0 +1,87 @@
+"""scikit-build-core as pip calls it, with what a first build needs around it.
+
+An old Python is refused in words, before pip looks for libraries that it cannot have. A long compile says on the
+terminal what it does, since pip shows nothing of a build that succeeds. And a build finds the object files of the one
+before: pip makes an isolated environment in another temporary folder each time, for which scikit-build-core would throw
+them away, but no object of this package depends on that folder (pin_nonideal/_core/CMakeLists.txt).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+
+OLDEST = (3, 10)
+
+if sys.version_info < OLDEST:
+    raise SystemExit(
+        "pin_nonideal needs Python {0} or newer, and this is Python {1}: {2}\n"
+        "Make an environment with a newer one and run the same command again:\n"
+        "  python{0} -m venv env && . env/bin/activate\n"
+        "  Debian, Ubuntu:  sudo apt install python3-venv\n"
+        "  any system:      conda create -n env python=3.12, or https://docs.astral.sh/uv".format(
+            ".".join(map(str, OLDEST)), sys.version.split()[0], sys.executable
+        )
+    )
+
+import scikit_build_core.build as backend  # noqa: E402
+
+ROOT = Path(__file__).resolve().parent.parent
+CORE = ROOT / "pin_nonideal" / "_core"
+PROCESSOR_SECONDS = 250.0  # of a whole build, as measured by `pin-nonideal bench build`
+
+get_requires_for_build_sdist = backend.get_requires_for_build_sdist
+get_requires_for_build_wheel = backend.get_requires_for_build_wheel
+get_requires_for_build_editable = backend.get_requires_for_build_editable
+prepare_metadata_for_build_wheel = backend.prepare_metadata_for_build_wheel
+prepare_metadata_for_build_editable = backend.prepare_metadata_for_build_editable
+build_sdist = backend.build_sdist
+
+
+def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
+    """Builds a wheel; see PEP 517."""
+    _prepare()
+    return backend.build_wheel(wheel_directory, config_settings, metadata_directory)
+
+
+def build_editable(wheel_directory, config_settings=None, metadata_directory=None):
+    """Builds a wheel for an editable install; see PEP 660."""
+    _prepare()
+    return backend.build_editable(wheel_directory, config_settings, metadata_directory)
+
+
+def _prepare():
+    infos = list((ROOT / "build").glob("*/.skbuild-info.json"))
+    for info in infos:
+        _keep_objects(info)
+    if not infos:
+        _announce()
+
+
+def _keep_objects(info):
+    """Names this environment as the one that configured a build folder."""
+    try:
+        content = json.loads(info.read_text(encoding="utf-8"))
+        content["skbuild_path"] = os.fspath(Path(backend.__file__).parent.parent.resolve())
+        info.write_text(json.dumps(content, indent=2), encoding="utf-8")
+    except (OSError, ValueError, TypeError):
+        pass  # scikit-build-core then starts anew
+
+
+def _announce():
+    """One line on the terminal, if there is one: what is compiled, and about how long it takes here."""
+    sources = len(list(CORE.rglob("*.cpp")))
+    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    minutes = max(1, round(PROCESSOR_SECONDS / processors / 60.0 + 0.5))
+    line = (
+        f"pin_nonideal: compiling the core, {sources} C++ sources, once; about {minutes} min on {processors} "
+        f"processor{'s' * (processors > 1)} (pip -v shows each)"
+    )
+    print(line, flush=True)
+    try:
+        with open("/dev/tty", "w", encoding="utf-8") as terminal:
+            terminal.write(f"\n  {line}\n")
+    except OSError:
+        pass
