@@ -66,6 +66,7 @@ EPILOG = """parts:
   long         ten simulated seconds: cost, closure gap, energy change
   footprint    time and memory of an import
 actions:
+  build        compile the core in a temporary folder: processor time, wall time and memory by room
   build-peers  compile the C++ peers (some minutes, once)
   references   compute the references anew
   report       keep the full results of the output folder; write docs/benchmarks.md and the README's table
@@ -225,6 +226,13 @@ def chosen_tools(options: argparse.Namespace) -> list[Any]:
     return tools
 
 
+def build(options: argparse.Namespace) -> int:
+    from . import build_core
+
+    del options
+    return build_core.build()
+
+
 def build_peers(options: argparse.Namespace) -> int:
     from . import build_peers
 
@@ -253,6 +261,7 @@ PARTS: dict[str, Callable[[argparse.Namespace], Any]] = {
     for part in (evaluation, scaling, growth, accuracy, features, batches, contacts, long, footprint)
 }
 ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
+    "build": build,
     "build-peers": build_peers,
     "references": references,
     "report": report,

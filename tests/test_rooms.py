@@ -39,8 +39,8 @@ replaying plotting browser rendering commands pin_nonideal cli_runs cli
 
 # Headers and sources of the core in the same way, a header together with its source.
 CORE_ORDER = """
-math: lanes unrolled spatial angles timefunction roots radau nonnegative
-tree: mechanism model_extraction liegroup body_terms articulated pinocchio_pass own_pass terms factor
+math: lanes unrolled spatial angles timefunction roots radau factorizations nonnegative
+tree: mechanism liegroup body_terms articulated pinocchio_pass model_reading own_pass terms factor
 constraints: geometry coordinates kinds kind block row_layout row_system orthogonal row_factor rank \
 redundancy pulls
 forces: given_forces laws mode friction

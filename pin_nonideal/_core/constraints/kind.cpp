@@ -26,6 +26,10 @@ template <class K> using RoleOf = std::integral_constant<Role, std::decay_t<K>::
 // Something of a type, in questions that nobody asks.
 template <class T> T given();
 
+// Whether K gives residual and rows at once, from nearest points found once.
+template <class K, class At>
+constexpr bool places = answers<K>([](const auto& k) -> decltype(k.place(given<At>(), given<RowValues&>())) {});
+
 // A struct is a kind when it says all this of itself.
 template <class K>
 constexpr bool is_complete() {
@@ -55,8 +59,8 @@ constexpr bool is_complete() {
                   "a kind needs `static constexpr Shown shown`: what a replay shows of it");
     static_assert(answers<K>([](const auto& k) -> decltype(k.residual(given<At>(), given<RowValues&>())) {}),
                   "a kind needs `residual`: phi(q, t) of each row, with phi_t and phi_tt where it moves");
-    static_assert(answers<K>([](const auto& k) -> decltype(k.rows(given<At>(), given<RowValues&>())) {}),
-                  "a kind needs `rows`: unit wrenches, or A itself");
+    static_assert(places<K, At> || answers<K>([](const auto& k) -> decltype(k.rows(given<At>(), given<RowValues&>())) {}),
+                  "a kind needs `rows`: unit wrenches, or A itself; or `place`: residual and rows at once");
     static_assert(answers<K>([](const auto& k) -> decltype(k.rate_and_drift(given<At>(), given<RowValues&>())) {}),
                   "a kind needs `rate_and_drift`: A v + phi_t, and its rate at zero acceleration");
     return true;
@@ -140,9 +144,13 @@ template <Part part, class K, class At>
 static PN_INLINE void evaluate_at(const K& kind, const At& at, RowValues& out) {
     if constexpr (part == Part::motion) {
         kind.rate_and_drift(at, out);
+    } else if constexpr (part == Part::place && places<K, At>) {
+        kind.place(at, out);
     } else {
         kind.residual(at, out);
-        if (part == Part::place && !out.has_A) kind.rows(at, out);
+        if constexpr (part == Part::place) {
+            if (!out.has_A) kind.rows(at, out);
+        }
     }
 }
 
@@ -156,18 +164,52 @@ static PN_INLINE void evaluate_kind(const K& kind, const State& s, RowValues& ou
     }
 }
 
-// Like std::visit, but part of the caller.
-template <Part part, size_t... k>
-static PN_INLINE void evaluate_part(const Kind& kind, const State& s, RowValues& out, std::index_sequence<k...>) {
-    (void)((kind.index() == k && (evaluate_kind<part>(*std::get_if<k>(&kind), s, out), true)) || ...);
+// Like std::visit, but part of the caller; the kinds from the first on, one for each index k.
+template <Part part, size_t first, size_t... k>
+static PN_INLINE void evaluate_some(const Kind& kind, const State& s, RowValues& out, std::index_sequence<k...>) {
+    (void)((kind.index() == first + k && (evaluate_kind<part>(*std::get_if<first + k>(&kind), s, out), true)) || ...);
 }
 
-PN_WIDE void evaluate(const Kind& kind, const State& s, Part part, RowValues& out) {
-    constexpr auto kinds = std::make_index_sequence<std::variant_size_v<Kind>>();
+template <Part part, size_t first, size_t last>
+static PN_INLINE void evaluate_between(const Kind& kind, const State& s, RowValues& out) {
+    evaluate_some<part, first>(kind, s, out, std::make_index_sequence<last - first>());
+}
+
+template <class Sought, class... K>
+static constexpr size_t index_of(const std::variant<K...>*) {
+    size_t i = 0;
+    (void)((std::is_same_v<Sought, K> || (++i, false)) || ...);
+    return i;
+}
+
+// Gaps between shapes, whose nearest points are searched for, stand last. Six functions and not one: compilers take far
+// more than twice the time for a function of twice the size.
+constexpr size_t shapes = index_of<EllipsoidRow>(static_cast<const Kind*>(nullptr)), all = std::variant_size_v<Kind>;
+static PN_WIDE void residual(const Kind& kind, const State& s, RowValues& out) {
+    evaluate_between<Part::residual, 0, shapes>(kind, s, out);
+}
+static PN_WIDE void place(const Kind& kind, const State& s, RowValues& out) {
+    evaluate_between<Part::place, 0, shapes>(kind, s, out);
+}
+static PN_WIDE void motion(const Kind& kind, const State& s, RowValues& out) {
+    evaluate_between<Part::motion, 0, shapes>(kind, s, out);
+}
+static PN_WIDE void residual_of_shapes(const Kind& kind, const State& s, RowValues& out) {
+    evaluate_between<Part::residual, shapes, all>(kind, s, out);
+}
+static PN_WIDE void place_of_shapes(const Kind& kind, const State& s, RowValues& out) {
+    evaluate_between<Part::place, shapes, all>(kind, s, out);
+}
+static PN_WIDE void motion_of_shapes(const Kind& kind, const State& s, RowValues& out) {
+    evaluate_between<Part::motion, shapes, all>(kind, s, out);
+}
+
+void evaluate(const Kind& kind, const State& s, Part part, RowValues& out) {
+    const bool of_shapes = kind.index() >= shapes;
     switch (part) {
-        case Part::residual: evaluate_part<Part::residual>(kind, s, out, kinds); break;
-        case Part::place: evaluate_part<Part::place>(kind, s, out, kinds); break;
-        case Part::motion: evaluate_part<Part::motion>(kind, s, out, kinds); break;
+        case Part::residual: return of_shapes ? residual_of_shapes(kind, s, out) : residual(kind, s, out);
+        case Part::place: return of_shapes ? place_of_shapes(kind, s, out) : place(kind, s, out);
+        case Part::motion: return of_shapes ? motion_of_shapes(kind, s, out) : motion(kind, s, out);
     }
 }
 

@@ -136,7 +136,7 @@ struct Implicit : Unknowns {
                 return;
             }
             last = error;
-            const VecX step = (MatX::Identity(n, n) - J).partialPivLu().solve(residual);
+            const VecX step = pn::solve(MatX::Identity(n, n) - J, residual);
             if (!step.allFinite()) throw Failure(Failure::Kind::paradox, t, elements(), 0.0);  // between one and none
             y += step;
         }

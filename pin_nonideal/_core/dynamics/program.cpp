@@ -5,6 +5,13 @@
 
 namespace pn {
 
+Program::Program() = default;
+Program::Program(const Program&) = default;
+Program::Program(Program&&) noexcept = default;
+Program& Program::operator=(const Program&) = default;
+Program& Program::operator=(Program&&) noexcept = default;
+Program::~Program() = default;
+
 // Numbers the law's states after those of the laws before.
 template <class L>
 static void number_states(Program& p, L& law) {

@@ -26,6 +26,14 @@ struct Gap {
 enum class ImpactLaw { newton, poisson };
 
 struct Program {
+    // In its source: to copy each kind of constraint, force and law takes seconds to compile.
+    Program();
+    Program(const Program&);
+    Program(Program&&) noexcept;
+    Program& operator=(const Program&);
+    Program& operator=(Program&&) noexcept;
+    ~Program();
+
     Mechanism mechanism;
     std::vector<Block> blocks;  // constraints first, then gaps, then directions of friction
     int constraints = 0;        // number of blocks of constraints and contacts, gaps among them

@@ -21,6 +21,12 @@ void ReactionEquation::resize(int size, int vectors) {
     columns.resize(3 * vectors, size);
 }
 
+Eigen::Vector3d ReactionEquation::vector(int k, const VecX& y, double s) const {
+    return s * offset.col(k) + columns.middleRows<3>(3 * k) * y;
+}
+
+bool ReactionEquation::finite() const { return constant.allFinite() && offset.allFinite() && columns.allFinite(); }
+
 void ReactionEquation::image(const VecX& y, double s, VecX& g) const {
     g = s * constant;
     for (int k = 0; k < vectors(); ++k) {

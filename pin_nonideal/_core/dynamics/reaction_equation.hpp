@@ -23,9 +23,7 @@ struct ReactionEquation {
     void resize(int size, int vectors);
     int size() const { return static_cast<int>(constant.size()); }
     int vectors() const { return static_cast<int>(element.size()); }
-    Eigen::Vector3d vector(int k, const VecX& y, double s) const {
-        return s * offset.col(k) + columns.middleRows<3>(3 * k) * y;
-    }
+    Eigen::Vector3d vector(int k, const VecX& y, double s) const;
     void image(const VecX& y, double s, VecX& g) const;
     // dg/dy; nothing of a vector that vanishes.
     void slope(const VecX& y, double s, MatX& J) const;
@@ -33,7 +31,7 @@ struct ReactionEquation {
     void steepest(MatX& L) const;
     // The same in s: what the limits are where friction causes no load.
     VecX steepest_in_s() const;
-    bool finite() const { return constant.allFinite() && offset.allFinite() && columns.allFinite(); }
+    bool finite() const;
 };
 
 // Newton's method on the arrays; the storage is kept.

@@ -124,7 +124,7 @@ bool Search::follow(VecX& z, double s) const {
         if (error <= rounding * terms(z, s)) return true;
         before = error;
         eq_.slope(z, s, J);
-        const VecX step = (MatX::Identity(m, m) - among(J, following_, following_)).partialPivLu().solve(residual);
+        const VecX step = solve(MatX::Identity(m, m) - among(J, following_, following_), residual);
         for (int i = 0; i < m; ++i) trial[following_[i]] += step[i];
     }
     return false;
@@ -178,7 +178,7 @@ bool Search::polish(int column, VecX& z, double& s) const {
         const VecX residual = g - z;
         if (residual.cwiseAbs().maxCoeff() <= rounding * terms(z, s)) return true;
         interval_slope(z, s, none, 0.0, column, A, D);
-        VecX step = A.partialPivLu().solve(residual);
+        VecX step = solve(A, residual);
         if (!step.allFinite()) return false;
         if (column >= 0) {
             s -= step[column];
@@ -201,7 +201,7 @@ void Search::keep(const VecX& z, double s) {
     }
     MatX J;
     eq_.slope(z, s, J);
-    if (std::abs((MatX::Identity(n_, n_) - J).determinant()) < least_determinant) found_.at_edge = true;
+    if (std::abs(determinant(MatX::Identity(n_, n_) - J)) < least_determinant) found_.at_edge = true;
     found_.y.push_back(y.cwiseProduct(scale_));
 }
 

@@ -256,7 +256,7 @@ bool leads_elsewhere(Unknowns& u, const VecX& y, VecX& start, double size) {
             if (residual.cwiseAbs().maxCoeff() <= same_solution * scale)
                 return (start - y).cwiseAbs().maxCoeff() > other_solution * scale;
             differentiate(u, start, g, scale, J);
-            start += (MatX::Identity(u.n, u.n) - J).partialPivLu().solve(residual);
+            start += solve(MatX::Identity(u.n, u.n) - J, residual);
         }
     } catch (const Failure& failure) {
         if (failure.kind != Failure::Kind::not_finite && failure.kind != Failure::Kind::not_converged) throw;
@@ -268,27 +268,27 @@ bool leads_elsewhere(Unknowns& u, const VecX& y, VecX& start, double size) {
 
 double least_determinant(const Unknowns& u, const MatX& J) {
     const MatX I = MatX::Identity(u.n, u.n);
-    double least = (I - J).determinant();
-    each_mixture(u, J, [&](const MatX& other, const VecX&) { least = std::min(least, (I - other).determinant()); });
+    double least = determinant(I - J);
+    each_mixture(u, J, [&](const MatX& other, const VecX&) { least = std::min(least, determinant(I - other)); });
     return least;
 }
 
 void look_for_others(Unknowns& u, VecX& y, const MatX& J, double size) {
     RunState& state = u.w.state;
     const MatX I = MatX::Identity(u.n, u.n);
-    const double here = (I - J).determinant();
+    const double here = determinant(I - J);
     const bool regular = here > least_determinant_told;
     u.w.now.determinant = here;
     state.unique = Uniqueness::not_shown;
     if (std::abs(here) <= least_determinant_told) throw paradox(u, std::min(here, 0.0));  // not told from zero: it is zero
-    const VecX bound = (I - J.cwiseAbs()).partialPivLu().solve(VecX::Ones(u.n));
+    const VecX bound = solve(I - J.cwiseAbs(), VecX::Ones(u.n));
     if ((bound.array() > 0.0).all()) return;
     const VecX c = constants(u), solution = y;
     each_mixture(u, J, [&](const MatX& other, const VecX& mirrored) {
-        const double there = (I - other).determinant();
+        const double there = determinant(I - other);
         if ((regular && there > 0.0) || state.unique == Uniqueness::several) return;
         if (there == 0.0) throw paradox(u, there);
-        VecX elsewhere = solution + (I - other).partialPivLu().solve(2.0 * mirrored.cwiseProduct(c - solution));
+        VecX elsewhere = solution + solve(I - other, 2.0 * mirrored.cwiseProduct(c - solution));
         if (!leads_elsewhere(u, solution, elsewhere, size)) return;
         if (!u.w.continues) throw two_motions(u, std::min(here, there), solution, elsewhere);
         state.unique = Uniqueness::several;

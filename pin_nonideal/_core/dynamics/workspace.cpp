@@ -68,6 +68,9 @@ static void size(const Program& p, const Evaluation& now, Scratch& scratch) {
     scratch.law_force.assign(p.law_names.size(), VecX::Zero(nv));
 }
 
+Workspace::Workspace(Workspace&&) noexcept = default;
+Workspace::~Workspace() = default;
+
 Workspace::Workspace(const Program& p) {
     size(p, state);
     size(p, now);

@@ -126,6 +126,8 @@ struct Workspace {
     bool continues = false;  // where several motions are possible: with the one nearest to the motion before
 
     explicit Workspace(const Program& p);
+    Workspace(Workspace&&) noexcept;
+    ~Workspace();
 };
 
 // Rows that must hold in these modes: constraints, closed gaps, and elements that stick elsewhere than in a joint (a

@@ -187,7 +187,7 @@ double RestEquation::determinant(const VecX& x) const {
     VecX alpha;
     respond(x, alpha, still_limits.fixed);
     still_limits.frozen = 1.0;
-    return jacobian(x).determinant() / still_limits.jacobian(x).determinant();
+    return pn::determinant(jacobian(x)) / pn::determinant(still_limits.jacobian(x));
 }
 
 double RestEquation::determinant_far_away() const {
@@ -210,7 +210,7 @@ double RestEquation::determinant_far_away() const {
             for (int j = 0; j < count; ++j)
                 slope(i, j) =
                     dlimits.row(i).segment(elements[j].row, elements[j].dim).dot(part(x, elements[j]).normalized());
-        least = std::min(least, (MatX::Identity(count, count) - slope).determinant());
+        least = std::min(least, determinant(MatX::Identity(count, count) - slope));
     }
     return least;
 }

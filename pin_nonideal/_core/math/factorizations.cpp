@@ -22,6 +22,10 @@ double LU::reciprocal_condition() const { return factor_.rcond(); }
 
 void LU::solve(const VecX& b, VecX& x) const { x = factor_.solve(b); }
 
+VecX solve(const MatX& A, const VecX& b) { return A.partialPivLu().solve(b); }
+
+double determinant(const MatX& A) { return A.determinant(); }
+
 MatX inverse(const MatX& A) { return A.inverse(); }
 
 VecX least_squares(const MatX& A, const VecX& b, double threshold) {

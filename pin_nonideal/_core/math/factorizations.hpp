@@ -39,7 +39,9 @@ private:
     Eigen::PartialPivLU<MatX> factor_;
 };
 
-// A^-1 by LU.
+// x of A x = b, |A|, and A^-1, by LU.
+VecX solve(const MatX& A, const VecX& b);
+double determinant(const MatX& A);
 MatX inverse(const MatX& A);
 
 // Shortest x among those with the least |A x - b|. Pivots below `threshold` of the largest count as zero.

@@ -91,7 +91,8 @@ struct Mat3 {
     static Mat3 Identity() { return {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}; }
     Eigen::Matrix3d eigen() const {
         Eigen::Matrix3d m;
-        m << c[0].eigen(), c[1].eigen(), c[2].eigen();
+        for (int k = 0; k < 3; ++k)
+            for (int i = 0; i < 3; ++i) m(i, k) = c[k][i];
         return m;
     }
 

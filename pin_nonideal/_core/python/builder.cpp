@@ -9,7 +9,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "python/callbacks.hpp"
-#include "tree/model_extraction.hpp"
+#include "tree/model_reading.hpp"
 
 using namespace nanobind::literals;
 

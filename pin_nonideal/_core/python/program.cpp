@@ -8,7 +8,7 @@
 #include "dynamics/power.hpp"
 #include "python/constraints.hpp"
 #include "python/runner.hpp"
-#include "tree/model_extraction.hpp"
+#include "tree/model_reading.hpp"
 
 using namespace nanobind::literals;
 

@@ -69,8 +69,4 @@ struct Mechanism {
     std::vector<int> dofs_of(int joint) const;
 };
 
-// Reads a pinocchio model (passed as `const pinocchio::Model*`); throws std::invalid_argument for one that has no
-// motion here, or none that `provider` computes.
-Mechanism read_mechanism(const void* model, Provider provider);
-
 }  // namespace pn

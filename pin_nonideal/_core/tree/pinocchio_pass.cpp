@@ -3,10 +3,9 @@
 #include <pinocchio/multibody.hpp>
 #include <pinocchio/algorithm/crba.hpp>
 #include <pinocchio/algorithm/jacobian.hpp>
+#include <pinocchio/algorithm/joint-configuration.hpp>
 #include <pinocchio/algorithm/kinematics.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
-
-#include "tree/lone_joint.hpp"
 
 namespace pn {
 
@@ -18,6 +17,30 @@ using Vector = Eigen::Ref<const VecX>;  // what the wheel's libraries are compil
 const Model& model_of(const Mechanism& m) { return *static_cast<const Model*>(m.model.get()); }
 
 Motion motion(const pinocchio::Motion& x) { return {x.linear(), x.angular()}; }
+
+// One joint of a model by itself, moved by the functions that Pinocchio's library holds compiled: the joint's own
+// templates take ten seconds to compile.
+class LoneJoint {
+public:
+    explicit LoneJoint(const pinocchio::JointModel& joint) : model_(with(joint)), data_(model_) {}
+
+    // Placement, motion subspace and bias at a configuration (nq) and velocity (nv) of this joint.
+    const pinocchio::JointData& move(const Eigen::Ref<const VecX>& q, const Eigen::Ref<const VecX>& v) {
+        pinocchio::forwardKinematics(model_, data_, q, v);
+        return data_.joints[1];
+    }
+    const pinocchio::Model& model() const { return model_; }
+
+private:
+    static pinocchio::Model with(const pinocchio::JointModel& joint) {
+        pinocchio::Model model;
+        model.addJoint(0, joint, pinocchio::SE3::Identity(), "joint");
+        return model;
+    }
+
+    pinocchio::Model model_;
+    pinocchio::Data data_;
+};
 
 // Placement of a body from Pinocchio's, which is about the world's origin.
 void place(const Mechanism& m, const pinocchio::Data& data, int i, Body& b) {
@@ -70,6 +93,16 @@ void PinocchioJoints::evaluate(const Mechanism& m, int i, const VecX& q, const V
     out.p = placement.translation();
     each_column(data, [&](int k, const Motion& column) { out.S[k] = column; });
     out.bias = motion(pinocchio::bias(data));
+}
+
+Motion first_motion(const void* model, int joint) {
+    LoneJoint lone(static_cast<const Model*>(model)->joints[joint]);
+    const VecX rest = VecX::Zero(lone.model().nv);
+    Motion first;
+    each_column(lone.move(pinocchio::neutral(lone.model()), rest), [&](int k, const Motion& column) {
+        if (k == 0) first = column;
+    });
+    return first;
 }
 
 struct PinocchioPass::Data {

@@ -31,6 +31,10 @@ private:
     std::unique_ptr<Data> data_;
 };
 
+// The first column of a joint's motion subspace, in its own axes at its neutral configuration; of the joint of this number
+// of a `pinocchio::Model`.
+Motion first_motion(const void* model, int joint);
+
 // Every term by Pinocchio's algorithms, on one pinocchio::Data.
 class PinocchioPass {
 public:

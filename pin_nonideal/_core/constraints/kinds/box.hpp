@@ -33,8 +33,10 @@ struct BoxRow {
         out.residual[0] = NearestOnBox<Sides>(s, half).distance - radius;  // Eq. (2)
     }
     template <class Sides, class Out>
-    PN_INLINE void rows(const Sides& s, Out& out) const {
-        out.wrench[0] = force_at(s.a.x, NearestOnBox<Sides>(s, half).n);
+    PN_INLINE void place(const Sides& s, Out& out) const {
+        const NearestOnBox<Sides> p(s, half);
+        out.residual[0] = p.distance - radius;
+        out.wrench[0] = force_at(s.a.x, p.n);
     }
     template <class Sides, class Out>
     PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {

@@ -34,8 +34,9 @@ struct CapsulesRow {
     }
     // The force at the first point: the second lies on its line.
     template <class Sides, class Out>
-    PN_INLINE void rows(const Sides& s, Out& out) const {
+    PN_INLINE void place(const Sides& s, Out& out) const {
         const NearestPoints<Sides> p(s, half1, half2);
+        out.residual[0] = p.distance - radius;
         out.wrench[0] = force_at(p.c1, p.n);
     }
     template <class Sides, class Out>

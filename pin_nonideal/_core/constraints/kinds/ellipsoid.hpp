@@ -35,8 +35,9 @@ struct EllipsoidRow {
         out.residual[0] = lowest.n.dot(s.a.x - s.b.x) - lowest.depth;  // Eq. (2)
     }
     template <class Sides, class Out>
-    PN_INLINE void rows(const Sides& s, Out& out) const {
+    PN_INLINE void place(const Sides& s, Out& out) const {
         const LowestOnEllipsoid<Sides> lowest(s, normal, semiaxes);
+        out.residual[0] = lowest.n.dot(s.a.x - s.b.x) - lowest.depth;
         out.wrench[0] = force_at(lowest.place, lowest.n);
     }
     template <class Sides, class Out>

@@ -34,8 +34,9 @@ struct LineRow {
         out.residual[0] = NearestAlongLine<Sides>(s, solid, half1).at.distance - radius;  // Eq. (2)
     }
     template <class Sides, class Out>
-    PN_INLINE void rows(const Sides& s, Out& out) const {
+    PN_INLINE void place(const Sides& s, Out& out) const {
         const NearestAlongLine<Sides> p(s, solid, half1);
+        out.residual[0] = p.at.distance - radius;
         out.wrench[0] = force_at(p.place(), p.at.n);
     }
     template <class Sides, class Out>

@@ -34,8 +34,9 @@ struct RimRow {
         out.residual[0] = NearestOfRim<Sides>(s, solid, rim).distance - radius;  // Eq. (2)
     }
     template <class Sides, class Out>
-    PN_INLINE void rows(const Sides& s, Out& out) const {
+    PN_INLINE void place(const Sides& s, Out& out) const {
         const NearestOfRim<Sides> p(s, solid, rim);
+        out.residual[0] = p.distance - radius;
         out.wrench[0] = force_at(p.place, p.n);
     }
     // Over a face as over a plane; beside an edge as that edge over the disk.

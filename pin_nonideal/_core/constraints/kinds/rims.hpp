@@ -35,8 +35,9 @@ struct RimsRow {
     }
     // The force at the place that slides: the other lies on its line.
     template <class Sides, class Out>
-    PN_INLINE void rows(const Sides& s, Out& out) const {
+    PN_INLINE void place(const Sides& s, Out& out) const {
         const NearestOfRims<Sides> p(s, first, second);
+        out.residual[0] = p.distance - radius;
         out.wrench[0] = force_at(p.found.place, p.n);
     }
     template <class Sides, class Out>

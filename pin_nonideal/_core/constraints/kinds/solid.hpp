@@ -38,8 +38,10 @@ struct SolidRow {
         out.residual[0] = nearest(s).distance - radius;  // Eq. (2)
     }
     template <class Sides, class Out>
-    PN_INLINE void rows(const Sides& s, Out& out) const {
-        out.wrench[0] = force_at(s.a.x, nearest(s).n);
+    PN_INLINE void place(const Sides& s, Out& out) const {
+        const auto p = nearest(s);
+        out.residual[0] = p.distance - radius;
+        out.wrench[0] = force_at(s.a.x, p.n);
     }
     template <class Sides, class Out>
     PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {

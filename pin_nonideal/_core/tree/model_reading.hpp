@@ -1,5 +1,7 @@
-// The pinocchio model behind a Python object of type pinocchio.Model.
+// A Pinocchio model as it comes from Python: found behind its object, read into a Mechanism, compared with another.
 #pragma once
+
+#include "tree/mechanism.hpp"
 
 struct _object;
 
@@ -12,5 +14,9 @@ const void* model_pointer(_object* python_object);
 // limits. What is told by name only (reference configurations) is left out, and so is what follows from the tree; that is
 // four times as fast as Pinocchio's own comparison.
 bool same_model(const void* one, const void* other);
+
+// Reads a pinocchio model (passed as `const pinocchio::Model*`); throws std::invalid_argument for one that has no
+// motion here, or none that `provider` computes.
+Mechanism read_mechanism(const void* model, Provider provider);
 
 }  // namespace pn
