@@ -31,9 +31,7 @@ def build() -> int:
         configure = ["cmake", "-S", str(SOURCE), "-B", folder, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release"]
         configure += [f"-DPython_EXECUTABLE={sys.executable}"]
         configure += [f"-DCMAKE_CXX_{step}_LAUNCHER={launcher}" for step in ("COMPILER", "LINKER")]
-        status = subprocess.run(
-            configure, env=environment, check=False, stdout=subprocess.DEVNULL
-        ).returncode
+        status = subprocess.run(configure, env=environment, check=False, stdout=subprocess.DEVNULL).returncode
         if status:
             return status
         log.unlink(missing_ok=True)  # of CMake's trials
@@ -50,7 +48,7 @@ def table(units: list[dict[str, float | str]], wall: float) -> str:
     """Sums by room, as text.
 
     Args:
-        units: of each call of the compiler the output, processor and wall seconds and the largest memory [MB].
+        units: output, processor and wall seconds and largest memory [MB] of each call of the compiler.
         wall: seconds of the whole build.
     """
     rooms = defaultdict(list)

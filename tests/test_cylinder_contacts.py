@@ -12,6 +12,7 @@ import pin_nonideal as pn
 
 from .mechanisms import GRAVITY, body, empty, frame
 from .same_run import assert_same_run
+from .seeds import ranges
 
 RADIUS, LENGTH = 0.1, 0.3
 DEPTH = 1e-10  # [m], that nothing sinks below the plane
@@ -236,7 +237,7 @@ def dropped(kind, seed):
 
 
 @pytest.mark.parametrize("kind", SHAPES)
-@pytest.mark.parametrize("seeds", [range(12), pytest.param(range(300), marks=pytest.mark.stress)], ids=len)
+@pytest.mark.parametrize("seeds", ranges(6, 12, 300))
 def test_dropped_at_random(kind, seeds):
     """None else fails, hangs or sinks, by the gaps of its places; every sixth is repeated bit by bit."""
     for seed in seeds:

@@ -11,6 +11,7 @@ import pin_nonideal as pn
 from oracles.long_recursion import LongTree
 
 from .random_trees import AXIS, JOINTS, add, state
+from .seeds import seeds
 
 # Rounding of one evaluation, relative to the largest acceleration: sweeps along three hundred links, whose
 # angles carry it themselves.
@@ -252,7 +253,7 @@ def test_massless_end_is_named():
 
 
 @pytest.mark.stress
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", seeds(range(40)))
 def test_many_random_deep_trees(seed):
     rng = np.random.default_rng(1000 + seed)
     model = deep_tree(rng, KNOWN, int(rng.integers(30, 200)), branches=5)

@@ -18,6 +18,7 @@ from .mechanisms import TIGHT, dof
 from .random_mechanisms import mechanism
 from .random_trees import state, tree
 from .row_cases import ROBOTS, kept
+from .seeds import seeds
 
 # Sums over the bodies of a tree in another order.
 ROUNDING = 1e-12
@@ -51,7 +52,7 @@ def test_instants_of_robots(name):
         assert_same_instant(scene, *consistent(scene, rng, t, speed), t)
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", seeds(range(60)))
 def test_instants_of_random_mechanisms(seed):
     print("seed", seed)
     m = mechanism(seed)
@@ -85,7 +86,7 @@ def test_runs_of_robots_without_friction(name):
     assert_same_run(scene, q, v, DURATIONS.get(name, 0.2))
 
 
-@pytest.mark.parametrize("seed", range(16))
+@pytest.mark.parametrize("seed", seeds(range(16)))
 def test_runs_of_random_mechanisms_without_friction(seed):
     print("seed", seed)
     m = mechanism(seed)

@@ -12,6 +12,7 @@ import pin_nonideal as pn
 from . import random_trees
 from .mechanisms import GRAVITY, body, empty, frame, hinge
 from .same_run import assert_same_run
+from .seeds import seeds
 
 INSTANT = 1e-9  # of the time itself
 
@@ -165,7 +166,7 @@ def random_contacts(model, q, rng, count):
     return contacts, gaps
 
 
-@pytest.mark.parametrize("seed", range(16))
+@pytest.mark.parametrize("seed", seeds(range(16)))
 def test_the_first_of_many_touches(seed):
     """Random trees among contacts near and far: by the motion without them, looked at each 0.5 ms, none
     closes before the first touch, and one does there.

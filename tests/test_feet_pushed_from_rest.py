@@ -12,6 +12,8 @@ from scipy.optimize import nnls
 
 import pin_nonideal as pn
 
+from .seeds import seeds
+
 DRAWS = range(40)
 # One of their feet has to pull where all stay closed; they lift then.
 LIFTING = [1594, 2437, 2789, 3003, 3273, 3401, 3448, 3772, 4478]
@@ -91,7 +93,7 @@ def slowness(places, solution):
     return (np.abs(solution.a).max() + GRAVITY) / min(slips, default=GRAVITY)
 
 
-@pytest.mark.parametrize("seed", [*DRAWS, *LIFTING])
+@pytest.mark.parametrize("seed", seeds([*LIFTING[:4], *DRAWS, *LIFTING[4:]]))
 def test_what_begins_keeps_the_law_of_coulomb(seed):
     scene, *rest = drawn(seed)
     assert lack(*rest, scene.solve(*scene.project(), 0.0)) < 1e-8
@@ -114,7 +116,7 @@ def test_what_begins_keeps_it_in_many_draws(first):
     assert refused <= 1
 
 
-@pytest.mark.parametrize("seed", [*DRAWS, *LIFTING])
+@pytest.mark.parametrize("seed", seeds([*LIFTING[:4], *DRAWS, *LIFTING[4:]]))
 def test_the_motion_goes_on_as_it_begins(seed):
     scene, *_ = drawn(seed)
     begun = scene.solve(*scene.project(), 0.0)

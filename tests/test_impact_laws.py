@@ -13,6 +13,7 @@ from oracles.impacts import velocities_after
 
 from .mechanisms import GRAVITY, body, empty, frame, planar
 from .same_run import assert_same_run
+from .seeds import seeds
 
 ROUNDING = 1e-11
 
@@ -36,7 +37,7 @@ def rows(corners):
 
 
 @pytest.mark.parametrize("law", ["newton", "poisson"])
-@pytest.mark.parametrize("seed", range(25))
+@pytest.mark.parametrize("seed", seeds(range(25)))
 def test_random_impacts(law, seed):
     """One or two corners of a body strike together; all that the modes allow is known."""
     rng = np.random.default_rng(seed)
@@ -112,7 +113,7 @@ class TestKane:
             self.run("newton", strict=True)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", seeds(range(20)))
 def test_poisson_gains_no_energy(seed):
     """Three corners with friction and restitutions of their own, struck together."""
     rng = np.random.default_rng(200 + seed)

@@ -17,6 +17,7 @@ from pin_nonideal._core import friction_program
 
 from .mechanisms import dof
 from .random_trees import add
+from .seeds import seeds
 
 LARGEST = 8
 
@@ -31,7 +32,7 @@ def random_program(rng, n, rank):
 
 
 class TestProgram:
-    @pytest.mark.parametrize("seed", range(120))
+    @pytest.mark.parametrize("seed", seeds(range(120)))
     def test_independent_elements(self, seed):
         """W is positive definite: one combination, one force."""
         print("seed", seed)
@@ -43,7 +44,7 @@ class TestProgram:
         f = friction_program(W, alpha0, [1] * n, limits)
         np.testing.assert_allclose(f, found[0][1], rtol=0.0, atol=SLACK * limits.max())
 
-    @pytest.mark.parametrize("seed", range(120))
+    @pytest.mark.parametrize("seed", seeds(range(120)))
     def test_redundant_elements(self, seed):
         """W is semidefinite: several forces, one motion."""
         print("seed", seed)
@@ -60,7 +61,7 @@ class TestProgram:
             np.testing.assert_allclose(alpha0 + W @ f, alpha, rtol=0.0, atol=10.0 * SLACK * size)
         assert found
 
-    @pytest.mark.parametrize("seed", range(60))
+    @pytest.mark.parametrize("seed", seeds(range(60)))
     def test_accelerations_that_no_force_causes(self, seed):
         """alpha0 has a part outside the range of W, as at a dead point: then some of the redundant slip.
 
@@ -91,7 +92,7 @@ class TestProgram:
             np.testing.assert_allclose(alpha0 + W @ f, alpha, rtol=0.0, atol=1e-12 * n * total)
             assert (np.abs(f) <= limits * (1.0 + 1e-12)).all()
 
-    @pytest.mark.parametrize("seed", range(60))
+    @pytest.mark.parametrize("seed", seeds(range(60)))
     def test_elements_of_several_directions(self, seed):
         """Disks and balls: |f| <= s, and f = -s alpha/|alpha| or alpha = 0; a convex program has no other."""
         print("seed", seed)
@@ -108,7 +109,7 @@ class TestProgram:
             assert np.linalg.norm(fe) <= s * (1.0 + SLACK)
             np.testing.assert_allclose(np.linalg.norm(ae) * fe, -s * ae, rtol=0.0, atol=1e-8 * s * size)
 
-    @pytest.mark.parametrize("seed", range(120))
+    @pytest.mark.parametrize("seed", seeds(range(120)))
     def test_shares_that_are_all_at_their_limits(self, seed):
         """A load at the limit of what disks and balls can hold, or beside it by 1e-12 to 0.1 of that.
 
@@ -193,7 +194,7 @@ class RandomTree:
 
 
 class TestScenes:
-    @pytest.mark.parametrize("seed", range(60))
+    @pytest.mark.parametrize("seed", seeds(range(60)))
     def test_random_trees(self, seed):
         """solve finds modes that keep every condition, and no other combination does.
 
@@ -216,7 +217,7 @@ class TestScenes:
         a = next(solution.a for modes, solution in consistent if modes == tuple(found.modes))
         np.testing.assert_allclose(found.a, a, rtol=1e-9, atol=1e-9)
 
-    @pytest.mark.parametrize("seed", range(20))
+    @pytest.mark.parametrize("seed", seeds(range(20)))
     def test_linkage_of_one_freedom(self, seed):
         """Three rubbing pins of a four-bar hold or let go together: |n . F| against sum |n_k| limit_k.
 
@@ -305,7 +306,7 @@ class Loop:
         return friction[at], np.array(limits), s.a[at]
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", seeds(range(40)))
 def test_loop(seed):
     """At rest, under random torques: solve finds the one combination that keeps every condition."""
     print("seed", seed)

@@ -10,6 +10,7 @@ import pytest
 import pin_nonideal as pn
 
 from .mechanisms import GRAVITY, body, empty
+from .seeds import seeds
 from .test_revolved_pairs import distance
 
 HERE = pin.SE3.Identity()
@@ -79,7 +80,7 @@ class Drop:
             assert self.depth(q) <= fastest + ROUNDED_OFF * rounding
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", seeds(range(40)))
 def test_random_solids(seed):
     """By Coal's distance none enters another by more than it approaches in a step; no run fails."""
     Drop(seed).check()

@@ -12,6 +12,7 @@ import pin_nonideal as pn
 from oracles.nearest import distance, nearest_by_search
 
 from .mechanisms import again, body, empty, frame, point_mass
+from .seeds import seeds
 
 # Two distances of the same closure: the optimizer's own tolerance.
 SAME_DISTANCE = 1e-6
@@ -103,7 +104,7 @@ def check(seed):
     return report.nearest
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(range(12)))
 def test_random_loops(seed):
     check(seed)
 

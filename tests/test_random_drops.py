@@ -10,6 +10,7 @@ import pin_nonideal as pn
 
 from .mechanisms import body, empty, frame
 from .same_run import assert_same_run
+from .seeds import ranges, seeds
 
 DEPTH = 1e-10  # [m], that no contact sinks below its plane
 
@@ -48,7 +49,7 @@ def deepest(scene, run):
 RATTLING = [10, 13, 31, 75, 82, 88, 120, 128, 133, 149, 178, 181, 195, 246, 286, 349, 352, 423, 571, 622]
 
 
-@pytest.mark.parametrize("seed", RATTLING)
+@pytest.mark.parametrize("seed", seeds(RATTLING))
 def test_contacts_that_rattle_come_to_rest(seed):
     """Two or more bounce in turn, ever lower: each end of a series throws another up again."""
     scene = dropped(seed)
@@ -59,11 +60,11 @@ def test_contacts_that_rattle_come_to_rest(seed):
     assert np.abs(run.energy["balance"]).max() < 1e-5 * run.energy["total"][0]
 
 
-@pytest.mark.parametrize("seeds", [range(60), pytest.param(range(1000), marks=pytest.mark.stress)], ids=len)
-def test_random_bodies_dropped(seeds, kept, tmp_path):
+@pytest.mark.parametrize("those", ranges(10, 60, 1000))
+def test_random_bodies_dropped(those, kept, tmp_path):
     """None fails, hangs or sinks; every tenth is repeated, and resumed from a state in flight, bit by bit."""
     path = tmp_path / "run"
-    for seed in seeds:
+    for seed in those:
         scene = dropped(seed)
         run = pn.simulate(scene, 3.0, max_steps=20000)
         assert np.isfinite(run.q).all()

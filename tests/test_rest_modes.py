@@ -13,6 +13,7 @@ from oracles.stance import Stance
 
 from .mechanisms import GRAVITY, empty, frame
 from .random_loaded_trees import loaded_tree
+from .seeds import seeds
 from .standing import plate, star
 
 # A fold of the equation of rest costs half the digits of a force near it.
@@ -54,17 +55,16 @@ def check(seed, joints):
     return len(solutions)
 
 
-@pytest.mark.parametrize("first", range(0, 300, 50))
-def test_one_loaded_joint(first):
+@pytest.mark.parametrize("count", [10, pytest.param(300, marks=pytest.mark.slow)])
+def test_one_loaded_joint(count):
     """Drawers and journals, loaded up to and beyond the paradox."""
-    counts = [check(seed, 1) for seed in range(first, first + 50)]
-    assert counts.count(1) > 20
+    counts = [check(seed, 1) for seed in range(count)]
+    assert counts.count(1) > 0.4 * count
 
 
-@pytest.mark.parametrize("first", range(0, 20, 5))
-def test_two_loaded_joints(first):
-    for seed in range(first, first + 5):
-        check(seed, 2)
+@pytest.mark.parametrize("seed", seeds(range(20)))
+def test_two_loaded_joints(seed):
+    check(seed, 2)
 
 
 @pytest.mark.stress
@@ -137,7 +137,7 @@ def check_stance(seed, static_ratio, beyond):
     return run.stats.steps
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(range(12)))
 def test_stances(seed):
     check_stance(seed, 1.15, 0.01)
 

@@ -10,6 +10,7 @@ import pytest
 import pin_nonideal as pn
 
 from .mechanisms import GRAVITY, body, empty, frame
+from .seeds import seeds
 
 ROUNDING = 1e-12
 
@@ -129,7 +130,7 @@ def capsule_distance(run, k, half1, half2):
     return coal.distance(first, one, second, coal.Transform3s(), request, result)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(range(12)))
 def test_tumbling_capsules_do_not_pass_through_each_other(seed):
     """Thrown at a fixed one, with spin: it strikes, never deeper than 1e-8 m by Coal's distance."""
     rng = np.random.default_rng(seed)

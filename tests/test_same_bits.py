@@ -12,6 +12,7 @@ import pin_nonideal as pn
 from .random_mechanisms import mechanism
 from .row_cases import ROBOTS
 from .same_run import assert_same_run
+from .seeds import seeds
 
 EVERYTHING = ("a", "forces", "energy", "power")
 METHODS = [{}, {"method": "rk4", "dt": 2e-3}, {"method": "moreau", "dt": 2e-3}]
@@ -52,14 +53,14 @@ def test_robots(name, options):
 
 
 @pytest.mark.parametrize("options", METHODS, ids=lambda o: o.get("method", "dop853"))
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", seeds(range(24)))
 def test_random_mechanisms(seed, options):
     print("seed", seed)
     m = mechanism(seed)
     assert_nothing_but_the_start_matters(m.scene, mechanism(seed).scene, m.q, m.v, options)
 
 
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", seeds(range(24)))
 def test_evaluations(seed):
     """Of one state, after any other, and with everything that a solution tells beside the acceleration."""
     m, other = mechanism(seed), mechanism(seed)

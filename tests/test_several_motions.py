@@ -18,6 +18,7 @@ from oracles.reaction_equation import acceleration, equation
 
 from .mechanisms import body, empty, frame
 from .random_loaded_joints import random_scene
+from .seeds import seeds
 
 # The oracle's roots and the core's carry the rounding of one linear solution, magnified by 1/det(I - dg/dy),
 # which is 1e4 at most in cases that are not in doubt.
@@ -56,7 +57,7 @@ def check_random(seed):
     return found
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", seeds(range(60)))
 def test_random_loaded_joints(seed):
     check_random(seed)
 

@@ -14,6 +14,7 @@ from oracles.rows import rows
 from oracles.sharing import constraint_force, least_norm
 
 from .mechanisms import GRAVITY, assert_close, body, empty, frame
+from .seeds import seeds
 
 # Of the loads: products of a dozen numbers, through a least-squares solution.
 ROUNDING = 1e-9
@@ -132,7 +133,7 @@ def geared(seed):
     return pn.Scene(model, constraints=constraints, contacts=contacts, actuation=tau, q0=q)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", seeds(range(20)))
 def test_scaled_copies_beside_dense_least_norm(seed):
     """A gear said backward, a foot below a ceiling: copies of other scales and signs."""
     scene = geared(seed)

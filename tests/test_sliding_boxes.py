@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 import pin_nonideal as pn
 
 from .mechanisms import GRAVITY, body, empty, frame
+from .seeds import ranges
 
 KEPT = 1e-7  # [m, rad, m/s, rad/s] at tolerances of 1e-10, over a second
 DEPTH = 1e-10  # [m], that no contact sinks below its plane
@@ -86,7 +87,7 @@ def any_box(seed):
     return thrown(size, mass, mu, v0, q0, restitution), size
 
 
-@pytest.mark.parametrize("seeds", [range(40), pytest.param(range(1000), marks=pytest.mark.stress)], ids=len)
+@pytest.mark.parametrize("seeds", ranges(10, 40, 1000))
 def test_boxes_come_to_rest(seeds):
     """None fails or hangs, none sinks, and all lie still in the end."""
     for seed in seeds:

@@ -9,6 +9,7 @@ import pytest
 import pin_nonideal as pn
 
 from .mechanisms import GRAVITY, TIGHT, body, decades, empty, frame
+from .seeds import seeds
 
 DRAWS = 20
 LOADS = 1e-9  # part of the weight
@@ -16,7 +17,7 @@ STILL = 1e-10  # [m/s^2]
 ENTERED = 1e-10  # [m]
 PRECESSION = 1e-9  # part of the angle turned, and of the loads
 
-each_draw = pytest.mark.parametrize("draw", range(DRAWS))
+each_draw = pytest.mark.parametrize("draw", seeds(range(DRAWS)))
 
 
 def table(legs, mass, inertia):
@@ -102,7 +103,9 @@ def test_a_table_stands_while_its_load_slides(draw):
 
 
 # Of a hundred tables two ended in errors where the last of them dwindles.
-@pytest.mark.parametrize("draw", [*range(DRAWS), 101, 154, 167, 286, 441, 517, 540, 566, 650, 690])
+@pytest.mark.parametrize(
+    "draw", seeds([*range(DRAWS), 101, 154, 167, 286, 441, 517, 540, 566, 650, 690], always=[101, 441])
+)
 def test_a_table_that_its_load_jerks_rattles_to_rest(draw):
     """The driven mass starts with a jerk, which throws the table; feet land where others come to rest."""
     scene, _, _ = with_slider(draw)

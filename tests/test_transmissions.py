@@ -11,6 +11,7 @@ from oracles.threads import Screw
 
 from .mechanisms import GRAVITY, TIGHT, again, assert_close, body, empty
 from .refusals import refuses
+from .seeds import seeds
 
 # Accelerations and forces follow from a system of two equations: relative error of rounding.
 EXACT = 1e-11
@@ -54,7 +55,7 @@ def draw(seed):
 
 
 class TestFreeBodies:
-    @pytest.mark.parametrize("seed", range(60))
+    @pytest.mark.parametrize("seed", seeds(range(60)))
     def test_sliding(self, seed):
         thread, scene, force, torque, rate = draw(seed)
         found = thread.sliding(force, torque, np.sign(rate))
@@ -69,7 +70,7 @@ class TestFreeBodies:
         np.testing.assert_allclose(s.a, [a, thread.ratio * a], rtol=EXACT)
         np.testing.assert_allclose(s.lam, [along_axis], rtol=EXACT)
 
-    @pytest.mark.parametrize("seed", range(60))
+    @pytest.mark.parametrize("seed", seeds(range(60)))
     def test_rest(self, seed):
         thread, scene, force, torque, _ = draw(seed)
         s = scene.solve(scene.q0, [0.0, 0.0])
