@@ -1,8 +1,8 @@
 """scikit-build-core as pip calls it, with what a first build needs around it.
 
 An old Python is refused in words, before pip looks for libraries that it cannot have. A long compile says on
-the terminal what it does, since pip shows nothing of a build that succeeds. And a build finds the object files
-of the one before: pip makes an isolated environment in another temporary folder each time, for which
+the terminal what it does, since pip shows nothing of a build that succeeds. And a build finds the objects of
+the one before: pip makes an isolated environment in another temporary folder each time, for which
 scikit-build-core would throw them away, but no object of this package depends on that folder
 (pin_nonideal/_core/CMakeLists.txt).
 """
