@@ -10,6 +10,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from .browser import opened
@@ -97,7 +98,8 @@ def render(
         size = [x + x % 2 for x in size]  # both codecs halve the colors
     page: ReplayPage = replay(run, forces=forces)
     kind = "image/png" if ending in (".png", ".gif") else "image/jpeg"
-    pictures = asyncio.run(_pictures(page.text, size, times, kind))
+    with ThreadPoolExecutor(max_workers=1) as thread:  # a notebook has a loop of its own running in this one
+        pictures = thread.submit(asyncio.run, _pictures(page.text, size, times, kind)).result()
     if ending in CODECS:
         content = _video(pictures, ending, fps, encoder)
     else:

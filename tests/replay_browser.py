@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import io
 import shutil
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -34,14 +36,24 @@ MOVED = 2000  # pixels: a robot that fills the view moves several times as many
 
 @contextlib.contextmanager
 def headless_browser() -> Iterator[Any]:
-    """The browser; tests that need it are skipped where it is missing."""
+    """The browser of this process, begun once; tests that need it are skipped where it is missing."""
     api = pytest.importorskip("playwright.sync_api", reason="needs playwright")
     if BROWSER is None:
         pytest.skip("needs chromium, chromium-browser or google-chrome on the path")
-    with api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=BROWSER, args=FLAGS)
-        yield browser
-        browser.close()
+    browser = _launched(api)
+    before = set(browser.contexts)
+    yield browser
+    for context in set(browser.contexts) - before:
+        context.close()
+
+
+@cache
+def _launched(api: Any) -> Any:
+    playwright = api.sync_playwright().start()
+    browser = playwright.chromium.launch(executable_path=BROWSER, args=FLAGS)
+    atexit.register(playwright.stop)
+    atexit.register(browser.close)
+    return browser
 
 
 class Watched:

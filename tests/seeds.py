@@ -23,7 +23,7 @@ def seeds(every: Iterable[int], always: Iterable[int] = ()) -> list[Any]:
 
 
 def ranges(few: int, many: int, most: int | None = None) -> list[Any]:
-    """Parameters of a test that takes many seeds at once: few by default, many are slow, most are a stress run."""
+    """Parameters of a test of many seeds at once: few by default, many when slow, most under stress."""
     every = [
         pytest.param(range(few), id=str(few)),
         pytest.param(range(many), id=str(many), marks=pytest.mark.slow),
