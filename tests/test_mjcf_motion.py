@@ -62,7 +62,7 @@ def test_many_random_files(tmp_path_factory, text, seed):
     compare_file(tmp_path_factory, text, seed)
 
 
-@settings(max_examples=60, deadline=None, phases=[Phase.generate], derandomize=True)
+@settings(max_examples=10, deadline=None, phases=[Phase.generate], derandomize=True)
 @given(text=mjcf_files(), seed=st.integers(0, 1000))
 def test_random_files(tmp_path_factory, text, seed):
     compare_file(tmp_path_factory, text, seed)

@@ -124,10 +124,11 @@ def test_a_pushed_table_slides(feet):
     assert max(run.stats.signorini, run.stats.coulomb, run.stats.dissipation) < 1e-10
 
 
-def test_random_tables_slide_without_a_halt():
+@pytest.mark.parametrize("count", [4, pytest.param(20, marks=pytest.mark.slow)])
+def test_random_tables_slide_without_a_halt(count):
     """Pushed and turned on 4 to 12 feet: what the scheme itself takes is far below the joules that slide."""
     rng, taken = np.random.default_rng(0), []
-    for _ in range(20):
+    for _ in range(count):
         feet, model = int(rng.integers(4, 13)), empty()
         joint = body(model, 0, pin.JointModelFreeFlyer(), "table", 10.0, inertia=0.3 * np.eye(3))
         turn = np.sort(rng.uniform(0.0, 2.0 * np.pi, feet))

@@ -236,7 +236,7 @@ def test_a_stack_of_three():
     assert loads == pytest.approx([GRAVITY, 2.0 * GRAVITY, 3.0 * GRAVITY], abs=1e-9)
 
 
-@pytest.mark.parametrize(("part", "falls"), [(0.99, False), (1.05, True)])
+@pytest.mark.parametrize(("part", "falls"), [(0.99, False), pytest.param(1.05, True, marks=pytest.mark.slow)])
 def test_a_can_over_the_rim_of_another(part, falls):
     """It stands as long as its weight points at chords that both faces share, and falls beyond the rim."""
     turn = np.pi / 8.0  # so that chords cross the way to the rim

@@ -253,3 +253,50 @@ def test_a_mesh_that_is_missing_is_named_where_it_would_give_the_mass(tmp_path, 
     file.write_text(robot('<link name="base"/>', bare, joint("j", "base", "x")))
     with refuses('the meshes of links "x", which state no inertia, were not found', pn.SingularMassError):
         pn.load(file, density=density)
+
+
+def collada(unit, up="Z_UP"):
+    """A cube of four units, as COLLADA."""
+    corners = [(x, y, z) for x in (0, 4) for y in (0, 4) for z in (0, 4)]
+    faces = "0 1 3 0 3 2 4 6 7 4 7 5 0 4 5 0 5 1 2 3 7 2 7 6 0 2 6 0 6 4 1 5 7 1 7 3"
+    numbers = " ".join(str(x) for corner in corners for x in corner)
+    axes = "".join(f'<param name="{axis}" type="float"/>' for axis in "XYZ")
+    return f"""<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+      <asset>{unit}<up_axis>{up}</up_axis></asset>
+      <library_geometries><geometry id="g"><mesh>
+        <source id="p"><float_array id="n" count="24">{numbers}</float_array>
+          <technique_common><accessor source="#n" count="8" stride="3">{axes}</accessor></technique_common>
+        </source>
+        <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+        <triangles count="12"><input semantic="VERTEX" source="#v" offset="0"/><p>{faces}</p></triangles>
+      </mesh></geometry></library_geometries>
+      <library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/></node></visual_scene>
+      </library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+
+
+UNITS = [
+    ("", "", 4.0),
+    ('<unit name="meter" meter="1"/>', "", 4.0),
+    ('<unit name="centimeter" meter="0.01"/>', "", 0.04),
+    ('<unit meter="0.001" name="mm"/>', ' scale="2 2 2"', 0.008),
+    ('<unit name="inch" meter="0.0254"/>', "", 0.1016),
+]
+
+
+@pytest.mark.parametrize("up", ["Z_UP", "Y_UP"])
+@pytest.mark.parametrize(("unit", "scale", "edge"), UNITS)
+def test_a_collada_mesh_has_the_unit_that_its_file_states(tmp_path, unit, scale, edge, up):
+    (tmp_path / "cube.dae").write_text(collada(unit, up))
+    shape = f'<geometry><mesh filename="cube.dae"{scale}/></geometry>'
+    inside = f"<visual>{shape}</visual><collision>{shape}</collision>"
+    path = tmp_path / "arm.urdf"
+    path.write_text(robot(*ARM, f'<link name="x">{inside}</link>', joint("j", "base", "x")))
+    scene = pn.load(path, density=1000.0)
+    for geometry in (scene.visual_model, scene.collision_model):
+        (cube,) = [item for item in geometry.geometryObjects if item.name.startswith("x")]
+        cube.geometry.computeLocalAABB()
+        np.testing.assert_allclose(cube.geometry.aabb_local.max_, edge, rtol=1e-6)
+    mass = scene.model.inertias[scene.model.getJointId("j")].mass
+    assert mass == pytest.approx(1000.0 * edge**3, rel=1e-6)
+    told = [note for note in scene.notes if "are drawn in units of" in note]
+    assert len(told) == (edge not in (4.0,))

@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from .xml import listed
+import numpy as np
+
+from .xml import listed, numbers
 
 SCHEMES = ("package://", "model://")
 MESHES = "meshes"  # folder of a package in which a mesh of a broken path is looked for by its ending
@@ -42,6 +44,7 @@ def resolve_meshes(root: ElementTree.Element, path: Path, package_dirs: Sequence
     files = cache(_files)  # for this reading only: files come and go
     missing: dict[str, None] = {}
     guessed: dict[str, Path] = {}
+    drawn: dict[str, float] = {}
     for link in root.findall("link"):
         for kind in ("visual", "collision"):
             for shape in link.findall(kind):
@@ -55,6 +58,11 @@ def resolve_meshes(root: ElementTree.Element, path: Path, package_dirs: Sequence
                     link.remove(shape)
                     continue
                 mesh.set("filename", str(found.path))
+                meter = unit_of(found.path)
+                if meter != 1.0:
+                    scale = numbers(mesh, "scale", 3, (1, 1, 1), f'link "{link.get("name")}"')
+                    mesh.set("scale", " ".join(repr(float(x)) for x in meter * scale))
+                    drawn[filename] = meter
                 if found.broken:
                     guessed[filename] = found.path
     notes = [f'mesh "{m}" was not found; its shape is left out' for m in missing]
@@ -64,7 +72,33 @@ def resolve_meshes(root: ElementTree.Element, path: Path, package_dirs: Sequence
             f"paths of meshes {listed(guessed)} lead nowhere; they are the only ones beneath a folder "
             f'"{MESHES}" that end so, such as "{guessed[first]}"'
         )
+    if drawn:
+        units = ", ".join(f"{meter:g} m" for meter in sorted(set(drawn.values())))
+        notes.append(f"meshes {listed(drawn)} are drawn in units of {units}, as their files say")
     return notes
+
+
+def unit_of(path: Path) -> float:
+    """Length of a mesh file's unit [m]: what a COLLADA file states, as RViz reads it, and 1 for every other.
+
+    Its up axis turns nothing, as in RViz; the other formats state no unit.
+
+    Args:
+        path: of the mesh.
+    """
+    if path.suffix.lower() != ".dae":
+        return 1.0
+    try:
+        for _, element in ElementTree.iterparse(path):
+            name = element.tag.rpartition("}")[2]
+            if name == "unit":
+                meter = float(element.get("meter", "1"))
+                return meter if np.isfinite(meter) and meter > 0.0 else 1.0
+            if name == "asset":
+                break
+    except (ElementTree.ParseError, OSError, ValueError):
+        pass  # whoever reads the shape says what is wrong with it
+    return 1.0
 
 
 def find_mesh(
