@@ -29,7 +29,7 @@ from .scene_steps import Steps
 from .scene_tables import Tables
 from .states.closure import CLOSURE_TOLERANCE
 from .states.configurations import unit_parts
-from .states.named import named_configuration
+from .states.named import named_configuration, named_entries
 from .states.projection import ProjectionReport
 from .types import Array, GeometryModel, Model, State, Table
 
@@ -63,7 +63,8 @@ class Scene(States, Geometry, Tables, Steps):
             {"crank": 1.0, "base": {"xyz": [0, 0, 1], "rpy": [0, 0, 1.57]}}, which leaves the others as they
             are (in `solve`, `project` and `simulate` as in the scene's initial state), or the name of a
             reference configuration.
-        v0: initial velocity, an array (nv,) or a table by joint name; zero when None.
+        v0: initial velocity, an array (nv,), or a table by joint name whose entries are held while the others
+            follow the constraints; zero when None.
         visual_model: pinocchio.GeometryModel for the replay, or a function that makes it when asked for.
         collision_model: pinocchio.GeometryModel, or such a function.
         name: shown in messages and pages; the model's own when None.
@@ -143,6 +144,7 @@ class Scene(States, Geometry, Tables, Steps):
             self._q0 = named_configuration(model, q0, self._q0, "q0", self._unit_parts)
         if v0 is not None:
             self._v0 = self._velocity(v0, "v0")
+        self._held = named_entries(model, v0)
         for state in (self._q0, self._v0):
             state.setflags(write=False)
         said = Descriptions(
@@ -293,7 +295,7 @@ class Scene(States, Geometry, Tables, Steps):
         """What the scene is made of: joints, constraints, rows, rank, mobility, and what was left out."""
         q, v = self.initial_state()
         self._runner.solve(q, v, 0.0, modes=[core.Mode.slip_plus] * len(self.element_names))
-        notes = [f"note: {n}" for n in (*self.notes, *self._moved(self.q0, q))]
+        notes = [f"note: {n}" for n in (*self.notes, *self._start_notes())]
         credits = {"source": self.source, "licence": self.licence}
         notes += [f"{key}: {value}" for key, value in credits.items() if value]
         return report(self._compiled, self.name, self._runner.rank, notes)

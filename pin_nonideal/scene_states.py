@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .checks import choice, number
 from .errors import InputError
 from .states.configurations import require_resolved
-from .states.named import named_configuration, named_velocity
+from .states.held import told
+from .states.named import named_configuration, named_entries, named_velocity
 from .states.projection import ProjectionReport
 from .types import Array, Model, State
 
@@ -30,6 +32,7 @@ class States:
         _unit_parts: tuple[tuple[str, slice], ...]
         _q0: Array
         _v0: Array
+        _held: NDArray[np.bool_] | None
         _compiled: CompiledScene
         _closed: tuple[Array, Array, ProjectionReport] | None
         _told: list[str] | None
@@ -79,7 +82,7 @@ class States:
 
     def _initial(self) -> tuple[Array, Array, ProjectionReport]:
         if self._closed is None:
-            self._closed = self._project(self.q0, self.v0, 0.0)
+            self._closed = self._project(self.q0, self.v0, 0.0, self._held)
         q, v, moved = self._closed
         return q.copy(), v.copy(), moved
 
@@ -110,7 +113,8 @@ class States:
 
         Args:
             q: configuration, (nq,) or by joint name; the scene's initial one when None.
-            v: velocity, (nv,) or by joint name; the scene's initial one when None.
+            v: velocity, (nv,) or by joint name; the scene's initial one when None.  Entries that are named
+                are held, and the others follow.
             t: time [s].
             report: also returns how far q moved, a `ProjectionReport`.
 
@@ -119,9 +123,9 @@ class States:
 
         Raises:
             LoopClosureError: the constraints cannot be met from here; `gaps` names each gap.
-            InputError: wrong shapes or numbers, a contact that starts deep inside its plane or has no short
-                way out of it, or a coordinate where floating-point numbers are more than a millimeter or
-                milliradian apart.
+            InputError: wrong shapes or numbers, named velocities that the constraints do not allow together,
+                a contact that starts deep inside its plane or has no short way out of it, or a coordinate
+                where floating-point numbers are more than a millimeter or milliradian apart.
         """
         time, wanted = number("t", t), choice("report", report, (True, False))
         if q is None and v is None and time == 0.0:
@@ -129,12 +133,22 @@ class States:
         else:
             q_in = self.q0 if q is None else self._configuration(q, "q")
             v_in = self.v0 if v is None else self._velocity(v, "v")
-            found = self._project(q_in, v_in, time)
+            held = self._held if v is None else named_entries(self.model, v)
+            found = self._project(q_in, v_in, time, held)
         return found if wanted else found[:2]
 
-    def _project(self, q: Array, v: Array, t: float) -> tuple[Array, Array, ProjectionReport]:
+    def _project(
+        self, q: Array, v: Array, t: float, held: NDArray[np.bool_] | None
+    ) -> tuple[Array, Array, ProjectionReport]:
         require_resolved(self.model, q)
-        return self._compiled.project(q, v, t)
+        return self._compiled.project(q, v, t, held)
+
+    def _followed(self, v: State | None, on: Array) -> list[str]:
+        """What to tell of velocities that follow those that are named."""
+        held = self._held if v is None else named_entries(self.model, v)
+        if held is None:
+            return []
+        return told(self.model, self.v0 if v is None else self._velocity(v, "v"), on, held)
 
     def _moved(self, q: State, on: Array) -> list[str]:
         """What to tell of a configuration that was moved onto the constraints, see `Projection.notes`."""
@@ -145,5 +159,6 @@ class States:
     def _start_notes(self) -> list[str]:
         """What to tell of the scene's own initial state, once it is closed."""
         if self._told is None:
-            self._told = self._moved(self.q0, self.initial_state()[0])
+            q, v = self.initial_state()
+            self._told = self._moved(self.q0, q) + self._followed(None, v)
         return self._told

@@ -58,7 +58,8 @@ def simulate(
         q: initial configuration, (nq,) or by joint name (see `Scene`); the scene's when None.  It is
             projected onto the constraints first (`Scene.project`); `Trajectory.notes` tells of one that moved
             more than a little, and where it was given here a RuntimeWarning does.
-        v: initial velocity, (nv,) or by joint name; the scene's when None.
+        v: initial velocity, (nv,) or by joint name; the scene's when None.  An array is projected onto the
+            constraints; entries that are named are held, and the others follow, as a note says.
         t0: initial time [s].
         method: "dop853" (order 8) or "dopri5" (order 5), adaptive; "rk4", "semi_implicit_euler" or "moreau"
             (time stepping at velocity level), fixed dt; "Radau", "BDF" or "LSODA" by SciPy, for stiff scenes.
@@ -115,9 +116,10 @@ def simulate(
         scene.project(q, v, options.t0) if (q is not None or v is not None or t0) else scene.initial_state()
     )
     own = q is None and v is None and not t0
-    notes = scene._start_notes() if own else scene._moved(scene.q0 if q is None else q, q0)
-    if notes and q is not None:
-        warnings.warn(f"simulate: {notes[0]}", RuntimeWarning, stacklevel=2)
+    moved = [] if own else scene._moved(scene.q0 if q is None else q, q0)
+    notes = scene._start_notes() if own else moved + scene._followed(v, v0)
+    if moved and q is not None:
+        warnings.warn(f"simulate: {moved[0]}", RuntimeWarning, stacklevel=2)
     choice("simulate: progress", progress, (True, False, None))
     between = asked_callback(callback, scene.model.nv)
     _check_together(method, asked, callback, checkpoint)

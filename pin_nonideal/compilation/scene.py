@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pin_nonideal.constraints import UserConstraint
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, RunError
@@ -87,10 +90,12 @@ class CompiledScene:
             self.program = builder.finish()
         self.projection = Projection(model, self.program, q0, {name for name, _, _ in self.dropped})
 
-    def project(self, q: Array, v: Array, t: float) -> tuple[Array, Array, ProjectionReport]:
+    def project(
+        self, q: Array, v: Array, t: float, held: NDArray[np.bool_] | None = None
+    ) -> tuple[Array, Array, ProjectionReport]:
         """Nearest state on the constraints, see `Projection.nearest`."""
         try:
-            return self.projection.nearest(q, v, t)
+            return self.projection.nearest(q, v, t, held)
         except core.CoreFailure as failure:
             raise self.named(failure) from None
 

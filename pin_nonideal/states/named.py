@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from pin_nonideal.checks import array, number
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
@@ -121,6 +122,18 @@ def named_velocity(model: Model, given: State, base: Array, what: str) -> Array:
         first, size = model.idx_vs[j], model.nvs[j]
         v[first : first + size] = _values(model, j, 1, value, v[first : first + size], f'{what} of "{name}"')
     return v
+
+
+def named_entries(model: Model, given: State | None) -> NDArray[np.bool_] | None:
+    """Which entries of a velocity a table names, (nv,); None of anything else.
+
+    Args:
+        model: pinocchio.Model.
+        given: a velocity as `named_velocity` takes it.
+    """
+    if not isinstance(given, Mapping):
+        return None
+    return ~np.isnan(named_velocity(model, given, np.full(model.nv, np.nan), "v"))
 
 
 def joint_named(model: Model, name: object, what: str) -> int:

@@ -16,6 +16,7 @@ from pin_nonideal.types import Array, Model
 
 from .closure import CLOSURE_TOLERANCE, FAR, WELL_CONDITIONED, Closure, Rows, Search, conditioning
 from .extents import VANISHING, chain, coordinate, slides
+from .held import holding
 from .rows import copies, gap_rows, holonomic_rows, rows_at
 from .unmet import largest_loop_gap, lost_velocity, no_way_out, open_loops, refuse_deep_starts
 from .ways_out import SearchOutside
@@ -90,20 +91,24 @@ class Projection:
         self._gaps = gap_rows(program, idle)
         self._has_gaps = bool(self._gaps.any())
 
-    def nearest(self, q: Array, v: Array, t: float) -> tuple[Array, Array, ProjectionReport]:
+    def nearest(
+        self, q: Array, v: Array, t: float, held: NDArray[np.bool_] | None = None
+    ) -> tuple[Array, Array, ProjectionReport]:
         """Nearest state with phi(q, t) = 0 and A v + phi_t = 0.
 
         Args:
             q: configuration, (nq,).
             v: velocity, (nv,).
             t: time [s].
+            held: entries of v that stay as they are, (nv,), or None.
 
         Returns:
             q (nq,), v (nv,), and how far q moved.
 
         Raises:
             LoopClosureError: no configuration satisfies the constraints.
-            InputError: a contact starts too deep inside its plane.
+            InputError: a contact starts too deep inside its plane, or the constraints do not allow the held
+                velocities together.
             InconsistentConstraintsError: no velocity does.
         """
         if not self.program.rows:
@@ -121,6 +126,9 @@ class Projection:
             self._require_met(runner, q, found.q, met, nearest, t)
         if not rate <= RATE_TOLERANCE * min(1.0, self.length) * (1.0 + _largest(v_on)):
             raise lost_velocity(rows_at(runner, on, v_on, t)[3], self.program, t)
+        if held is not None and (v_on != v)[held].any():
+            metric = self._metric(_mass(self.model, runner)(on))
+            v_on = holding(self.model, self.program, on, v, held, ~self._gaps, metric, t)
         return on, v_on, self._report(runner, q, on, before, iterations, nearest)
 
     def _require_met(

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "constraints/kind.hpp"
+#include "constraints/kinds/complete.hpp"
 
 struct Dual {  // value and derivative in time
     double x = 0.0, d = 0.0;
@@ -136,8 +137,12 @@ Rows<S> rows_of(const K& kind, const Motion& m1, const Motion& m2, bool with_res
     place(m2, s.b);
     s.t = 0.0;
     Rows<S> out;
-    if (with_residual) kind.residual(s, out);
-    kind.rows(s, out);
+    if constexpr (pn::places<K, pn::Sides<TestPose<S>>, Rows<S>>) {
+        kind.place(s, out);
+    } else {
+        if (with_residual) kind.residual(s, out);
+        kind.rows(s, out);
+    }
     kind.rate_and_drift(s, out);
     return out;
 }

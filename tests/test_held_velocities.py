@@ -1,0 +1,101 @@
+"""Velocities that are named stay, whatever the constraints make of the others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import pin_nonideal as pn
+
+from .mechanisms import body, empty, frame
+from .refusals import refuses
+from .seeds import seeds
+
+ROUNDING = 1e-9  # of rates and velocities of some 10
+
+
+def rates(scene, q, v):
+    """A v + phi_t of all rows."""
+    return scene._compiled.program.runner().rows(q, v, 0.0)[3]
+
+
+@pytest.mark.parametrize(("name", "joint"), [("four_bar", "crank_joint"), ("slider_crank", "crank_joint")])
+def test_a_named_crank_has_its_speed(name, joint):
+    scene = pn.load(name)
+    dof = scene.model.joints[scene.model.getJointId(joint)].idx_v
+    for speed in (10.0, -3.0, 0.0):
+        run = pn.simulate(scene, 0.01, v={joint: speed})
+        assert run.v[0, dof] == speed
+        assert np.abs(rates(scene, run.q[0], run.v[0])).max() < ROUNDING
+        told = [note for note in run.notes if "that were named are held" in note]
+        assert len(told) == 1
+        assert f'"{joint}" = {speed:.4g}' in told[0]
+
+
+def chain(seed):
+    """A closed chain of three to six links in space, by a ball at its end, with some joints named."""
+    draw = np.random.default_rng(seed)
+    model, last = empty(), 0
+    count = int(draw.integers(4, 8))
+    for k in range(count):
+        axis = draw.normal(size=3)
+        joint = pin.JointModelRevoluteUnaligned(axis / np.linalg.norm(axis))
+        place = pin.SE3(pin.exp3(draw.normal(size=3)), draw.normal(0.0, 0.3, 3))
+        last = model.addJoint(last, joint, place, f"j{k}")
+        model.appendBodyToJoint(
+            last, pin.Inertia(1.0, draw.normal(0.0, 0.1, 3), 0.01 * np.eye(3)), pin.SE3.Identity()
+        )
+    q = draw.uniform(-1.0, 1.0, count)
+    frame(model, "tip", last, pin.SE3(np.eye(3), draw.normal(0.0, 0.3, 3)))
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    frame(model, "ground", 0, pin.SE3(np.eye(3), data.oMf[model.getFrameId("tip")].translation))
+    scene = pn.Scene(model, constraints=[pn.PointAnchor("tip", "ground")], q0=q)
+    named = draw.permutation(count)[: int(draw.integers(1, count - 2))]
+    return scene, {f"j{k}": float(draw.normal(0.0, 5.0)) for k in named}
+
+
+@pytest.mark.parametrize("seed", seeds(range(300)))
+def test_the_others_follow_by_the_least_change(seed):
+    """The change d has the least d^T M d under A v = 0 and the named values, by its KKT equations."""
+    scene, named = chain(seed)
+    q, v = scene.project(v=named)
+    model, n = scene.model, scene.model.nv
+    assert {name: v[model.joints[model.getJointId(name)].idx_v] for name in named} == named
+    A = scene._compiled.program.runner().rows(q, v, 0.0)[0].reshape(-1, n)
+    M = pin.crba(model, model.createData(), q)
+    M = np.triu(M) + np.triu(M, 1).T
+    dofs = [model.joints[model.getJointId(name)].idx_v for name in named]
+    rows = np.vstack([A, np.eye(n)[dofs]])
+    asked = np.zeros(n)
+    asked[dofs] = list(named.values())
+    right = np.concatenate([-A @ asked, np.zeros(len(dofs))])
+    kkt = np.block([[M, rows.T], [rows, np.zeros((len(rows), len(rows)))]])
+    expected = asked + np.linalg.lstsq(kkt, np.concatenate([np.zeros(n), right]), rcond=1e-13)[0][:n]
+    np.testing.assert_allclose(v, expected, rtol=0.0, atol=1e-7 * (1.0 + np.abs(expected).max()))
+
+
+def test_what_cannot_be_together_is_named():
+    scene = pn.load("four_bar")
+    words = 'the constraints do not allow "crank_joint" = 10, "coupler_joint" = 3 together'
+    with refuses(words, pn.InputError):
+        pn.simulate(scene, 0.1, v={"crank_joint": 10.0, "coupler_joint": 3.0})
+
+
+def test_arrays_and_nothing_are_projected_as_before():
+    scene = pn.load("four_bar")
+    v = np.array([10.0, 0.0, 0.0])
+    assert np.abs(rates(scene, *scene.project(v=v))).max() < ROUNDING
+    assert scene.project(v=v)[1][0] != 10.0
+
+
+def test_a_scene_begins_with_the_velocity_it_names():
+    model = empty()
+    crank = body(model, 0, pin.JointModelRZ(), "crank", 1.0, inertia=np.eye(3))
+    wheel = body(model, 0, pin.JointModelRZ(), "wheel", 5.0, inertia=np.eye(3))
+    assert (crank, wheel) == (1, 2)
+    coupling = pn.JointCoupling("wheel", "crank", ratio=0.5)
+    scene = pn.Scene(model, constraints=[coupling], v0={"crank": 4.0})
+    np.testing.assert_allclose(scene.initial_state()[1], [4.0, 2.0], rtol=0.0, atol=ROUNDING)
+    assert any("that were named are held" in note for note in pn.simulate(scene, 0.01).notes)
