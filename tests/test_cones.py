@@ -92,7 +92,9 @@ def test_driven_problems_are_solved_or_refused(count):
     assert count_of["jammed"] > 0
 
 
-@pytest.mark.parametrize("count", [150, pytest.param(5000, marks=pytest.mark.stress)])
+@pytest.mark.parametrize(
+    "count", [30, pytest.param(150, marks=pytest.mark.slow), pytest.param(5000, marks=pytest.mark.stress)]
+)
 @pytest.mark.parametrize("driven", [False, True])
 def test_planar_problems_against_enumeration(count, driven):
     """Where all modes are tried the motion is one of those found; where there is none it is refused."""

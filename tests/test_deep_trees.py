@@ -134,7 +134,7 @@ def test_joints_that_stick_are_locked(terms):
     assert error(found.F_nonideal, torque) < BESIDE
 
 
-@pytest.mark.parametrize("n", [100, 300])
+@pytest.mark.parametrize("n", [100, pytest.param(300, marks=pytest.mark.slow)])
 def test_ring(n, terms):
     model = chain(n, turn=2.0 * np.pi / n, axes="yyx")
     scene = pn.Scene(model, constraints=[pn.PointAnchor(f"j{n - 1} tip", None)], terms=terms)

@@ -51,7 +51,7 @@ def test_a_saved_run_becomes_a_moving_picture(run: Any, tmp_path: Path, capsys: 
 
 
 @needs_browser
-@pytest.mark.parametrize("ending", ["mp4", "webm"])
+@pytest.mark.parametrize("ending", ["mp4", pytest.param("webm", marks=pytest.mark.slow)])
 def test_a_video_is_played(run: Any, tmp_path: Path, ending: str) -> None:
     """What a player shows of it is the picture of that time."""
     video = pn.render(run, tmp_path / f"a.{ending}", width=319, height=200, seconds=2.0, fps=8)

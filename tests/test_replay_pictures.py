@@ -56,6 +56,7 @@ def shows(picture: np.ndarray, color: str, within: int = 40) -> int:
     return int(np.count_nonzero(np.abs(picture - wanted).max(axis=2) < within))
 
 
+@pytest.mark.slow
 def test_a_mechanism_of_hundredths_of_a_second_is_drawn_closed_and_played_slowly(opened: Any) -> None:
     """Andrews' squeezer: 0.03 s, links from 7 mm."""
     scene = pn.load("andrews_squeezer")
@@ -321,7 +322,9 @@ def test_legends_are_whole_and_what_is_left_out_is_said(opened: Any) -> None:
     assert page.page.locator(".plot li").count() == 8
 
 
-@pytest.mark.parametrize(("width", "height"), [(420, 800), (900, 500), (1400, 900)])
+@pytest.mark.parametrize(
+    ("width", "height"), [(420, 800), pytest.param(900, 500, marks=pytest.mark.slow), (1400, 900)]
+)
 def test_controls_are_within_reach_on_every_screen(opened: Any, width: int, height: int) -> None:
     run = pn.simulate(pn.load("solo12_standing"), 0.1, record=("forces", "energy"))
     page = opened(run)

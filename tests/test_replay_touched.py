@@ -165,6 +165,7 @@ def test_points_of_contact_that_span_a_solid_are_its_corners() -> None:
     assert len(flat) > 3
 
 
+@pytest.mark.slow
 def test_views_are_framed_between_what_lies_over_them(tmp_path: Path) -> None:
     """The robot is neither under the heading nor under the buttons, and a belt that ran 100 m stays large."""
     runs = {

@@ -43,6 +43,7 @@ def test_three_feet_begin_to_slip_as_a_stiff_solver_has_it():
     assert evaluations_after(scene, instant, instant + 0.05) < ONSET
 
 
+@pytest.mark.slow
 def test_a_ball_joint_begins_to_slip_as_a_stiff_solver_has_it():
     scene, oracle = ball()
     turn = Rotation.identity()

@@ -36,7 +36,7 @@ def chain(links, span):
     return pn.Scene(model, constraints=[pn.PointAnchor("end", "nail", axes="xz", name="nailed")])
 
 
-@pytest.mark.parametrize("links", [3, 8, 25])
+@pytest.mark.parametrize("links", [3, 8, pytest.param(25, marks=pytest.mark.slow)])
 def test_a_hanging_chain_is_the_discrete_catenary(links):
     """tan(theta_i) of the links grows evenly, by the weight of one over the horizontal pull."""
     scene, length, span = chain(links, 0.6), 1.0 / links, 0.6

@@ -1,8 +1,8 @@
 // The kinds of constraints, and of directions along which friction acts.
 //
 // A kind is one struct in one header that knows everything about itself; constraints/kinds/complete.hpp lists what. Most
-// kinds act between two bodies: a row is then the power of a unit wrench w on the motion of body 1 relative to body 2, so that
-// A_j = w . J_j, and the multiplier is the size of that wrench. The others act on dofs directly and write A.
+// kinds act between two bodies: a row is then the power of a unit wrench w on the motion of body 1 relative to body 2, so
+// that A_j = w . J_j, and the multiplier is the size of that wrench. The others act on dofs directly and write A.
 #pragma once
 
 #include <utility>
