@@ -71,6 +71,7 @@ def test_a_mechanism_of_hundredths_of_a_second_is_drawn_closed_and_played_slowly
     assert "gap drawn" in page.page.locator("#heading").inner_text()
 
 
+@pytest.mark.slow
 def test_forty_revolutions_a_second_are_drawn_closed(opened: Any) -> None:
     """A four-bar whose crank is driven at 251 rad/s, against Pinocchio at frames and between them."""
     drive = pn.load("four_bar")
@@ -182,7 +183,8 @@ def test_a_surface_is_traced_beside_the_path_of_its_point() -> None:
     assert np.linalg.norm(surface.points[0] - surface.points[surface.columns - 1]) > 0.3
 
 
-IN_VIEW = ["four_bar", "belt_oscillator", "rolling_disk", "knife_edge_sleigh", "andrews_squeezer"]
+MORE = ("belt_oscillator", "knife_edge_sleigh", "andrews_squeezer")
+IN_VIEW = ["four_bar", "rolling_disk", *(pytest.param(name, marks=pytest.mark.slow) for name in MORE)]
 
 
 def stays_in_view(page: Watched, name: str) -> None:
@@ -389,6 +391,7 @@ def test_on_a_phone_names_of_modes_and_bands_are_whole(opened: Any) -> None:
     )
 
 
+@pytest.mark.slow
 def test_on_a_short_screen_curves_are_seen_and_the_heading_is_beside_the_robot(opened: Any) -> None:
     scene = pn.load("four_bar")
     runs = [pn.simulate(scene, 1.0, output_dt=0.01, record=("forces", "energy")) for _ in range(2)]

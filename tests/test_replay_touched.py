@@ -212,6 +212,7 @@ def test_forces_between_round_bodies_act_where_they_touch() -> None:
     assert names == {"ball round", "beam round"}
 
 
+@pytest.mark.slow
 def test_paths_coils_and_lists_of_runs_are_drawn_as_they_are(tmp_path: Path) -> None:
     """A path whose frames are too far apart is left out; a hundred runs fold their names away."""
     model = jointed(pin.JointModelRY())
