@@ -1,4 +1,4 @@
-"""What the core costs to compile: processor time, wall time and memory of each room's sources."""
+"""Compile time of the core: processor time, wall time and memory of the sources of each folder."""
 
 from __future__ import annotations
 

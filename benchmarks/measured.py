@@ -1,4 +1,4 @@
-"""Runs a command and appends to a file what it took: python measured.py FILE COMMAND..."""
+"""Runs a command and appends its time and memory to a file: python measured.py FILE COMMAND..."""
 
 import json
 import os

@@ -1,10 +1,10 @@
-"""scikit-build-core as pip calls it, with what a first build needs around it.
+"""Build backend: scikit-build-core with three additions for source installs.
 
-An old Python is refused in words, before pip looks for libraries that it cannot have. A long compile says on
-the terminal what it does, since pip shows nothing of a build that succeeds. And a build finds the objects of
-the one before: pip makes an isolated environment in another temporary folder each time, for which
-scikit-build-core would throw them away, but no object of this package depends on that folder
-(pin_nonideal/_core/CMakeLists.txt).
+- A Python older than 3.10 ends in an error that says so, before pip looks for wheels that do not exist.
+- A line on the terminal announces a full compile; pip shows no output of a successful build.
+- Object files are reused. pip makes each isolated environment in a new temporary folder, and
+  scikit-build-core discards a build folder that was configured from another one. No object file of this
+  package depends on that folder (pin_nonideal/_core/CMakeLists.txt), so the build folder is kept.
 """
 
 import json

@@ -39,7 +39,7 @@ def parts_of(scene: Any) -> Table:
     made |= {"q0": scene.q0, "v0": scene.v0, "assembly_tolerance": scene._assembly_tolerance}
     made |= {"visual_model": shapes[0], "collision_model": shapes[1]}
     later = {"notes": list(scene.notes), "contact_friction": scene.contact_friction}
-    later |= {"_origin": scene._origin, "_shape_sources": scene._shape_sources}
+    later |= {"_origin": scene._origin, "_shape_sources": scene._shape_sources, "_held": scene._held}
     return {"model": scene.model, "made": made, "later": later, "order": file_order(scene.model)}
 
 

@@ -144,7 +144,7 @@ class States:
         return self._compiled.project(q, v, t, held)
 
     def _followed(self, v: State | None, on: Array) -> list[str]:
-        """What to tell of velocities that follow those that are named."""
+        """A note on velocities that follow the named ones."""
         held = self._held if v is None else named_entries(self.model, v)
         if held is None:
             return []

@@ -1,4 +1,4 @@
-"""What a first build meets: an old Python, a missing compiler, the object files of another environment."""
+"""First builds: an old Python, a missing compiler, object files from another environment."""
 
 from __future__ import annotations
 

@@ -1,6 +1,9 @@
-"""Velocities that are named stay, whatever the constraints make of the others."""
+"""Velocities given by joint name are held; the others follow the constraints."""
 
 from __future__ import annotations
+
+import copy
+import pickle
 
 import numpy as np
 import pinocchio as pin
@@ -33,25 +36,29 @@ def test_a_named_crank_has_its_speed(name, joint):
         assert f'"{joint}" = {speed:.4g}' in told[0]
 
 
-def chain(seed):
-    """A closed chain of three to six links in space, by a ball at its end, with some joints named."""
+def chain(seed, *, length=1.0, mass=1.0, mount=None, times=1):
+    """A chain of four to seven links in space, closed by a ball, with some joints named.
+
+    In another unit of length or of mass, on a mount that is turned, its loop stated several times.
+    """
     draw = np.random.default_rng(seed)
     model, last = empty(), 0
     count = int(draw.integers(4, 8))
     for k in range(count):
         axis = draw.normal(size=3)
         joint = pin.JointModelRevoluteUnaligned(axis / np.linalg.norm(axis))
-        place = pin.SE3(pin.exp3(draw.normal(size=3)), draw.normal(0.0, 0.3, 3))
+        place = pin.SE3(pin.exp3(draw.normal(size=3)), length * draw.normal(0.0, 0.3, 3))
+        place = mount * place if mount is not None and k == 0 else place
         last = model.addJoint(last, joint, place, f"j{k}")
-        model.appendBodyToJoint(
-            last, pin.Inertia(1.0, draw.normal(0.0, 0.1, 3), 0.01 * np.eye(3)), pin.SE3.Identity()
-        )
+        lever, moments = length * draw.normal(0.0, 0.1, 3), mass * length**2 * 0.01 * np.eye(3)
+        model.appendBodyToJoint(last, pin.Inertia(mass, lever, moments), pin.SE3.Identity())
     q = draw.uniform(-1.0, 1.0, count)
-    frame(model, "tip", last, pin.SE3(np.eye(3), draw.normal(0.0, 0.3, 3)))
+    frame(model, "tip", last, pin.SE3(np.eye(3), length * draw.normal(0.0, 0.3, 3)))
     data = model.createData()
     pin.framesForwardKinematics(model, data, q)
     frame(model, "ground", 0, pin.SE3(np.eye(3), data.oMf[model.getFrameId("tip")].translation))
-    scene = pn.Scene(model, constraints=[pn.PointAnchor("tip", "ground")], q0=q)
+    loops = [pn.PointAnchor("tip", "ground", name=f"loop {k}") for k in range(times)]
+    scene = pn.Scene(model, constraints=loops, q0=q)
     named = draw.permutation(count)[: int(draw.integers(1, count - 2))]
     return scene, {f"j{k}": float(draw.normal(0.0, 5.0)) for k in named}
 
@@ -74,6 +81,41 @@ def test_the_others_follow_by_the_least_change(seed):
     kkt = np.block([[M, rows.T], [rows, np.zeros((len(rows), len(rows)))]])
     expected = asked + np.linalg.lstsq(kkt, np.concatenate([np.zeros(n), right]), rcond=1e-13)[0][:n]
     np.testing.assert_allclose(v, expected, rtol=0.0, atol=1e-7 * (1.0 + np.abs(expected).max()))
+
+
+TURNED = pin.SE3(pin.exp3(np.array([0.3, -1.1, 0.7])), np.array([2.0, -1.0, 0.5]))
+SAME = [{"length": 1e-3}, {"length": 1e3}, {"mass": 1e-3}, {"mass": 1e3}, {"mount": TURNED}, {"times": 2}]
+
+
+@pytest.mark.parametrize("changed", SAME, ids=lambda changed: next(iter(changed)))
+@pytest.mark.parametrize("seed", seeds(range(60)))
+def test_units_mount_and_copies_of_rows_change_nothing(seed, changed):
+    scene, named = chain(seed)
+    other, _ = chain(seed, **changed)
+    _, v = scene.project(v=named)
+    _, same = other.project(v=named)
+    np.testing.assert_allclose(same, v, rtol=0.0, atol=1e-6 * (1.0 + np.abs(v).max()))
+
+
+@pytest.mark.parametrize("length", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("speed", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("seed", range(6))
+def test_too_many_named_are_refused_in_any_unit(seed, speed, length):
+    """All joints of a chain with a freedom to spare, at velocities drawn by lot."""
+    scene, _ = chain(seed, length=length)
+    draw = np.random.default_rng(seed)
+    named = {f"j{k}": speed * float(draw.normal()) for k in range(scene.model.nv)}
+    with refuses("the constraints do not allow", pn.InputError):
+        scene.project(v=named)
+
+
+def test_copies_files_and_other_processes_hold_the_same():
+    scene = pn.load("four_bar", v0={"crank_joint": 5.0})
+    q, v = scene.initial_state()
+    assert v[0] == 5.0
+    for other in (copy.deepcopy(scene), pickle.loads(pickle.dumps(scene))):
+        np.testing.assert_array_equal(other.initial_state()[1], v)
+    assert np.abs(rates(scene, q, v)).max() < ROUNDING
 
 
 def test_what_cannot_be_together_is_named():

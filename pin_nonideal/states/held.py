@@ -1,4 +1,4 @@
-"""Velocities of which some entries are held: the nearest that meet the constraints by the others."""
+"""Projection of a velocity onto the constraints with some of its entries held."""
 
 from __future__ import annotations
 
@@ -12,14 +12,28 @@ from pin_nonideal.types import Array, Model
 from .extents import coordinate
 from .rows import rows_at
 
-# Part of the largest row, over the root of the mass matrix, below which the free entries do not move one.
+# Free columns of a row below this part of all its columns are rounding: the free entries do not move it.
 UNMOVED = 1e-10
 # Singular values below this part of the largest are rounding of rows that depend on others.
 DEPENDENT = 1e-11
-# Part of 1 + |v| by which a row may miss its rate.
+# Part of the terms A_j v_j and phi_t of a row by which their sum may miss zero.
 MISSED = 1e-9
-# A change of a free entry of more than this part of 1 + |v| is worth a word.
+# Part of the largest velocity by which a projection changes velocities that meet the constraints already.
+ROUNDING = 1e-12
+# Part of the largest velocity above which the change of a free entry is reported.
 LITTLE = 1e-3
+
+
+def changes(asked: Array, found: Array, held: NDArray[np.bool_]) -> bool:
+    """Whether a projection has changed held entries by more than rounding.
+
+    Args:
+        asked: velocity before, (nv,).
+        found: velocity after, (nv,).
+        held: entries to be held, (nv,).
+    """
+    change = np.abs(found - asked)[held].max(initial=0.0)
+    return bool(change > ROUNDING * np.abs(asked).max(initial=0.0))
 
 
 def holding(
@@ -52,19 +66,17 @@ def holding(
     """
     runner, free = program.runner(), ~held
     A, _, _, rate = rows_at(runner, q, v, t)
+    A, rate = A[rows], rate[rows]
     root = np.linalg.cholesky(metric[np.ix_(free, free)])
-    B = np.linalg.solve(root, A[rows][:, free].T).T
-    size = np.linalg.norm(B, axis=1)
-    moved = size > UNMOVED * size.max(initial=0.0)
+    moved = np.abs(A[:, free]).max(axis=1, initial=0.0) > UNMOVED * np.abs(A).max(axis=1, initial=0.0)
+    B = np.linalg.solve(root, A[moved][:, free].T).T
+    scale = np.linalg.norm(B, axis=1)
+    x = np.linalg.lstsq(B / scale[:, None], -rate[moved] / scale, rcond=DEPENDENT)[0]
     found: Array = v.copy()
-    if moved.any():
-        scale = size[moved]
-        x = np.linalg.lstsq(B[moved] / scale[:, None], -rate[rows][moved] / scale, rcond=DEPENDENT)[0]
-        found[free] += np.linalg.solve(root.T, x)
-    missed = np.abs(np.where(rows, rows_at(runner, q, found, t)[3], 0.0))
-    # Rows as long as they are: of a meter or a radian each.
-    length = np.maximum(np.linalg.norm(A, axis=1), 1.0)
-    if (missed > MISSED * length * (1.0 + np.abs(found).max(initial=0.0))).any():
+    found[free] += np.linalg.solve(root.T, x)
+    missed = rows_at(runner, q, found, t)[3][rows]
+    terms = np.abs(A) @ (np.abs(v) + np.abs(found)) + np.abs(rate - A @ v)
+    if (np.abs(missed) > MISSED * terms).any():
         raise InputError(
             f"v: the constraints do not allow {_told(model, v, held)} together at t = {t:.2f} s; name fewer "
             "entries, so that the others can follow, or give velocities that go together"
@@ -73,16 +85,16 @@ def holding(
 
 
 def told(model: Model, asked: Array, found: Array, held: NDArray[np.bool_]) -> list[str]:
-    """A sentence on entries that follow held ones; none where nothing had to.
+    """A note that names the entries that follow held ones; none where no entry had to.
 
     Args:
         model: pinocchio.Model.
         asked: velocity as asked for, (nv,).
-        found: with which the run begins, (nv,).
+        found: velocity at the start of the run, (nv,).
         held: entries that stay, (nv,).
     """
     change = np.abs(found - asked)
-    follows = ~held & (change > LITTLE * (1.0 + np.abs(found).max(initial=0.0)))
+    follows = ~held & (change > LITTLE * max(np.abs(asked).max(initial=0.0), np.abs(found).max(initial=0.0)))
     if not follows.any():
         return []
     return [

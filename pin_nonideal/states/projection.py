@@ -16,7 +16,7 @@ from pin_nonideal.types import Array, Model
 
 from .closure import CLOSURE_TOLERANCE, FAR, WELL_CONDITIONED, Closure, Rows, Search, conditioning
 from .extents import VANISHING, chain, coordinate, slides
-from .held import holding
+from .held import changes, holding
 from .rows import copies, gap_rows, holonomic_rows, rows_at
 from .unmet import largest_loop_gap, lost_velocity, no_way_out, open_loops, refuse_deep_starts
 from .ways_out import SearchOutside
@@ -126,7 +126,7 @@ class Projection:
             self._require_met(runner, q, found.q, met, nearest, t)
         if not rate <= RATE_TOLERANCE * min(1.0, self.length) * (1.0 + _largest(v_on)):
             raise lost_velocity(rows_at(runner, on, v_on, t)[3], self.program, t)
-        if held is not None and (v_on != v)[held].any():
+        if held is not None and changes(v, v_on, held):
             metric = self._metric(_mass(self.model, runner)(on))
             v_on = holding(self.model, self.program, on, v, held, ~self._gaps, metric, t)
         return on, v_on, self._report(runner, q, on, before, iterations, nearest)

@@ -1,4 +1,4 @@
-// What a struct must say of itself to be a kind of constraint.
+// Members that a struct needs to be a kind of constraint, checked at compile time.
 #pragma once
 
 #include <string>
