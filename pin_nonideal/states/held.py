@@ -78,8 +78,8 @@ def holding(
     terms = np.abs(A) @ (np.abs(v) + np.abs(found)) + np.abs(rate - A @ v)
     if (np.abs(missed) > MISSED * terms).any():
         raise InputError(
-            f"v: no velocity on the constraints has {_told(model, v, held)} at t = {t:.2f} s; name fewer entries, "
-            "so that the others can follow, or give velocities that are consistent"
+            f"v: no velocity on the constraints has {_told(model, v, held)} at t = {t:.2f} s; name fewer "
+            "entries, so that the others can follow, or give velocities that are consistent"
         )
     return found
 

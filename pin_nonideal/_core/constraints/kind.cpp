@@ -124,8 +124,8 @@ static constexpr size_t index_of(const std::variant<K...>*) {
     return i;
 }
 
-// Gaps between shapes, whose nearest points are searched for, stand last. Six functions and not one: compilers take far
-// more than twice the time for a function of twice the size.
+// The last kinds are gaps between shapes, which search for nearest points. Six functions instead of one, because compile
+// time grows faster than the size of a function (GCC 12: 66 s for one, 36 s for six).
 constexpr size_t shapes = index_of<EllipsoidRow>(static_cast<const Kind*>(nullptr)), all = std::variant_size_v<Kind>;
 static PN_WIDE void residual(const Kind& kind, const State& s, RowValues& out) {
     evaluate_between<Part::residual, 0, shapes>(kind, s, out);

@@ -26,7 +26,7 @@ struct Gap {
 enum class ImpactLaw { newton, poisson };
 
 struct Program {
-    // In its source: to copy each kind of constraint, force and law takes seconds to compile.
+    // Defined in program.cpp: copies of all kinds of constraints, forces and laws take seconds to compile.
     Program();
     Program(const Program&);
     Program(Program&&) noexcept;

@@ -1,4 +1,4 @@
-// A Pinocchio model as it comes from Python: found behind its object, read into a Mechanism, compared with another.
+// Pinocchio models from Python: access to the C++ object, conversion to a Mechanism, comparison.
 #pragma once
 
 #include "tree/mechanism.hpp"

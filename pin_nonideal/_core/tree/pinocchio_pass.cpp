@@ -18,8 +18,8 @@ const Model& model_of(const Mechanism& m) { return *static_cast<const Model*>(m.
 
 Motion motion(const pinocchio::Motion& x) { return {x.linear(), x.angular()}; }
 
-// One joint of a model by itself, moved by the functions that Pinocchio's library holds compiled: the joint's own
-// templates take ten seconds to compile.
+// A model of one joint, evaluated by `forwardKinematics`, which Pinocchio's library instantiates. The templates of the
+// joint itself (createData, calc) take fifteen seconds to compile.
 class LoneJoint {
 public:
     explicit LoneJoint(const pinocchio::JointModel& joint) : model_(with(joint)), data_(model_) {}

@@ -31,8 +31,8 @@ private:
     std::unique_ptr<Data> data_;
 };
 
-// The first column of a joint's motion subspace, in its own axes at its neutral configuration; of the joint of this number
-// of a `pinocchio::Model`.
+// First column of the motion subspace of joint `joint` of a `pinocchio::Model`, in the joint's axes, at its neutral
+// configuration.
 Motion first_motion(const void* model, int joint);
 
 // Every term by Pinocchio's algorithms, on one pinocchio::Data.
