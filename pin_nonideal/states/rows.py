@@ -59,6 +59,22 @@ def rows_at(runner: core.Runner, q: Array, v: Array, t: float) -> tuple[Array, A
     return A.reshape(len(phi), len(v)), b, phi, rate
 
 
+def row_lengths(runner: core.Runner, q: Array, v: Array, t: float) -> Array:
+    """The greatest length that rows could have at q in the metric of M^-1, (m + d,).
+
+    The rows of `rows_at` come first, then the d directions along which frictional elements slip.  The length
+    of a row between two bodies is taken over all directions of its force and couple at its point.  A row is
+    short beside it where the joints leave no freedom, as out of the plane of a planar loop.
+
+    Args:
+        runner: a workspace of the core, whose friction carries nothing afterwards.
+        q: configuration, (nq,).
+        v: velocity, (nv,).
+        t: time [s].
+    """
+    return np.asarray(runner.row_lengths(q, v, t))
+
+
 # Rows whose directions differ by less than this part are copies: rounding of the kinematics.
 SAME_ROW = 1e-11
 # How far projections of copies may differ: rounding of long sums.

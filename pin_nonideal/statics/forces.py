@@ -8,10 +8,11 @@ import numpy as np
 
 from pin_nonideal.core import core
 from pin_nonideal.scene import Scene, program_of
-from pin_nonideal.states.rows import holonomic_rows, rows_at
+from pin_nonideal.states.rows import holonomic_rows, row_lengths, rows_at
 from pin_nonideal.types import Array
 
-# Rows whose singular value is below this part of the largest depend on the others.
+# Rows over their greatest lengths depend on others, or vanish, below this singular value: closures and
+# rounding reach about 1e-12, directions of light mechanisms lie above 1e-7.
 DEPENDENT = 1e-9
 
 
@@ -21,7 +22,7 @@ class Balance(NamedTuple):
     Attributes:
         F: given forces and laws at rest, without dry friction [N or N m], (nv,).
         A: rows of all constraints and contacts, (m, nv).
-        lam: multipliers that leave the least of F + A^T lam, those of least norm, (m,).
+        lam: multipliers that leave the least of F + A^T lam in the metric of M^-1, those of least norm, (m,).
         free: velocities that the rows allow, orthonormal columns, (nv, k).
         left: free^T F, which is zero in equilibrium, (k,).
     """
@@ -68,12 +69,24 @@ class AtRest:
         return np.asarray(now.F + now.C)
 
     def rows(self, q: Array) -> Array:
-        """Rows of all constraints and contacts, (m, nv).
+        """Rows of all constraints and contacts, (m, nv); those that only rounding gives a length are zero.
 
         Args:
             q: configuration, (nq,).
         """
-        return rows_at(self.runner, q, self.still, self.t)[0]
+        return self._rows(q, self._root(q))[0]
+
+    def _root(self, q: Array) -> Array:
+        """Lower triangular, M = root root^T."""
+        return np.asarray(np.linalg.cholesky(self.mass(q)))
+
+    def _rows(self, q: Array, root: Array) -> tuple[Array, Array, Array]:
+        """Rows A, their greatest lengths, and the rows over these in the metric of M^-1, M = root root^T."""
+        A = rows_at(self.runner, q, self.still, self.t)[0]
+        lengths = row_lengths(self.runner, q, self.still, self.t)[: len(A)]
+        scaled = np.linalg.solve(root, A.T).T / np.where(lengths > 0.0, lengths, 1.0)[:, None]
+        short = np.linalg.norm(scaled, axis=1) <= DEPENDENT
+        return np.where(short[:, None], 0.0, A), lengths, np.where(short[:, None], 0.0, scaled)
 
     def balance(self, q: Array) -> Balance:
         """What acts at one configuration.
@@ -81,10 +94,20 @@ class AtRest:
         Args:
             q: configuration, (nq,).
         """
-        F, A = self.forces(q), self.rows(q)
-        free = null_space(A)
-        lam = np.linalg.lstsq(A.T, -F, rcond=DEPENDENT)[0] if len(A) else np.zeros(0)
+        F, root = self.forces(q), self._root(q)
+        A, lengths, scaled = self._rows(q, root)
+        lam = shortest(scaled.T, np.asarray(np.linalg.solve(root, -F)), lengths)
+        free = _free(scaled, root)
         return Balance(F, A, lam, free, free.T @ F)
+
+    def free(self, q: Array) -> Array:
+        """Velocities that the rows allow, orthonormal columns, (nv, k).
+
+        Args:
+            q: configuration, (nq,).
+        """
+        root = self._root(q)
+        return _free(self._rows(q, root)[2], root)
 
     def mass(self, q: Array) -> Array:
         """M(q), (nv, nv).
@@ -96,19 +119,31 @@ class AtRest:
         return np.asarray(self.runner.terms(q, self.still)[0].reshape(n, n))
 
 
-def null_space(A: Array) -> Array:
-    """Orthonormal columns that span what all rows allow, (nv, k); rows count by their direction alone.
+def _free(scaled: Array, root: Array) -> Array:
+    """Orthonormal columns that span the velocities that scaled rows allow, M = root root^T."""
+    if not len(scaled):
+        return np.eye(len(root))
+    _, values, turned = np.linalg.svd(scaled)
+    rank = int((values > DEPENDENT).sum())
+    return np.asarray(np.linalg.qr(np.linalg.solve(root.T, turned[rank:].T))[0])
+
+
+def shortest(scaled: Array, y: Array, lengths: Array) -> Array:
+    """The least x of those with the least |scaled (lengths x) - y|, (n,).
 
     Args:
-        A: rows, (m, nv).
+        scaled: columns over their lengths, so that singular values tell their rank, (m, n).
+        y: (m,).
+        lengths: of the columns, (n,); x is zero where they are.
     """
-    size = np.linalg.norm(A, axis=1)
-    rows = A[size > 0.0] / size[size > 0.0, None]
-    if not len(rows):
-        return np.eye(A.shape[1])
-    _, values, turned = np.linalg.svd(rows)
-    rank = int((values > DEPENDENT * values[0]).sum())
-    return np.asarray(turned[rank:].T)
+    used = lengths > 0.0
+    x = np.zeros(len(lengths))
+    left, values, right = np.linalg.svd(scaled[:, used])
+    rank = int((values > DEPENDENT).sum())
+    found = right[:rank].T @ ((left.T[:rank] @ y) / values[:rank]) / lengths[used]
+    idle = right[rank:].T / lengths[used][:, None]
+    x[used] = found - idle @ np.linalg.lstsq(idle, found, rcond=None)[0]
+    return x
 
 
 def restricts_velocity_only(scene: Scene) -> bool:

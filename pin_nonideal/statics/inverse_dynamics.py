@@ -17,7 +17,7 @@ from pin_nonideal.states.named import joint_named, named_configuration, named_ve
 from pin_nonideal.states.rows import rows_at
 from pin_nonideal.types import Array, State
 
-from .forces import AtRest, null_space
+from .forces import DEPENDENT, AtRest, shortest
 
 # An acceleration follows the constraints to this part of its terms.
 FOLLOWS = 1e-6
@@ -89,7 +89,7 @@ def inverse_dynamics(
     rest = AtRest(scene, still, time)
     A, b = rows_at(rest.runner, at, speed, time)[:2]
     _check_follows(scene, A, b, wanted)
-    return _Torques(rest, at, speed, wanted, null_space(A), dofs).solve(limits)
+    return _Torques(rest, at, speed, wanted, dofs).solve(limits)
 
 
 def _driven(scene: Scene, actuated: Sequence[str] | None) -> list[int]:
@@ -138,10 +138,11 @@ def _check_follows(scene: Scene, A: Array, b: Array, a: Array) -> None:
 class _Torques:
     """Torques of one motion, in passes over friction that depends on them."""
 
-    def __init__(self, rest: AtRest, q: Array, v: Array, a: Array, free: Array, dofs: list[int]) -> None:
-        self.rest, self.q, self.v, self.a, self.free = rest, q, v, a, free
+    def __init__(self, rest: AtRest, q: Array, v: Array, a: Array, dofs: list[int]) -> None:
+        self.rest, self.q, self.v, self.a, self.free = rest, q, v, a, rest.free(q)
         self.select = np.eye(len(v))[:, dofs]
         self.M = rest.mass(q)
+        self.lengths = np.sqrt(np.diag(np.linalg.inv(self.M))[dofs])  # of the torques in the metric of M^-1
         self.modes, self.slipping = self._modes()
 
     def _modes(self) -> tuple[list[Any], Array]:
@@ -171,12 +172,14 @@ class _Torques:
     def solve(self, limits: tuple[Array, Array] | None) -> InverseDynamics:
         """Torques of least norm, within their limits, until friction is that of their own reactions."""
         G = self.free.T @ self.select
+        root = np.linalg.cholesky(self.free.T @ self.M @ self.free)
+        scaled = np.linalg.solve(root, G) / self.lengths
         tau, before = np.zeros(len(self.v)), np.inf
         for _ in range(PASSES):
             now = self.rest.runner.solve(self.q, self.slipping, self.rest.t, tau, self.modes)
             given = now.F - tau + now.C  # beside the torques
             needed = self.free.T @ (self.M @ self.a - given)
-            u = _least(G, needed, limits)
+            u = _least(scaled, np.linalg.solve(root, needed), self.lengths, limits)
             change = self.select @ u - tau
             tau = self.select @ u
             scale = float(
@@ -197,19 +200,21 @@ class _Torques:
         return InverseDynamics(tau, np.asarray(lam), left)
 
 
-def _least(G: Array, needed: Array, limits: tuple[Array, Array] | None) -> Array:
-    """Least-norm solution of G u = needed, of least residual; within limits, exact on those it touches."""
-    u = np.linalg.lstsq(G, needed, rcond=None)[0]
+def _least(scaled: Array, needed: Array, lengths: Array, limits: tuple[Array, Array] | None) -> Array:
+    """The least u of least |scaled (lengths u) - needed|; within limits, exact on those it touches."""
+    u = shortest(scaled, needed, lengths)
     if limits is None or ((limits[0] <= u) & (u <= limits[1])).all():
         return np.asarray(u)
     from scipy.optimize import lsq_linear
 
     least, largest = limits
+    left, values, right = np.linalg.svd(scaled, full_matrices=False)
+    G = left @ (np.where(values > DEPENDENT, values, 0.0)[:, None] * right) * lengths
     weight = 1e4 * max(1.0, float(np.linalg.norm(G)))
     rows = np.vstack([weight * G, np.eye(G.shape[1])])
     near = lsq_linear(rows, np.append(weight * needed, np.zeros(G.shape[1])), limits, method="bvls").x
     room = 1e-9 * (largest - least)
     free = (near > least + room) & (near < largest - room)
     u = np.where(near <= least + room, least, np.where(near >= largest - room, largest, 0.0))
-    u[free] = np.linalg.lstsq(G[:, free], needed - G[:, ~free] @ u[~free], rcond=None)[0]
+    u[free] = shortest(scaled[:, free], needed - G[:, ~free] @ u[~free], lengths[free])
     return np.asarray(np.clip(u, least, largest))

@@ -6,8 +6,10 @@
 
 namespace pn {
 
-// Rank of the required rows and a choice of independent ones, which become the rows in use, by column pivoting.
-void find_independent(const std::vector<Block>& blocks, const std::vector<double>& B, double tolerance, RowSystem& s);
+// Rank of the required rows and a choice of independent ones, `most` at most, which become the rows in use, by column
+// pivoting.
+void find_independent(const std::vector<Block>& blocks, const std::vector<double>& B, double tolerance, int most,
+                      RowSystem& s);
 // B^T = Q T of the active rows, as they stand.
 void factor_orthogonally(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s);
 // lam with T^T T lam = r.

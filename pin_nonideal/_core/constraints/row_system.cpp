@@ -9,7 +9,7 @@ void RowSystem::allocate(const RowLayout& layout, int block_count, int nv) {
     block_used.assign(block_count, 0);
     G.assign(layout.entries, 0.0);
     factor.assign(layout.entries, 0.0);
-    scale = VecX::Zero(layout.rows);
+    scale = longest = longest_chosen = VecX::Zero(layout.rows);
     active.assign(layout.rows, 0);
     required.assign(layout.rows, 0);
     Q.resize(nv, 0);
@@ -28,6 +28,9 @@ void RowSystem::use_required(const std::vector<Block>& all) {
         if (block_used[i]) blocks.push_back(static_cast<int>(i));
     }
     active = required;
+    longest.setZero();
+    longest_chosen.setZero();
+    chosen_pivot = 0.0;
     redundant = false;
     orthogonal = false;
 }

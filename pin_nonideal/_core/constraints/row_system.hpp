@@ -26,6 +26,10 @@ struct RowSystem {
     // (a singular position turns a row into zero): small near a singular position.
     double distance = 1.0;
     int rank = 0;
+    // While some row is not active, over starts of steps: the greatest square of the length of each row in these modes,
+    // and since active rows were chosen last; and the greatest of the smallest pivots since then.
+    VecX longest, longest_chosen;
+    double chosen_pivot = 0.0;
     // Orthogonal factorization of the scaled active rows, one column a row: no columns before it is first needed, for
     // in a mechanism of many loops it takes far more room than all else.
     MatX Q;

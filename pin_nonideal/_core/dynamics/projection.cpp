@@ -18,6 +18,8 @@ constexpr double stalled_part = 0.5;
 constexpr int sure_position_steps = 3, sure_velocity_steps = 1;
 // Factors of the new place cost less than this many iterations.
 constexpr double iterations_for_factors = 3.0;
+// Choices of rows by which one position is projected: each takes the gaps of the others down with the square.
+constexpr int most_choices = 3;
 // Near a singular position no residual is small enough, and the count ends at unit roundoff.
 constexpr double no_floor = 1e-16;
 
@@ -273,19 +275,31 @@ static double dependent_residual(const Program& p, const Workspace& w) {
     return largest;
 }
 
+static bool sticks_anywhere(const Workspace& w) {
+    return std::find(w.state.mode.begin(), w.state.mode.end(), sticking) != w.state.mode.end();
+}
+
+bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
+    if (!w.now.rows.redundant || sticks_anywhere(w)) return false;
+    const int rank = static_cast<int>(std::count(w.now.rows.active.begin(), w.now.rows.active.end(), char(1)));
+    bool moved = false;
+    for (int k = 0; k < most_choices && dependent_residual(p, w) > creeping_gap * scene_size(p, w); ++k) {
+        configure(p, w, t, q, v);
+        choose_rows(p, w, rank_tolerance, rank);
+        moved |= project_position(p, w, t, q, v);
+    }
+    return moved;
+}
+
 bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
-    if (!w.now.rows.redundant) return false;
-    if (std::find(w.state.mode.begin(), w.state.mode.end(), sticking) == w.state.mode.end()) return false;
+    if (!w.now.rows.redundant || !sticks_anywhere(w)) return false;
     if (dependent_residual(p, w) <= creeping_gap * scene_size(p, w)) return false;
     const std::vector<Mode> modes = w.state.mode;
     std::vector<Mode> released = modes;
     std::replace(released.begin(), released.end(), sticking, unloaded);
     set_modes(p, w, released);
     configure(p, w, t, q, v);
-    if (w.now.rows.orthogonal) {
-        decide_rows(p.layout, p.blocks, w.now.B, w.now.rows);
-        factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
-    }
+    if (w.now.rows.orthogonal) choose_rows(p, w);
     project_position(p, w, t, q, v);
     set_modes(p, w, modes);
     configure(p, w, t, q, v);
@@ -370,9 +384,7 @@ static void configure_anew(const Program& p, Workspace& w, double t, const VecX&
     set_modes(p, w, std::vector<Mode>(p.frictions.size(), slip_plus));
     configure(p, w, t, q, v);
     if (w.now.rows.blocks.empty() || !w.now.rows.orthogonal) return;
-    // Their Cholesky factor does not show that they are independent.
-    decide_rows(p.layout, p.blocks, w.now.B, w.now.rows);
-    factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+    choose_rows(p, w);  // their Cholesky factor does not show that they are independent
 }
 
 // What has gone through its plane comes out to it; whether it rests there or strikes its velocity tells later.

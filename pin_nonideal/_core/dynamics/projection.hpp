@@ -44,6 +44,10 @@ void learn_third_order(Workspace& w, double h);
 // that is to be projected and no more; M and the rows are those of q.
 bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v, bool configured = false,
                       bool keeps_factors = false);
+// Closes what rows that count as dependent have left open: active rows that become short over a step magnify what the
+// others miss. Of all rows those that are longest there are projected on, as many as before, for off the constraints
+// dependent rows look independent.
+bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 // Closes what rows that count as dependent have left open, where elements stick: these hold them by too small a part of
 // their forces to be kept (rank_tolerance_sticking), and creep by as little.
 bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);

@@ -16,6 +16,11 @@ void scale_rows(const Program& p, Workspace& w) {
     }
 }
 
+void choose_rows(const Program& p, Workspace& w, double tolerance, int most) {
+    decide_rows(p.mechanism, w.now.terms, p.blocks, w.now.values, w.now.B, w.now.rows, tolerance, most);
+    factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+}
+
 // r := b - A x, or b - B x with the scaled rows, for the rows in use.
 static PN_INLINE void row_residuals(const Program& p, const Evaluation& now, const std::vector<double>& rows, const VecX& x,
                           const VecX& b, VecX& r) {

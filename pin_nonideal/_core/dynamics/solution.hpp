@@ -2,12 +2,16 @@
 //     B B^T lam = b - B a_s',   a_s = a_s' + B^T lam,   a = R^-T a_s.
 #pragma once
 
+#include <climits>
+
 #include "dynamics/workspace.hpp"
 
 namespace pn {
 
 // B = A R^-T of the rows in use.
 void scale_rows(const Program& p, Workspace& w);
+// An independent choice of the required rows, `most` at most, and its factor.
+void choose_rows(const Program& p, Workspace& w, double tolerance = rank_tolerance, int most = INT_MAX);
 
 // x, a force, becomes a_s, the acceleration scaled by R; lam are the multipliers.
 // Returns the square of what it would be without rows.

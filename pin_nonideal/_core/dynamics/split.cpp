@@ -21,8 +21,8 @@ IdealMotion::IdealMotion(const Program& program, Workspace& workspace) : p(progr
         }
         if (!w.now.rows.blocks.empty()) {
             scale_rows(p, w);
-            if (!w.state.ideal_decided) decide_rows(p.layout, p.blocks, w.now.B, w.now.rows);
-            factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+            if (w.state.ideal_decided) factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+            else choose_rows(p, w);
         }
         w.state.ideal_decided = true;
     }

@@ -6,6 +6,7 @@
 
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
+#include "dynamics/solution.hpp"
 #include "tree/factor.hpp"
 
 namespace pn {
@@ -35,12 +36,22 @@ static double scaled_length(const Program& p, Workspace& w, const VecX& x) {
     return std::sqrt(square);
 }
 
-// What a row of unit length that counts as dependent may lack while elements stick: it keeps a part of itself below the
-// tolerance beside the others, which sees the motion (and its drift the velocities, as fast as they turn).
+// Angular speed of the body that turns fastest.
+static double fastest_turn(const Workspace& w) {
+    double square = 0.0;
+    for (const Body& body : w.now.terms.body) square = std::max(square, body.v.ang.squaredNorm());
+    return std::sqrt(square);
+}
+
+// What a dependent row of unit length may miss beside its own terms: a part of the accelerations of turning, which may
+// cancel in each of its terms, and while elements stick what it sees of the motion by the part of itself, below the
+// tolerance, that it keeps beside the others.
 static double unseen(const Program& p, Workspace& w, const VecX& v) {
-    if (!sticks_anywhere(w)) return 0.0;
-    return dependence_growth * w.state.rank_tolerance *
-           (scaled_length(p, w, w.now.a) + scaled_length(p, w, v) * v.cwiseAbs().maxCoeff());
+    const double speed = scaled_length(p, w, v);
+    const double turning = consistency_tolerance * background * speed * fastest_turn(w);
+    if (!sticks_anywhere(w)) return turning;
+    return turning + dependence_growth * w.state.rank_tolerance *
+                         (scaled_length(p, w, w.now.a) + speed * v.cwiseAbs().maxCoeff());
 }
 
 // Residual of the dependent rows; the worst block, or -1 when all are met.
@@ -76,16 +87,16 @@ static int contradicting_block(const Program& p, Workspace& w, const VecX& v, do
     return found;
 }
 
-static void choose_rows(const Program& p, Workspace& w) {
-    decide_rows(p.layout, p.blocks, w.now.B, w.now.rows, sticks_anywhere(w) ? w.state.rank_tolerance : rank_tolerance);
-    factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+static void choose_rows_anew(const Program& p, Workspace& w) {
+    choose_rows(p, w, sticks_anywhere(w) ? w.state.rank_tolerance : rank_tolerance);
     ++w.counters.factorizations;
 }
 
 bool configure_step(const Program& p, Workspace& w) {
     w.state.ideal_decided = false;
-    if (w.now.rows.blocks.empty() || !w.now.rows.orthogonal) return false;
-    choose_rows(p, w);
+    if (w.now.rows.blocks.empty()) return false;
+    if (!w.now.rows.orthogonal && !is_choice_due(p.layout, w.now.rows)) return false;
+    choose_rows_anew(p, w);
     return true;
 }
 
@@ -111,7 +122,7 @@ static void move_step(const Program& p, Workspace& w, double t, const VecX& v, b
     double residual = 0.0;
     int block = contradicting_block(p, w, v, residual);
     if (block >= 0 && !chosen) {  // what was dependent at an earlier step is not any more
-        choose_rows(p, w);
+        choose_rows_anew(p, w);
         solve_dynamics(p, w, t, v);
         block = contradicting_block(p, w, v, residual);
     }
@@ -137,7 +148,7 @@ void keep_moving(const Program& p, Workspace& w, double t, const VecX& v) {
     if (!w.now.rows.redundant || !sticks_anywhere(w) || v.cwiseAbs().maxCoeff() <= immobile_speed) return;
     const auto choose = [&](double tolerance) {
         w.state.rank_tolerance = tolerance;
-        choose_rows(p, w);
+        choose_rows_anew(p, w);
         move_step(p, w, t, v, true);
     };
     double tolerance = w.state.rank_tolerance;

@@ -1,6 +1,7 @@
 #include "python/runner.hpp"
 
 #include <chrono>
+#include <numeric>
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
@@ -8,6 +9,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include "constraints/row_length.hpp"
 #include "contact/closing.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
@@ -154,6 +156,26 @@ std::tuple<Numbers, Numbers, Numbers, Numbers> Runner::rows(const Array& q_in, c
     return {to_numpy(std::move(A)), to_numpy(std::move(b)), to_numpy(std::move(phi)), to_numpy(std::move(rate))};
 }
 
+Numbers Runner::row_lengths(const Array& q_in, const Array& v_in, double t) {
+    set(q_in, v_in, {});
+    set_modes(*p, *w, std::vector<Mode>(p->frictions.size(), unloaded));  // no joint is locked
+    configure(*p, *w, t, q, v);
+    std::vector<double> lengths(p->user_rows);
+    const auto find = [&](int i, double* length) {
+        const Block& block = p->blocks[i];
+        std::vector<int> rows(block.total);
+        std::iota(rows.begin(), rows.end(), 0);
+        evaluate_block(*p, *w, t, v, i);  // of open contacts too
+        greatest_lengths(p->mechanism, w->now.terms, block, rows, w->now.values[i], length);
+    };
+    for (int i = 0; i < p->constraints; ++i) find(i, lengths.data() + p->blocks[i].user_row);
+    for (const Friction& f : p->frictions) {
+        lengths.resize(lengths.size() + f.dim);
+        find(f.block, lengths.data() + lengths.size() - f.dim);
+    }
+    return to_numpy(std::move(lengths));
+}
+
 Numbers Runner::slip_rows(const Array& q_in, const Array& v_in, double t) {
     set(q_in, v_in, {});
     kinematics(p->mechanism, w->now.terms, q, v);
@@ -294,6 +316,7 @@ nb::class_<Runner> bind_runner(nb::module_& m) {
         .def("acceleration", &Runner::acceleration, "q"_a, "v"_a, "t"_a, "tau"_a.none(), "out"_a)
         .def("solve", &Runner::solve, "q"_a, "v"_a, "t"_a = 0.0, "tau"_a = nb::none(), "modes"_a = nb::none())
         .def("rows", &Runner::rows, "q"_a, "v"_a, "t"_a)
+        .def("row_lengths", &Runner::row_lengths, "q"_a, "v"_a, "t"_a)
         .def("slip_rows", &Runner::slip_rows, "q"_a, "v"_a, "t"_a)
         .def("pressing_lines", &Runner::pressing_lines, "q"_a, "v"_a, "t"_a)
         .def("terms", &Runner::terms, "q"_a, "v"_a)

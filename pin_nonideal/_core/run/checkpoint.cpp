@@ -84,9 +84,10 @@ static void fields(Archive& a, Recording& x) {
 }
 
 // One thing of an evaluation outlives it: which rows are independent, decided at the start of a step and kept until that
-// shows to be wrong.
+// shows to be wrong, and what that is judged by.
 static void archive(Archive& a, Workspace& w, Progress& progress, Recording& out) {
-    a(w.state, w.counters, w.now.rows.active, progress, out);
+    RowSystem& rows = w.now.rows;
+    a(w.state, w.counters, rows.active, rows.longest, rows.longest_chosen, rows.chosen_pivot, progress, out);
 }
 
 std::string to_bytes(Workspace& w, Progress& progress, Recording& out) {
@@ -97,14 +98,20 @@ std::string to_bytes(Workspace& w, Progress& progress, Recording& out) {
 
 // The factors and rows that the next step starts from, as the last one left them: all that it reads of an evaluation
 // before it makes its own.
-static void evaluate_anew(System& system, const Progress& progress, const std::vector<char>& active) {
+static void evaluate_anew(System& system, const Progress& progress) {
     const Program& p = system.p;
     Workspace& w = system.w;
     const RunState state = w.state;
+    const std::vector<char> active = w.now.rows.active;
+    const VecX longest = w.now.rows.longest, longest_chosen = w.now.rows.longest_chosen;
+    const double chosen_pivot = w.now.rows.chosen_pivot;
     const Counters counters = w.counters;
     select_rows(p, w);
     w.now.rows.active = active;
     w.now.rows.redundant = active != w.now.rows.required;
+    w.now.rows.longest = longest;
+    w.now.rows.longest_chosen = longest_chosen;
+    w.now.rows.chosen_pivot = chosen_pivot;
     system.read(progress.y);
     configure(p, w, progress.t, system.q, system.v);
     if (state.ideal_decided) {
@@ -128,7 +135,7 @@ void from_bytes(const std::string& bytes, System& system, Progress& progress, Re
     }
     a.require(progress.samples >= 0 && progress.next_period >= 0);
     try {
-        evaluate_anew(system, progress, std::vector<char>(system.w.now.rows.active));
+        evaluate_anew(system, progress);
     } catch (const Failure&) {
         a.require(false);  // no run has been in such a state
     }

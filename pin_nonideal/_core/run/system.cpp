@@ -101,6 +101,7 @@ void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
     read(y);
     read_law_states(y);
     bool moved = project_position(p, w, t, q, v);
+    moved |= project_onto_dependent(p, w, t, q, v);
     moved |= project_past_sticking(p, w, t, q, v);
     require_closed(p, w, t);
     moved |= begin_step_on_rates(p, w, t, v);
@@ -146,6 +147,7 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_throu
         project_position(p, w, t, q, v, true, !evaluates);
         moved = true;
     }
+    moved |= project_onto_dependent(p, w, t, q, v);
     const bool past_sticking = project_past_sticking(p, w, t, q, v);
     require_closed(p, w, t);
     if (past_sticking || (moved && evaluates)) chosen = configure_step(p, w);
