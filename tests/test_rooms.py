@@ -41,8 +41,8 @@ replaying plotting browser rendering commands pin_nonideal cli_runs cli
 CORE_ORDER = """
 math: lanes unrolled spatial angles timefunction roots radau factorizations nonnegative
 tree: mechanism liegroup body_terms articulated pinocchio_pass model_reading own_pass terms factor
-constraints: geometry coordinates kinds kind block row_layout row_system orthogonal row_factor rank \
-redundancy pulls
+constraints: geometry coordinates kinds kind block row_layout row_system orthogonal row_factor \
+row_length rank redundancy pulls
 forces: given_forces laws mode friction
 dynamics: failure program numbers reaction_equation reaction_roots workspace \
 given_forces law_forces solution \

@@ -1,6 +1,7 @@
 #include "constraints/rank.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "constraints/orthogonal.hpp"
 #include "constraints/row_length.hpp"
@@ -10,15 +11,31 @@ namespace pn {
 // Part of the square of a length, or of a pivot, below which another choice of rows is looked for.
 static constexpr double faded_part = 0.1;
 
+// Whether a row holds a position for good. Contacts and friction count by their own length, as in the programs that decide
+// who sticks.
+static bool is_of_loop(const Block& block) {
+    return pressing_row(block.kind) < 0 && !block.holonomic.empty() && block.holonomic.front();
+}
+
+static void own_lengths(const Block& block, const std::vector<double>& B, double* length) {
+    const size_t r = block.kept.size();
+    std::fill_n(length, r, 0.0);
+    for (size_t l = 0; l < block.support.size(); ++l)
+        for (size_t k = 0; k < r; ++k) length[k] += B[block.offset + l * r + k] * B[block.offset + l * r + k];
+    for (size_t k = 0; k < r; ++k) length[k] = std::sqrt(length[k]);
+}
+
 void decide_rows(const Mechanism& m, Terms& terms, const std::vector<Block>& blocks,
                  const std::vector<RowValues>& values, const std::vector<double>& B, RowSystem& s, double tolerance,
                  int most) {
     for (int i : s.blocks) {
         const Block& block = blocks[i];
         double* length = s.scale.data() + block.row;
-        greatest_lengths(m, terms, block, block.kept, values[i], length);
+        const bool lasts = is_of_loop(block);
+        if (lasts) greatest_lengths(m, terms, block, block.kept, values[i], length);
+        else own_lengths(block, B, length);
         for (size_t k = 0; k < block.kept.size(); ++k) {
-            if (!values[i].geometric) length[k] = std::max(length[k], std::sqrt(s.longest[block.row + k]));
+            if (lasts && !values[i].geometric) length[k] = std::max(length[k], std::sqrt(s.longest[block.row + k]));
             length[k] = length[k] > 0.0 ? 1.0 / length[k] : 1.0;
         }
     }

@@ -280,7 +280,7 @@ static bool sticks_anywhere(const Workspace& w) {
 }
 
 bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
-    if (!w.now.rows.redundant || sticks_anywhere(w)) return false;
+    if (!w.now.rows.redundant || !p.gaps.empty() || sticks_anywhere(w)) return false;
     const int rank = static_cast<int>(std::count(w.now.rows.active.begin(), w.now.rows.active.end(), char(1)));
     bool moved = false;
     for (int k = 0; k < most_choices && dependent_residual(p, w) > creeping_gap * scene_size(p, w); ++k) {

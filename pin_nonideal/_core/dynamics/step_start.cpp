@@ -95,7 +95,8 @@ static void choose_rows_anew(const Program& p, Workspace& w) {
 bool configure_step(const Program& p, Workspace& w) {
     w.state.ideal_decided = false;
     if (w.now.rows.blocks.empty()) return false;
-    if (!w.now.rows.orthogonal && !is_choice_due(p.layout, w.now.rows)) return false;
+    const bool due = p.gaps.empty() && is_choice_due(p.layout, w.now.rows);  // contacts are chosen with their modes
+    if (!w.now.rows.orthogonal && !due) return false;
     choose_rows_anew(p, w);
     return true;
 }
