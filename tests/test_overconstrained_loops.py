@@ -164,3 +164,14 @@ def test_statics_of_a_loop_do_not_depend_on_the_mount(seed: int) -> None:
     resting = pn.equilibrium(scene, q)
     assert np.abs(scene.acceleration(resting.q, still)).max() < 1e-4
     assert not pn.rest(scene, q).rests
+
+
+@pytest.mark.parametrize("seed", seeds(range(300)))
+def test_a_held_velocity_does_not_depend_on_the_mount(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    model, q, rates = four_bar(draw)
+    scene = pn.Scene(model, constraints=[CLOSINGS[seed % len(CLOSINGS)]], q0=q)
+    speed, joint = 5.0 * draw.standard_normal(), int(draw.integers(3))
+    _, v = scene.project(q, {model.names[joint + 1]: speed})
+    expected = rates * speed / rates[joint]
+    assert np.abs(v - expected).max() < 1e-7 * np.abs(rates / rates[joint]).max() * np.abs(expected).max()

@@ -10,12 +10,8 @@ from pin_nonideal.errors import InputError
 from pin_nonideal.types import Array, Model
 
 from .extents import coordinate
-from .rows import rows_at
+from .rows import DEPENDENT, row_lengths, rows_at, shortest
 
-# Free columns of a row below this part of all its columns are rounding: the free entries do not move it.
-UNMOVED = 1e-10
-# Singular values below this part of the largest are rounding of rows that depend on others.
-DEPENDENT = 1e-11
 # Part of the terms A_j v_j and phi_t of a row by which their sum may miss zero.
 MISSED = 1e-9
 # Part of the largest velocity by which a projection changes velocities that meet the constraints already.
@@ -66,15 +62,18 @@ def holding(
     """
     runner, free = program.runner(), ~held
     A, _, _, rate = rows_at(runner, q, v, t)
-    A, rate = A[rows], rate[rows]
+    lengths = row_lengths(runner, q, v, t)[: len(A)]
+    whole = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(metric), A.T), axis=0)
+    acting = np.flatnonzero(rows & (whole > DEPENDENT * lengths))
+    A, rate, lengths = A[acting], rate[acting], lengths[acting]
     root = np.linalg.cholesky(metric[np.ix_(free, free)])
-    moved = np.abs(A[:, free]).max(axis=1, initial=0.0) > UNMOVED * np.abs(A).max(axis=1, initial=0.0)
-    B = np.linalg.solve(root, A[moved][:, free].T).T
-    scale = np.linalg.norm(B, axis=1)
-    x = np.linalg.lstsq(B / scale[:, None], -rate[moved] / scale, rcond=DEPENDENT)[0]
+    B = np.linalg.solve(root, A[:, free].T).T
+    moved = np.linalg.norm(B, axis=1) > DEPENDENT * lengths
+    scale = lengths[moved]
+    x = shortest(B[moved] / scale[:, None], -rate[moved] / scale, np.ones(B.shape[1]))
     found: Array = v.copy()
     found[free] += np.linalg.solve(root.T, x)
-    missed = rows_at(runner, q, found, t)[3][rows]
+    missed = rows_at(runner, q, found, t)[3][acting]
     terms = np.abs(A) @ (np.abs(v) + np.abs(found)) + np.abs(rate - A @ v)
     if (np.abs(missed) > MISSED * terms).any():
         raise InputError(

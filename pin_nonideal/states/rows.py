@@ -75,6 +75,29 @@ def row_lengths(runner: core.Runner, q: Array, v: Array, t: float) -> Array:
     return np.asarray(runner.row_lengths(q, v, t))
 
 
+# Rows over their greatest lengths depend on others, or vanish, below this singular value: closures and
+# rounding reach about 1e-12, directions of light mechanisms lie above 1e-7.
+DEPENDENT = 1e-9
+
+
+def shortest(scaled: Array, y: Array, lengths: Array) -> Array:
+    """The x of least norm among those with the least |scaled diag(lengths) x - y|, (n,).
+
+    Args:
+        scaled: matrix with columns over their greatest lengths; its singular values tell the rank, (m, n).
+        y: right-hand side, (m,).
+        lengths: greatest lengths of the columns, (n,); x is zero where they are zero.
+    """
+    used = lengths > 0.0
+    x = np.zeros(len(lengths))
+    left, values, right = np.linalg.svd(scaled[:, used])
+    rank = int((values > DEPENDENT).sum())
+    found = right[:rank].T @ ((left.T[:rank] @ y) / values[:rank]) / lengths[used]
+    idle = right[rank:].T / lengths[used][:, None]
+    x[used] = found - idle @ np.linalg.lstsq(idle, found, rcond=None)[0]
+    return x
+
+
 # Rows whose directions differ by less than this part are copies: rounding of the kinematics.
 SAME_ROW = 1e-11
 # How far projections of copies may differ: rounding of long sums.

@@ -8,12 +8,8 @@ import numpy as np
 
 from pin_nonideal.core import core
 from pin_nonideal.scene import Scene, program_of
-from pin_nonideal.states.rows import holonomic_rows, row_lengths, rows_at
+from pin_nonideal.states.rows import DEPENDENT, holonomic_rows, row_lengths, rows_at, shortest
 from pin_nonideal.types import Array
-
-# Rows over their greatest lengths depend on others, or vanish, below this singular value: closures and
-# rounding reach about 1e-12, directions of light mechanisms lie above 1e-7.
-DEPENDENT = 1e-9
 
 
 class Balance(NamedTuple):
@@ -69,12 +65,23 @@ class AtRest:
         return np.asarray(now.F + now.C)
 
     def rows(self, q: Array) -> Array:
-        """Rows of all constraints and contacts, (m, nv); those that only rounding gives a length are zero.
+        """Rows of all constraints and contacts, (m, nv); those of rounding alone are zero.
 
         Args:
             q: configuration, (nq,).
         """
         return self._rows(q, self._root(q))[0]
+
+    def directions(self, q: Array) -> Array:
+        """Directions along which frictional elements slip, (d, nv); those of rounding alone are zero.
+
+        Args:
+            q: configuration, (nq,).
+        """
+        D = self.runner.slip_rows(q, self.still, self.t).reshape(-1, len(self.still))
+        lengths = row_lengths(self.runner, q, self.still, self.t)[self.program.rows :]
+        scaled = np.linalg.norm(np.linalg.solve(self._root(q), D.T), axis=0)
+        return np.where((scaled <= DEPENDENT * lengths)[:, None], 0.0, D)
 
     def _root(self, q: Array) -> Array:
         """Lower triangular, M = root root^T."""
@@ -126,24 +133,6 @@ def _free(scaled: Array, root: Array) -> Array:
     _, values, turned = np.linalg.svd(scaled)
     rank = int((values > DEPENDENT).sum())
     return np.asarray(np.linalg.qr(np.linalg.solve(root.T, turned[rank:].T))[0])
-
-
-def shortest(scaled: Array, y: Array, lengths: Array) -> Array:
-    """The least x of those with the least |scaled (lengths x) - y|, (n,).
-
-    Args:
-        scaled: columns over their lengths, so that singular values tell their rank, (m, n).
-        y: (m,).
-        lengths: of the columns, (n,); x is zero where they are.
-    """
-    used = lengths > 0.0
-    x = np.zeros(len(lengths))
-    left, values, right = np.linalg.svd(scaled[:, used])
-    rank = int((values > DEPENDENT).sum())
-    found = right[:rank].T @ ((left.T[:rank] @ y) / values[:rank]) / lengths[used]
-    idle = right[rank:].T / lengths[used][:, None]
-    x[used] = found - idle @ np.linalg.lstsq(idle, found, rcond=None)[0]
-    return x
 
 
 def restricts_velocity_only(scene: Scene) -> bool:

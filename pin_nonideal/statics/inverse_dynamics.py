@@ -14,10 +14,10 @@ from pin_nonideal.core import core
 from pin_nonideal.errors import FrictionConvergenceError, InputError
 from pin_nonideal.scene import Scene
 from pin_nonideal.states.named import joint_named, named_configuration, named_velocity
-from pin_nonideal.states.rows import rows_at
+from pin_nonideal.states.rows import DEPENDENT, rows_at, shortest
 from pin_nonideal.types import Array, State
 
-from .forces import DEPENDENT, AtRest, shortest
+from .forces import AtRest
 
 # An acceleration follows the constraints to this part of its terms.
 FOLLOWS = 1e-6

@@ -96,10 +96,9 @@ class _Cones:
     """
 
     def __init__(self, scene: Scene, at_rest: AtRest, q: Array) -> None:
-        program, runner = program_of(scene), at_rest.runner
+        program = program_of(scene)
         self.sizes = list(program.element_sizes)
-        D = runner.slip_rows(q, at_rest.still, at_rest.t).reshape(-1, scene.model.nv)
-        F, self.A = at_rest.forces(q), at_rest.rows(q)
+        F, self.A, D = at_rest.forces(q), at_rest.rows(q), at_rest.directions(q)
         m, ends = len(self.A), np.cumsum([0, *self.sizes])
         self.parts = [slice(m + a, m + b) for a, b in pairwise(ends.tolist())]
         self.count = m + int(ends[-1])

@@ -5,8 +5,8 @@
 
 namespace pn {
 
-// Rank tolerance on the pivots of B^T with rows over their greatest length: rounding and the constraints' own violation reach
-// about 1e-12 on the manifold, true directions of light mechanisms lie above 1e-7.
+// Rank tolerance on the pivots of B^T with rows over their greatest length: rounding and the constraints' own violation
+// reach about 1e-12 on the manifold, true directions of light mechanisms lie above 1e-7.
 constexpr double rank_tolerance = 1e-10;
 // The same while elements stick. What they hold by a smaller part of their forces than this they do not hold: it is the
 // square root of the threshold on responses in the program that finds the modes (rank_threshold).

@@ -1,4 +1,4 @@
-// How long rows are in a mechanism: the scale in which it is judged whether a row adds to others.
+// Characteristic lengths of rows, in which their rank is judged.
 #pragma once
 
 #include <vector>
@@ -7,9 +7,9 @@
 
 namespace pn {
 
-// The greatest length in the metric of M^-1 that each of these rows of a block could have: of a row of two bodies over all directions
-// of its force and couple at its point, so that one that the joints leave no freedom at this pose is short beside it;
-// of a row of coordinates its own.
+// Greatest length that each of these rows of a block could have in the metric of M^-1. For a row between two bodies it is
+// taken over all directions of its force and couple at its point; the row itself may be shorter at this pose, where the
+// joints leave it no freedom. For a row of coordinates it is the row's own length.
 void greatest_lengths(const Mechanism& m, Terms& terms, const Block& block, const std::vector<int>& rows,
                       const RowValues& values, double* length);
 
