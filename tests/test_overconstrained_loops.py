@@ -19,6 +19,8 @@ METHODS = (
     {"method": "dopri5", "rtol": 1e-8},
     {"method": "rk4", "dt": 2e-3},
 )
+# Of a revolution and of the largest velocity: rounding, magnified by the linkage.
+ON_PATH = 1e-10
 # Of the forces in play: a closed form beside a solution of linear equations.
 STATICS = 1e-7
 
@@ -96,6 +98,96 @@ def test_a_bennett_linkage_turns_through_its_collinear_poses(seed: int) -> None:
         run = pn.simulate(scene, DURATION, **options)
         missed = np.abs(np.angle(np.exp(1j * (run.q[-1] - expected)))).max()
         assert missed < (FIXED if options["method"] == "rk4" else ADAPTIVE), options["method"]
+
+
+@pytest.mark.parametrize("seed", seeds(range(100)))
+def test_states_between_steps_lie_on_the_path(seed: int) -> None:
+    """`run.at` and starts that are off by 1e-4 rad: positions and velocities of the one freedom."""
+    linkage, draw = Bennett(seed), np.random.default_rng(seed)
+    q, first, _ = linkage.path(linkage.angle)
+    hinge = pn.HingeAnchor("tip", "ground", "z", name="loop")
+    scene = pn.Scene(linkage.model, constraints=[hinge], q0=q, v0=first * linkage.rate)
+    run = pn.simulate(scene, 1.0, record="dense")
+    between = run.at(np.sort(draw.uniform(0.0, 1.0, 50)))
+    states = list(zip(between.q, between.v, strict=True))
+    states.append(scene.project(q + 1e-4 * draw.standard_normal(3), first * linkage.rate))
+    for at, velocity in states:
+        expected, direction, _ = linkage.path(at[0])
+        assert np.abs(np.angle(np.exp(1j * (at - expected)))).max() < ON_PATH
+        assert np.abs(velocity - direction * velocity[0]).max() < ON_PATH * np.abs(velocity).max()
+
+
+class SideRods:
+    """Wheels in a row, joined by parallel side rods at several crank angles: all wheels turn alike.
+
+    Each rod passes its dead centers, where its row vanishes and another one holds the wheels.
+    """
+
+    def __init__(self, seed: int, apart: float, *, gravity: float = 9.81, balanced: bool = False) -> None:
+        draw = np.random.default_rng(seed)
+        count, radius, distance = int(draw.integers(2, 4)), draw.uniform(0.1, 0.3), draw.uniform(0.5, 1.2)
+        while True:
+            cranks = np.sort(draw.uniform(0.0, 2.0 * np.pi, int(draw.integers(2, 4))))
+            if np.abs(np.sin(cranks[:, None] - cranks)).max() > apart:
+                break
+        self.model = model = pin.Model()
+        mount = pin.SE3(pin.rpy.rpyToMatrix(*draw.uniform(-3.0, 3.0, 3)), draw.standard_normal(3))
+        model.gravity.linear = mount.rotation @ np.array([0.0, -gravity, 0.0])
+        self.weight, self.inertia = np.zeros(2), 0.0
+        for k in range(count):
+            place = mount * pin.SE3(np.eye(3), np.array([k * distance, 0.0, 0.0]))
+            joint = model.addJoint(0, pin.JointModelRZ(), place, f"wheel {k}")
+            mass, moment = draw.uniform(1.0, 3.0), draw.uniform(0.01, 0.05)
+            lever = np.zeros(2) if balanced else 0.05 * draw.standard_normal(2)
+            body = pin.Inertia(mass, np.append(lever, 0.0), moment * np.eye(3))
+            model.appendBodyToJoint(joint, body, pin.SE3.Identity())
+            self.weight += mass * gravity * lever
+            self.inertia += moment + mass * lever @ lever
+            for i, crank in enumerate(cranks):
+                arm = radius * np.array([np.cos(crank), np.sin(crank), 0.0])
+                model.addFrame(
+                    pin.Frame(f"pin {k} {i}", joint, 0, pin.SE3(np.eye(3), arm), pin.FrameType.OP_FRAME)
+                )
+        rods = [
+            pn.Distance(f"pin {k} {i}", f"pin {k + 1} {i}", distance, name=f"rod {k} {i}")
+            for k in range(count - 1)
+            for i in range(len(cranks))
+        ]
+        self.angle, self.rate = draw.uniform(-3.0, 3.0), draw.uniform(8.0, 20.0) * draw.choice([-1.0, 1.0])
+        still, moving = np.full(count, self.angle), np.full(count, self.rate)
+        self.scene = pn.Scene(model, constraints=rods, q0=still, v0=moving)
+
+    def end(self, duration: float) -> float:
+        """The angle at the end, by the equation of motion of one wheel with the inertia of all."""
+
+        def rate(_: float, y: np.ndarray) -> list[float]:
+            moment = self.weight[0] * np.cos(y[0]) - self.weight[1] * np.sin(y[0])
+            return [y[1], -moment / self.inertia]
+
+        span, start = (0.0, duration), [self.angle, self.rate]
+        return float(solve_ivp(rate, span, start, method="DOP853", rtol=1e-12, atol=1e-13).y[0, -1])
+
+
+@pytest.mark.parametrize("output", [None, 0.01])
+@pytest.mark.parametrize("seed", seeds(range(300)))
+def test_wheels_on_side_rods_turn_alike_through_dead_centers(seed: int, output: float | None) -> None:
+    """Crank angles whose dead centers come as close as 0.05 rad."""
+    rods = SideRods(seed, apart=0.05)
+    expected = rods.end(DURATION)
+    for options in METHODS:
+        run = pn.simulate(rods.scene, DURATION, output_dt=output, **options)
+        assert np.abs(run.q[-1] - expected).max() < (FIXED if options["method"] == "rk4" else ADAPTIVE), (
+            options
+        )
+
+
+@pytest.mark.parametrize("seed", seeds(range(300)))
+def test_rows_that_turn_steadily_do_not_contradict_each_other(seed: int) -> None:
+    """Without gravity and imbalance only centripetal accelerations act, and cancel in each row."""
+    rods = SideRods(seed, apart=0.3, gravity=0.0, balanced=True)
+    run = pn.simulate(rods.scene, 20.0, output_dt=0.05)
+    expected = rods.angle + rods.rate * 20.0
+    assert np.abs(run.q[-1] - expected).max() < 1e-9 * abs(expected)
 
 
 def four_bar(draw: np.random.Generator) -> tuple[pin.Model, np.ndarray, np.ndarray]:

@@ -33,7 +33,6 @@ void dense_columns(const std::vector<Block>& blocks, const std::vector<double>& 
 // Householder factorization of the first n columns of Q in place, with column pivoting when asked. Returns the rank.
 int householder(RowSystem& s, int n, bool pivot, double tolerance) {
     const int m = static_cast<int>(s.Q.rows());
-    double largest = 0.0;
     for (int k = 0; k < n; ++k) {
         if (k >= m) return k;
         if (pivot) {
@@ -50,8 +49,7 @@ int householder(RowSystem& s, int n, bool pivot, double tolerance) {
         }
         auto x = s.Q.col(k).tail(m - k);
         const double norm = x.norm();
-        largest = std::max(largest, norm);
-        if (pivot && norm <= tolerance * largest) return k;
+        if (pivot && norm <= tolerance) return k;
         if (norm == 0.0) { s.tau[k] = 0.0; continue; }
         const double beta = x[0] > 0.0 ? -norm : norm;
         s.tau[k] = (beta - x[0]) / beta;

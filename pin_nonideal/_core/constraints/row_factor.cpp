@@ -81,6 +81,17 @@ static PN_INLINE double shortest_row(const RowLayout& layout, const std::vector<
     return shortest;
 }
 
+// Square of the shortest active row beside its own greatest length in these modes, where others depend on it.
+static double shortest_passing(const RowLayout& layout, const RowSystem& s) {
+    double shortest = 1.0;
+    for (int i = 0; i < layout.rows; ++i) {
+        const int row = layout.row_at[i];
+        const double square = s.G[layout.start[i] + i];
+        if (s.active[row] && square < shortest * s.longest[row]) shortest = square / s.longest[row];
+    }
+    return shortest;
+}
+
 // Cholesky factor of the unit-diagonal B B^T inside the envelope; returns whether its pivots are safe.
 static PN_INLINE bool factor_cholesky(const RowLayout& layout, RowSystem& s) {
     double* L = s.factor.data();
@@ -115,6 +126,7 @@ PN_WIDE void factor_rows(const RowLayout& layout, const std::vector<Block>& bloc
     s.min_pivot = 1.0;
     s.orthogonal = !factor_cholesky(layout, s);
     s.distance = std::min(shortest_row(layout, blocks, s), s.min_pivot);
+    if (s.redundant) s.distance = std::min(s.distance, shortest_passing(layout, s));
     if (s.orthogonal) factor_orthogonally(blocks, B, s);
 }
 

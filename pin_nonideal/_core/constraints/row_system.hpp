@@ -11,25 +11,30 @@
 
 namespace pn {
 
-struct RowSystem {
+// Which required rows are in use, and by what another choice is judged to be due.
+struct RowChoice {
+    std::vector<char> active;
+    bool redundant = false;  // some required row is not active
+    // While it is so, over starts of steps: the greatest square of the length of each row in these modes, and since active
+    // rows were chosen last; and the greatest of the smallest pivots since then.
+    VecX longest, longest_chosen;
+    double chosen_pivot = 0.0;
+};
+
+struct RowSystem : RowChoice {
     std::vector<double> G, factor;  // B B^T and its Cholesky factor, in the envelope
     VecX scale;                     // 1 / length of each row of B
-    std::vector<char> active;       // rows in use
     std::vector<char> required;     // rows that must hold (constraints, sticking elements)
     std::vector<int> blocks;        // blocks with a required row
     std::vector<char> block_used;
     bool orthogonal = false;        // B^T = Q T in use instead of the Cholesky factor
-    bool redundant = false;         // some required row is not active
     bool refine = false;            // very unequal pivots of M: solutions are refined
     double min_pivot = 1.0;
     // Square of the sine at which some row stands to the others, or of its length beside the other rows of its block
-    // (a singular position turns a row into zero): small near a singular position.
+    // (a singular position turns a row into zero), or of a row beside its greatest length where others depend on it: small
+    // near a singular position.
     double distance = 1.0;
     int rank = 0;
-    // While some row is not active, over starts of steps: the greatest square of the length of each row in these modes,
-    // and since active rows were chosen last; and the greatest of the smallest pivots since then.
-    VecX longest, longest_chosen;
-    double chosen_pivot = 0.0;
     // Orthogonal factorization of the scaled active rows, one column a row: no columns before it is first needed, for
     // in a mechanism of many loops it takes far more room than all else.
     MatX Q;

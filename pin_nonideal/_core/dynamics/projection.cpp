@@ -18,6 +18,9 @@ constexpr double stalled_part = 0.5;
 constexpr int sure_position_steps = 3, sure_velocity_steps = 1;
 // Factors of the new place cost less than this many iterations.
 constexpr double iterations_for_factors = 3.0;
+// Pivots that count where a state is off the constraints, where dependent rows look independent: the fewest rows with
+// which all others close are taken.
+constexpr double tolerances_near[] = {1e-3, 1e-5, 1e-7, 1e-9};
 // Choices of rows by which one position is projected: each takes the gaps of the others down with the square.
 constexpr int most_choices = 3;
 // Near a singular position no residual is small enough, and the count ends at unit roundoff.
@@ -283,7 +286,8 @@ bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, c
     if (!w.now.rows.redundant || !p.gaps.empty() || sticks_anywhere(w)) return false;
     const int rank = static_cast<int>(std::count(w.now.rows.active.begin(), w.now.rows.active.end(), char(1)));
     bool moved = false;
-    for (int k = 0; k < most_choices && dependent_residual(p, w) > creeping_gap * scene_size(p, w); ++k) {
+    const auto is_open = [&] { return dependent_residual(p, w) > creeping_gap * scene_size(p, w); };
+    for (int k = 0; k < most_choices && (is_open() || (k == 0 && w.now.rows.distance < near_singular)); ++k) {
         configure(p, w, t, q, v);
         choose_rows(p, w, rank_tolerance, rank);
         moved |= project_position(p, w, t, q, v);
@@ -363,7 +367,8 @@ bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
 }
 
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
-    const bool moved = project_position(p, w, t, q, v);
+    bool moved = project_position(p, w, t, q, v);
+    moved |= project_onto_dependent(p, w, t, q, v);
     return project_velocity(p, w, t, v) || moved;
 }
 
@@ -380,11 +385,24 @@ void remove_normal_part(const Program& p, Workspace& w, Eigen::Ref<VecX> motion)
     motion -= w.scratch.work;
 }
 
-static void configure_anew(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+void choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
+    if (w.now.rows.blocks.empty() || !w.now.rows.orthogonal) return;
+    if (!p.gaps.empty() || sticks_anywhere(w)) return choose_rows(p, w);
+    const VecX start = q;
+    for (double tolerance : tolerances_near) {
+        choose_rows(p, w, tolerance);
+        project_position(p, w, t, q, v);
+        if (dependent_residual(p, w) <= creeping_gap * scene_size(p, w)) break;
+        q = start;
+        configure(p, w, t, q, v);
+    }
+    choose_rows(p, w);
+}
+
+static void configure_anew(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
     set_modes(p, w, std::vector<Mode>(p.frictions.size(), slip_plus));
     configure(p, w, t, q, v);
-    if (w.now.rows.blocks.empty() || !w.now.rows.orthogonal) return;
-    choose_rows(p, w);  // their Cholesky factor does not show that they are independent
+    choose_rows_near(p, w, t, q, v);  // their Cholesky factor does not show that they are independent
 }
 
 // What has gone through its plane comes out to it; whether it rests there or strikes its velocity tells later.

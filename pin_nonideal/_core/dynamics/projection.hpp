@@ -68,6 +68,10 @@ void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, Vec
 // Takes from a small motion what the rows forbid, by the factors in the workspace.
 void remove_normal_part(const Program& p, Workspace& w, Eigen::Ref<VecX> motion);
 
+// Chooses rows where no step has, at a state near the constraints, and moves its position onto them. The workspace must be
+// configured there.
+void choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
+
 // Where no step has left factors: those of the state itself serve, with the rows that are independent there, all elements
 // slipping.
 void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v);

@@ -87,17 +87,20 @@ static int contradicting_block(const Program& p, Workspace& w, const VecX& v, do
     return found;
 }
 
-static void choose_rows_anew(const Program& p, Workspace& w) {
-    choose_rows(p, w, sticks_anywhere(w) ? w.state.rank_tolerance : rank_tolerance);
+static void choose_rows_anew(const Program& p, Workspace& w, int most = INT_MAX) {
+    choose_rows(p, w, sticks_anywhere(w) ? w.state.rank_tolerance : rank_tolerance, most);
     ++w.counters.factorizations;
 }
 
 bool configure_step(const Program& p, Workspace& w) {
     w.state.ideal_decided = false;
     if (w.now.rows.blocks.empty()) return false;
+    const RowSystem& rows = w.now.rows;
     const bool due = p.gaps.empty() && is_choice_due(p.layout, w.now.rows);  // contacts are chosen with their modes
-    if (!w.now.rows.orthogonal && !due) return false;
-    choose_rows_anew(p, w);
+    if (!rows.orthogonal && !due) return false;
+    // Rows that tell the rank as they are stay as many.
+    const bool keeps_rank = !rows.orthogonal;
+    choose_rows_anew(p, w, keeps_rank ? std::count(rows.active.begin(), rows.active.end(), char(1)) : INT_MAX);
     return true;
 }
 

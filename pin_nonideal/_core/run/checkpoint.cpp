@@ -102,16 +102,11 @@ static void evaluate_anew(System& system, const Progress& progress) {
     const Program& p = system.p;
     Workspace& w = system.w;
     const RunState state = w.state;
-    const std::vector<char> active = w.now.rows.active;
-    const VecX longest = w.now.rows.longest, longest_chosen = w.now.rows.longest_chosen;
-    const double chosen_pivot = w.now.rows.chosen_pivot;
+    const RowChoice choice = w.now.rows;
     const Counters counters = w.counters;
     select_rows(p, w);
-    w.now.rows.active = active;
-    w.now.rows.redundant = active != w.now.rows.required;
-    w.now.rows.longest = longest;
-    w.now.rows.longest_chosen = longest_chosen;
-    w.now.rows.chosen_pivot = chosen_pivot;
+    static_cast<RowChoice&>(w.now.rows) = choice;
+    w.now.rows.redundant = choice.active != w.now.rows.required;
     system.read(progress.y);
     configure(p, w, progress.t, system.q, system.v);
     if (state.ideal_decided) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/step_start.hpp"
 
@@ -52,8 +53,9 @@ void sample_inside(const Program& p, Workspace& w, const InsideStates& inside, c
         hold(p, w, inside, k);
         system.read(y);
         system.read_law_states(y);
-        begin_step(p, w, inside.t[k], system.q, system.v);
-        project(p, w, inside.t[k], system.q, system.v);
+        configure(p, w, inside.t[k], system.q, system.v);
+        choose_rows_near(p, w, inside.t[k], system.q, system.v);
+        project_into_modes(p, w, inside.t[k], system.q, system.v);
         system.write(y);
         recorder.sample(inside.t[k], y, {0.0, inside.moved[k]}, false);
     }

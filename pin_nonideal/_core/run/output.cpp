@@ -82,6 +82,8 @@ void Output::keep_time_step(double from, const VecX& y_from) {
 void Output::emit_between(double at) {
     stepper_.make_interpolant();
     stepper_.interpolate((at - stepper_.t0) / stepper_.h, sample_);
+    const bool redundant = w.now.rows.redundant;
+    if (redundant) choice_ = w.now.rows;
     if (!w.now.rows.blocks.empty()) {
         system_.read(sample_);
         project(p, w, at, system_.q, system_.v);
@@ -92,6 +94,16 @@ void Output::emit_between(double at) {
         progress_.configured_y.head(system_.ns) = sample_.head(system_.ns);
     }
     emit(at, sample_, false);
+    if (redundant) choose_as_before(at);
+}
+
+// A sample chooses rows that are long at its place; the run goes on with its own.
+void Output::choose_as_before(double at) {
+    const bool same = choice_.active == w.now.rows.active;
+    static_cast<RowChoice&>(w.now.rows) = choice_;
+    if (same) return;
+    system_.read(sample_);
+    configure(p, w, at, system_.q, system_.v);
 }
 
 void Output::inside_step(std::optional<double> between) {

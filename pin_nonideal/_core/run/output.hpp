@@ -36,6 +36,7 @@ private:
     void emit(double at, const VecX& state, bool evaluated);
     // A sample inside the step just taken, from its interpolant.
     void emit_between(double at);
+    void choose_as_before(double at);
 
     const Program& p;
     Workspace& w;
@@ -47,6 +48,7 @@ private:
     Recorder recorder_;
     DenseRecorder dense_;
     VecX sample_;
+    RowChoice choice_;  // of the step around a sample
     bool jumps_ = false;  // after the last sample
 };
 
