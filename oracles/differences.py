@@ -13,6 +13,9 @@ STEP = 1e-3
 DIFFERENCES = 1e-6
 # Rows of a state that was projected are met to rounding.
 MET = 1e-12
+# Newton's method onto them squares the gap in each step; directions held by less than this part are free.
+NEWTON_STEPS = 12
+HELD = 1e-9
 
 
 def fourth_order(f):
@@ -21,9 +24,30 @@ def fourth_order(f):
 
 
 def consistent(scene, rng, t, speed=1.0):
-    """A random state of the scene on its constraints."""
-    q = pin.integrate(scene.model, scene.initial_state()[0], 0.1 * rng.standard_normal(scene.model.nv))
-    return scene.project(q, speed * rng.standard_normal(scene.model.nv), t)
+    """A random state on the constraints: by Newton's method, or else by the scene's projection."""
+    model = scene.model
+    near = pin.integrate(model, scene.q0, 0.1 * rng.standard_normal(model.nv))
+    v = speed * rng.standard_normal(model.nv)
+    state = None if any(contact_opens(c) for c in scene.contacts) else _on_rows(scene, near, v, t)
+    return scene.project(near, v, t) if state is None else state
+
+
+def contact_opens(contact):
+    """Whether a contact may open: its rows are none to stand on."""
+    return getattr(contact, "unilateral", True)
+
+
+def _on_rows(scene, q, v, t):
+    """A state nearby at which the rows are met, without a search for the nearest; None if none is found."""
+    runner, position = scene._compiled.program.runner(), holonomic_rows(scene._compiled.program)
+    for _ in range(NEWTON_STEPS):
+        A, _, phi, rate = rows_at(scene, runner, q, v, t)
+        if np.abs(phi[position]).max(initial=0.0) < 0.1 * MET and np.abs(rate).max(initial=0.0) < MET:
+            return q, v
+        q = pin.integrate(scene.model, q, -np.linalg.lstsq(A[position], phi[position], rcond=HELD)[0])
+        A, _, _, rate = rows_at(scene, runner, q, v, t)
+        v = v - np.linalg.lstsq(A, rate, rcond=HELD)[0]
+    return None
 
 
 def rows_at(scene, runner, q, v, t):

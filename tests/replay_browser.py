@@ -28,6 +28,7 @@ FLAGS = [
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",  # the software renderer of WebGL is a slow one for the page around it
 ]
 SIZE = (1000, 720)
 TIMEOUT = 60_000  # milliseconds; a software renderer on a busy machine takes seconds
@@ -40,11 +41,7 @@ def headless_browser() -> Iterator[Any]:
     api = pytest.importorskip("playwright.sync_api", reason="needs playwright")
     if BROWSER is None:
         pytest.skip("needs chromium, chromium-browser or google-chrome on the path")
-    browser = _launched(api)
-    before = set(browser.contexts)
-    yield browser
-    for context in set(browser.contexts) - before:
-        context.close()
+    yield _launched(api)
 
 
 @cache
@@ -56,24 +53,47 @@ def _launched(api: Any) -> Any:
     return browser
 
 
+@cache
+def _offline(browser: Any) -> tuple[Any, list[Any]]:
+    """The context without network, and its tabs that no test uses: a new process for each page takes long."""
+    return browser.new_context(offline=True), []
+
+
 class Watched:
     """A page opened without network, with all that it complained about and asked for."""
 
     def __init__(self, browser: Any, path: Path, fragment: str = "paused") -> None:
-        self.context = browser.new_context(viewport={"width": SIZE[0], "height": SIZE[1]}, offline=True)
-        self.page = self.context.new_page()
+        context, self._unused = _offline(browser)
+        self.page = self._unused.pop() if self._unused else context.new_page()
         self.page.set_default_timeout(TIMEOUT)
+        self.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
+        self.page.emulate_media(color_scheme="light")
         self.complaints: list[str] = []
         self.requests: list[str] = []
-        self.page.on("console", lambda message: self.hear(message.type, message.text))
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.on("request", lambda request: self.requests.append(request.url))
+        self._listeners = {"console": self._log, "pageerror": self._fail, "request": self._ask}
+        for event, listener in self._listeners.items():
+            self.page.on(event, listener)
         self.page.goto(f"{path.resolve().as_uri()}#{fragment}")
         self.page.wait_for_function("() => window.replayDone || window.replayError")
 
-    def hear(self, kind: str, text: str) -> None:
-        if kind in ("error", "warning") and "GPU stall" not in text and "GL Driver" not in text:
+    def _log(self, message: Any) -> None:
+        text = message.text
+        if message.type in ("error", "warning") and "GPU stall" not in text and "GL Driver" not in text:
             self.complaints.append(text)
+
+    def _fail(self, error: Any) -> None:
+        self.complaints.append(str(error))
+
+    def _ask(self, request: Any) -> None:
+        self.requests.append(request.url)
+
+    def close(self) -> None:
+        """Leave the tab to the next page."""
+        for event, listener in self._listeners.items():
+            self.page.remove_listener(event, listener)
+        self.page.mouse.move(0.0, 0.0)
+        self.page.goto("about:blank")
+        self._unused.append(self.page)
 
     def run(self, script: str, argument: object = None) -> Any:
         return self.page.evaluate(script, argument)
@@ -96,7 +116,7 @@ def opened_replay(browser: Any, run: Any, path: Path) -> Iterator[SimpleNamespac
     """A run written as a page, and the page opened."""
     watched = Watched(browser, replay(run, path))
     yield SimpleNamespace(run=run, path=path, watched=watched, page=watched.page)
-    watched.context.close()
+    watched.close()
 
 
 def changed(one: np.ndarray, other: np.ndarray) -> int:

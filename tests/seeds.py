@@ -10,15 +10,16 @@ import pytest
 BY_DEFAULT = 10
 
 
-def seeds(every: Iterable[int], always: Iterable[int] = ()) -> list[Any]:
-    """Parameters of a test: the first ten seeds, and those that must always run; the others are slow.
+def seeds(every: Iterable[int], always: Iterable[int] = (), count: int = BY_DEFAULT) -> list[Any]:
+    """Parameters of a test: the first few seeds, and those that must always run; the others are slow.
 
     Args:
         every: all seeds.
         always: more of them that a default run takes in, each for a reason told where it stands.
+        count: how many a default run takes; fewer than ten where each takes long.
     """
     listed, kept = list(every), set(always)
-    kept |= set([seed for seed in listed if seed not in kept][: BY_DEFAULT - len(kept)])
+    kept |= set([seed for seed in listed if seed not in kept][: count - len(kept)])
     return [seed if seed in kept else pytest.param(seed, marks=pytest.mark.slow) for seed in listed]
 
 

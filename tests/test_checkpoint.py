@@ -65,7 +65,7 @@ def weak_arm():
 # Every method of the core; friction that sticks and slips; loops, redundant ones too; held torques.
 RUNS = {
     "events": (cart, 1.5, {"record": ALL, "rtol": 1e-6}),
-    "effort": (weak_arm, 1.0, {"record": ALL, "rtol": 1e-6}),
+    "effort": (weak_arm, 0.4, {"record": ALL, "rtol": 1e-6}),
     "events on a grid": (cart, 1.5, {"record": ALL, "output_dt": 0.02, "method": "dopri5"}),
     "fixed steps with events": (cart, 1.5, {"record": "energy", "method": "rk4", "dt": 0.01}),
     "time stepping": (cart, 1.5, {"record": ALL, "method": "moreau", "dt": 0.01, "output_dt": 0.03}),

@@ -74,7 +74,13 @@ def assert_same_run(scene, q, v, duration):
     np.testing.assert_allclose(gap, 0.0, rtol=0, atol=SAME * (1.0 + moved))
 
 
-DURATIONS = {"andrews_squeezer": 0.005, "delta": 0.02, "solo12_standing": 0.05, "belt_oscillator": 1.0}
+DURATIONS = {
+    "andrews_squeezer": 0.005,
+    "delta": 0.02,
+    "solo12_standing": 0.05,
+    "solo12_dropped": 0.05,
+    "belt_oscillator": 1.0,
+}
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -74,7 +74,7 @@ def test_motors_of_an_arm_beside_scipy(seed):
         return lambda t, y: most[k] - abs(asked(y)[k])
 
     beside = solve_ivp(
-        rate, (0.0, 2.0), np.r_[q0, 0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-13, max_step=2e-4,
+        rate, (0.0, 2.0), np.r_[q0, 0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-13, max_step=2e-3,
         events=[left(0), left(1)],
     )  # fmt: skip
     scene = pn.Scene(model, actuation=pn.EffortLimits(hold, most), q0=q0)

@@ -78,13 +78,17 @@ SCENES = (
 )
 
 
+def slow(value):
+    return pytest.param(value, marks=pytest.mark.slow)
+
+
 def no_torque(nv):
     return lambda t, q, v: np.zeros(nv)
 
 
 @pytest.mark.parametrize("method", ["dop853", "dopri5", "rk4"])
-@pytest.mark.parametrize("spacings", [-3, -1, 0, 1, 3])
-@pytest.mark.parametrize("periods", [1, 2, 3])
+@pytest.mark.parametrize("spacings", [slow(-3), -1, 0, 1, slow(3)])
+@pytest.mark.parametrize("periods", [1, slow(2), 3])
 @pytest.mark.parametrize("make", SCENES, ids=lambda make: make.__name__)
 def test_a_step_that_ends_at_an_event(make, periods, spacings, method):
     model, parts = make()

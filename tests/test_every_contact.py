@@ -299,4 +299,4 @@ def test_pages_show_it(case: Case, run: Any, browser: Any, tmp_path: Path) -> No
         page.run("time => replay.seek(time)", strike + 1e-3)
         assert page.run("() => replay.flashes") == 1
     assert page.complaints == []
-    page.context.close()
+    page.close()

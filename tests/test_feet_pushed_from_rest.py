@@ -5,6 +5,8 @@ each foot that slips and within the cone of each that sticks, must give the acce
 squares over the generators of these forces).
 """
 
+from functools import cache
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -55,6 +57,13 @@ def drawn(seed):
     return table(places, mu, pushed, push), places, mu, pushed, np.array(push)
 
 
+@cache
+def begun(seed):
+    """What a draw begins to do; with many feet it takes seconds to find."""
+    scene, *_ = drawn(seed)
+    return scene.solve(*scene.project(), 0.0)
+
+
 def lack(places, mu, pushed, push, solution):
     """What the law's forces lack to give the acceleration, as part of the weight."""
     a = solution.a
@@ -93,10 +102,10 @@ def slowness(places, solution):
     return (np.abs(solution.a).max() + GRAVITY) / min(slips, default=GRAVITY)
 
 
-@pytest.mark.parametrize("seed", seeds([*LIFTING[:4], *DRAWS, *LIFTING[4:]]))
+@pytest.mark.parametrize("seed", seeds([*LIFTING[:3], *DRAWS, *LIFTING[3:]]))
 def test_what_begins_keeps_the_law_of_coulomb(seed):
-    scene, *rest = drawn(seed)
-    assert lack(*rest, scene.solve(*scene.project(), 0.0)) < 1e-8
+    _, *rest = drawn(seed)
+    assert lack(*rest, begun(seed)) < 1e-8
 
 
 @pytest.mark.stress
@@ -116,13 +125,13 @@ def test_what_begins_keeps_it_in_many_draws(first):
     assert refused <= 1
 
 
-@pytest.mark.parametrize("seed", seeds([*LIFTING[:4], *DRAWS, *LIFTING[4:]]))
+@pytest.mark.parametrize("seed", seeds([*LIFTING[:3], *DRAWS, *LIFTING[3:]]))
 def test_the_motion_goes_on_as_it_begins(seed):
     scene, *_ = drawn(seed)
-    begun = scene.solve(*scene.project(), 0.0)
+    a = begun(seed).a
     run = pn.simulate(scene, 1e-6, output_dt=1e-6)
-    size = np.abs(begun.a).max() + GRAVITY
-    assert np.abs(run.v[-1] / 1e-6 - begun.a).max() < 1e-4 * size
+    size = np.abs(a).max() + GRAVITY
+    assert np.abs(run.v[-1] / 1e-6 - a).max() < 1e-4 * size
 
 
 def test_six_feet_begin_to_slip_in_one_step():

@@ -35,7 +35,7 @@ def page(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any
     watched = Watched(browser, path)
     yield watched
     assert watched.complaints == []
-    watched.context.close()
+    watched.close()
 
 
 def ghosts(page: Watched) -> Any:
@@ -102,7 +102,7 @@ def test_a_hundred_rollouts_are_one_page_of_ghosts(browser: Any, tmp_path: Path)
     assert watched.run("() => replay.runs") == 100
     assert watched.run("() => replay.draws")["calls"] <= 60
     assert "8 of 100 runs" in watched.page.locator(".plot h2").first.inner_text()
-    watched.context.close()
+    watched.close()
 
 
 def test_names_must_fit_the_runs() -> None:

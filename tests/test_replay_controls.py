@@ -136,7 +136,7 @@ def test_the_camera_turns_and_returns(arm: Any) -> None:
 def test_it_plays_by_itself_unless_told_not_to(browser: Any, loop: Any) -> None:
     watched = Watched(browser, loop.path, fragment="")
     watched.page.wait_for_function("() => replay.playing && replay.time > 0")
-    watched.context.close()
+    watched.close()
 
 
 def test_keys_go_from_event_to_event(arm: Any) -> None:

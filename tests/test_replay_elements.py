@@ -90,7 +90,7 @@ def page(sliding: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Wat
         watched = Watched(browser, path)
         yield watched
         assert watched.complaints == []
-        watched.context.close()
+        watched.close()
 
 
 def test_rings_take_the_color_of_the_mode(page: Watched) -> None:

@@ -66,7 +66,7 @@ def test_the_watch_hears_what_reaches_for_the_network(browser: Any, loop: Any, t
     )
     watched = Watched(browser, spoiled)
     assert any("Content Security Policy" in complaint for complaint in watched.complaints)
-    watched.context.close()
+    watched.close()
 
 
 @pytest.mark.parametrize("sample", [0, 19])
@@ -159,7 +159,7 @@ def test_a_page_that_is_not_compressed_shows_the_same(browser: Any, loop: Any, t
     watched = Watched(browser, path)
     assert watched.complaints == []
     assert watched.poses(0.5) == loop.watched.poses(0.5)
-    watched.context.close()
+    watched.close()
 
 
 def test_names_cannot_break_out_of_the_page(browser: Any, tmp_path: Path) -> None:
@@ -185,7 +185,7 @@ def test_names_cannot_break_out_of_the_page(browser: Any, tmp_path: Path) -> Non
     assert watched.page.title() == evil
     assert watched.page.locator("h1").inner_text() == evil
     assert len(watched.poses(0.0)["joints"]) == 2
-    watched.context.close()
+    watched.close()
 
 
 def test_a_damaged_page_says_so(browser: Any, loop: Any, tmp_path: Path) -> None:
@@ -195,7 +195,7 @@ def test_a_damaged_page_says_so(browser: Any, loop: Any, tmp_path: Path) -> None
     watched = Watched(browser, path)
     assert watched.run("() => window.replayError")
     assert "This replay cannot be shown." in watched.page.locator("#message").inner_text()
-    watched.context.close()
+    watched.close()
 
 
 def test_one_sample_is_a_still_picture(browser: Any, tmp_path: Path) -> None:
@@ -203,7 +203,7 @@ def test_one_sample_is_a_still_picture(browser: Any, tmp_path: Path) -> None:
     watched = Watched(browser, replay(run, tmp_path / "still.html"))
     assert watched.complaints == []
     assert watched.run("() => [replay.time, replay.duration]") == [2.0, 0.0]
-    watched.context.close()
+    watched.close()
 
 
 def test_a_simulated_robot_stands_where_its_run_says(browser: Any, tmp_path: Path) -> None:
@@ -223,7 +223,7 @@ def test_a_simulated_robot_stands_where_its_run_says(browser: Any, tmp_path: Pat
         for end, name in zip(ends, (anchor.frame1, anchor.frame2), strict=True):
             place = data.oMf[scene.model.getFrameId(name)].translation
             np.testing.assert_allclose(end, place, atol=POSE)
-    watched.context.close()
+    watched.close()
 
 
 def test_a_notebook_shows_the_page_in_place(browser: Any, loop: Any) -> None:

@@ -32,7 +32,7 @@ def loop(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any
         group.evaluate("one => { one.open = true; }")
     yield watched
     assert watched.complaints == []
-    watched.context.close()
+    watched.close()
 
 
 def moved(page: Watched, action: Any) -> int:
@@ -140,7 +140,7 @@ def test_the_address_brings_back_what_was_seen(browser: Any, loop: Watched, tmp_
     now = again.run("() => replay.address").split("cam=")[1].split("&")[0].split(",")
     np.testing.assert_allclose([float(x) for x in now], camera, rtol=1e-5, atol=1e-9)
     again.page.wait_for_function("() => location.hash.includes('t=0.4321')")
-    again.context.close()
+    again.close()
     loop.page.locator("#views button", has_text="usual").click()
 
 

@@ -47,7 +47,7 @@ def opened(browser: Any, tmp_path: Path) -> Iterator[Any]:
     for page in pages:
         assert page.complaints == []
         assert len(page.requests) == 1
-        page.context.close()
+        page.close()
 
 
 def shows(picture: np.ndarray, color: str, within: int = 40) -> int:

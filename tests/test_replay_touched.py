@@ -191,7 +191,7 @@ def test_views_are_framed_between_what_lies_over_them(tmp_path: Path) -> None:
                     across = (box[2] - box[0]) / canvas["width"], (box[3] - box[1]) / canvas["height"]
                     assert max(across) > 0.12, (name, size, box)
             assert page.complaints == []
-            page.context.close()
+            page.close()
 
 
 def test_forces_between_round_bodies_act_where_they_touch() -> None:
@@ -223,7 +223,7 @@ def test_paths_coils_and_lists_of_runs_are_drawn_as_they_are(tmp_path: Path) -> 
         before = page.picture(1e4)
         page.run("() => replay.show('trails', false)")
         assert np.array_equal(before, page.picture(1e4))
-        page.context.close()
+        page.close()
         page = Watched(browser, pn.replay(many, tmp_path / "many.html"))
         assert page.page.locator("#run-list summary").inner_text() == "20 runs"
         assert not page.page.locator("#run-list button").first.is_visible()
@@ -231,4 +231,4 @@ def test_paths_coils_and_lists_of_runs_are_drawn_as_they_are(tmp_path: Path) -> 
         page.page.locator("#run-list button").nth(3).click()
         assert page.page.locator("#run-list button").nth(3).get_attribute("aria-pressed") == "false"
         assert page.complaints == []
-        page.context.close()
+        page.close()

@@ -171,18 +171,19 @@ def modelled_as(scene, other, kind, rounding=None):
 @pytest.mark.parametrize("other", OTHERS)
 @pytest.mark.parametrize("kind", REVOLVED)
 @pytest.mark.parametrize("rounding", [None, ROUNDING])
-def test_gaps_beside_coal(kind, other, rounding):
-    """At 1,000 random placements, those included that have entered each other by less than their rounding."""
+@pytest.mark.parametrize("count", [200, pytest.param(1000, marks=pytest.mark.slow)])
+def test_gaps_beside_coal(kind, other, rounding, count):
+    """At random placements, those included that have entered each other by less than their rounding."""
     scene, places = pair(kind, other, rounding=rounding)
     oracle = modelled_as(scene, other, kind, rounding)
     compared, worst = 0, 0.0
-    for q in placements(np.random.default_rng(1), 1000):
+    for q in placements(np.random.default_rng(1), count):
         cores, exact = oracle.apart(places[1], pin.XYZQUATToSE3(q) * places[0])
         if cores < NEAR:
             continue
         compared += 1
         worst = max(worst, abs(modelled(scene, q)[0] - exact))
-    assert compared > 800
+    assert compared > 0.8 * count
     assert worst < EXACT
 
 
@@ -398,7 +399,7 @@ def thrown(kind, other, seed):
 
 @pytest.mark.parametrize("other", OTHERS)
 @pytest.mark.parametrize("kind", REVOLVED)
-@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(60), marks=pytest.mark.stress)], ids=len)
+@pytest.mark.parametrize("seeds", [range(2), pytest.param(range(60), marks=pytest.mark.stress)], ids=len)
 def test_thrown_bodies_do_not_enter(kind, other, seeds):
     """With spin: by Coal's distance, and the ledger of energy closes; the first is repeated bit by bit."""
     struck = 0
