@@ -54,17 +54,18 @@ def _launched(api: Any) -> Any:
 
 
 @cache
-def _offline(browser: Any) -> tuple[Any, list[Any]]:
-    """The context without network, and its tabs that no test uses: a new process for each page takes long."""
-    return browser.new_context(offline=True), []
+def _unused_pages(browser: Any) -> list[Any]:
+    """Pages without network that no test uses; a new process for each test would take long."""
+    return []
 
 
 class Watched:
     """A page opened without network, with all that it complained about and asked for."""
 
     def __init__(self, browser: Any, path: Path, fragment: str = "paused") -> None:
-        context, self._unused = _offline(browser)
-        self.page = self._unused.pop() if self._unused else context.new_page()
+        self._unused = _unused_pages(browser)
+        # Each page has a context, and so a window, of its own: a browser draws a tab in the background once a second.
+        self.page = self._unused.pop() if self._unused else browser.new_context(offline=True).new_page()
         self.page.set_default_timeout(TIMEOUT)
         self.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
         self.page.emulate_media(color_scheme="light")
@@ -88,7 +89,7 @@ class Watched:
         self.requests.append(request.url)
 
     def close(self) -> None:
-        """Leave the tab to the next page."""
+        """Leave the page to the next test."""
         for event, listener in self._listeners.items():
             self.page.remove_listener(event, listener)
         self.page.mouse.move(0.0, 0.0)
