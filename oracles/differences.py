@@ -13,7 +13,7 @@ STEP = 1e-3
 DIFFERENCES = 1e-6
 # Rows of a state that was projected are met to rounding.
 MET = 1e-12
-# Newton's method onto them squares the gap in each step; directions held by less than this part are free.
+# Newton's method onto the rows squares the gap in each step; singular values below this part are rounding.
 NEWTON_STEPS = 12
 HELD = 1e-9
 
@@ -33,12 +33,12 @@ def consistent(scene, rng, t, speed=1.0):
 
 
 def contact_opens(contact):
-    """Whether a contact may open: its rows are none to stand on."""
+    """Whether a contact may open."""
     return getattr(contact, "unilateral", True)
 
 
 def _on_rows(scene, q, v, t):
-    """A state nearby at which the rows are met, without a search for the nearest; None if none is found."""
+    """A nearby state on the rows by Newton's method, or None where it does not converge."""
     runner, position = scene._compiled.program.runner(), holonomic_rows(scene._compiled.program)
     for _ in range(NEWTON_STEPS):
         A, _, phi, rate = rows_at(scene, runner, q, v, t)

@@ -55,7 +55,7 @@ def _launched(api: Any) -> Any:
 
 @cache
 def _unused_pages(browser: Any) -> list[Any]:
-    """Pages without network that no test uses; a new process for each test would take long."""
+    """Pages without network that wait for the next test: a process for each test would take long."""
     return []
 
 
@@ -64,7 +64,7 @@ class Watched:
 
     def __init__(self, browser: Any, path: Path, fragment: str = "paused") -> None:
         self._unused = _unused_pages(browser)
-        # Each page has a context, and so a window, of its own: a browser draws a tab in the background once a second.
+        # A context, and so a window, for each page: a browser draws a tab in the background once a second.
         self.page = self._unused.pop() if self._unused else browser.new_context(offline=True).new_page()
         self.page.set_default_timeout(TIMEOUT)
         self.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})

@@ -59,7 +59,7 @@ def drawn(seed):
 
 @cache
 def begun(seed):
-    """What a draw begins to do; with many feet it takes seconds to find."""
+    """The solution at the start of a draw, which takes seconds with many feet."""
     scene, *_ = drawn(seed)
     return scene.solve(*scene.project(), 0.0)
 

@@ -19,7 +19,7 @@ METHODS = (
     {"method": "dopri5", "rtol": 1e-8},
     {"method": "rk4", "dt": 2e-3},
 )
-# Of a revolution and of the largest velocity: rounding, magnified by the linkage.
+# Rounding that the linkage magnifies [rad, and part of the largest velocity].
 ON_PATH = 1e-10
 # Of the forces in play: a closed form beside a solution of linear equations.
 STATICS = 1e-7

@@ -65,7 +65,7 @@ class AtRest:
         return np.asarray(now.F + now.C)
 
     def rows(self, q: Array) -> Array:
-        """Rows of all constraints and contacts, (m, nv); those of rounding alone are zero.
+        """Rows of all constraints and contacts, (m, nv); a row that rounding alone makes is zero.
 
         Args:
             q: configuration, (nq,).
@@ -73,7 +73,7 @@ class AtRest:
         return self._rows(q, self._root(q))[0]
 
     def directions(self, q: Array) -> Array:
-        """Directions along which frictional elements slip, (d, nv); those of rounding alone are zero.
+        """Slip directions of frictional elements, (d, nv); a direction that rounding alone makes is zero.
 
         Args:
             q: configuration, (nq,).

@@ -11,12 +11,12 @@
 
 namespace pn {
 
-// Which required rows are in use, and by what another choice is judged to be due.
+// The choice of active rows among the required ones, and the record by which a new choice becomes due.
 struct RowChoice {
     std::vector<char> active;
     bool redundant = false;  // some required row is not active
-    // While it is so, over starts of steps: the greatest square of the length of each row in these modes, and since active
-    // rows were chosen last; and the greatest of the smallest pivots since then.
+    // Kept at the starts of steps while `redundant`: the greatest square of each row's length in these modes, and the same
+    // since the last choice; and the greatest of the smallest pivots since the last choice.
     VecX longest, longest_chosen;
     double chosen_pivot = 0.0;
 };

@@ -18,8 +18,8 @@ constexpr double stalled_part = 0.5;
 constexpr int sure_position_steps = 3, sure_velocity_steps = 1;
 // Factors of the new place cost less than this many iterations.
 constexpr double iterations_for_factors = 3.0;
-// Pivots that count where a state is off the constraints, where dependent rows look independent: the fewest rows with
-// which all others close are taken.
+// Rank tolerances tried in this order at a state off the constraints, where dependent rows have pivots above
+// rank_tolerance: the first choice, that of the fewest rows, whose projection closes all other rows is taken.
 constexpr double tolerances_near[] = {1e-3, 1e-5, 1e-7, 1e-9};
 // Choices of rows by which one position is projected: each takes the gaps of the others down with the square.
 constexpr int most_choices = 3;

@@ -98,7 +98,7 @@ bool configure_step(const Program& p, Workspace& w) {
     const RowSystem& rows = w.now.rows;
     const bool due = p.gaps.empty() && is_choice_due(p.layout, w.now.rows);  // contacts are chosen with their modes
     if (!rows.orthogonal && !due) return false;
-    // Rows that tell the rank as they are stay as many.
+    // The Cholesky factor shows that the active rows are independent: a new choice has at most as many.
     const bool keeps_rank = !rows.orthogonal;
     choose_rows_anew(p, w, keeps_rank ? std::count(rows.active.begin(), rows.active.end(), char(1)) : INT_MAX);
     return true;
