@@ -157,6 +157,8 @@ class Builder:
 
     def add_copy(self, row: int, first: int, factor: float) -> None: ...
 
+    def add_breaks(self, times: Sequence[float]) -> None: ...
+
     def let_open(self, restitution: float) -> None: ...
 
     def set_impact(self, law: ImpactLaw) -> None: ...
@@ -418,13 +420,16 @@ class EventKind(enum.Enum):
     desaturate = 9
     """a drive gives again what is asked of it"""
 
-    impact = 10
+    jump = 10
+    """the rate of a prescribed motion jumps, with an impulse"""
+
+    impact = 11
     """a contact strikes, with an impulse"""
 
-    touch_down = 11
+    touch_down = 12
     """a contact closes without an impulse, or its bouncing ends"""
 
-    lift_off = 12
+    lift_off = 13
     """a contact opens"""
 
 class Event:
@@ -591,6 +596,8 @@ class FollowedRun:
     def jacobian(self, t: float, y: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]: ...
 
     def follow(self, t: float, interpolant: Callable[[float], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]) -> bool: ...
+
+    def stop_before(self, end: float) -> float: ...
 
     @property
     def t(self) -> float: ...

@@ -156,8 +156,8 @@ class Distance:
         frame1: name of a frame of the model.
         frame2: name of a frame, or None for the world at the place where frame1 starts (then `length` must be
             given).
-        length: positive length [m]; a function t -> (value, rate, acceleration); None for the distance at the
-            start.
+        length: positive length [m]; a function t -> (value, rate, acceleration), whose breaks are those of
+            `PrescribedMotion`; None for the distance at the start.
         name: used in messages and results.
     """
 
@@ -224,10 +224,16 @@ class PrescribedMotion:
     Residual: phi = q_joint - function(t) [m or rad].
     Rows: 1.
     lam: the generalized force that the drive exerts on the joint [N or N m]; its power is v lam.
+    Breaks: where pieces of the function meet, a step of the integrator ends and the next one begins.  A rate
+    that jumps there is an impulse I on the rows, M (v+ - v-) = A^T I with A v+ + phi_t+ = 0; an event of kind
+    "jump" tells it, and its work is the motion's.  Contacts that it drives into each other strike; dry
+    friction, whose forces are finite, gives no impulse.
 
     Args:
         joint: name of the joint.
-        function: t -> (value, rate, acceleration), for example `sinusoid(...)`.
+        function: t -> (value, rate, acceleration), for example `sinusoid(...)`.  A function of the user's may
+            tell its breaks [s] by an attribute `breaks`; otherwise they are searched for in each step, by the
+            values at both ends and in the middle: a pulse within one step is seen with the attribute only.
         name: used in messages and results.
     """
 

@@ -125,18 +125,18 @@ def _reactions(scene: Scene, outcome: core.Outcome) -> dict[str, Array]:
 
 
 def _event(scene: Scene, event: core.Event, functions: Sequence[str]) -> Event:
-    """An event with the name of its element or contact, or of the user's function."""
+    """An event with the name of its element, contact or constraint, or of the user's function."""
     if event.kind is core.EventKind.user:
         return Event(event.time, event.kind.name, functions[event.element])
     if event.kind in (core.EventKind.saturate, core.EventKind.desaturate):
         joint = scene.model.names[joint_of(scene.model, event.element)]
         return Event(event.time, event.kind.name, str(joint))
-    if not event.of_contact:
+    if not event.of_contact and event.kind is not core.EventKind.jump:
         # A cluster of events without any friction is one of contacts.
         names = scene.element_names or scene._compiled.opening_names
         return Event(event.time, event.kind.name, names[event.element])
     name = scene._compiled.program.constraints[event.element].name
-    if event.kind is not core.EventKind.impact:
+    if event.kind not in (core.EventKind.impact, core.EventKind.jump):
         return Event(event.time, event.kind.name, name)
     change = event.energy_change
     return Event(event.time, event.kind.name, name, event.impulse, change, event.v_minus, event.v_plus)

@@ -25,11 +25,14 @@ class Event:
             where on "moreau" goes through modes that allow none; of contacts that may open "impact" with an
             impulse, "touch_down" where one closes without, or its bouncing ends, and "lift_off" where one
             opens; of joints with `EffortLimits` "saturate" where a drive is asked for more than it has, and
-            "desaturate" where it gives again what is asked.
-        element: name of the law, contact or joint.
-        impulse: of an impact [N s], (3,): along the contact's normal, then along its directions of slip.
-        energy_change: kinetic energy that an impact gave at this contact [J], negative for a loss.
-        v_minus: velocity before an impact, (nv,).
+            "desaturate" where it gives again what is asked; "jump" of a prescribed motion or length whose
+            rate jumps.
+        element: name of the law, contact, joint or constraint.
+        impulse: of an impact [N s], (3,): along the contact's normal, then along its directions of slip; of a
+            jump (impulse, 0, 0), of the motion's row [N s or N m s].
+        energy_change: kinetic energy that an impact gave at this contact [J], negative for a loss; of a jump
+            the work of the motion's impulse.
+        v_minus: velocity before an impact or jump, (nv,).
         v_plus: velocity after it, (nv,).
     """
 

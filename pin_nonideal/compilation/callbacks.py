@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pin_nonideal.checks import floats
+from pin_nonideal.checks import array, floats
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, RunError, UnknownNameError, UserFunctionError, nearest
 from pin_nonideal.timefunctions import Constant, Polynomial, Sinusoid, Spline
@@ -120,6 +120,25 @@ def time_function(function: Any, who: str) -> Any:
     jet = checked(function, f"{who}: function of time", (), (), ())
     _check_derivatives(jet, who)
     return lambda t: tuple(float(x) for x in jet(t))
+
+
+def breaks(function: Any, who: str) -> list[float]:
+    """Times at which the pieces of a user's function of time meet, as its attribute `breaks` tells them.
+
+    Args:
+        function: the user's.
+        who: words for messages.
+
+    Raises:
+        InputError: the attribute holds something else than ascending times.
+    """
+    given = getattr(function, "breaks", None)
+    if given is None or isinstance(function, Spline):
+        return []
+    times = array(f"{who}: breaks", given, (None,))
+    if (np.diff(times) <= 0.0).any():
+        raise InputError(f"{who}: breaks must increase; got {times}")
+    return [float(t) for t in times]
 
 
 def _check_derivatives(jet: Callable[..., Any], who: str) -> None:

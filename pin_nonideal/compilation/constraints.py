@@ -29,7 +29,7 @@ from pin_nonideal.errors import InputError, UnknownNameError
 from pin_nonideal.timefunctions import Constant
 from pin_nonideal.types import Array
 
-from .callbacks import checked, time_function
+from .callbacks import breaks, checked, time_function
 from .names import Frame, Resolution, placed_on, words
 
 # A rational gear ratio with a larger denominator than this leaves the angle of endless joints undetermined.
@@ -115,6 +115,7 @@ def _(c: Distance, name: str, out: core.Builder, where: Resolution) -> None:
         length = Constant(gap)
     elif not callable(length):
         length = Constant(length)
+    out.add_breaks(breaks(length, who))
     out.add_distance(name, f1, f2, length=time_function(length, who))
 
 
@@ -143,6 +144,7 @@ def _(c: PrescribedMotion, name: str, out: core.Builder, where: Resolution) -> N
     who = words(c, name)
     joint = where.joint(c.joint, who)
     period = 2.0 * math.pi if where.model.joints[joint].nq == 2 else 0.0
+    out.add_breaks(breaks(c.function, who))
     out.add_motion(name, joint, function=time_function(c.function, who), period=period)
 
 

@@ -16,6 +16,7 @@ EVENTS = {
     "paradox": ("#9d174d", "the laws allow no motion at a step's end"),
     "saturate": ("#a16207", "a drive reaches its limit of effort"),
     "desaturate": ("#ca8a04", "a drive gives again what is asked of it"),
+    "jump": ("#be185d", "a prescribed rate jumps, with an impulse"),
     "user": ("#65a30d", "a condition of the user's"),
     "other": ("#64748b", "something else"),
 }

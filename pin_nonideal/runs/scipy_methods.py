@@ -69,13 +69,16 @@ class _Run:
         return np.concatenate([known, np.full(size - known.size, FREE)])
 
     def smooth_stretch(self, method: Any, t_end: float) -> None:
-        """To the next event, or to the end."""
+        """To the next event or break of a function of time, or to the end."""
         y = self.core.y
         tolerance = {"rtol": max(self.options.rtol, LEAST_RTOL), "atol": self.tolerance(y.size)}
-        solver = method(self.rate, self.core.t, y, t_end, jac=self.jacobian, **tolerance)
+        stop = self.core.stop_before(t_end)
+        solver = method(self.rate, self.core.t, y, stop, jac=self.jacobian, **tolerance)
         while solver.status == "running":
             self.failure = None
             self._step(solver)
+            if self.core.stop_before(solver.t) < solver.t:  # inside the step, which is taken again
+                return
             if self.core.follow(solver.t, solver.dense_output()):
                 return
             if self.options.method in ONE_STEP and not np.array_equal(solver.y, self.core.y):

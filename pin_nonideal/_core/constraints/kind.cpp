@@ -51,6 +51,19 @@ Shown shown(const Kind& kind) {
     return std::visit([](const auto& k) { return k.shown; }, kind);
 }
 
+std::vector<const TimeFunction*> time_functions(const Kind& kind) {
+    std::vector<const TimeFunction*> found;
+    std::visit([&](const auto& k) {
+        std::apply([&](const auto&... datum) {
+            const auto take = [&](const auto& value) {
+                if constexpr (std::is_same_v<std::decay_t<decltype(value)>, TimeFunction>) found.push_back(&value);
+            };
+            (take(k.*datum.member), ...);
+        }, std::decay_t<decltype(k)>::data());
+    }, kind);
+    return found;
+}
+
 std::pair<const Frame*, const Frame*> frames(const Kind& kind) {
     return std::visit([](const auto& k) -> std::pair<const Frame*, const Frame*> {
         if constexpr (is_geometric<std::decay_t<decltype(k)>>) return {&k.frame1, &k.frame2};

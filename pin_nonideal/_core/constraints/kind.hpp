@@ -84,6 +84,8 @@ int pressing_row(const Kind& kind);
 Shown shown(const Kind& kind);
 // Its two frames, where it acts between bodies; else none.
 std::pair<const Frame*, const Frame*> frames(const Kind& kind);
+// The functions of time that move it.
+std::vector<const TimeFunction*> time_functions(const Kind& kind);
 // Dofs on which A may differ from zero.
 std::vector<int> dofs(const Kind& kind, const Mechanism& m);
 

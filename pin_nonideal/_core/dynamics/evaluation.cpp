@@ -33,7 +33,7 @@ static void factor_mass(const Program& p, Workspace& w, double t) {
 
 void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     place_bodies(p.mechanism, w.now.terms, q, p.constrained_joints, p.constrained_angles);
-    const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
+    const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
     for (int i : w.now.awake)
         if (i < p.constraints) evaluate(p.blocks[i].kind, state, Part::residual, w.now.values[i]);
 }
@@ -41,7 +41,7 @@ void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q,
 // Residuals and A, Eq. (3); and the users' own b.
 void place_rows(const Program& p, Workspace& w, double t, const VecX& v) {
     if (w.now.awake.empty()) return;
-    const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
+    const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
     for (int i : w.now.awake) {
         const Block& block = p.blocks[i];
         RowValues& values = w.now.values[i];
@@ -55,7 +55,7 @@ void place_rows(const Program& p, Workspace& w, double t, const VecX& v) {
 // Rates and b, Eq. (3).
 static void move_rows(const Program& p, Workspace& w, double t, const VecX& v) {
     if (w.now.awake.empty()) return;
-    const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
+    const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
     for (int i : w.now.awake) {
         const Block& block = p.blocks[i];
         RowValues& values = w.now.values[i];
@@ -183,7 +183,7 @@ void evaluate_gap(const Program& p, Workspace& w, double t, const VecX& v, int g
 void evaluate_block(const Program& p, Workspace& w, double t, const VecX& v, int i) {
     const Block& block = p.blocks[i];
     RowValues& values = w.now.values[i];
-    const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
+    const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
     evaluate(block.kind, state, Part::place, values);
     evaluate(block.kind, state, Part::motion, values);
     if (!values.has_A) fill_A(block, p.mechanism, w.now.terms, values, w.now.A.data() + block.offset);
@@ -193,7 +193,8 @@ void evaluate_block(const Program& p, Workspace& w, double t, const VecX& v, int
 void measure_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) {
     if (p.is_users(gap)) return evaluate_gap(p, w, t, v, gap);
     const int i = p.gaps[gap].block;
-    evaluate(p.blocks[i].kind, State{p.mechanism, w.now.terms, t, w.now.terms.q, v}, Part::residual, w.now.values[i]);
+    const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
+    evaluate(p.blocks[i].kind, state, Part::residual, w.now.values[i]);
 }
 
 void follow_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) {
@@ -204,7 +205,8 @@ void follow_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap
 void move_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) {
     if (p.is_users(gap)) return;
     const int i = p.gaps[gap].block;
-    evaluate(p.blocks[i].kind, State{p.mechanism, w.now.terms, t, w.now.terms.q, v}, Part::motion, w.now.values[i]);
+    const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
+    evaluate(p.blocks[i].kind, state, Part::motion, w.now.values[i]);
 }
 
 // A contact violates where its gap is negative; that of an open one is looked at here only.

@@ -141,7 +141,14 @@ void Program::finish() {
     for (int i = 0; i < constraints; ++i) {
         moves_in_time |= pn::moves_in_time(blocks[i].kind);
         affine_rates &= blocks[i].affine_rate;
+        for (const TimeFunction* f : time_functions(blocks[i].kind)) {
+            const std::vector<double> known = pn::breaks(*f);
+            breaks.insert(breaks.end(), known.begin(), known.end());
+            if (pn::is_users(*f)) users_motions.push_back(i);
+        }
     }
+    std::sort(breaks.begin(), breaks.end());
+    breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());
     std::vector<char> constrained(mechanism.joints.size(), 0);
     for (int i = 0; i < constraints; ++i)
         for (int joint : {blocks[i].joint1, blocks[i].joint2})

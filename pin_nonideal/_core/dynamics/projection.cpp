@@ -57,7 +57,7 @@ double gather_residuals(const Program& p, Workspace& w) { return gather_residual
 
 // A v + phi_t by the rows in the workspace, which needs no motion of the bodies; a user's rate is his own function.
 double gather_rates(const Program& p, Workspace& w, double t, const VecX& v, const std::vector<char>& counts) {
-    const State state{p.mechanism, w.now.terms, t, w.now.terms.q, v};
+    const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
     for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
         if (block.affine_rate) multiply(block, w.now.A, v, w.scratch.residual);
@@ -378,11 +378,23 @@ void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, Vec
     solve_dynamics(p, w, t, v);
 }
 
-void remove_normal_part(const Program& p, Workspace& w, Eigen::Ref<VecX> motion) {
-    w.scratch.work = motion;
+void remove_normal_velocity(const Program& p, Workspace& w, Eigen::Ref<VecX> change) {
+    w.scratch.work = change;
     for (int i : w.now.rows.blocks) multiply(p.blocks[i], w.now.A, w.scratch.work, w.scratch.r);
     least_move(p, w, w.scratch.work);
-    motion -= w.scratch.work;
+    change -= w.scratch.work;
+}
+
+void remove_normal_move(const Program& p, Workspace& w, Eigen::Ref<VecX> move) {
+    w.scratch.work = move;
+    for (int i : w.now.rows.blocks) {
+        const Block& block = p.blocks[i];
+        multiply(block, w.now.A, w.scratch.work, w.scratch.r);
+        for (size_t k = 0; k < block.kept.size(); ++k)
+            if (!block.holonomic[k]) w.scratch.r[block.row + k] = 0.0;
+    }
+    least_move(p, w, w.scratch.work);
+    move -= w.scratch.work;
 }
 
 void choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {

@@ -65,8 +65,10 @@ bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 // And evaluates them there.
 void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 
-// Takes from a small motion what the rows forbid, by the factors in the workspace.
-void remove_normal_part(const Program& p, Workspace& w, Eigen::Ref<VecX> motion);
+// Take from a small change of the velocity, or from a small move, what a projection takes of it, by the factors in the
+// workspace. Nonholonomic rows bind velocities only: no projection puts a position back along them.
+void remove_normal_velocity(const Program& p, Workspace& w, Eigen::Ref<VecX> change);
+void remove_normal_move(const Program& p, Workspace& w, Eigen::Ref<VecX> move);
 
 // Chooses rows where no step has, at a state near the constraints, and moves its position onto them. The workspace must be
 // configured there.

@@ -2,6 +2,7 @@
 // last evaluation found, Scratch means nothing after the call that wrote it.
 #pragma once
 
+#include <cmath>
 #include <cstring>
 
 #include "constraints/rank.hpp"
@@ -63,6 +64,13 @@ struct Reactions {
 // What one evaluation at (t, q, v) yields.
 struct Evaluation {
     Terms terms;
+    // Rows are evaluated in this stretch of time: at its ends, where functions of time break, as inside of it.
+    double not_before = -HUGE_VAL, not_after = HUGE_VAL;
+    void set_stretch(double begin, double end) {
+        not_before = std::nextafter(begin, HUGE_VAL);
+        not_after = std::nextafter(end, -HUGE_VAL);
+    }
+    double row_time(double t) const { return t < not_before ? not_before : t > not_after ? not_after : t; }
     std::vector<RowValues> values;  // of each block
     std::vector<char> idle;  // blocks of open contacts, which are no rows and are not evaluated
     std::vector<int> awake;              // the other blocks

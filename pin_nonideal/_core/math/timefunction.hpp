@@ -54,6 +54,14 @@ inline bool is_constant(const TimeFunction& f) {
     return polynomial && polynomial->coefficients.size() <= 1;
 }
 
+// Times at which the pieces of a function meet, where its derivatives may jump; those of a user's function are not known.
+inline std::vector<double> breaks(const TimeFunction& f) {
+    const auto* spline = std::get_if<Spline>(&f);
+    return spline ? spline->breaks : std::vector<double>();
+}
+
+inline bool is_users(const TimeFunction& f) { return std::holds_alternative<std::function<Jet(double)>>(f); }
+
 inline Jet evaluate(const TimeFunction& f, double t) {
     return std::visit([t](const auto& g) { return g(t); }, f);
 }

@@ -217,6 +217,9 @@ nb::class_<Builder> bind_builder(nb::module_& m) {
         .def("add_copy", [](Builder& b, int row, int first, double factor) {
             b.p->copies.push_back({row, first, factor});
         }, "row"_a, "first"_a, "factor"_a)
+        .def("add_breaks", [](Builder& b, const std::vector<double>& times) {
+            b.p->breaks.insert(b.p->breaks.end(), times.begin(), times.end());
+        }, "times"_a)
         .def("let_open", &Builder::let_open, "restitution"_a)
         .def("set_impact", [](Builder& b, ImpactLaw law) { b.p->impact_law = law; }, "law"_a)
         .def("order_contacts", &Builder::order_contacts, "blocks"_a)

@@ -13,6 +13,8 @@ inline void clear(const Program& p, Workspace& w, const RunState& first) {
     w.state = first;
     w.counters = {};
     w.now.has_override = false;
+    w.now.not_before = -HUGE_VAL;
+    w.now.not_after = HUGE_VAL;
     w.now.several = w.now.no_motion = w.now.ideal = false;
     for (VecX* x : {&w.now.lam, &w.now.reactions.lam, &w.now.C, &w.now.C_smooth, &w.now.base_C, &w.now.a, &w.now.dz})
         x->setZero();

@@ -70,6 +70,7 @@ void bind_followed(nb::module_& m) {
         .def("derivative", &Followed::derivative, "t"_a, "y"_a)
         .def("jacobian", &Followed::jacobian, "t"_a, "y"_a)
         .def("follow", &Followed::follow, "t"_a, "interpolant"_a)
+        .def("stop_before", [](Followed& f, double end) { return f.run.stop_before(end); }, "end"_a)
         .def_prop_ro("t", [](const Followed& f) { return f.run.time(); })
         .def_prop_ro("done", [](const Followed& f) { return f.run.done(); })
         .def_prop_ro("y", [](const Followed& f) { return to_numpy(f.run.state()); }, own)

@@ -64,6 +64,7 @@ Outcome samples_inside(const Program& p, const Options& options, const Array& t,
     InsideStates inside;
     inside.t.assign(t.data(), t.data() + t.shape(0));
     inside.moved.assign(moved.data(), moved.data() + moved.shape(0));
+    inside.end = options.end();
     const size_t elements = p.frictions.size();
     for (size_t k = 0; k < t.shape(0); ++k) {
         inside.y.emplace_back(map(y).row(k));

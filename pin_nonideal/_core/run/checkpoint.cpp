@@ -44,10 +44,10 @@ static void fields(Archive& a, GapState& x) {
 }
 
 static void fields(Archive& a, Progress& x) {
-    auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, recent_events,
+    auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, found_break, recent_events,
            last_changes, sides, bridged_time, bridged_end, slip_at_start, pulls, gaps, left, impact_energy, several,
            stiff_steps, quiet_steps, rounding, next_look, turning_steps] = x;
-    a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, sides, bridged_time, bridged_end,
+    a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, found_break, sides, bridged_time, bridged_end,
       slip_at_start, pulls, left, impact_energy, several, stiff_steps, quiet_steps, rounding, next_look, turning_steps);
     fields(a, gaps);
     a.list(recent_events);

@@ -19,6 +19,7 @@ struct Progress {
     double moved_energy = 0.0;  // by projection, so far
     long samples = 0;           // of the output grid, so far
     long next_period = 0;       // of sampled control
+    double found_break = HUGE_VAL;  // of a function of time of the user's, inside the next steps
     std::vector<double> recent_events;  // times, for the count of those that come too thick
     std::vector<double> last_changes;   // times of the last instants at which modes changed
     std::vector<double> sides;          // of values that tell events by their signs

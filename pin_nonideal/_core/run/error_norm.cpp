@@ -68,22 +68,25 @@ void ErrorNorm::set_tolerances(const VecX& y0, const VecX& y1, double h) {
     share_tolerance_ = share_part * std::max(std::abs(h), shortest_resolved);
 }
 
-void ErrorNorm::raise(VecX& rounding, const VecX& dy, const VecX& y) {
+void ErrorNorm::to_tangent(const VecX& dy, const VecX& y) {
     const int nq = system_.nq, nv = system_.nv, nz = system_.nz;
     ambient_to_tangent(system_.p.mechanism, y.data(), dy.data(), tangent_.data());
     tangent_.segment(nv, nv + nz) = dy.segment(nq, nv + nz);
+}
+
+void ErrorNorm::raise(VecX& rounding, const VecX& dy, const VecX& y) {
+    to_tangent(dy, y);
     rounding = rounding.cwiseMax(tangent_.cwiseAbs());
 }
 
 double ErrorNorm::operator()(const VecX& dy, const VecX& y) {
-    const int nq = system_.nq, nv = system_.nv, nz = system_.nz;
+    const int nv = system_.nv, nz = system_.nz;
     int n = 2 * nv + nz;
-    ambient_to_tangent(system_.p.mechanism, y.data(), dy.data(), tangent_.data());
-    tangent_.segment(nv, nv + nz) = dy.segment(nq, nv + nz);
+    to_tangent(dy, y);
     if (system_.on_constraints) {
         // What the rows forbid is removed by the projection at the step's end; near a singular position it is noise.
-        remove_normal_part(system_.p, system_.w, tangent_.head(nv));
-        remove_normal_part(system_.p, system_.w, tangent_.segment(nv, nv));
+        remove_normal_move(system_.p, system_.w, tangent_.head(nv));
+        remove_normal_velocity(system_.p, system_.w, tangent_.segment(nv, nv));
     }
     double sum = 0.0;
     for (int k = 0; k < 2 * nv + nz; ++k) {
@@ -99,6 +102,12 @@ double ErrorNorm::operator()(const VecX& dy, const VecX& y) {
         ++n;
     }
     return std::sqrt(sum / n);
+}
+
+double ErrorNorm::of_projection(const VecX& dy, const VecX& y) {
+    to_tangent(dy, y);
+    const int n = system_.on_constraints ? system_.nv : 2 * system_.nv;
+    return std::sqrt((tangent_.head(n).array() / tolerance_.head(n).array()).square().mean());
 }
 
 double ErrorNorm::initial_step(int order, double t, const VecX& y, const VecX& dy, double limit) {

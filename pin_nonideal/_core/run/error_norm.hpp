@@ -19,10 +19,15 @@ public:
     void raise(VecX& rounding, const VecX& dy, const VecX& y);
     // Root mean square of dy at y, each coordinate as a part of its tolerance.
     double operator()(const VecX& dy, const VecX& y);
+    // The same of a move of positions, and of velocities where stages are not projected, by which a projection has put a
+    // step's end back; no part of it is removed.
+    double of_projection(const VecX& dy, const VecX& y);
     // Step of a method of this order from y, where the rate is dy; `limit` at most. Leaves the workspace elsewhere.
     double initial_step(int order, double t, const VecX& y, const VecX& dy, double limit);
 
 private:
+    // dy at y in tangent coordinates.
+    void to_tangent(const VecX& dy, const VecX& y);
     // Raises magnitudes to those of tangent coordinates, velocities and states at y.
     void magnitude(const VecX& y);
 

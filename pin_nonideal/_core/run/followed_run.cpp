@@ -51,8 +51,10 @@ bool FollowedRun::follow(double end, const OutsideStep::Interpolant& interpolant
     accept({stepper.h, end, true}, event);
     record(event);
     system.on_constraints = w.now.rows.distance < near_singular && !w.now.rows.blocks.empty();
-    if (event || options.method.one_step) moved_before_ = moved_energy;
-    return event.has_value();
+    const bool breaks_here = breaks.reached() && !done();
+    if (breaks_here) pass_break();
+    if (event || breaks_here || options.method.one_step) moved_before_ = moved_energy;
+    return event.has_value() || breaks_here;
 }
 
 }  // namespace pn

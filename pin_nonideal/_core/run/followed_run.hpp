@@ -3,6 +3,8 @@
 // at the first event inside, and samples are recorded.
 #pragma once
 
+#include <algorithm>
+
 #include "run/simulation.hpp"
 
 namespace pn {
@@ -17,6 +19,12 @@ public:
     // Follows a step from the present state to one at `end`; whether the integrator has to start again, from the present
     // state as it is then.
     bool follow(double end, const OutsideStep::Interpolant& interpolant);
+
+    // Where a step that an integrator may take next, to this time at most, has to end for a function of time breaks.
+    double stop_before(double end) {
+        if (!p.users_motions.empty()) breaks.look(end);
+        return std::min(end, breaks.next());
+    }
 
     double time() const { return t; }
     using Simulation::done;

@@ -33,6 +33,13 @@ void StepPolynomials::at(size_t step, double part, double* out) const {
     for (int i = 0; i < size_; ++i) out[i] /= weights;
 }
 
+// Of the step that begins at t, or of the last one at the end of the run.
+static void enter_stretch(const Program& p, Workspace& w, double t, double end) {
+    const auto first = p.breaks.begin(), last = p.breaks.end();
+    const auto next = t < end ? std::upper_bound(first, last, t) : std::lower_bound(first, last, t);
+    w.now.set_stretch(next == first ? -HUGE_VAL : *(next - 1), next == last ? HUGE_VAL : *next);
+}
+
 static void hold(const Program& p, Workspace& w, const InsideStates& inside, size_t k) {
     if (k == 0 || !(inside.modes[k] == inside.modes[k - 1])) set_modes(p, w, inside.modes[k]);
     for (size_t e = 0; e < p.frictions.size(); ++e)
@@ -50,6 +57,7 @@ void sample_inside(const Program& p, Workspace& w, const InsideStates& inside, c
     for (size_t k = 0; k < inside.t.size(); ++k) {
         y.head(system.ns) = inside.y[k];
         system.normalize(y);
+        enter_stretch(p, w, inside.t[k], inside.end);
         hold(p, w, inside, k);
         system.read(y);
         system.read_law_states(y);

@@ -27,6 +27,7 @@ struct InsideStates {
     std::vector<double> t, moved;
     std::vector<VecX> y, torque, directions;
     std::vector<std::vector<Mode>> modes;
+    double end = HUGE_VAL;  // of the run
 };
 // Puts them on the constraints and samples them.
 void sample_inside(const Program& p, Workspace& w, const InsideStates& inside, const RecordOptions& options,

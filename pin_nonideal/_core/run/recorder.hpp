@@ -16,12 +16,13 @@ namespace pn {
 
 struct Event {
     enum class Kind {
-        stick, slip, reverse, pull, chatter, several, paradox, user, saturate, desaturate, impact, touch_down, lift_off
+        stick, slip, reverse, pull, chatter, several, paradox, user, saturate, desaturate, jump, impact, touch_down, lift_off
     };
     double time;
     Kind kind;
-    int element;  // of friction; of a contact its block; of the user his function; of a drive its dof
-    Vec3 impulse = Vec3::Zero();  // of an impact: along the normal, then the directions of slip
+    int element;  // of friction; of a contact or prescribed motion its block; of the user his function; of a drive its dof
+    // Of an impact: along the normal, then the directions of slip; of a prescribed motion in place of the first.
+    Vec3 impulse = Vec3::Zero();
     double energy_change = 0.0;
     VecX v_minus = {}, v_plus = {};
     static bool of_drive(Kind kind) { return kind == Kind::saturate || kind == Kind::desaturate; }
@@ -44,6 +45,7 @@ constexpr EventKind event_kinds[] = {
     {Event::Kind::user, "user", "a function of the user crosses zero"},
     {Event::Kind::saturate, "saturate", "a drive reaches the effort that it has"},
     {Event::Kind::desaturate, "desaturate", "a drive gives again what is asked of it"},
+    {Event::Kind::jump, "jump", "the rate of a prescribed motion jumps, with an impulse"},
     {Event::Kind::impact, "impact", "a contact strikes, with an impulse"},
     {Event::Kind::touch_down, "touch_down", "a contact closes without an impulse, or its bouncing ends"},
     {Event::Kind::lift_off, "lift_off", "a contact opens"},

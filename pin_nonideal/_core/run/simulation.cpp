@@ -43,7 +43,8 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       floor(system, stepper, norm, *this, recording),
       watch(system, gaps), locator(system, stepper, slip_at_start, pulls, watch),
       output(system, stepper, *this, run_options, recording), notices(system, stepper, *this, recording),
-      value_events(run_options.events, system, stepper, *this), torques(system, *this, run_options, output),
+      value_events(run_options.events, system, stepper, *this), breaks(system, *this, output, recording),
+      torques(system, *this, run_options, output, breaks),
       landing(system, *this, watch, run_options, output, recording),
       time_stepping(system, *this, watch, run_options, torques, output, notices, value_events, recording),
       clusters(system, *this, run_options, stiffness, time_stepping, recording),
@@ -63,6 +64,7 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
     y.segment(system.nq, system.nv) = v0;
     if (system.nz > 0) y.segment(system.nq + system.nv, system.nz) = w.state.z;
     output.begin();
+    breaks.enter();
     w.state.has_held = false;
     w.state.warm = false;
     torques.sample();
@@ -134,13 +136,18 @@ void Simulation::save() {
     next_save = Clock::now() + options.save_interval;
 }
 
-void Simulation::restore(const std::string& state) { from_bytes(state, system, *this, out); }
+void Simulation::restore(const std::string& state) {
+    from_bytes(state, system, *this, out);
+    breaks.enter();
+}
 
 // --- Propose --------------------------------------------------------------------------------------------------------
 
 Simulation::Proposal Simulation::propose() {
+    if (breaks.reached()) pass_break();
     torques.sample();
     const bool adaptive = options.method.adaptive();
+    if (!p.users_motions.empty()) breaks.look(std::min(t_end, t + (adaptive ? h : options.dt)));
     double stop = torques.next_stop(t_end);
     if (!adaptive)  // the fixed grid, whatever events cut out of it
         stop = std::min(stop, options.t0 + (whole_lengths(t - options.t0, options.dt) + 1.0) * options.dt);
@@ -163,6 +170,12 @@ Simulation::Proposal Simulation::propose() {
         size = shorter;
     }
     return {size, stop, last};
+}
+
+void Simulation::pass_break() {
+    if (!breaks.pass()) return;
+    if (system.has_events()) modes.change({FoundEvent::Kind::touch, -1, t});
+    output.now();
 }
 
 // --- Integrate ------------------------------------------------------------------------------------------------------
@@ -209,10 +222,17 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
         w.state.seeks_directions &= !stepper.collocates() || size > shortest_sought;
         return error;
     }
+    const bool measures = p.moves_in_time && options.method.adaptive();
+    if (measures) moved_ = stepper.y1;
     if (!leaves_rate(proposal) || !system.is_on_constraints(t + size, stepper.y1))
         system.project_and_evaluate(t + size, stepper.y1, stepper.end_rate());
     stepper.learn();
     if (needs_end) error = stepper.error();
+    if (measures) {
+        // What projection puts back is an error that stages do not see where the constraints drive the motion.
+        moved_ -= stepper.y1;
+        error = std::max(error, norm.of_projection(moved_, stepper.y0));
+    }
     choice.look();
     return error;
 }

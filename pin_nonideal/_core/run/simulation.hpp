@@ -43,6 +43,7 @@ protected:
     void accept(const Proposal& proposal, const std::optional<FoundEvent>& event);
     void record(const std::optional<FoundEvent>& event);
 
+    void pass_break();
     void find_event();
     bool goes_on(const Failure& failure);
     void back_to_start();
@@ -73,11 +74,13 @@ protected:
     Output output;
     Notices notices;
     ValueEvents value_events;
+    Breaks breaks;
     Torques torques;
     Landing landing;
     TimeStepping time_stepping;
     Clusters clusters;
     ModeChanges modes;
+    VecX moved_;  // by the projection of the step's end
     long ticks = 0;
     Clock::time_point next_save;
     const Clock::time_point begun = Clock::now();

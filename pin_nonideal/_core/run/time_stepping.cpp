@@ -106,6 +106,7 @@ void TimeStepping::take(double end, double t_end) {
 }
 
 void TimeStepping::step(double size, double stop, double t_end) {
+    torques_.enter();
     torques_.sample();
     double& t = now_.t;
     VecX& y = now_.y;

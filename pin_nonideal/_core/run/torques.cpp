@@ -19,8 +19,9 @@ double whole_lengths(double time, double length) {
     return std::floor(time / length * (1.0 + quotient_rounding) + count_rounding);
 }
 
-Torques::Torques(System& system, Progress& progress, const Options& options, Output& output)
-    : p(system.p), w(system.w), system_(system), now_(progress), options_(options), output_(output) {}
+Torques::Torques(System& system, Progress& progress, const Options& options, Output& output, Breaks& breaks)
+    : p(system.p), w(system.w), system_(system), now_(progress), options_(options), output_(output),
+      breaks_(breaks) {}
 
 void Torques::sample() {
     const auto* sampled = std::get_if<SampledTorque>(&p.actuation);
@@ -56,7 +57,7 @@ void Torques::take_rate_anew() {
 }
 
 double Torques::next_stop(double t_end) const {
-    double stop = t_end;
+    double stop = std::min(t_end, breaks_.next());
     if (const auto* sampled = std::get_if<SampledTorque>(&p.actuation))
         stop = std::min(stop, options_.t0 + now_.next_period * sampled->period);
     if (const auto* table = std::get_if<TorqueTable>(&p.actuation)) {

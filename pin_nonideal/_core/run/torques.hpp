@@ -2,21 +2,23 @@
 // the rate is taken anew behind it.
 #pragma once
 
-#include "run/output.hpp"
+#include "run/breaks.hpp"
 
 namespace pn {
 
 class Torques {
 public:
-    Torques(System& system, Progress& progress, const Options& options, Output& output);
+    Torques(System& system, Progress& progress, const Options& options, Output& output, Breaks& breaks);
 
+    // Behind a break of functions of time that was reached: a step of time stepping finds velocities that jump itself.
+    void enter() { if (breaks_.reached()) breaks_.enter(); }
     // Of sampled control, where its next period begins now.
     void sample();
     // Of the callback, where it gives some; whether the run goes on.
     bool ask_callback();
     // In place of the actuation's from here on.
     void set(const VecX& torque);
-    // Where actuation jumps or bends next, not beyond the end of the run.
+    // Where actuation jumps or bends, or a function of time breaks next, not beyond the end of the run.
     double next_stop(double t_end) const;
 
 private:
@@ -28,6 +30,7 @@ private:
     Progress& now_;
     const Options& options_;
     Output& output_;
+    Breaks& breaks_;
 };
 
 // Number of whole lengths in a time that should be a multiple of them, but for rounding.
