@@ -18,6 +18,7 @@ from .constraints import *
 from .contacts import *
 from .equation import Solution, solve
 from .errors import (
+    DivergenceError,
     EquilibriumError,
     FrictionConvergenceError,
     FrictionParadoxError,
@@ -109,6 +110,7 @@ def __dir__() -> list[str]:
 __all__ = [
     "ConeResiduals",
     "ConeSolution",
+    "DivergenceError",
     "Equilibrium",
     "EquilibriumError",
     "Event",

@@ -150,6 +150,8 @@ def _arrays(
     if scene._unit_parts:
         q = np.array([scene._configuration(one, "q") for one in q]).reshape(q.shape)
     require_resolved(scene.model, q)
+    if len(q):
+        scene._compiled.check_functions(q[0], v[0], options.t0)
     on, v_on, opened = scene._compiled.projection.nearest_of_each(q, v, options.t0, threads, numbers)
     for i, failure in opened.items():
         error = scene._compiled.named(failure) if isinstance(failure, core.CoreFailure) else failure
@@ -177,6 +179,8 @@ def _run(
     if scene._unit_parts:
         q = np.array([scene._configuration(one, "q") for one in q]).reshape(q.shape)
     require_resolved(scene.model, q)
+    if len(q):
+        compiled.check_functions(q[0], v[0], options.t0)
     on, v_on, open_starts = compiled.projection.nearest_of_each(q, v, options.t0, threads, numbers)
     results: list[Any] = [None] * len(q)
     for i, failure in open_starts.items():

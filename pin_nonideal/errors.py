@@ -177,6 +177,24 @@ class StiffnessError(StepSizeError):
         self.rate = rate
 
 
+class DivergenceError(RunError):
+    """Speeds grow exponentially over many decades: the motion is unstable.
+
+    Attributes:
+        joint: name of the fastest joint.
+        source: words for what does most work on the motion: the actuation, forces or laws.
+        rate: of the growth [1/s].
+    """
+
+    def __init__(
+        self, message: str, *, joint: str, source: str, rate: float, time: float | None = None
+    ) -> None:
+        super().__init__(message, time=time)
+        self.joint = joint
+        self.source = source
+        self.rate = rate
+
+
 class UserFunctionError(RunError):
     """A function passed by the user raised, or returned a value of wrong shape or not finite."""
 

@@ -20,11 +20,10 @@ from .formats.example_robots import example_names, example_robot
 from .formats.generators import GENERATORS
 from .formats.robot_yaml import MODEL_KEYS, check_keys, optional_string, read_yaml
 from .formats.rounding import relaxed
-from .formats.starts import Start
+from .formats.starts import Start, held_start
 from .formats.urdf import RobotFile, read_urdf
 from .formats.xml import listed
 from .scene import Scene, loaded
-from .states.named import named_entries
 from .types import Table
 
 FILE_PARAMETERS = ("free_flyer", "package_dirs", "merge_ball_joints", "density")
@@ -62,8 +61,9 @@ def load(
         q0: initial configuration in place of the file's: numbers (nq,), a table by joint name that changes
             some of them (see `Scene`), or the name of a reference configuration (of a keyframe of an MJCF
             file, whose velocities and controls come along).
-        v0: initial velocity in place of the file's: numbers (nv,), or a table by joint name, whose entries
-            are held while the others follow the constraints.
+        v0: initial velocity in place of the file's: numbers (nv,), or a table by joint name.  Entries of
+            tables, and without them those that the file's own tables name, are held while the others follow
+            the constraints.
         assembly_tolerance: to which the frames of the file's loops are given [m or rad], as exports of CAD
             round them: rows that depend on others to this tolerance are left out, which `notes` tell.
         limits: whether the limits of positions in the file are stops of the joints, each a `JointLimit`
@@ -107,7 +107,7 @@ def load(
         arguments.update(model=parts.model, constraints=parts.constraints, q0=parts.q)
         arguments["notes"] = (*scene.notes, parts.note)
         scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
-    scene._held = named_entries(scene.model, v0)
+    scene._held = held_start(found.robot, found.table, q0, v0)
     return _with_origin(scene, _origin(text, given), found)
 
 

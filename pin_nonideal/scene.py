@@ -29,8 +29,8 @@ from .scene_steps import Steps
 from .scene_tables import Tables
 from .states.closure import CLOSURE_TOLERANCE
 from .states.configurations import unit_parts
-from .states.named import named_configuration, named_entries
-from .states.projection import ProjectionReport
+from .states.named import named_configuration, named_coordinates, named_entries
+from .states.projection import Held, ProjectionReport
 from .types import Array, GeometryModel, Model, State, Table
 
 Rest = ParamSpec("Rest")
@@ -62,7 +62,8 @@ class Scene(States, Geometry, Tables, Steps):
             are here.  Here and wherever a configuration is taken it is an array (nq,), a table by joint name,
             {"crank": 1.0, "base": {"xyz": [0, 0, 1], "rpy": [0, 0, 1.57]}}, which leaves the others as they
             are (in `solve`, `project` and `simulate` as in the scene's initial state), or the name of a
-            reference configuration.
+            reference configuration.  Where a state is put on the constraints the entries of a table are held
+            and the others follow by the least move.
         v0: initial velocity, an array (nv,), or a table by joint name whose entries are held while the others
             follow the constraints; zero when None.
         visual_model: pinocchio.GeometryModel for the replay, or a function that makes it when asked for.
@@ -144,14 +145,16 @@ class Scene(States, Geometry, Tables, Steps):
             self._q0 = named_configuration(model, q0, self._q0, "q0", self._unit_parts)
         if v0 is not None:
             self._v0 = self._velocity(v0, "v0")
-        self._held = named_entries(model, v0)
+        self._held = Held(named_coordinates(model, q0), named_entries(model, v0))
         for state in (self._q0, self._v0):
             state.setflags(write=False)
         said = Descriptions(
             self.constraints, self.contacts, self.laws, self.forces, actuation, terms, self.impact
         )
         tolerance = nonnegative("Scene: assembly_tolerance", assembly_tolerance)
-        self._compiled = CompiledScene(model, self.q0, self.v0, said, tolerance)
+        self._compiled = CompiledScene(model, self.q0, said, tolerance, q0 is not None)
+        if q0 is not None:
+            self._compiled.check_functions(self.q0, self.v0, 0.0)
         self.constraint_slices, self.anchor_frames = self._compiled.slices, self._compiled.anchors
         self.contact_names = self._compiled.contact_names
         self.element_names = self._compiled.program.element_names
@@ -266,6 +269,8 @@ class Scene(States, Geometry, Tables, Steps):
             InconsistentConstraintsError, FrictionParadoxError, SingularMassError: there is no solution.
         """
         self._require_unchanged()
+        if self._compiled.unchecked:
+            self._checked_at(q, v, t)
         a = np.empty(self._nv)
         self._runner.continues = choice("acceleration: several", several, SEVERAL) == "continue"
         try:  # arrays of the right shape go straight to the core, which checks sizes, lengths and finiteness
@@ -285,6 +290,7 @@ class Scene(States, Geometry, Tables, Steps):
         **named: Rest.kwargs,
     ) -> Result:
         q_in, v_in = self._configuration(q, "q"), self._velocity(v, "v")
+        self._checked_at(q_in, v_in, t)
         torque = None if tau is None else np.array(array("tau", tau, (self.model.nv,)))
         try:
             return function(q_in, v_in, number("t", t), torque, *rest, **named)

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .checks import choice, number
 from .errors import InputError
 from .states.configurations import require_resolved
-from .states.held import told
-from .states.named import named_configuration, named_entries, named_velocity
-from .states.projection import ProjectionReport
+from .states.held import changed, changes, told
+from .states.named import named_configuration, named_coordinates, named_entries, named_velocity
+from .states.projection import Held, ProjectionReport
 from .types import Array, Model, State
 
 if TYPE_CHECKING:
@@ -32,7 +31,7 @@ class States:
         _unit_parts: tuple[tuple[str, slice], ...]
         _q0: Array
         _v0: Array
-        _held: NDArray[np.bool_] | None
+        _held: Held
         _compiled: CompiledScene
         _closed: tuple[Array, Array, ProjectionReport] | None
         _told: list[str] | None
@@ -62,6 +61,12 @@ class States:
                 f'the model of scene "{self.name}" was changed after the scene was made, which has its own '
                 "numbers; make a new Scene of the changed model"
             )
+
+    def _checked_at(self, q: State, v: State, t: float) -> None:
+        """Compares derivatives of the user's functions where none were known before."""
+        if self._compiled.unchecked:
+            start = self._configuration(q, "q"), self._velocity(v, "v")
+            self._compiled.check_functions(*start, number("t", t))
 
     def _velocity(self, v: State, what: str) -> Array:
         return named_velocity(self.model, v, self._v0, what)
@@ -113,17 +118,19 @@ class States:
 
         Args:
             q: configuration, (nq,) or by joint name; the scene's initial one when None.
-            v: velocity, (nv,) or by joint name; the scene's initial one when None.  Entries that are named
-                are held, and the others follow.
+            v: velocity, (nv,) or by joint name; the scene's initial one when None.  Entries of q and v that
+                are named are held, and the others follow; where the constraints leave no such configuration
+                but one within a thousandth of a radian or of the mechanism's length, named entries are taken
+                for rounded numbers, and move there.
             t: time [s].
-            report: also returns how far q moved, a `ProjectionReport`.
+            report: also returns how far q and v moved, a `ProjectionReport`.
 
         Returns:
             q (nq,), v (nv,), and with `report` the report.
 
         Raises:
             LoopClosureError: the constraints cannot be met from here; `gaps` names each gap.
-            InputError: wrong shapes or numbers, named velocities that the constraints do not allow together,
+            InputError: wrong shapes or numbers, named entries that the constraints do not allow together,
                 a contact that starts deep inside its plane or has no short way out of it, or a coordinate
                 where floating-point numbers are more than a millimeter or milliradian apart.
         """
@@ -133,32 +140,41 @@ class States:
         else:
             q_in = self.q0 if q is None else self._configuration(q, "q")
             v_in = self.v0 if v is None else self._velocity(v, "v")
-            held = self._held if v is None else named_entries(self.model, v)
-            found = self._project(q_in, v_in, time, held)
+            found = self._project(q_in, v_in, time, self._named(q, v, time))
         return found if wanted else found[:2]
 
-    def _project(
-        self, q: Array, v: Array, t: float, held: NDArray[np.bool_] | None
-    ) -> tuple[Array, Array, ProjectionReport]:
+    def _named(self, q: State | None, v: State | None, t: float = 0.0) -> Held:
+        """Entries that are named by a state, or by the scene's own, which are those of its own start."""
+        return Held(
+            self._held.q if q is None else named_coordinates(self.model, q),
+            self._held.v if v is None else named_entries(self.model, v),
+            firm_q=q is not None or t == 0.0,
+            firm_v=v is not None or (q is None and t == 0.0),
+        )
+
+    def _project(self, q: Array, v: Array, t: float, held: Held) -> tuple[Array, Array, ProjectionReport]:
         require_resolved(self.model, q)
+        self._compiled.check_functions(q, v, t)
         return self._compiled.project(q, v, t, held)
 
     def _followed(self, v: State | None, on: Array) -> list[str]:
-        """A note on velocities that follow the named ones."""
-        held = self._held if v is None else named_entries(self.model, v)
-        if held is None:
-            return []
-        return told(self.model, self.v0 if v is None else self._velocity(v, "v"), on, held)
+        """A note on velocities that follow named ones, or that were changed to meet the constraints."""
+        held = self._named(None, v).v
+        asked = self.v0 if v is None else self._velocity(v, "v")
+        if held is None or changes(asked, on, held):
+            return changed(self.model, asked, on)
+        return told(self.model, asked, on, held)
 
-    def _moved(self, q: State, on: Array) -> list[str]:
+    def _moved(self, q: State | None, on: Array) -> list[str]:
         """What to tell of a configuration that was moved onto the constraints, see `Projection.notes`."""
         if isinstance(q, np.ndarray) and (_same_bytes(q, on) or np.array_equal(q, on)):
             return []
-        return self._compiled.projection.notes(self._configuration(q, "q"), on)
+        asked = self.q0 if q is None else self._configuration(q, "q")
+        return self._compiled.projection.notes(asked, on, self._named(q, None).q)
 
     def _start_notes(self) -> list[str]:
         """What to tell of the scene's own initial state, once it is closed."""
         if self._told is None:
             q, v = self.initial_state()
-            self._told = self._moved(self.q0, q) + self._followed(None, v)
+            self._told = self._moved(None, q) + self._followed(None, v)
         return self._told

@@ -99,6 +99,7 @@ class Stepper:
         model = self._compiled.model
         at, speed = array("Stepper: q", q, (model.nq,)), array("Stepper: v", v, (model.nv,))
         time = number("Stepper: t", t)
+        self._compiled.check_functions(at, speed, time)
         self._guarded(lambda torque: self._run.begin(at, speed, time, torque), tau)
 
     def _guarded(self, act: Callable[[Any], None], tau: ArrayLike | None) -> None:
@@ -128,6 +129,7 @@ class Steps:
         _steps: dict[tuple[str, float], core.SteppedRun]
         _call: Callable[..., Any]
         _require_unchanged: Callable[[], None]
+        _checked_at: Callable[[State, State, float], None]
         project: Callable[..., Any]
 
     def step(
@@ -167,6 +169,8 @@ class Steps:
             choice("step: method", method, FIXED)
             length = positive("step: dt", dt)
             run = self._steps[method, length] = self._new_run(method, length, length, RTOL, ATOL)
+        if self._compiled.unchecked:
+            self._checked_at(q, v, t)
         try:  # arrays of the right shape go straight to the core, which checks sizes, lengths and finiteness
             return run.step(q, v, t, tau)
         except (TypeError, ValueError, core.CoreFailure):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -56,10 +56,10 @@ def simulate(
         scene: what to simulate.
         duration: length of time [s].
         q: initial configuration, (nq,) or by joint name (see `Scene`); the scene's when None.  It is
-            projected onto the constraints first (`Scene.project`); `Trajectory.notes` tells of one that moved
-            more than a little, and where it was given here a RuntimeWarning does.
-        v: initial velocity, (nv,) or by joint name; the scene's when None.  An array is projected onto the
-            constraints; entries that are named are held, and the others follow, as a note says.
+            projected onto the constraints first (`Scene.project`): an array by the least move, while entries
+            that are named are held and the others follow.  `Trajectory.notes` tells of what moved more than a
+            little, and of an array that was given here a RuntimeWarning does.
+        v: initial velocity, (nv,) or by joint name; the scene's when None.  The same holds for it.
         t0: initial time [s].
         method: "dop853" (order 8) or "dopri5" (order 5), adaptive; "rk4", "semi_implicit_euler" or "moreau"
             (time stepping at velocity level), fixed dt; "Radau", "BDF" or "LSODA" by SciPy, for stiff scenes.
@@ -101,6 +101,8 @@ def simulate(
         OutputError: the checkpoint cannot be written.
         LoopClosureError: the initial state cannot be put on the constraints, or the run was pulled off them.
         StiffnessError: the scene is stiff, and the method explicit; `joint` and `rate` say where and how.
+        DivergenceError: speeds grow exponentially over many decades, and max_steps was not given; `joint`,
+            `source` and `rate` say where, by what and how.
         WallTimeError: `max_wall` is over.
         RunError: the run stopped early; its `trajectory` holds the samples up to there.
         ImpactEnergyError: an impact gained energy, and `strict` was asked for.
@@ -116,10 +118,11 @@ def simulate(
         scene.project(q, v, options.t0) if (q is not None or v is not None or t0) else scene.initial_state()
     )
     own = q is None and v is None and not t0
-    moved = [] if own else scene._moved(scene.q0 if q is None else q, q0)
-    notes = scene._start_notes() if own else moved + scene._followed(v, v0)
-    if moved and q is not None:
-        warnings.warn(f"simulate: {moved[0]}", RuntimeWarning, stacklevel=2)
+    moved, followed = ([], scene._start_notes()) if own else (scene._moved(q, q0), scene._followed(v, v0))
+    notes = moved + followed
+    for given, told in ((q, moved), (v, followed)):
+        if told and given is not None and not isinstance(given, Mapping):
+            warnings.warn(f"simulate: {told[0]}", RuntimeWarning, stacklevel=2)
     choice("simulate: progress", progress, (True, False, None))
     between = asked_callback(callback, scene.model.nv)
     _check_together(method, asked, callback, checkpoint)
@@ -129,9 +132,10 @@ def simulate(
 
         saver = Saver(checkpoint, scene, options, checkpoint_interval)
     hints: list[str] = []
+    explicit_only = scene._compiled.explicit_only
 
     def hint(at: float, dof: int, rate: float, decays: bool) -> None:
-        hints.append(f"from t = {at:.4g} s on {stiff_hint(scene.model, dof, rate, decays)}")
+        hints.append(f"from t = {at:.4g} s on {stiff_hint(scene.model, dof, rate, decays, explicit_only)}")
         warnings.warn(f"simulate: {hints[0]}", RuntimeWarning, stacklevel=4)
 
     begin = time.perf_counter()

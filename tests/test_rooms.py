@@ -47,14 +47,14 @@ forces: given_forces laws mode friction
 dynamics: failure program numbers reaction_equation reaction_roots workspace \
 given_forces law_forces solution \
 reactions split slip unknowns uniqueness implicit power evaluation projection step_start
-friction: dense_solver box_program lorentz cone_program cone_problem cone_newton cone_path cone_shares \
-cone_certificate cone_complementarity rest_equation rest_solver rest_branches problem rest_problem \
-beginning each_choice modes continuation
+friction: friction_limits dense_solver box_program lorentz cone_program cone_problem cone_newton cone_path \
+cone_shares cone_certificate cone_complementarity rest_equation rest_solver rest_branches problem \
+rest_problem beginning each_choice modes continuation
 contact: gaps reach ways separation contact_rows impact resting closing moving_out
 run: archive method step outside_step step_control runge_kutta system semi_implicit_euler error_norm \
 collocation stepper gap_watch gap_search moreau moreau_contacts dense_output recorder inside_samples \
-checkpoint options output stiffness rounding event_search event_location events stepper_choice bouncing \
-notices value_events breaks torques landing time_stepping clusters mode_changes simulation followed_run \
+checkpoint options output stiffness growth rounding event_search event_location events stepper_choice \
+bouncing notices value_events breaks torques landing time_stepping clusters mode_changes simulation followed_run \
 stepped_run
 python: arrays buffers failures callbacks builder constraints cleared kept_run options runner \
 run_programs share_out runs batch followed stepped program cones module

@@ -1,24 +1,36 @@
-"""What is found once, before the first step: bad numbers in the model, idle rows, wrong derivatives."""
+"""What is found once, before the first step: bad numbers in the model, idle rows, wrong derivatives.
+
+Functions of the user are called near states of a run only: rows that they make are never idle.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.checks import array
-from pin_nonideal.constraints import UserConstraint
+from pin_nonideal.constraints import Distance, PrescribedMotion, UserConstraint
 from pin_nonideal.contacts import UserContact
 from pin_nonideal.core import core
-from pin_nonideal.errors import InconsistentConstraintsError, InputError, LoopClosureError
+from pin_nonideal.errors import InconsistentConstraintsError, InputError, LoopClosureError, UserFunctionError
+from pin_nonideal.laws import UserFriction
 from pin_nonideal.states.closure import CLOSURE_TOLERANCE
 from pin_nonideal.states.rows import copies, row_slices, rows_at
+from pin_nonideal.timefunctions import Constant, Polynomial, Sinusoid, Spline
 from pin_nonideal.types import Array, Model
+
+from .lowering import Descriptions
 
 Rows = NDArray[np.bool_]
 
+# Functions of time that call none of the user's.
+KNOWN = (Constant, Polynomial, Sinusoid, Spline)
 # Rows below this part of the largest entry of A at random states vanish structurally: rounding of the
 # kinematics.
 STRUCTURAL = 1e-11
@@ -28,8 +40,11 @@ SUM_ROUNDING = 1e-9
 LEAST_LENGTH = 1e-300
 # The derivatives of a user's constraint are compared with differences, which carry about this relative error.
 DERIVATIVE_TOLERANCE = 1e-4
-# Step of these [s], the cube root of unit roundoff, and an instant that no function singles out.
-DIFFERENCE, AN_INSTANT = 1e-5, 0.21
+# Step of these [s], the cube root of unit roundoff, and how long after a start they are taken: at an instant
+# that no function singles out.
+DIFFERENCE, AFTER_START = 1e-5, 0.21
+# Parts of random moves [rad or m] around a start: a function that has no value there is tried closer to it.
+AROUND = (0.1, 1e-2, 1e-3, 1e-4)
 
 
 def check_model(model: Model) -> None:
@@ -65,8 +80,58 @@ def check_model(model: Model) -> None:
         )
 
 
+def without_functions(said: Descriptions, nv: int) -> Descriptions | None:
+    """A scene with the same rows, in which nothing stands for functions of the user; None where it has none.
+
+    Args:
+        said: what the scene is made of.
+        nv: number of degrees of freedom.
+    """
+    constraints = tuple(_without_function(c, nv) for c in said.constraints)
+    contacts = tuple(_without_function(c, nv) for c in said.contacts)
+    laws = tuple(_without_function(law, nv) for law in said.laws)
+    pairs = zip(
+        (*constraints, *contacts, *laws), (*said.constraints, *said.contacts, *said.laws), strict=True
+    )
+    if all(one is other for one, other in pairs):
+        return None
+    return said._replace(constraints=constraints, contacts=contacts, laws=laws)
+
+
+def _without_function(c: Any, nv: int) -> Any:
+    """A description with zeros for rows, gaps and directions of the user, and a number for a drive."""
+    if isinstance(c, UserConstraint):
+        rows, zeros = (np.zeros((c.size, nv)), np.zeros(c.size)), np.zeros(c.size)
+        return replace(
+            c,
+            function=lambda t, q, v, data: rows,
+            residual=None if c.residual is None else lambda t, q: zeros,
+            rate=None if c.rate is None else lambda t, q, v: zeros,
+        )
+    if isinstance(c, UserContact):
+        rows, zeros = (np.zeros((1, nv)), np.zeros(1)), np.zeros(1)
+        return replace(
+            c,
+            function=lambda t, q, v, data: rows,
+            gap=lambda t, q: zeros,
+            rate=None if c.rate is None else lambda t, q, v: zeros,
+            directions=None if c.directions is None else lambda t, q: np.zeros((1, nv)),
+        )
+    if isinstance(c, UserFriction):
+        return replace(c, direction=lambda t, q: np.zeros(nv))
+    if isinstance(c, PrescribedMotion) and not isinstance(c.function, KNOWN):
+        return replace(c, function=Constant(0.0))
+    if isinstance(c, Distance) and callable(c.length) and not isinstance(c.length, KNOWN):
+        return replace(c, length=Constant(1.0))
+    return c
+
+
 def idle_rows(
-    model: Model, q0: Array, program: core.Program, tolerance: float = CLOSURE_TOLERANCE
+    model: Model,
+    q0: Array,
+    program: core.Program,
+    sampled: core.Program,
+    tolerance: float = CLOSURE_TOLERANCE,
 ) -> tuple[list[tuple[str, int, str]], list[tuple[int, int, float]]]:
     """Rows that can never act: they vanish at every state, or are copies of others.
 
@@ -74,6 +139,7 @@ def idle_rows(
         model: pinocchio.Model.
         q0: configuration around which the rows are sampled, (nq,).
         program: the scene with all its rows.
+        sampled: the same without functions of the user, see `without_functions`.
         tolerance: gap that a row that vanishes may have [m or rad].
 
     Returns:
@@ -92,7 +158,7 @@ def idle_rows(
     opens = np.array([c.name in opening for c in blocks for _ in range(c.count)], dtype=bool)
     if fixed.all():
         return [], []
-    runner, generator, samples = program.runner(), np.random.default_rng(1), []
+    runner, generator, samples = sampled.runner(), np.random.default_rng(1), []
     for _ in range(3):
         q = pin.integrate(model, q0, generator.standard_normal(model.nv))
         samples.append(rows_at(runner, q, generator.standard_normal(model.nv), 0.37)[:3])
@@ -129,17 +195,29 @@ def _check_vanishing(
         )
 
 
+def has_rates(c: object) -> bool:
+    """Whether a description holds functions of the user that are derivatives of each other.
+
+    Args:
+        c: constraint or contact.
+    """
+    return isinstance(c, UserContact) or (
+        isinstance(c, UserConstraint) and (c.residual is not None or c.rate is not None)
+    )
+
+
 def check_user_functions(
-    model: Model, q0: Array, v0: Array, described: Mapping[str, object], program: core.Program
+    model: Model, q0: Array, v0: Array, t0: float, described: Mapping[str, object], program: core.Program
 ) -> None:
     """Compares once, by central differences: d residual/dt = rate and d rate/dt = A a - b.
 
-    The residual of a contact is its gap.
+    The residual of a contact is its gap.  Functions that have no value around the start are left to the run.
 
     Args:
         model: pinocchio.Model.
-        q0: configuration near which they are compared, (nq,).
+        q0: configuration near which they are compared, that of a start, (nq,).
         v0: velocity, (nv,).
+        t0: time of the start [s].
         described: constraints and contacts by their names.
         program: the scene as the core knows it.
 
@@ -147,39 +225,44 @@ def check_user_functions(
         InputError: they differ.
     """
     slices = row_slices(program)
-    mine = [
-        (slices[name], f'{type(c).__name__} "{name}"', c)
-        for name, c in described.items()
-        if isinstance(c, UserContact)
-        or (isinstance(c, UserConstraint) and (c.residual is not None or c.rate is not None))
-    ]
-    if not mine:
-        return
-    runner, h, t = program.runner(), DIFFERENCE, AN_INSTANT
-    generator = np.random.default_rng(3)
-    n = model.nv
-    for rows, name, c in mine:
-        q = pin.integrate(model, q0, 0.1 * generator.standard_normal(n))
-        v, a = v0 + generator.standard_normal(n), generator.standard_normal(n)
-        A, b, _, rate = (x[rows] for x in rows_at(runner, q, v, t))
-        ends = []
-        for s in (h, -h):
-            ahead = pin.integrate(model, q, s * v + 0.5 * s * s * a)
-            ends.append(rows_at(runner, ahead, v + s * a, t + s))
-        size = float(np.abs(A).max()) * (1.0 + float(np.abs(v).max())) ** 2
-        scale = 1.0 + size + float(np.abs(b).max())
-        if isinstance(c, UserContact) or c.residual is not None:
-            difference = (ends[0][2] - ends[1][2])[rows] / (2.0 * h)
-            _compare(
-                name,
-                "d gap/dt" if isinstance(c, UserContact) else "d residual/dt",
-                difference,
-                "rate",
-                rate,
-                scale,
-            )
-        difference = (ends[0][3] - ends[1][3])[rows] / (2.0 * h)
-        _compare(name, "d rate/dt", difference, "A a - b", A @ a - b, scale)
+    runner, generator = program.runner(), np.random.default_rng(3)
+    for name, c in described.items():
+        if not has_rates(c):
+            continue
+        moves = [generator.standard_normal(model.nv) for _ in range(3)]
+        for part in AROUND:
+            q, t = pin.integrate(model, q0, part * moves[0]), t0 + part / AROUND[0] * AFTER_START
+            with suppress(UserFunctionError), np.errstate(all="ignore"):
+                _check_derivatives(model, runner, q, v0 + moves[1], moves[2], t, slices[name], name, c)
+                break
+
+
+def _check_derivatives(
+    model: Model,
+    runner: core.Runner,
+    q: Array,
+    v: Array,
+    a: Array,
+    t: float,
+    rows: slice,
+    name: str,
+    c: Any,
+) -> None:
+    """The comparison at one state, along a motion with an acceleration."""
+    h, who = DIFFERENCE, f'{type(c).__name__} "{name}"'
+    A, b, _, rate = (x[rows] for x in rows_at(runner, q, v, t))
+    ends = []
+    for s in (h, -h):
+        ahead = pin.integrate(model, q, s * v + 0.5 * s * s * a)
+        ends.append(rows_at(runner, ahead, v + s * a, t + s))
+    size = float(np.abs(A).max()) * (1.0 + float(np.abs(v).max())) ** 2
+    scale = 1.0 + size + float(np.abs(b).max())
+    if isinstance(c, UserContact) or c.residual is not None:
+        difference = (ends[0][2] - ends[1][2])[rows] / (2.0 * h)
+        of_what = "d gap/dt" if isinstance(c, UserContact) else "d residual/dt"
+        _compare(who, of_what, difference, "rate", rate, scale)
+    difference = (ends[0][3] - ends[1][3])[rows] / (2.0 * h)
+    _compare(who, "d rate/dt", difference, "A a - b", A @ a - b, scale)
 
 
 def _compare(name: str, left: str, x: Array, right: str, y: Array, scale: float) -> None:

@@ -99,6 +99,31 @@ def numbers_of(part: Any, shape: tuple[int, ...], who: str) -> Array:
     return np.asarray(result.reshape(shape), order="C")
 
 
+def checked_limits(function: Callable[..., Any], who: str) -> Callable[..., tuple[float, float]]:
+    """The user's limit of friction as two numbers, against slip forward and backward.
+
+    Args:
+        function: what the user passed, which returns one number for both, or two.
+        who: words for messages.
+    """
+    ask = named(function, who)
+
+    def call(*arguments: Any) -> tuple[float, float]:
+        value = ask(*arguments)
+        if type(value) is float and 0.0 <= value < math.inf:
+            return value, value
+        two = isinstance(value, (tuple, list)) or (np.ndim(value) == 1 and np.size(value) == 2)
+        try:
+            numbers = numbers_of(value, (2,) if two else (), who).reshape(-1).tolist()
+        except UserFunctionError as error:
+            raise _failed(str(error), arguments) from None
+        if min(numbers) < 0.0:
+            raise UserFunctionError(f"{who} must not be negative; got {min(numbers):g}")
+        return numbers[0], numbers[-1]
+
+    return call
+
+
 def time_function(function: Any, who: str) -> Any:
     """A function of time as numbers for the core, or checked when it is the user's.
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import pinocchio as pin
 
 from pin_nonideal.core import core
 from pin_nonideal.errors import (
+    DivergenceError,
     FrictionConvergenceError,
     FrictionParadoxError,
     ImpactEnergyError,
@@ -41,13 +43,28 @@ def opened(name: str, gaps: dict[str, float], t: float, after: str = "") -> Loop
     )
 
 
-def named_failure(failure: core.CoreFailure, model: Model, program: core.Program) -> RunError:
+class Circumstances(NamedTuple):
+    """Parts of a scene that errors of its runs refer to.
+
+    Attributes:
+        explicit_only: words for what no implicit method here takes, empty where they take all.
+        sources: words for the actuation, the given forces and the laws.
+    """
+
+    explicit_only: str
+    sources: tuple[str, str, str]
+
+
+def named_failure(
+    failure: core.CoreFailure, model: Model, program: core.Program, around: Circumstances
+) -> RunError:
     """The exception that says in names what the core says in numbers.
 
     Args:
         failure: the core's CoreFailure.
         model: pinocchio.Model.
         program: the scene as the core knows it.
+        around: parts of the scene to be named.
     """
     kinds, kind, t, value = core.FailureKind, failure.kind, failure.time, failure.value
     if kind is kinds.singular_mass:
@@ -71,7 +88,9 @@ def named_failure(failure: core.CoreFailure, model: Model, program: core.Program
     if kind is kinds.impact_energy:
         return _gained(", ".join(program.constraints[i].name for i in failure.elements), value, t)
     if kind is kinds.stiff:
-        return _stiff(model, failure.elements[0], value, t)
+        return _stiff(model, failure.elements[0], value, t, around.explicit_only)
+    if kind is kinds.growing:
+        return _growing(model, failure.elements[0], around.sources[failure.elements[1]], value, t)
     if kind is kinds.steps:
         return StepSizeError(
             f"the run has taken all of its max_steps = {value:.0f} steps by t = {t:.4g} s; allow more, "
@@ -84,7 +103,7 @@ def named_failure(failure: core.CoreFailure, model: Model, program: core.Program
             "rtol and atol, or simulate a shorter duration",
             time=t,
         )
-    return _stuck(value, t)
+    return _stuck(value, t, around.explicit_only)
 
 
 def _gained(element: str, gain: float, t: float) -> RunError:
@@ -97,19 +116,38 @@ def _gained(element: str, gain: float, t: float) -> RunError:
     )
 
 
-def _stiff(model: Model, dof: int, rate: float, t: float) -> RunError:
+def _growing(model: Model, dof: int, source: str, rate: float, t: float) -> RunError:
     joint = str(model.names[joint_of(model, dof)])
+    return DivergenceError(
+        f'the speed of joint "{joint}" grows without bound by t = {t:.4g} s, by a factor of e every '
+        f"{1.0 / rate:.2g} s over many decades, and {source} does most work on it: the motion is unstable; "
+        "look at the signs, gains and delays there, or follow it all the same with max_steps",
+        joint=joint,
+        source=source,
+        rate=rate,
+        time=t,
+    )
+
+
+def _stiff(model: Model, dof: int, rate: float, t: float, explicit_only: str) -> RunError:
+    joint = str(model.names[joint_of(model, dof)])
+    ways_out = (
+        "look at its damping, stiffness and inertia, or allow the steps with max_steps, since "
+        f"{explicit_only}"
+        if explicit_only
+        else "look at its damping, stiffness and inertia, "
+        'use method="Radau", or allow the steps with max_steps'
+    )
     return StiffnessError(
         f'joint "{joint}" is stiff at t = {t:.4g} s: its motion relaxes at {rate:.2g} 1/s, and an explicit '
-        "method takes steps that short, too many to reach the end; look at its damping, stiffness and "
-        'inertia, use method="Radau", or allow the steps with max_steps',
+        f"method takes steps that short, too many to reach the end; {ways_out}",
         joint=joint,
         rate=rate,
         time=t,
     )
 
 
-def stiff_hint(model: Model, dof: int, rate: float, decays: bool) -> str:
+def stiff_hint(model: Model, dof: int, rate: float, decays: bool, explicit_only: str) -> str:
     """What to know of a run that takes long because its steps follow a fast motion.
 
     Args:
@@ -117,16 +155,23 @@ def stiff_hint(model: Model, dof: int, rate: float, decays: bool) -> str:
         dof: the one whose force does most to the fastest motion.
         rate: of that motion [1/s].
         decays: whether it decays; else it swings.
+        explicit_only: words for what no implicit method here takes, empty where they take all.
     """
     joint = str(model.names[joint_of(model, dof)])
     if decays:
+        ways_out = (
+            f"look at its damping, stiffness and inertia, or wait, since {explicit_only}"
+            if explicit_only
+            else 'use method="Radau", or look at its damping, stiffness and inertia'
+        )
         return (
             f'joint "{joint}" is stiff: its motion relaxes at {rate:.2g} 1/s, and an explicit method takes '
-            'steps that short; use method="Radau", or look at its damping, stiffness and inertia'
+            f"steps that short; {ways_out}"
         )
+    ways_out = "" if explicit_only else 'damp them and use method="Radau", or '
     return (
         f'joint "{joint}" swings at {rate:.2g} rad/s, and the steps follow it; where these vibrations do not '
-        'matter, damp them and use method="Radau", or loosen rtol and atol'
+        f"matter, {ways_out}loosen rtol and atol"
     )
 
 
@@ -163,16 +208,17 @@ def _unresolved(element: str, t: float) -> RunError:
     )
 
 
-def _stuck(steps: float, t: float) -> RunError:
+def _stuck(steps: float, t: float, explicit_only: str) -> RunError:
+    last = "or loosen rtol and atol" if explicit_only else 'loosen rtol and atol, or use "Radau"'
     if steps:
         return StepSizeError(
             f"the run would never end: after {steps:.0f} steps it has come to t = {t:.4g} s; "
-            'simulate a shorter duration, loosen rtol and atol, or use "Radau"',
+            f"simulate a shorter duration, {last}",
             time=t,
         )
     return StepSizeError(
         f"the step size fell below rounding at t = {t:.6g} s: the motion is singular there, or stiff; "
-        'look at the last samples, loosen rtol and atol, or use "Radau"',
+        f"look at the last samples, {last}",
         time=t,
     )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +12,7 @@ import pinocchio as pin
 from pin_nonideal.constraints import HingeAnchor, JointCoupling, PointAnchor, Rolling
 from pin_nonideal.contacts import Contact, UserContact
 from pin_nonideal.core import core
-from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.errors import InputError, UnknownNameError, UserFunctionError, nearest
 from pin_nonideal.laws import JointFriction
 from pin_nonideal.round_contacts import BoxContact
 from pin_nonideal.solid_contacts import (
@@ -27,6 +29,8 @@ from .names import Frame, Resolution, turned, words
 
 # Constraint models of Pinocchio that hold a point on a point.
 BALLS = ("PointAnchorConstraintModel", "RigidConstraintModel")
+# Random moves from q0 [rad or m] at which a function is asked for the shape of its result.
+AROUND = (0.0, 0.1, 1.0)
 # Parameters of JointFriction that say something of a bearing, and those that say something of teeth.
 BEARING = ("radius", "axial_radius", "span")
 TEETH = ("lead_angle", "efficiency")
@@ -337,12 +341,22 @@ def _round_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list
 def _user_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[tuple[str, int, float]]:
     """The same in directions of the user's."""
     who, nv = f"{words(c, name)}: directions", where.model.nv
-    shape = np.shape(named(c.directions, who)(0.0, where.q0))
+    shape = _shape_of_directions(named(c.directions, who), where)
     if shape not in ((1, nv), (2, nv)):
         raise InputError(f"{who} must return one or two rows of {nv} numbers each; got shape {shape}")
     function = checked(c.directions, who, shape)
     block = out.add_user_slip(name, shape[0], lambda t, q: function(t, q).ravel())
     return [(name, block, c.mu)]
+
+
+def _shape_of_directions(directions: Callable[..., Any], where: Resolution) -> tuple[int, ...]:
+    """The shape of what it returns at q0, or near there where it has no value at q0."""
+    generator = np.random.default_rng(5)
+    for part in AROUND:
+        with suppress(UserFunctionError):
+            move = part * generator.standard_normal(where.model.nv)
+            return np.shape(directions(0.0, pin.integrate(where.model, where.q0, move)))
+    return np.shape(directions(0.0, where.q0))
 
 
 def _flat_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[tuple[str, int, float]]:

@@ -6,11 +6,11 @@ from functools import singledispatch
 from typing import Any
 
 from pin_nonideal.core import core
-from pin_nonideal.errors import InputError, UserFunctionError
+from pin_nonideal.errors import InputError
 from pin_nonideal.laws import Drag, JointFriction, LuGre, SigmoidFriction, UserFriction, UserLaw
 from pin_nonideal.types import Array
 
-from .callbacks import Reactions, checked
+from .callbacks import Reactions, checked, checked_limits
 from .friction import Surroundings, lower_joint_friction, rubbing_joint
 from .names import words
 
@@ -84,13 +84,10 @@ def _(law: UserLaw, name: str, out: core.Builder, around: Surroundings) -> None:
 def _(law: UserFriction, name: str, out: core.Builder, around: Surroundings) -> None:
     who, names = words(law, name), around.reactions
     direction = checked(law.direction, f"{who}: direction", (around.where.model.nv,))
-    limit = checked(law.limit, f"{who}: limit", ())
+    limits = checked_limits(law.limit, f"{who}: limit")
 
-    def bound(t: float, q: Array, v: Array, view: core.ReactionView) -> float:
-        value = float(limit(t, q, v, Reactions(view, names)))
-        if value < 0.0:
-            raise UserFunctionError(f"{who}: limit must not be negative; got {value:g}")
-        return value
+    def bounds(t: float, q: Array, v: Array, view: core.ReactionView) -> tuple[float, float]:
+        return limits(t, q, v, Reactions(view, names))
 
     block = out.add_user_slip(name, 1, direction)
     out.add_friction(
@@ -99,6 +96,6 @@ def _(law: UserFriction, name: str, out: core.Builder, around: Surroundings) -> 
         name=name,
         load=core.Load.user,
         reaction=core.Reaction.total,
-        user_limit=bound,
+        user_limit=bounds,
         static_ratio=law.static_ratio,
     )

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Sequence
+from typing import Any
 
+from pin_nonideal.actuation import SampledControl, asked_by
 from pin_nonideal.constraints import UserConstraint
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, RunError
 from pin_nonideal.states.configurations import joint_places
-from pin_nonideal.states.projection import Projection, ProjectionReport
+from pin_nonideal.states.projection import NOTHING_HELD, Held, Projection, ProjectionReport
 from pin_nonideal.states.rows import row_slices
 from pin_nonideal.types import Array, Model
 
-from .analysis import check_user_functions, idle_rows
+from .analysis import check_user_functions, has_rates, idle_rows, without_functions
 from .constraints import anchor_frames
-from .failures import named_failure
+from .failures import Circumstances, named_failure
 from .lowering import Descriptions, lower
-from .names import Resolution
+from .names import Resolution, unique_names
+
+MOST_QUOTED = 4  # names in a message
 
 
 class CompiledScene:
@@ -26,9 +29,9 @@ class CompiledScene:
     Args:
         model: pinocchio.Model.
         q0: configuration at which `frame2=None` and lengths left out are read, (nq,).
-        v0: velocity near which derivatives of the user's constraints are compared, (nv,).
         said: what the scene is made of.
         tolerance: gap that a row along which nothing moves may have [m or rad].
+        is_start: whether q0 was given as a start, so that functions of the user may be called there.
 
     Raises:
         InputError, UnknownNameError: something does not fit the model.
@@ -49,9 +52,12 @@ class CompiledScene:
         dropped: (name, row, reason) of rows that can never act.
         projection: onto the constraints.
         unprojected: names of user constraints without residual and rate.
+        unchecked: whether derivatives of functions of the user are still to be compared.
     """
 
-    def __init__(self, model: Model, q0: Array, v0: Array, said: Descriptions, tolerance: float) -> None:
+    def __init__(
+        self, model: Model, q0: Array, said: Descriptions, tolerance: float, is_start: bool = True
+    ) -> None:
         self.model, self.q0, self.said = model, q0, said
         try:
             builder = core.Builder(model, core.Provider[said.terms])
@@ -78,8 +84,13 @@ class CompiledScene:
             for name, c in named
             if isinstance(c, UserConstraint) and c.residual is None and c.rate is None
         ]
-        check_user_functions(model, q0, v0, described, self.program)
-        self.dropped, copies = idle_rows(model, q0, self.program, tolerance)
+        self.unchecked = any(has_rates(c) for c in described.values())
+        plain, sampled = without_functions(said, model.nv), self.program
+        if plain is not None:
+            stand_in = core.Builder(model, core.Provider[said.terms])
+            lower(plain, stand_in, where)
+            sampled = stand_in.finish()
+        self.dropped, copies = idle_rows(model, q0, self.program, sampled, tolerance)
         if self.dropped:
             idle = {(name, row) for name, row, _ in self.dropped}
             for block, c in enumerate(self.program.constraints):
@@ -88,10 +99,27 @@ class CompiledScene:
             for row, first, factor in copies:
                 builder.add_copy(row, first, factor)
             self.program = builder.finish()
-        self.projection = Projection(model, self.program, q0, {name for name, _, _ in self.dropped})
+        idle_names = {name for name, _, _ in self.dropped}
+        self.projection = Projection(model, self.program, q0, idle_names, is_start or plain is None)
+
+    def check_functions(self, q: Array, v: Array, t: float) -> None:
+        """Compares derivatives of the user's functions, at the first start that is known.
+
+        Args:
+            q: configuration, (nq,).
+            v: velocity, (nv,).
+            t: time [s].
+
+        Raises:
+            InputError: they differ.
+        """
+        if not self.unchecked:
+            return
+        check_user_functions(self.model, q, v, t, self.described, self.program)
+        self.unchecked = False
 
     def project(
-        self, q: Array, v: Array, t: float, held: NDArray[np.bool_] | None = None
+        self, q: Array, v: Array, t: float, held: Held = NOTHING_HELD
     ) -> tuple[Array, Array, ProjectionReport]:
         """Nearest state on the constraints, see `Projection.nearest`."""
         try:
@@ -101,4 +129,27 @@ class CompiledScene:
 
     def named(self, failure: core.CoreFailure) -> RunError:
         """The core's failure as the exception that names what is to blame."""
-        return named_failure(failure, self.model, self.program)
+        return named_failure(failure, self.model, self.program, self._circumstances())
+
+    @property
+    def explicit_only(self) -> str:
+        """Words for what no implicit method here takes, empty where they take all."""
+        if self.opening_names:
+            return f'no implicit method here opens and closes contacts such as "{self.opening_names[0]}" yet'
+        if isinstance(asked_by(self.said.actuation), SampledControl):
+            return "no implicit method here holds the torques of a SampledControl yet"
+        return ""
+
+    def _circumstances(self) -> Circumstances:
+        """Parts of the scene to be named in errors of its runs."""
+        said = self.said
+        sources = ("the actuation", _quoted("force", said.forces), _quoted("law", said.laws))
+        return Circumstances(self.explicit_only, sources)
+
+
+def _quoted(kind: str, descriptions: Sequence[Any]) -> str:
+    """The names of all descriptions of a kind, of many the first few."""
+    names = unique_names(descriptions, set())
+    shown = ", ".join(f'"{name}"' for name in names[:MOST_QUOTED])
+    shown += ", ..." if len(names) > MOST_QUOTED else ""
+    return f"{kind} {shown}" if len(names) == 1 else f"one of the {kind}s {shown}"

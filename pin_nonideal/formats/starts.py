@@ -11,8 +11,16 @@ from numpy.typing import NDArray
 
 from pin_nonideal.checks import array
 from pin_nonideal.errors import InputError, LoadingError, UnknownNameError, nearest
-from pin_nonideal.states.named import named_configuration, named_velocity, with_unit_lengths
+from pin_nonideal.states.named import (
+    joint_named,
+    named_configuration,
+    named_coordinates,
+    named_entries,
+    named_velocity,
+    with_unit_lengths,
+)
 from pin_nonideal.states.orders import order_words, tell_order
+from pin_nonideal.states.projection import Held
 from pin_nonideal.types import Model
 
 from .robot_yaml import check_keys
@@ -125,6 +133,36 @@ def asked_start(
     if speed is not None:
         v0 = named_velocity(robot.model, speed, v0, "load: v0")
     return q0, v0
+
+
+def held_start(robot: RobotFile, table: Mapping[str, Any], start: Start, speed: Start) -> Held:
+    """Entries that the caller of `load` names, or else the tables of the file.
+
+    Args:
+        robot: what the robot's file holds, its joints as the scene has them.
+        table: content of robot.yaml.
+        start: configuration that is asked for, or None.
+        speed: velocity that is asked for, or None.
+    """
+    model, initial = robot.model, table.get("initial") or {}
+    of_keyframe = isinstance(start, str) and start in robot.keyframes
+
+    def named(asked: Start, key: str) -> Any:
+        given = initial.get(key) if asked is None else asked
+        if asked is None and isinstance(given, dict):  # joints that were fixed have no entries any more
+            given = {name: value for name, value in given.items() if _moves(model, name)}
+        return given
+
+    speeds = None if of_keyframe and speed is None else named(speed, "v")
+    return Held(named_coordinates(model, named(start, "q")), named_entries(model, speeds))
+
+
+def _moves(model: Model, name: Any) -> bool:
+    try:
+        joint_named(model, name, "initial")
+    except UnknownNameError:
+        return False
+    return True
 
 
 def _asked(model: Model, start: Any, q0: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -225,7 +225,8 @@ def _check_opening(method: str, record: str | Sequence[str], name: str) -> None:
     if method not in known:
         raise InputError(
             f'simulate: method "{method}" cannot open and close contacts, and "{name}" may open; use one of '
-            f"{', '.join(known)}, or keep it closed with unilateral=False"
+            f"{', '.join(known)}, with max_steps where one of them calls the scene stiff, or keep it closed "
+            "with unilateral=False"
         )
 
 

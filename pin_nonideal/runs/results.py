@@ -11,7 +11,14 @@ import numpy as np
 from pin_nonideal.compilation.failures import opened
 from pin_nonideal.core import core
 from pin_nonideal.dense import dense_output
-from pin_nonideal.errors import LoopClosureError, OutputError, RunError, RunInterrupted, UserFunctionError
+from pin_nonideal.errors import (
+    LoopClosureError,
+    NonFiniteError,
+    OutputError,
+    RunError,
+    RunInterrupted,
+    UserFunctionError,
+)
 from pin_nonideal.outcome import outcome_fields, outcome_stats
 from pin_nonideal.records import UserEventRecord
 from pin_nonideal.scene import Scene
@@ -73,7 +80,7 @@ def finish(
     cause: BaseException | None = None
     if isinstance(stopped, core.CoreFailure):
         error = scene._compiled.named(stopped)
-        error.args = (f"{error}; {KEPT}", *error.args[1:])
+        error.args = (f"{error}{_fixed_step_hint(error, options)}; {KEPT}", *error.args[1:])
     elif isinstance(stopped, KeyboardInterrupt):
         error = RunInterrupted(f"the run was interrupted at t = {last:.4g} s; {KEPT}", time=last)
     elif isinstance(stopped, RunError):
@@ -116,6 +123,16 @@ def _opened(scene: Scene, trajectory: Trajectory) -> LoopClosureError:
     stopped = opened(max(gaps, key=lambda key: gaps[key]), gaps, t, f"; {KEPT}")
     stopped.trajectory = _stopped(trajectory.first(k), stopped)
     return stopped
+
+
+def _fixed_step_hint(error: RunError, options: RunOptions) -> str:
+    """Words on a run by fixed steps that has overflowed; none for other failures."""
+    if not (isinstance(error, NonFiniteError) and options.dt > 0.0):
+        return ""
+    return (
+        f": where steps of dt = {options.dt:g} s are too long for the stiffest force the motion overflows; "
+        'take a shorter dt, or method="dop853", with max_steps where it calls the scene stiff'
+    )
 
 
 def _stopped(trajectory: Trajectory, error: RunError) -> Trajectory:

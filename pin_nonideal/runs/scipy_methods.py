@@ -70,6 +70,7 @@ class _Run:
 
     def smooth_stretch(self, method: Any, t_end: float) -> None:
         """To the next event or break of a function of time, or to the end."""
+        self._require_regular_start()
         y = self.core.y
         tolerance = {"rtol": max(self.options.rtol, LEAST_RTOL), "atol": self.tolerance(y.size)}
         stop = self.core.stop_before(t_end)
@@ -83,6 +84,23 @@ class _Run:
                 return
             if self.options.method in ONE_STEP and not np.array_equal(solver.y, self.core.y):
                 solver.y, solver.f = self.core.y, self.core.rate
+
+    def _require_regular_start(self) -> None:
+        """Refuses an onset of slip whose direction relaxes faster than any of these methods' steps.
+
+        Raises:
+            StepSizeError: slip in several directions begins so.
+        """
+        element = self.core.singular_onset
+        if element is None:
+            return
+        raise StepSizeError(
+            f'{self.options.method} cannot go on at t = {self.core.t:.6g} s: "{element}" begins to slip in '
+            "several directions with hardly any acceleration, where its direction relaxes faster than any "
+            'step; use method="dop853", which solves for the direction of an onset, or a larger '
+            "static_ratio; the trajectory up to there is in error.trajectory",
+            time=self.core.t,
+        )
 
     def _step(self, solver: Any) -> None:
         message = solver.step()

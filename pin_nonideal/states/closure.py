@@ -12,11 +12,13 @@ scales of rows and copies of rows change nothing.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
+from pin_nonideal.errors import UserFunctionError
 from pin_nonideal.types import Array, Model
 
 from .least_moves import complement, held
@@ -109,6 +111,7 @@ class Search:
         unit: a long move of each coordinate, (nv,).
         angles: which coordinates are angles, (nv,).
         q0: where it begins, (nq,).
+        free: which coordinates move, (nv,); all when None.  Of the others nothing above holds entries.
     """
 
     def __init__(
@@ -120,7 +123,9 @@ class Search:
         unit: Array,
         angles: Array,
         q0: Array,
+        free: NDArray[np.bool_] | None = None,
     ) -> None:
+        self.free = free
         self.model, self.rows, self.mass, self.q0 = model, rows, mass, q0
         self.unit, self.angles = unit, angles
         self.root = np.linalg.cholesky(metric).T
@@ -138,17 +143,20 @@ class Search:
         open_place = self._place(self.q0)
         starts, further, often = STARTS, 0, 0
         generator = np.random.default_rng(0)  # the same closure every time
-        most = MOST_STARTS if self.model.nv <= FEW_FREEDOMS else 0
+        most = MOST_STARTS if len(self.unit) <= FEW_FREEDOMS else 0
         k = 0
         while k < starts or (further and often < OFTEN and k < most):
             longest = 1.0 if best is None else max(1.0, self._longest(best.q))
-            spread = longest * SPREADS[k % len(SPREADS)] * generator.standard_normal(self.model.nv)
-            place = self._close(pin.integrate(self.model, self.q0, spread * self.unit) if k else self.q0)
+            spread = longest * SPREADS[k % len(SPREADS)] * generator.standard_normal(len(self.unit))
             k += 1
-            if not self._is_closed(place):
-                open_place = min(place, open_place, key=self._lacking)
+            try:
+                place = self._close(self._integrate(self.q0, spread * self.unit) if k > 1 else self.q0)
+                if not self._is_closed(place):
+                    open_place = min(place, open_place, key=self._lacking)
+                    continue
+                found = self._unwound(self._settle(place))
+            except UserFunctionError:  # a way that leads where a function of the user has no value
                 continue
-            found = self._unwound(self._settle(place))
             if conditioning(self.mass(found.q)) <= WELL_CONDITIONED:
                 fallback = fallback if fallback and fallback.distance <= found.distance else found
                 continue
@@ -172,11 +180,11 @@ class Search:
 
     def _unwound(self, found: Closure) -> Closure:
         """The nearer one of a closure and of what it is without whole turns of joints."""
-        move = pin.difference(self.model, self.q0, found.q)
+        move = self._difference(found.q)
         turns = np.where(self.angles, np.round(move / TURN), 0.0)
         if not turns.any():
             return found
-        place = self._close(pin.integrate(self.model, self.q0, move - TURN * turns))
+        place = self._close(self._integrate(self.q0, move - TURN * turns))
         return min(found, self._settle(place), key=lambda c: c.distance) if self._is_closed(place) else found
 
     def _is_closed(self, place: Place) -> bool:
@@ -189,13 +197,14 @@ class Search:
 
     def _longest(self, q: Array) -> float:
         """The longest move of a coordinate [units]."""
-        return float((np.abs(pin.difference(self.model, self.q0, q)) / self.unit).max(initial=0.0))
+        return float((np.abs(self._difference(q)) / self.unit).max(initial=0.0))
 
     def _place(self, q: Array) -> Place:
         A, phi = self.rows(q)
-        move = self.root @ pin.difference(self.model, self.q0, q)
+        move = self.root @ self._difference(q)
         turned = pin.dDifference(self.model, self.q0, q, pin.ArgumentPosition.ARG1)
-        half = self.root @ turned.reshape(self.root.shape)
+        turned = turned.reshape(self.model.nv, self.model.nv)
+        half = self.root @ (turned if self.free is None else turned[np.ix_(self.free, self.free)])
         return Place(q, move, half, np.linalg.solve(half.T, A.T).T, phi)
 
     @staticmethod
@@ -208,8 +217,21 @@ class Search:
         longest = float((np.abs(dq) / self.unit).max(initial=0.0))
         if not np.isfinite(longest):
             raise np.linalg.LinAlgError("a move is not finite")
-        q: Array = pin.integrate(self.model, place.q, dq * (part / max(longest, 1.0)))
-        return q
+        return self._integrate(place.q, dq * (part / max(longest, 1.0)))
+
+    def _integrate(self, q: Array, dq: Any) -> Array:
+        """The configuration from which the free coordinates of q have moved by dq."""
+        if self.free is not None:
+            whole = np.zeros(self.model.nv)
+            whole[self.free] = dq
+            dq = whole
+        moved: Array = pin.integrate(self.model, q, dq)
+        return moved
+
+    def _difference(self, q: Array) -> Array:
+        """The move of the free coordinates from the start to q."""
+        move: Array = pin.difference(self.model, self.q0, q)
+        return move if self.free is None else move[self.free]
 
     # --- onto the constraints -------------------------------------------------------------------------------
 

@@ -1,14 +1,16 @@
-"""Projection of a velocity onto the constraints with some of its entries held."""
+"""Projection onto the constraints with some entries of a configuration or a velocity held."""
 
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError
 from pin_nonideal.types import Array, Model
 
+from .configurations import JointPlace, joint_places
 from .extents import coordinate
 from .rows import DEPENDENT, row_lengths, rows_at, shortest
 
@@ -18,6 +20,8 @@ MISSED = 1e-9
 ROUNDING = 1e-12
 # Part of the largest velocity above which the change of a free entry is reported.
 LITTLE = 1e-3
+# Newton steps from a closure that a search has found, which is near enough for each to square its gap.
+SETTLINGS = 8
 
 
 def changes(asked: Array, found: Array, held: NDArray[np.bool_]) -> bool:
@@ -30,6 +34,161 @@ def changes(asked: Array, found: Array, held: NDArray[np.bool_]) -> bool:
     """
     change = np.abs(found - asked)[held].max(initial=0.0)
     return bool(change > ROUNDING * np.abs(asked).max(initial=0.0))
+
+
+def moving(model: Model, q: Array, on: Array, unit: Array) -> NDArray[np.bool_]:
+    """Which coordinates a projection has moved by more than rounding, (nv,).
+
+    Args:
+        model: pinocchio.Model.
+        q: configuration before, (nq,).
+        on: configuration after, (nq,).
+        unit: a long move of each coordinate, (nv,).
+    """
+    away: NDArray[np.bool_] = np.abs(pin.difference(model, q, on)) > ROUNDING * unit
+    return away
+
+
+def moves(model: Model, q: Array, on: Array, held: NDArray[np.bool_], unit: Array) -> bool:
+    """Whether it has moved held ones.
+
+    Args:
+        model: pinocchio.Model.
+        q: configuration before, (nq,).
+        on: configuration after, (nq,).
+        held: coordinates to be held, (nv,).
+        unit: a long move of each coordinate, (nv,).
+    """
+    return bool((moving(model, q, on, unit) & held).any())
+
+
+def settled(
+    model: Model,
+    runner: core.Runner,
+    q: Array,
+    free: NDArray[np.bool_],
+    rows: NDArray[np.bool_],
+    t: float,
+) -> Array:
+    """Free coordinates near the constraints brought onto them to rounding, by Newton's method.
+
+    Args:
+        model: pinocchio.Model.
+        runner: a workspace of the core.
+        q: configuration, (nq,).
+        free: coordinates that move, (nv,).
+        rows: rows that must hold, (m,).
+        t: time [s].
+
+    Returns:
+        The configuration, (nq,).
+    """
+    zero = np.zeros(model.nv)
+    gap = np.inf
+    for _ in range(SETTLINGS):
+        A, _, phi, _ = rows_at(runner, q, zero, t)
+        now = float(np.abs(phi[rows]).max(initial=0.0))
+        if not now < gap:
+            break
+        gap, kept, move = now, q, np.zeros(model.nv)
+        move[free] = np.linalg.lstsq(A[np.ix_(rows, free)], -phi[rows], rcond=DEPENDENT)[0]
+        q = pin.integrate(model, q, move)
+    return kept
+
+
+def with_entries(model: Model, q: Array, given: Array, held: NDArray[np.bool_]) -> Array:
+    """A configuration with the held coordinates as they were given, to the last digit.
+
+    Args:
+        model: pinocchio.Model.
+        q: configuration whose held coordinates differ by rounding, (nq,).
+        given: the configuration that was given, (nq,).
+        held: coordinates, (nv,).
+
+    Returns:
+        The configuration, (nq,).
+    """
+    out = np.array(q)
+    for place in joint_places(model):
+        own = held[place.v_first : place.v_first + place.nv]
+        if own.all():
+            part = slice(place.q_first, place.q_first + place.nq)
+            out[part] = given[part]
+            continue
+        for k in np.flatnonzero(own[: _plain(place)]):
+            out[place.q_first + k] = given[place.q_first + k]
+    return out
+
+
+def _plain(place: JointPlace) -> int:
+    """How many values of a joint are coordinates themselves, before those of an orientation."""
+    if place.nq == place.nv:
+        return place.nq
+    kinds = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2}
+    return next((count for kind, count in kinds.items() if place.kind.startswith(kind)), 0)
+
+
+def require_rounding(
+    model: Model, q: Array, on: Array, held: NDArray[np.bool_], little: Array, t: float
+) -> None:
+    """Refuses a configuration that has moved held entries by more than written numbers are rounded.
+
+    Args:
+        model: pinocchio.Model.
+        q: configuration as it was given, (nq,).
+        on: the nearest one on the constraints, (nq,).
+        held: coordinates to be held, (nv,).
+        little: rounding of each coordinate, (nv,).
+        t: time [s].
+
+    Raises:
+        InputError: one is.
+    """
+    move = pin.difference(model, q, on)
+    if not (held & (np.abs(move) > little)).any():
+        return
+    raise InputError(
+        f"q: no configuration on the constraints has {_told(model, _coordinates(model, q), held)} at t = "
+        f"{t:.2f} s; name fewer entries, so that the others can follow, or give a configuration that is "
+        "consistent"
+    )
+
+
+def told_coordinates(
+    model: Model, asked: Array, found: Array, held: NDArray[np.bool_], unit: Array
+) -> list[str]:
+    """A note that names the coordinates that follow held ones, and another on held ones that moved; or none.
+
+    Args:
+        model: pinocchio.Model.
+        asked: configuration as asked for, (nq,).
+        found: configuration at the start of the run, (nq,).
+        held: coordinates that were named, (nv,).
+        unit: a long move of each coordinate, (nv,).
+    """
+    move = np.abs(pin.difference(model, asked, found))
+    follows, gave_way = ~held & (move > LITTLE * unit), held & (move > ROUNDING * unit)
+    now, notes = _coordinates(model, found), []
+    if gave_way.any():
+        notes.append(
+            "the coordinates that were named are rounded, since the constraints do not allow them together "
+            f"to the last digit: the run starts with {_told(model, now, gave_way)}"
+        )
+    if follows.any():
+        notes.append(
+            f"the coordinates that were named are held, {_told(model, now, held)}, and others follow them: "
+            f"{_told(model, now, follows)}"
+        )
+    return notes
+
+
+def _coordinates(model: Model, q: Array) -> Array:
+    """A configuration as numbers for a message, (nv,): positions, angles, rotation vectors."""
+    out: Array = pin.difference(model, pin.neutral(model), q)
+    for place in joint_places(model):
+        count = _plain(place)
+        out[place.v_first : place.v_first + count] = q[place.q_first : place.q_first + count]
+    return out
 
 
 def holding(
@@ -81,6 +240,24 @@ def holding(
             "entries, so that the others can follow, or give velocities that are consistent"
         )
     return found
+
+
+def changed(model: Model, asked: Array, found: Array) -> list[str]:
+    """A note on a velocity that did not meet the constraints and was changed more than a little; or none.
+
+    Args:
+        model: pinocchio.Model.
+        asked: velocity as asked for, (nv,).
+        found: velocity at the start of the run, (nv,).
+    """
+    change = np.abs(found - asked)
+    much = change > LITTLE * max(np.abs(asked).max(initial=0.0), np.abs(found).max(initial=0.0))
+    if not much.any():
+        return []
+    return [
+        "the initial velocity did not satisfy the constraints and was projected onto them: the run starts "
+        f"with {_told(model, found, much)}; Scene.project(report=True) says more"
+    ]
 
 
 def told(model: Model, asked: Array, found: Array, held: NDArray[np.bool_]) -> list[str]:

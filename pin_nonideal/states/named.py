@@ -136,6 +136,33 @@ def named_entries(model: Model, given: State | None) -> NDArray[np.bool_] | None
     return ~np.isnan(named_velocity(model, given, np.full(model.nv, np.nan), "v"))
 
 
+def named_coordinates(model: Model, given: State | None) -> NDArray[np.bool_] | None:
+    """Which tangent coordinates a table of a configuration names, (nv,); None of anything else.
+
+    Args:
+        model: pinocchio.Model.
+        given: a configuration as `named_configuration` takes it.
+    """
+    if not isinstance(given, Mapping):
+        return None
+    named = np.zeros(model.nv, dtype=bool)
+    for name, value in given.items():
+        j = joint_named(model, name, "q")
+        own = named[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]]
+        if not isinstance(value, Mapping):
+            own[:] = True
+            continue
+        places = len(own) - 3 if model.joints[j].shortname().startswith("JointModelFreeFlyer") else 0
+        for key in value:
+            if key in ("xyz", "xy"):
+                own[: len(key)] = True
+            elif key == "angle":
+                own[2] = True
+            else:  # an orientation
+                own[places:] = True
+    return named
+
+
 def joint_named(model: Model, name: object, what: str) -> int:
     """Index of the joint of that name; a floating base goes by "base" and by the name of its body as well.
 

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from contextlib import suppress
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.core import core
-from pin_nonideal.errors import PinNonidealError
+from pin_nonideal.errors import InputError, PinNonidealError, UserFunctionError
 from pin_nonideal.types import Array, Model
 
 from .closure import CLOSURE_TOLERANCE, FAR, WELL_CONDITIONED, Closure, Rows, Search, conditioning
 from .extents import VANISHING, chain, coordinate, slides
-from .held import changes, holding
+from .held import changes, holding, moves, moving, require_rounding, settled, told_coordinates, with_entries
 from .rows import copies, gap_rows, holonomic_rows, rows_at
 from .unmet import largest_loop_gap, lost_velocity, no_way_out, open_loops, refuse_deep_starts
 from .ways_out import SearchOutside
@@ -37,13 +39,15 @@ INSIDE = 1e-12
 DEEP = 1e-2
 # The inertia that a coordinate has at least in the distance where M is singular, as a part of the largest.
 LEAST_INERTIA = 1e-9
+# Parts of a move at which rows are sampled, each where the one before is beyond a function of the user.
+NEARER = (1.0, 0.1, 1e-2, 1e-3)
 # A search in more freedoms takes minutes: Newton's method has the first word, however large the gap.
 MANY_FREEDOMS = 300
 
 
 @dataclass(frozen=True)
 class ProjectionReport:
-    """How far a projection moved a configuration.
+    """How far a projection moved a state.
 
     Attributes:
         distance: sqrt(d^T M(q) d) of the move d = q' - q in tangent coordinates [sqrt(kg) m].
@@ -55,6 +59,11 @@ class ProjectionReport:
         iterations: steps of the search; 0 where Newton's method sufficed.
         nearest: whether this is the nearest consistent configuration as far as can be told: no nearer one
             lies around it, nor was one found from other starts, of which two ended here.
+        velocity_distance: sqrt(d^T M d) of the change d = v' - v of the velocity [sqrt(kg) m/s].
+        velocity_coordinate: the one whose velocity changed most, as `coordinate`; empty where none changed.
+        velocity_changed: by how much that one did [rad/s or m/s].
+        held: coordinates whose values were named and stayed as they were, by the same names.
+        held_velocities: the same of velocities.
     """
 
     distance: float = 0.0
@@ -63,9 +72,31 @@ class ProjectionReport:
     gap: float = 0.0
     iterations: int = 0
     nearest: bool = True
+    velocity_distance: float = 0.0
+    velocity_coordinate: str = ""
+    velocity_changed: float = 0.0
+    held: tuple[str, ...] = ()
+    held_velocities: tuple[str, ...] = ()
 
 
-UNMOVED = ProjectionReport()
+class Held(NamedTuple):
+    """Entries of a state that were named and stay.
+
+    Attributes:
+        q: tangent coordinates of the configuration, (nv,), or None.
+        v: entries of the velocity, (nv,), or None.
+        firm_q: whether it is an error that they cannot stay; else all are projected then, as entries that
+            were named for another time.
+        firm_v: the same of the velocity.
+    """
+
+    q: NDArray[np.bool_] | None = None
+    v: NDArray[np.bool_] | None = None
+    firm_q: bool = True
+    firm_v: bool = True
+
+
+UNMOVED, NOTHING_HELD = ProjectionReport(), Held()
 
 
 class Projection:
@@ -76,23 +107,49 @@ class Projection:
         program: the scene as the core knows it.
         q0: a configuration, (nq,), whose lengths count where the model has none.
         idle: names of contacts that nothing moves.
+        is_start: whether a run may start at q0.  Else functions of the user are not called there, and the
+            lengths of the first start count.
 
     Attributes:
         unit: a long move of each coordinate, (nv,): a radian, or the length of the mechanism.
         length: of the mechanism [m]: the longest chain of joints and frames.
     """
 
-    def __init__(self, model: Model, program: core.Program, q0: Array, idle: Collection[str] = ()) -> None:
+    def __init__(
+        self,
+        model: Model,
+        program: core.Program,
+        q0: Array,
+        idle: Collection[str] = (),
+        is_start: bool = True,
+    ) -> None:
         self.model, self.program = model, program
         self._slides = slides(model)
-        self.length = chain(model) or self._length_at(q0) or 1.0
-        self.unit = np.where(self._slides, self.length, 1.0)
-        self._closed = CLOSURE_TOLERANCE * min(1.0, self.length)
+        self._chain = chain(model)
+        self._measured = self._chain > 0.0 or is_start
+        self._measure(self._chain or (self._length_at(q0) if self._measured else 0.0))
         self._gaps = gap_rows(program, idle)
+        self._loops = holonomic_rows(program)
         self._has_gaps = bool(self._gaps.any())
 
+    def _measure(self, length: float) -> None:
+        """Takes the length of the mechanism, 1 m where it has none."""
+        self.length = length or 1.0
+        self.unit = np.where(self._slides, self.length, 1.0)
+        self._closed = CLOSURE_TOLERANCE * min(1.0, self.length)
+
+    def measure_at(self, q: Array) -> None:
+        """Measures the mechanism at its first start, where its length is not known before.
+
+        Args:
+            q: configuration of the start, (nq,).
+        """
+        if not self._measured:
+            self._measured = True
+            self._measure(self._length_at(q))
+
     def nearest(
-        self, q: Array, v: Array, t: float, held: NDArray[np.bool_] | None = None
+        self, q: Array, v: Array, t: float, held: Held = NOTHING_HELD
     ) -> tuple[Array, Array, ProjectionReport]:
         """Nearest state with phi(q, t) = 0 and A v + phi_t = 0.
 
@@ -100,19 +157,20 @@ class Projection:
             q: configuration, (nq,).
             v: velocity, (nv,).
             t: time [s].
-            held: entries of v that stay as they are, (nv,), or None.
+            held: entries of q and v that stay as they are.
 
         Returns:
-            q (nq,), v (nv,), and how far q moved.
+            q (nq,), v (nv,), and how far both moved.
 
         Raises:
             LoopClosureError: no configuration satisfies the constraints.
             InputError: a contact starts too deep inside its plane, or the constraints do not allow the held
-                velocities together.
+                entries together.
             InconsistentConstraintsError: no velocity does.
         """
         if not self.program.rows:
-            return q, v, UNMOVED
+            return q, v, self._with_held(UNMOVED, held)
+        self.measure_at(q)
         runner = self.program.runner()
         phi = rows_at(runner, q, v, t)[2]
         refuse_deep_starts(phi, self.program, DEEP * min(1.0, self.length), t)
@@ -124,12 +182,27 @@ class Projection:
             on, v_on, after, rate = self._polished(runner, found.q, v, t)
             met = after <= self._closed or found.gap <= CLOSURE_TOLERANCE
             self._require_met(runner, q, found.q, met, nearest, t)
+        if held.q is not None and held.q.any():
+            free = ~held.q
+            if moves(self.model, q, on, held.q, self.unit):
+                found, nearest = self._search(runner, q, t, None, free)
+                iterations += found.iterations
+                there = settled(self.model, runner, found.q, free, self._loops, t)
+                phi = self._residuals(runner, there, t)
+                if _largest(phi[self._loops]) <= self._closed and self._is_outside(there, phi):
+                    on = there
+                elif held.firm_q:
+                    require_rounding(self.model, q, on, held.q, LITTLE * self.unit, t)
+            on = with_entries(self.model, on, q, held.q & ~moving(self.model, q, on, self.unit))
+            _, v_on, _, _, rate = runner.project(on, v, t, np.inf)
         if not rate <= RATE_TOLERANCE * min(1.0, self.length) * (1.0 + _largest(v_on)):
             raise lost_velocity(rows_at(runner, on, v_on, t)[3], self.program, t)
-        if held is not None and changes(v, v_on, held):
+        if held.v is not None and changes(v, v_on, held.v):
             metric = self._metric(_mass(self.model, runner)(on))
-            v_on = holding(self.model, self.program, on, v, held, ~self._gaps, metric, t)
-        return on, v_on, self._report(runner, q, on, before, iterations, nearest)
+            with suppress(*(() if held.firm_v else (InputError,))):
+                v_on = holding(self.model, self.program, on, v, held.v, ~self._gaps, metric, t)
+        report = self._report(runner, q, on, before, iterations, nearest)
+        return on, v_on, self._with_held(self._with_velocity(report, runner, on, v, v_on), held)
 
     def _require_met(
         self, runner: core.Runner, q: Array, found: Array, met: bool, nearest: bool, t: float
@@ -187,6 +260,7 @@ class Projection:
         failures: dict[int, PinNonidealError | core.CoreFailure] = {}
         if not self.program.rows:
             return q, v, failures
+        self.measure_at(q[0])
         names, values = numbers
         found_q, found_v, after, rate = core.nearest_states(
             self.program, q, v, t=t, far=self._reached(), threads=threads, names=names, values=values
@@ -236,8 +310,20 @@ class Projection:
     def _is_nearby(self, q: Array, on: Array) -> bool:
         return bool((np.abs(pin.difference(self.model, q, on)) <= NEARBY * self.unit).all())
 
-    def _search(self, runner: core.Runner, q: Array, t: float, newton: Array | None) -> tuple[Closure, bool]:
-        """The nearest closure, and whether it is known to be; Newton's own where a search takes minutes."""
+    def _search(
+        self,
+        runner: core.Runner,
+        q: Array,
+        t: float,
+        newton: Array | None,
+        free: NDArray[np.bool_] | None = None,
+    ) -> tuple[Closure, bool]:
+        """The nearest closure, and whether it is known to be; Newton's own where a search takes minutes.
+
+        `free`: coordinates that may move, (nv,); all when None.
+        """
+        if free is not None and not free.any():
+            return Closure(q, np.inf, 0.0, False, 0), False
         if (
             newton is not None
             and self.model.nv > MANY_FREEDOMS
@@ -246,11 +332,22 @@ class Projection:
             return Closure(newton, 0.0, 0.0, False, 0), False
         mass, unit = _mass(self.model, runner), self._unit_at(runner, q, t)
         try:
-            loops = self._rows(runner, q, t, unit, holonomic_rows(self.program))
-            given = (self.model, loops, mass, self._metric(mass(q)), unit, np.logical_not(self._slides), q)
+            own = np.ones(self.model.nv, dtype=bool) if free is None else free
+            block = np.ix_(own, own)
+            loops = self._rows(runner, q, t, unit, self._loops, own)
+            given = (
+                self.model,
+                loops,
+                lambda q: mass(q)[block],
+                self._metric(mass(q))[block],
+                unit[own],
+                np.logical_not(self._slides)[own],
+                q,
+                free,
+            )
             if not self._has_gaps:
                 return Search(*given).nearest()
-            return SearchOutside(self._rows(runner, q, t, unit, self._gaps), *given).nearest()
+            return SearchOutside(self._rows(runner, q, t, unit, self._gaps, own), *given).nearest()
         except np.linalg.LinAlgError:  # numbers that ran away: no closure
             return Closure(q, np.inf, 0.0, False, 0), False
 
@@ -262,12 +359,19 @@ class Projection:
         far = np.divide(np.abs(phi), slope, out=np.zeros_like(phi), where=slope > 0.0)
         return np.where(self._slides, max(self.length, _largest(far)), 1.0)
 
-    def _rows(self, runner: core.Runner, q: Array, t: float, unit: Array, wanted: NDArray[np.bool_]) -> Rows:
-        """The wanted rows over their reach, without copies and rows that move nothing."""
-        zero, generator, samples = np.zeros(self.model.nv), np.random.default_rng(1), []
-        for _ in range(3):
-            away = pin.integrate(self.model, q, unit * generator.standard_normal(self.model.nv))
-            samples.append(rows_at(runner, away, zero, t))
+    def _rows(
+        self,
+        runner: core.Runner,
+        q: Array,
+        t: float,
+        unit: Array,
+        wanted: NDArray[np.bool_],
+        free: NDArray[np.bool_],
+    ) -> Rows:
+        """The wanted rows of free coordinates over their reach, without copies and rows that move nothing."""
+        zero, generator = np.zeros(self.model.nv), np.random.default_rng(1)
+        moves = [unit * generator.standard_normal(self.model.nv) for _ in range(3)]
+        samples = [self._sample(runner, q, move, t) for move in moves]
         weighted = np.hstack([A * unit for A, _, _, _ in samples])
         reach = np.abs(weighted).max(axis=1, initial=0.0)
         used = wanted & (reach > VANISHING * reach.max(initial=0.0))
@@ -277,9 +381,18 @@ class Projection:
 
         def rows(q: Array) -> tuple[Array, Array]:
             A, _, phi, _ = rows_at(runner, q, zero, t)
-            return A[used] * scale[:, None], phi[used] * scale
+            return A[np.ix_(used, free)] * scale[:, None], phi[used] * scale
 
         return rows
+
+    def _sample(
+        self, runner: core.Runner, q: Array, move: Array, t: float
+    ) -> tuple[Array, Array, Array, Array]:
+        """The rows a move away, or nearer where a function of the user has no value there."""
+        for part in NEARER:
+            with suppress(UserFunctionError):
+                return rows_at(runner, pin.integrate(self.model, q, part * move), np.zeros(self.model.nv), t)
+        return rows_at(runner, q, np.zeros(self.model.nv), t)
 
     def _metric(self, M: Array) -> Array:
         """M, with a little inertia for coordinates that move none where it is singular."""
@@ -299,17 +412,46 @@ class Projection:
             distance, coordinate(self.model, dof), float(move[dof]), gap, iterations, nearest
         )
 
+    def _with_velocity(
+        self, report: ProjectionReport, runner: core.Runner, on: Array, v: Array, v_on: Array
+    ) -> ProjectionReport:
+        """The report with the change of the velocity."""
+        change = v_on - v
+        if not change.any():
+            return report
+        dof = self._furthest(change)
+        distance = float(np.sqrt(max(float(change @ _mass(self.model, runner)(on) @ change), 0.0)))
+        return replace(
+            report,
+            velocity_distance=distance,
+            velocity_coordinate=coordinate(self.model, dof),
+            velocity_changed=float(change[dof]),
+        )
+
+    def _with_held(self, report: ProjectionReport, held: Held) -> ProjectionReport:
+        """The report with the names of what was held."""
+        if held.q is None and held.v is None:
+            return report
+        names = [
+            () if each is None else tuple(coordinate(self.model, int(dof)) for dof in np.flatnonzero(each))
+            for each in (held.q, held.v)
+        ]
+        return replace(report, held=names[0], held_velocities=names[1])
+
     def _furthest(self, move: Array) -> int:
         """The coordinate that moves by most of its unit."""
         return int(np.argmax(np.abs(move) / self.unit))
 
-    def notes(self, q: Array, on: Array) -> list[str]:
+    def notes(self, q: Array, on: Array, held: NDArray[np.bool_] | None = None) -> list[str]:
         """A sentence on a configuration that was moved more than a little; none for one that was not.
 
         Args:
             q: as it was given, (nq,).
             on: where the run starts, (nq,).
+            held: coordinates that were named, (nv,), or None.
         """
+        if held is not None:
+            return told_coordinates(self.model, q, on, held, self.unit)
         move = pin.difference(self.model, q, on)
         if not (np.abs(move) > LITTLE * self.unit).any():
             return []

@@ -44,7 +44,7 @@ static PN_INLINE LoadVectors vectors_of_load(const Program& p, Workspace& w, con
 
 LoadVectors load_vectors(const Program& p, Workspace& w, const Friction& f) { return vectors_of_load(p, w, f); }
 
-double load_limit(const Program& p, Workspace& w, const Friction& f, double t, const VecX& q, const VecX& v) {
+SlipLimits load_limits(const Program& p, Workspace& w, const Friction& f, double t, const VecX& q, const VecX& v) {
     if (f.load == Friction::Load::user) return f.user_limit(p, t, q, v, w);
     double limit = f.constant;
     if (f.load == Friction::Load::none) return limit;
@@ -98,14 +98,14 @@ double limit_under(const Program& p, const Workspace& w, int e, double load) {
 }
 
 void update_limit(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
-    w.now.load[e] = load_limit(p, w, p.frictions[e], t, q, v);
-    w.now.limit[e] = limit_under(p, w, e, w.now.load[e]);
+    w.now.load[e] = load_limits(p, w, p.frictions[e], t, q, v);
+    w.now.limit[e] = limit_under(p, w, e, w.now.load[e].against(w.state.mode[e]));
 }
 
-double static_limit(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
+SlipLimits static_limits(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
     const Friction& f = p.frictions[e];
-    if (f.reaction == Reaction::total) w.now.load[e] = load_limit(p, w, f, t, q, v);
-    return f.holding_limit(w.now.load[e]);
+    if (f.reaction == Reaction::total) w.now.load[e] = load_limits(p, w, f, t, q, v);
+    return w.now.load[e] * f.static_ratio;
 }
 
 Vec3 friction_force(const Program& p, Workspace& w, int e) {
@@ -118,6 +118,20 @@ Vec3 friction_force(const Program& p, Workspace& w, int e) {
     else
         for (int k = 0; k < f.dim; ++k) force[k] = w.now.lam[block.row + k];
     return force;
+}
+
+HoldingForce holding_force(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
+    const SlipLimits limits = static_limits(p, w, e, t, q, v);
+    HoldingForce out{friction_force(p, w, e), limits.reach()};
+    if (p.frictions[e].dim == 1) out.force[0] -= limits.middle();
+    return out;
+}
+
+double limit_at_hand(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
+    if (w.state.mode[e] == unloaded) return 0.0;
+    if (w.state.mode[e] != sticking) return w.now.limit[e];
+    const SlipLimits limits = static_limits(p, w, e, t, q, v);
+    return limits.bounding(p.frictions[e].dim == 1 ? friction_force(p, w, e)[0] : 0.0);
 }
 
 // Unit direction of the friction force of a slipping element.

@@ -21,15 +21,24 @@ double limit_under(const Program& p, const Workspace& w, int element, double loa
 // has beyond its constant part. Those that a bearing has not are zero; a user's limit has none.
 using LoadVectors = std::array<Vec3, 3>;
 LoadVectors load_vectors(const Program& p, Workspace& w, const Friction& f);
-// The load of an element, as the limit that it gives at rest without the static ratio, for the motion in the workspace.
-double load_limit(const Program& p, Workspace& w, const Friction& f, double t, const VecX& q, const VecX& v);
+// The load of an element, as the limits that it gives at rest without the static ratio, for the motion in the workspace.
+SlipLimits load_limits(const Program& p, Workspace& w, const Friction& f, double t, const VecX& q, const VecX& v);
 // Load and kinetic limit of an element for that motion.
 void update_limit(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
-// Largest force with which an element can stick now.
-double static_limit(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
+// Limits of the force with which an element can stick now.
+SlipLimits static_limits(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
 
 // Friction force of an element in the evaluation at hand: the multiplier of what sticks, the law's force of what slips.
 Vec3 friction_force(const Program& p, Workspace& w, int element);
+// The force of an element that sticks, from the middle of its limits, and how far it may lie from there.
+struct HoldingForce {
+    Vec3 force;
+    double limit = 0.0;
+    bool is_within(double slack) const { return force.norm() <= limit * (1.0 + slack); }
+};
+HoldingForce holding_force(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
+// The bound of its friction force that a sticking element is nearest to, the limit of one that slips, none of others.
+double limit_at_hand(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
 // Adds the force of a slipping element, for the limit in the workspace, to a generalized force; or those of all whose
 // load comes from these reactions (`loaded`: from any).
 void add_slip_force(const Program& p, Workspace& w, int element, VecX& C);

@@ -89,9 +89,7 @@ bool holds(Unknowns& u, const VecX& y) {
     u.set(y);
     u.motion();
     for (int e = 0; e < static_cast<int>(u.p.frictions.size()); ++e)
-        if (u.w.state.mode[e] == sticking && !(friction_force(u.p, u.w, e).norm() <=
-                                               static_limit(u.p, u.w, e, u.t, u.q, u.v) * (1.0 + at_limit)))
-            return false;
+        if (u.w.state.mode[e] == sticking && !holding_force(u.p, u.w, e, u.t, u.q, u.v).is_within(at_limit)) return false;
     return true;
 }
 

@@ -51,8 +51,8 @@ void Unknowns::image(const VecX& y, VecX& g) {
     const int nv = p.mechanism.nv;
     int k = 0;
     each([&](size_t e) {
-        w.now.load[e] = load_limit(p, w, p.frictions[e], t, q, v);
-        g[k++] = limit_under(p, w, static_cast<int>(e), w.now.load[e]);
+        w.now.load[e] = load_limits(p, w, p.frictions[e], t, q, v);
+        g[k++] = limit_under(p, w, static_cast<int>(e), w.now.load[e].against(w.state.mode[e]));
     }, [&](const UserLaw& law) { g.segment(k, nv) = ask(p, law, w, t, q, v); k += nv; });
 }
 

@@ -48,7 +48,7 @@ static void size(const Program& p, Evaluation& now) {
     now.reactions.body.assign(bodies, no_force);
     now.reactions.momentum.assign(bodies, no_force);
     now.reactions.motion.assign(bodies, Motion{Vec3::Zero(), Vec3::Zero()});
-    now.load.assign(elements, 0.0);
+    now.load.assign(elements, SlipLimits());
     now.limit.assign(elements, 0.0);
     now.slip_force.assign(elements, Vec3::Zero());
     now.user_C.assign(p.user_laws, VecX::Zero(nv));

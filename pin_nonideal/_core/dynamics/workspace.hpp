@@ -90,7 +90,7 @@ struct Evaluation {
     VecX holding;                     // M a - F - C - A^T lam: what holds the locked dofs
     bool has_holding = false;
     bool ideal = false;               // the motion is that of the ideal constraints alone
-    std::vector<double> load;         // limit at rest before the static ratio
+    std::vector<SlipLimits> load;     // limits at rest before the static ratio
     std::vector<double> limit;        // kinetic, of each element
     std::vector<Vec3> slip_force;     // of each slipping element, along its directions
     std::vector<VecX> user_C;

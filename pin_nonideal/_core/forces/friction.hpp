@@ -13,6 +13,23 @@
 
 namespace pn {
 
+// Limits of the friction against slip forward and backward, along the direction of an element and against it:
+// -forward <= force <= backward. Elements of several directions have one limit for all.
+struct SlipLimits {
+    double forward = 0.0, backward = 0.0;
+
+    SlipLimits() = default;
+    SlipLimits(double limit) : forward(limit), backward(limit) {}
+    SlipLimits(double ahead, double back) : forward(ahead), backward(back) {}
+    double against(Mode slip) const { return slip == slip_minus ? backward : forward; }
+    // The bound that a force is nearest to.
+    double bounding(double force) const { return force > middle() ? backward : forward; }
+    // |force - middle| <= reach.
+    double middle() const { return 0.5 * (backward - forward); }
+    double reach() const { return 0.5 * (backward + forward); }
+    SlipLimits operator*(double factor) const { return {factor * forward, factor * backward}; }
+};
+
 struct Friction {
     enum class Load { none, revolute, prismatic, spherical, planar, multiplier, user } load = Load::none;
     std::string name;
@@ -30,7 +47,7 @@ struct Friction {
     int row = -1;        // and its place among the rows of all descriptions, as Program::finish finds it
     Vec3 axis = Vec3::UnitZ();  // in the joint's frame, or in frame 1 of the anchor
     int axis_dof = -1;          // dof whose axis it is, where it is fixed in no frame
-    std::function<double(const Program& p, double t, const VecX& q, const VecX& v, Workspace& w)> user_limit;
+    std::function<SlipLimits(const Program& p, double t, const VecX& q, const VecX& v, Workspace& w)> user_limit;
 
     bool varies_with_speed() const { return static_ratio != 1.0 && stribeck_velocity != 0.0; }
     // Limit over load at a slip speed.

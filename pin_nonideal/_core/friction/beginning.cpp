@@ -13,7 +13,8 @@ constexpr double unsolved = 10.0;  // what the equation lacks leaves so much in 
 constexpr double slow = 1e-6;      // part of the accelerations that begin at a limit alone
 
 struct Beginning {
-    VecX force, slip;   // along its directions; slip tells the way that it begins to go
+    VecX force, slip;   // along its directions, the force from the middle of its limits; slip tells the way that it begins
+                        // to go
     bool slides, told;  // its acceleration is more than rounding; its way is known
     bool breaks;        // it stuck until now, and is at its limit
 };
@@ -46,15 +47,15 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const std
 // Of the friction of what slips and its acceleration, which are opposite, the one that is larger beside its rounding tells
 // the way.
 std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const FrictionProblem& problem, const VecX& f,
-                           const VecX& limits) {
-    const VecX alpha = problem.alpha0 + problem.W * f;
+                           const FrictionLimits& limits) {
+    const VecX alpha = problem.alpha0 + problem.W * f, from_middle = f - limits.middle;
     const double noise = no_acceleration * problem.alpha0.cwiseAbs().maxCoeff();
     const double slowest = slow * problem.alpha0.cwiseAbs().maxCoeff();
     std::vector<Beginning> all;
     VecX onset;
     for (size_t i = 0, at = 0; i < question.at_rest.size(); at += problem.dims[i], ++i) {
         const int dim = problem.dims[i];
-        const VecX force = f.segment(at, dim), slip = alpha.segment(at, dim);
+        const VecX force = from_middle.segment(at, dim), slip = alpha.segment(at, dim);
         const bool broken = breaks(question, question.at_rest[i], force, limits[i]);
         const bool slides = force.norm() >= limits[i] * (1.0 - at_limit) && slip.norm() > noise;
         const bool slowly = dim > 1 ? force.norm() >= limits[i] * (1.0 - limit_slack) && slip.norm() < slowest
@@ -70,13 +71,15 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const Fri
 }
 
 std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const RestEquation& equation, const VecX& x) {
-    VecX alpha, limits, onset;
+    VecX alpha, onset;
+    FrictionLimits limits;
     equation.respond(x, alpha, limits);
+    const VecX from_middle = x - limits.middle;
     const double noise = no_acceleration + unsolved * equation.error(x);
     std::vector<Beginning> all;
     for (size_t i = 0; i < question.at_rest.size(); ++i) {
         const RestElement& e = equation.elements[i];
-        const VecX force = x.segment(e.row, e.dim), slip = alpha.segment(e.row, e.dim);
+        const VecX force = from_middle.segment(e.row, e.dim), slip = alpha.segment(e.row, e.dim);
         const bool broken = breaks(question, question.at_rest[i], force, limits[i]);
         const bool at_its_limit = force.norm() >= limits[i] * (1.0 - at_limit) ||
                                   (force - e.rho * slip).norm() > limits[i] * (1.0 + at_limit);

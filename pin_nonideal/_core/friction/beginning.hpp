@@ -22,7 +22,7 @@ struct ModeQuestion {
 };
 // Under forces f of a program for these limits. Directions of slip stay in the workspace.
 std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const FrictionProblem& problem, const VecX& f,
-                           const VecX& limits);
+                           const FrictionLimits& limits);
 // The same of a solution of the equation of rest, which is as exact as what it lacks.
 std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const RestEquation& equation, const VecX& x);
 

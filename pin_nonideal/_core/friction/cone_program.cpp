@@ -245,10 +245,15 @@ VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>&
     return ball_program(W, alpha0, dims, s);
 }
 
-VecX onset_accelerations(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s) {
+VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits) {
+    if (limits.middle.isZero(0.0)) return friction_program(W, alpha0, dims, limits.size);
+    return limits.middle + friction_program(W, alpha0 + W * limits.middle, dims, limits.size);
+}
+
+VecX onset_accelerations(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits) {
     constexpr double beyond = 1e-6;  // part of the load by which it is raised
     const VecX more = (1.0 + beyond) * alpha0;
-    return more + W * friction_program(W, more, dims, s);
+    return more + W * friction_program(W, more, dims, limits);
 }
 
 }  // namespace pn

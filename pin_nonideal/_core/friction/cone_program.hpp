@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "friction/box_program.hpp"
+#include "friction/friction_limits.hpp"
 
 namespace pn {
 
@@ -13,8 +14,9 @@ VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dim
 // The same, as a box program where every element has one direction.
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s,
                       const VecX* near = nullptr);
+VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits);
 // Slip accelerations a little beyond the load at which elements give way: there they are rounding, and forces of elements
 // that share a load tell the directions in which all begin to move together only to its root.
-VecX onset_accelerations(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s);
+VecX onset_accelerations(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits);
 
 }  // namespace pn

@@ -24,10 +24,10 @@ std::optional<int> change_modes(const Program& p, Workspace& w, double t, const 
     int changed = 0;
     for (int e : at_rest) {
         if (modes[e] == sticking) {
-            const Vec3 force = friction_force(p, w, e);
-            if (force.norm() <= static_limit(p, w, e, t, q, v) * (1.0 + slack)) continue;
+            const HoldingForce held = holding_force(p, w, e, t, q, v);
+            if (held.is_within(slack)) continue;
             if (p.frictions[e].dim > 1 || w.now.rows.redundant) return std::nullopt;
-            modes[e] = force[0] < 0.0 ? slip_plus : slip_minus;
+            modes[e] = held.force[0] < 0.0 ? slip_plus : slip_minus;
         } else {
             if (slip_rate_along_mode(p, w, e) >= -slack * size) continue;
             modes[e] = sticking;
@@ -46,7 +46,7 @@ bool go_on(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const Mod
     if (p.needs_reactions || (breaks && !alone)) return false;
     std::vector<Mode> modes = question.modes;
     for (int e : question.at_rest) modes[e] = sticking;
-    if (breaks) modes[element] = friction_force(p, w, element)[0] < 0.0 ? slip_plus : slip_minus;
+    if (breaks) modes[element] = holding_force(p, w, element, t, q, v).force[0] < 0.0 ? slip_plus : slip_minus;
     const VecX q_before = q, v_before = v;
     for (int round = 0; round < rounds; ++round) {
         set_modes(p, w, modes);

@@ -51,7 +51,7 @@ struct EachChoice {
         const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
         return std::all_of(question.at_rest.begin(), question.at_rest.end(), [&](int e) {
             if (w.state.mode[e] != sticking) return slip_rate_along_mode(p, w, e) >= -limit_slack * size;
-            return friction_force(p, w, e).norm() <= static_limit(p, w, e, t, q, v) * (1.0 + limit_slack);
+            return holding_force(p, w, e, t, q, v).is_within(limit_slack);
         });
     }
 
@@ -89,7 +89,8 @@ struct EachChoice {
         for (size_t i = 0; i < std::min<size_t>(2, motions.size()); ++i) {
             move(motions[i]);
             VecX limits(question.at_rest.size());
-            for (int k = 0; k < limits.size(); ++k) limits[k] = static_limit(p, w, question.at_rest[k], t, q, v);
+            for (int k = 0; k < limits.size(); ++k)
+                limits[k] = static_limits(p, w, question.at_rest[k], t, q, v).reach();
             failure.limits.push_back(limits);
             failure.accelerations.push_back(w.now.a);
         }

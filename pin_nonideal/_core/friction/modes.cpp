@@ -68,7 +68,7 @@ struct Search {
         const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
         return std::all_of(list.begin(), list.end(), [&](int e) {
             if (w.state.mode[e] == sticking)
-                return friction_force(p, w, e).norm() <= static_limit(p, w, e, t, q, v) * (1.0 + at_limit);
+                return holding_force(p, w, e, t, q, v).is_within(at_limit);
             return p.frictions[e].dim == 1 && slip_rate_along_mode(p, w, e) >= -limit_slack * size;
         });
     }
@@ -157,9 +157,10 @@ struct Search {
         Failure failure(Failure::Kind::paradox, t, list, determinant);
         failure.solutions = motions.empty() ? Failure::Solutions::none : Failure::Solutions::several;
         for (size_t i = 0; i < std::min<size_t>(2, motions.size()); ++i) {
-            VecX alpha, limits;
+            VecX alpha;
+            FrictionLimits limits;
             problem.equation.respond(motions[i], alpha, limits);
-            failure.limits.push_back(limits.head(list.size()));
+            failure.limits.push_back(limits.size.head(list.size()));
             failure.accelerations.push_back(problem.acceleration(motions[i]));
         }
         throw failure;
@@ -190,16 +191,20 @@ struct Search {
 
     // The motion of these modes, which have just been found together with the limits.
     void settle(const RestEquation& equation, const VecX& x, const std::vector<Mode>& modes) {
-        VecX alpha, limits;
+        VecX alpha;
+        FrictionLimits limits;
         equation.respond(x, alpha, limits);
-        for (size_t i = 0; i < equation.elements.size(); ++i)
-            w.state.unknown[i < list.size() ? list[i] : slipping[i - list.size()]] = limits[i];
+        for (size_t i = 0; i < equation.elements.size(); ++i) {
+            const int e = i < list.size() ? list[i] : slipping[i - list.size()];
+            const double middle = limits.middle[equation.elements[i].row];
+            w.state.unknown[e] = limits[i] - (slips(modes[e]) ? modes[e] * middle : 0.0);
+        }
         apply(modes, proven);
     }
 
     // The motion under the forces f of the elements at rest, and the limits that its loads give: the kinetic one for what
     // slips. Returns their largest relative change.
-    double follow(FrictionProblem& problem, const VecX& f, const std::vector<Mode>& modes, VecX& limits) {
+    double follow(FrictionProblem& problem, const VecX& f, const std::vector<Mode>& modes, FrictionLimits& limits) {
         VecX C = VecX::Zero(p.mechanism.nv);
         problem.add_forces(p, w, f, C);
         C = w.now.C_smooth + C;
@@ -209,12 +214,14 @@ struct Search {
         for (int i = 0; i < problem.rows; ++i)
             if (problem.W(i, i) == 0.0) problem.alpha0[i] = driven[i];
         double change = 0.0;
-        for (size_t i = 0; i < list.size(); ++i) {
+        for (size_t i = 0, at = 0; i < list.size(); at += problem.dims[i], ++i) {
             const Friction& friction = p.frictions[list[i]];
-            double limit = static_limit(p, w, list[i], t, q, v);
-            if (modes[list[i]] != sticking) limit = friction.kinetic_limit(w.now.load[list[i]], 0.0);
-            change = std::max(change, std::abs(limit - limits[i]) / std::max(limit, least_limit));
-            limits[i] = limit;
+            SlipLimits now = static_limits(p, w, list[i], t, q, v);
+            if (modes[list[i]] != sticking) now = w.now.load[list[i]] * friction.speed_factor(0.0);
+            const double missed = std::max(std::abs(now.reach() - limits[i]), std::abs(now.middle() - limits.middle[at]));
+            change = std::max(change, missed / std::max(now.reach(), least_limit));
+            limits.size[i] = now.reach();
+            limits.middle[at] = now.middle();
         }
         return change;
     }
@@ -227,8 +234,12 @@ struct Search {
         const double noise = no_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
         for (int i = 0; i < problem.rows; ++i)  // what the constraints hold still has no slip acceleration
             if (problem.W(i, i) == 0.0 && std::abs(problem.alpha0[i]) <= noise) problem.alpha0[i] = 0.0;
-        VecX limits(list.size());
-        for (size_t i = 0; i < list.size(); ++i) limits[i] = static_limit(p, w, list[i], t, q, v);
+        FrictionLimits limits(static_cast<int>(list.size()), problem.rows);
+        for (size_t i = 0, at = 0; i < list.size(); at += problem.dims[i], ++i) {
+            const SlipLimits now = static_limits(p, w, list[i], t, q, v);
+            limits.size[i] = now.reach();
+            limits.middle[at] = now.middle();
+        }
         double change = 0.0;
         for (int turn = 0; turn < most_turns; ++turn) {
             const VecX f = friction_program(problem.W, problem.alpha0, problem.dims, limits);

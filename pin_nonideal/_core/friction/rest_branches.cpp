@@ -152,7 +152,8 @@ struct Search {
     int undecided = 0;
 
     explicit Search(const RestEquation& e) : equation(e), n(e.n), unit(e.n) {
-        VecX alpha, limits;
+        VecX alpha;
+        FrictionLimits limits;
         e.respond(VecX::Zero(n), alpha, limits);
         for (size_t i = 0; i < e.elements.size(); ++i) {
             const RestElement& from = e.elements[i];
@@ -296,6 +297,8 @@ struct Search {
 
 bool is_searched(const RestEquation& equation) {
     if (equation.ask || equation.n > most_searched) return false;
+    for (const RestElement& e : equation.elements)
+        if (e.middle != 0.0) return false;
     Cholesky cholesky;
     if (!cholesky.compute(equation.W)) return false;  // redundant elements share in ways without number
     const auto pivots = cholesky.factor().diagonal().array().square();

@@ -48,8 +48,8 @@ bool energy_factor(const RestEquation& equation, MatX& G, MatX& loads) {
 
 }  // namespace
 
-void RestEquation::respond(const VecX& x, VecX& alpha, VecX& limits) const {
-    limits.resize(elements.size());
+void RestEquation::respond(const VecX& x, VecX& alpha, FrictionLimits& limits) const {
+    limits = FrictionLimits(static_cast<int>(elements.size()), n);
     if (ask) {
         ask(x, alpha, limits);
     } else {
@@ -58,29 +58,38 @@ void RestEquation::respond(const VecX& x, VecX& alpha, VecX& limits) const {
         const VecX vectors = still + loads * x;
         for (size_t i = 0; i < elements.size(); ++i) {
             const RestElement& e = elements[i];
-            limits[i] = e.constant;
-            if (e.directed) limits[i] += std::max(vectors[3 * e.vector], 0.0);
-            for (int k = e.vector; !e.directed && k < e.vector + e.vectors; ++k)
-                limits[i] += vectors.segment<3>(3 * k).norm();
+            double& limit = limits.size[i];
+            limit = e.constant;
+            limits.middle[e.row] = e.middle;
+            if (e.directed) limit += std::max(vectors[3 * e.vector], 0.0);
+            for (int k = e.vector; !e.directed && k < e.vector + e.vectors; ++k) limit += vectors.segment<3>(3 * k).norm();
         }
     }
-    for (size_t i = 0; i < elements.size(); ++i) limits[i] *= elements[i].factor;
-    if (frozen > 0.0) limits += frozen * (fixed - limits);
+    for (size_t i = 0; i < elements.size(); ++i) {
+        limits.size[i] *= elements[i].factor;
+        limits.middle[elements[i].row] *= elements[i].factor;
+    }
+    if (!(frozen > 0.0)) return;
+    limits.size += frozen * (fixed.size - limits.size);
+    limits.middle += frozen * (fixed.middle - limits.middle);
 }
 
-void RestEquation::differentiate(const VecX& x, MatX& dalpha, MatX& dlimits) const {
+void RestEquation::differentiate(const VecX& x, MatX& dalpha, MatX& dlimits, MatX& dmiddle) const {
     const int count = static_cast<int>(elements.size());
     dlimits.setZero(count, n);
+    dmiddle.setZero(n, n);
     if (ask) {
         dalpha.resize(n, n);
-        VecX alpha, limits, alpha_there(n), limits_there(count), shifted = x;
+        VecX alpha, alpha_there(n), shifted = x;
+        FrictionLimits limits, limits_there;
         respond(x, alpha, limits);
-        const double h = difference * std::max({x.cwiseAbs().maxCoeff(), limits.cwiseAbs().maxCoeff(), least_size});
+        const double h = difference * std::max({x.cwiseAbs().maxCoeff(), limits.size.cwiseAbs().maxCoeff(), least_size});
         for (int k = 0; k < n; ++k) {
             shifted[k] = x[k] + h;
             respond(shifted, alpha_there, limits_there);
             dalpha.col(k) = (alpha_there - alpha) / h;
-            dlimits.col(k) = (limits_there - limits) / h;
+            dlimits.col(k) = (limits_there.size - limits.size) / h;
+            dmiddle.col(k) = (limits_there.middle - limits.middle) / h;
             shifted[k] = x[k];
         }
         return;
@@ -100,29 +109,32 @@ void RestEquation::differentiate(const VecX& x, MatX& dalpha, MatX& dlimits) con
 }
 
 VecX RestEquation::residual(const VecX& x) const {
-    VecX alpha, limits, out(n);
+    VecX alpha, out(n);
+    FrictionLimits limits;
     respond(x, alpha, limits);
+    const VecX from_middle = x - limits.middle;
     for (size_t i = 0; i < elements.size(); ++i) {
         const RestElement& e = elements[i];
         if (!e.may_stick) {
-            out.segment(e.row, e.dim) = part(x, e) + limits[i] * e.direction;
+            out.segment(e.row, e.dim) = part(from_middle, e) + limits[i] * e.direction;
             continue;
         }
-        const VecX asked = part(x, e) - e.rho * part(alpha, e);
+        const VecX asked = part(from_middle, e) - e.rho * part(alpha, e);
         const double length = asked.norm();
         if (length <= limits[i]) out.segment(e.row, e.dim) = e.rho * part(alpha, e);
-        else out.segment(e.row, e.dim) = part(x, e) - limits[i] / length * asked;
+        else out.segment(e.row, e.dim) = part(from_middle, e) - limits[i] / length * asked;
     }
     return out;
 }
 
-double RestEquation::force_in_play(size_t i, const VecX& x, const VecX& limits) const {
+double RestEquation::force_in_play(size_t i, const VecX& x, const FrictionLimits& limits) const {
     const RestElement& e = elements[i];
     return std::max({limits[i], part(x, e).norm(), e.rho * part(alpha0, e).norm(), least_size});
 }
 
 double RestEquation::error(const VecX& x) const {
-    VecX alpha, limits;
+    VecX alpha;
+    FrictionLimits limits;
     respond(x, alpha, limits);
     const VecX lack = residual(x);
     double worst = 0.0;
@@ -132,15 +144,18 @@ double RestEquation::error(const VecX& x) const {
 }
 
 MatX RestEquation::jacobian(const VecX& x) const {
-    VecX alpha, limits;
-    MatX dalpha, dlimits, J(n, n);
+    VecX alpha;
+    FrictionLimits limits;
+    MatX dalpha, dlimits, dmiddle, J(n, n);
     respond(x, alpha, limits);
-    differentiate(x, dalpha, dlimits);
+    differentiate(x, dalpha, dlimits, dmiddle);
+    const VecX from_middle = x - limits.middle;
+    const MatX slope = MatX::Identity(n, n) - dmiddle;
     for (size_t i = 0; i < elements.size(); ++i) {
         const RestElement& e = elements[i];
         auto rows = J.middleRows(e.row, e.dim);
-        const MatX unit = MatX::Identity(n, n).middleRows(e.row, e.dim);
-        const VecX asked = part(x, e) - e.rho * part(alpha, e);
+        const MatX unit = slope.middleRows(e.row, e.dim);
+        const VecX asked = part(from_middle, e) - e.rho * part(alpha, e);
         const double length = asked.norm();
         if (!e.may_stick) {
             rows = unit + e.direction * dlimits.row(i);
@@ -157,12 +172,13 @@ MatX RestEquation::jacobian(const VecX& x) const {
 }
 
 VecX RestEquation::holding_forces() const {
-    VecX x = VecX::Zero(n), alpha, limits;
+    VecX x = VecX::Zero(n), alpha;
+    FrictionLimits limits;
     respond(x, alpha, limits);
     std::vector<int> rows;
     for (size_t i = 0; i < elements.size(); ++i) {
         const RestElement& e = elements[i];
-        if (!e.may_stick) x.segment(e.row, e.dim) = -limits[i] * e.direction;
+        if (!e.may_stick) x.segment(e.row, e.dim) = part(limits.middle, e) - limits[i] * e.direction;
         for (int k = 0; e.may_stick && k < e.dim; ++k) rows.push_back(e.row + k);
     }
     const VecX driven = alpha0 + W * x;
@@ -172,12 +188,14 @@ VecX RestEquation::holding_forces() const {
 }
 
 std::vector<bool> RestEquation::sticks(const VecX& x) const {
-    VecX alpha, limits;
+    VecX alpha;
+    FrictionLimits limits;
     respond(x, alpha, limits);
+    const VecX from_middle = x - limits.middle;
     std::vector<bool> out;
     for (size_t i = 0; i < elements.size(); ++i) {
         const RestElement& e = elements[i];
-        out.push_back(e.may_stick && (part(x, e) - e.rho * part(alpha, e)).norm() <= limits[i] * (1.0 + limit_rounding));
+        out.push_back(e.may_stick && (part(from_middle, e) - e.rho * part(alpha, e)).norm() <= limits[i] * (1.0 + limit_rounding));
     }
     return out;
 }
@@ -191,9 +209,10 @@ double RestEquation::determinant(const VecX& x) const {
 }
 
 double RestEquation::determinant_far_away() const {
-    VecX alpha, limits;
+    VecX alpha;
+    FrictionLimits limits;
     respond(VecX::Zero(n), alpha, limits);
-    MatX dalpha, dlimits;
+    MatX dalpha, dlimits, dmiddle;
     const int count = static_cast<int>(elements.size());
     double least = HUGE_VAL;
     for (int signs = 0; signs < 1 << std::min(count, most_signs); ++signs) {
@@ -204,8 +223,10 @@ double RestEquation::determinant_far_away() const {
             x.segment(e.row, e.dim) = far * (e.may_stick ? VecX(sign * size * VecX::Unit(e.dim, 0))
                                                          : VecX(-size * e.direction));
         }
-        differentiate(x, dalpha, dlimits);
+        differentiate(x, dalpha, dlimits, dmiddle);
         MatX slope = MatX::Zero(count, count);
+        for (int i = 0; i < count; ++i)
+            dlimits.row(i) += part(x, elements[i]).normalized().transpose() * dmiddle.middleRows(elements[i].row, elements[i].dim);
         for (int i = 0; i < count; ++i)
             for (int j = 0; j < count; ++j)
                 slope(i, j) =

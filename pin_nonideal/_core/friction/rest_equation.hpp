@@ -2,12 +2,14 @@
 // linear: slip accelerations are alpha = alpha0 + W x, and limits come from lengths of vectors that are linear in x. An
 // element sticks (alpha = 0, |x| <= limit) or begins to slip (x = -limit alpha / |alpha|); either is
 //     x = P(x - rho alpha),    P the nearest point of the ball of the limit, rho > 0 any.
-// One whose slip is known (it slips already, or is driven) has x = -limit times its direction. Pure functions on arrays.
+// One whose slip is known (it slips already, or is driven) has x = -limit times its direction. Where limits differ between
+// forward and backward the ball lies about the middle of them. Pure functions on arrays.
 #pragma once
 
 #include <functional>
 #include <vector>
 
+#include "friction/friction_limits.hpp"
 #include "math/spatial.hpp"
 
 namespace pn {
@@ -17,6 +19,7 @@ struct RestElement {
     bool may_stick = true;
     VecX direction;           // of its slip, where that is known
     double constant = 0.0;    // limit without any load, of an element that has begun to slip
+    double middle = 0.0;      // and the middle of its limits, where it has one direction
     double factor = 1.0;      // static over kinetic limit, or 1 once it has begun to slip
     double rho = 1.0;         // of the equation: the force that an acceleration asks for
     int vector = 0, vectors = 0;  // its load: rows of `loads`, three a vector
@@ -31,20 +34,20 @@ struct RestEquation {
     VecX still;  // load vectors without friction,
     MatX loads;  // and for a unit of each force
     // Where laws are known only as functions: slip accelerations and limits before `factor`, asked for forces x.
-    std::function<void(const VecX& x, VecX& alpha, VecX& limits)> ask;
+    std::function<void(const VecX& x, VecX& alpha, FrictionLimits& limits)> ask;
     // Part of the limits that is as `fixed` says and not as the load does: on the way from one to the other.
     double frozen = 0.0;
-    VecX fixed;
+    FrictionLimits fixed;
 
     bool loaded() const { return ask || loads.rows() > 0; }
-    void respond(const VecX& x, VecX& alpha, VecX& limits) const;
-    // Derivatives of both: alpha (n, n) and limits (elements, n).
-    void differentiate(const VecX& x, MatX& dalpha, MatX& dlimits) const;
+    void respond(const VecX& x, VecX& alpha, FrictionLimits& limits) const;
+    // Derivatives: of alpha (n, n), and of the limits' sizes (elements, n) and middles (n, n).
+    void differentiate(const VecX& x, MatX& dalpha, MatX& dlimits, MatX& dmiddle) const;
     // What x lacks, row by row; and the largest of it as part of each element's forces.
     VecX residual(const VecX& x) const;
     double error(const VecX& x) const;
     // The largest of an element's force and limit and of what would stop it.
-    double force_in_play(size_t element, const VecX& x, const VecX& limits) const;
+    double force_in_play(size_t element, const VecX& x, const FrictionLimits& limits) const;
     // d residual / dx on the branch that x is on.
     MatX jacobian(const VecX& x) const;
 

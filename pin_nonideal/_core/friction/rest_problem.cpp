@@ -36,7 +36,7 @@ RestProblem::RestProblem(const Program& program, Workspace& workspace, double ti
         const Friction& f = p.frictions[e];
         by_functions |= f.reaction == Reaction::total && f.load == Friction::Load::user;
     }
-    if (by_functions) equation.ask = [this](const VecX& x, VecX& alpha, VecX& limits) { ask(x, alpha, limits); };
+    if (by_functions) equation.ask = [this](const VecX& x, VecX& alpha, FrictionLimits& limits) { ask(x, alpha, limits); };
     else collect_loads();
 }
 
@@ -53,7 +53,9 @@ void RestProblem::describe(size_t i, bool resting) {
     e.dim = f.dim;
     if (i > 0) e.row = equation.elements.back().row + equation.elements.back().dim;
     e.directed = f.gap >= 0 && f.load == Friction::Load::multiplier && shares_pressing(p, w);
-    e.constant = f.reaction == Reaction::total ? f.constant : w.now.load[problem_.elements[i]];
+    const SlipLimits known = f.reaction == Reaction::total ? SlipLimits(f.constant) : w.now.load[problem_.elements[i]];
+    e.constant = known.reach();
+    e.middle = known.middle();
     const double response = equation.W.diagonal().segment(e.row, e.dim).sum();
     const VecX alpha = equation.alpha0.segment(e.row, e.dim);
     if (response > 0.0) e.rho = e.dim / response;
@@ -119,12 +121,13 @@ void RestProblem::move(const VecX& x) {
 bool RestProblem::is_motion(const VecX& x) {
     if (p.gaps.empty() || equation.loads.rows() == 0) return true;
     move(x);
-    VecX alpha, limits;
+    VecX alpha;
+    FrictionLimits limits;
     equation.respond(x, alpha, limits);
-    double off = 0.0, size = limits.cwiseAbs().maxCoeff();
+    double off = 0.0, size = limits.size.cwiseAbs().maxCoeff();
     for (size_t i = 0; i < problem_.elements.size(); ++i) {
         if (equation.elements[i].vectors == 0) continue;
-        const double limit = equation.elements[i].factor * load_limit(p, w, friction(i), t, q, v);
+        const double limit = equation.elements[i].factor * load_limits(p, w, friction(i), t, q, v).reach();
         off = std::max(off, std::abs(limit - limits[i]));
         size = std::max(size, limit);
     }
@@ -141,7 +144,7 @@ void RestProblem::enter_piece(const std::vector<char>& unloaded) {
     collect_loads();
 }
 
-void RestProblem::ask(const VecX& x, VecX& alpha, VecX& limits) {
+void RestProblem::ask(const VecX& x, VecX& alpha, FrictionLimits& limits) {
     VecX C = VecX::Zero(p.mechanism.nv);
     problem_.add_forces(p, w, x, C);
     C = w.now.C_smooth + C;
@@ -150,8 +153,13 @@ void RestProblem::ask(const VecX& x, VecX& alpha, VecX& limits) {
     for (int i = 0; i < equation.n; ++i)
         if (equation.W(i, i) == 0.0) alpha[i] = equation.alpha0[i];
     for (size_t i = 0; i < problem_.elements.size(); ++i) {
-        const bool loaded = friction(i).reaction == Reaction::total;
-        limits[i] = loaded ? load_limit(p, w, friction(i), t, q, v) : equation.elements[i].constant;
+        const RestElement& e = equation.elements[i];
+        limits.size[i] = e.constant;
+        limits.middle[e.row] = e.middle;
+        if (friction(i).reaction != Reaction::total) continue;
+        const SlipLimits now = load_limits(p, w, friction(i), t, q, v);
+        limits.size[i] = now.reach();
+        limits.middle[e.row] = now.middle();
     }
 }
 

@@ -36,7 +36,7 @@ private:
     const Friction& friction(size_t i) const { return p.frictions[problem_.elements[i]]; }
     void describe(size_t i, bool resting);
     void collect_loads();
-    void ask(const VecX& x, VecX& alpha, VecX& limits);
+    void ask(const VecX& x, VecX& alpha, FrictionLimits& limits);
     // Puts the motion under forces x into the workspace.
     void move(const VecX& x);
 

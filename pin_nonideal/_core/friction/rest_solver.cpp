@@ -24,7 +24,8 @@ struct Turns {
     const RestEquation& equation;
     std::vector<int> dims, rows;
     MatX W;
-    VecX alpha, limits;
+    VecX alpha;
+    FrictionLimits limits;
 
     explicit Turns(const RestEquation& e) : equation(e) {
         for (const RestElement& element : e.elements) {
@@ -39,15 +40,16 @@ struct Turns {
     }
 
     // Under x: forces of those that slip in any case, limits of those that may stick, and what the others leave for them.
-    void ask(const VecX& x, VecX& out, VecX& held, VecX& own) {
+    void ask(const VecX& x, VecX& out, FrictionLimits& held, VecX& own) {
         equation.respond(x, alpha, limits);
         out = x;
-        held.resize(dims.size());
+        held.size.resize(dims.size());
+        held.middle = limits.middle(rows);
         int free = 0;
         for (size_t i = 0; i < equation.elements.size(); ++i) {
             const RestElement& e = equation.elements[i];
-            if (e.may_stick) held[free++] = limits[i];
-            else out.segment(e.row, e.dim) = -limits[i] * e.direction;
+            if (e.may_stick) held.size[free++] = limits[i];
+            else out.segment(e.row, e.dim) = limits.middle.segment(e.row, e.dim) - limits[i] * e.direction;
         }
         VecX before = out;
         for (int r : rows) before[r] = 0.0;
@@ -56,7 +58,8 @@ struct Turns {
 
     // The forces that the limits under x allow.
     VecX next(const VecX& x) {
-        VecX out, held, own;
+        VecX out, own;
+        FrictionLimits held;
         ask(x, out, held, own);
         out(rows) = friction_program(W, own, dims, held);
         return out;
@@ -108,7 +111,7 @@ bool follow_path(const RestEquation& equation, VecX& x) {
     return true;
 }
 
-double largest_force_in_play(const RestEquation& equation, const VecX& x, const VecX& limits) {
+double largest_force_in_play(const RestEquation& equation, const VecX& x, const FrictionLimits& limits) {
     double size = 0.0;
     for (size_t i = 0; i < equation.elements.size(); ++i) size = std::max(size, equation.force_in_play(i, x, limits));
     return size;
@@ -117,21 +120,23 @@ double largest_force_in_play(const RestEquation& equation, const VecX& x, const 
 // What forces x lack to hold all that rests: accelerations that are left, as the forces they ask for, and what is beyond
 // a limit; and the derivative.
 void lack_of_rest(const RestEquation& equation, const VecX& x, VecX& lack, MatX& J) {
-    VecX alpha, limits;
-    MatX dalpha, dlimits;
+    VecX alpha;
+    FrictionLimits limits;
+    MatX dalpha, dlimits, dmiddle;
     equation.respond(x, alpha, limits);
-    equation.differentiate(x, dalpha, dlimits);
+    equation.differentiate(x, dalpha, dlimits, dmiddle);
+    const VecX from_middle = x - limits.middle;
+    const MatX slope = MatX::Identity(equation.n, equation.n) - dmiddle;
     const int n = equation.n, count = static_cast<int>(equation.elements.size());
     const double no_limit = solved * largest_force_in_play(equation, x, limits);
     lack.setZero(2 * n);
     J.setZero(2 * n, n);
     for (int i = 0; i < count; ++i) {
         const RestElement& e = equation.elements[i];
-        const auto force = x.segment(e.row, e.dim);
+        const auto force = from_middle.segment(e.row, e.dim);
         if (!e.may_stick) {
             lack.segment(e.row, e.dim) = force + limits[i] * e.direction;
-            J.middleRows(e.row, e.dim) = e.direction * dlimits.row(i);
-            J.block(e.row, e.row, e.dim, e.dim).diagonal().array() += 1.0;
+            J.middleRows(e.row, e.dim) = slope.middleRows(e.row, e.dim) + e.direction * dlimits.row(i);
             continue;
         }
         lack.segment(e.row, e.dim) = e.rho * alpha.segment(e.row, e.dim);
@@ -139,11 +144,10 @@ void lack_of_rest(const RestEquation& equation, const VecX& x, VecX& lack, MatX&
         const double size = force.norm();
         if (limits[i] <= no_limit) {  // |x| has a kink there, x has none
             lack.segment(n + e.row, e.dim) = force;
-            J.block(n + e.row, e.row, e.dim, e.dim).setIdentity();
+            J.middleRows(n + e.row, e.dim) = slope.middleRows(e.row, e.dim);
         } else if (size > limits[i]) {
             lack[n + e.row] = size - limits[i];
-            J.row(n + e.row) = -dlimits.row(i);
-            J.row(n + e.row).segment(e.row, e.dim) += force.transpose() / size;
+            J.row(n + e.row) = force.transpose() / size * slope.middleRows(e.row, e.dim) - dlimits.row(i);
         }
     }
 }
@@ -156,7 +160,8 @@ bool hold_at_rest(const RestEquation& equation, VecX& x) {
     MatX J, J_there;
     lack_of_rest(equation, x, lack, J);
     for (int it = 0; it < most_newton; ++it) {
-        VecX alpha, limits;
+        VecX alpha;
+        FrictionLimits limits;
         equation.respond(x, alpha, limits);
         if (lack.cwiseAbs().maxCoeff() <= within * largest_force_in_play(equation, x, limits)) return true;
         const VecX step = least_squares(J, lack, rank_threshold);
@@ -196,7 +201,8 @@ bool refine_rest(const RestEquation& equation, VecX& x) {
 
 VecX onset_accelerations(const RestEquation& equation, const VecX& x) {
     Turns turns(equation);
-    VecX out, held, own;
+    VecX out, own;
+    FrictionLimits held;
     turns.ask(x, out, held, own);
     VecX accelerations = turns.alpha;
     accelerations(turns.rows) = onset_accelerations(turns.W, own, turns.dims, held);

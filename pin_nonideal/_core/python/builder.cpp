@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
@@ -66,7 +67,7 @@ void bind_friction(nb::class_<Builder>& builder) {
                                 Reaction reaction, int joint, int anchor, int row, const std::vector<double>& axis,
                                 int axis_dof, double constant, double mu, double radius, double axial_radius,
                                 double inverse_span, double static_ratio, double stribeck_velocity,
-                                const Function<double(double, Numbers, Numbers, ReactionView)>& user_limit) {
+                                const Function<std::pair<double, double>(double, Numbers, Numbers, ReactionView)>& user_limit) {
             Friction f;
             f.name = name;
             f.law = law;

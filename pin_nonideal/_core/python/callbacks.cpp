@@ -89,7 +89,9 @@ decltype(Friction::user_limit) limit_function(nb::object f) {
     return [f, q_in = HandedArray(), v_in = HandedArray()](const Program& p, double t, const VecX& q, const VecX& v,
                                                            Workspace& w) mutable {
         nb::gil_scoped_acquire gil;
-        return nb::cast<double>(f(t, q_in(q), v_in(v), ReactionView{&p, &w}));
+        const auto [forward, backward] =
+            nb::cast<std::pair<double, double>>(f(t, q_in(q), v_in(v), ReactionView{&p, &w}));
+        return SlipLimits(forward, backward);
     };
 }
 

@@ -18,7 +18,7 @@ inline void clear(const Program& p, Workspace& w, const RunState& first) {
     w.now.several = w.now.no_motion = w.now.ideal = false;
     for (VecX* x : {&w.now.lam, &w.now.reactions.lam, &w.now.C, &w.now.C_smooth, &w.now.base_C, &w.now.a, &w.now.dz})
         x->setZero();
-    std::fill(w.now.load.begin(), w.now.load.end(), 0.0);
+    std::fill(w.now.load.begin(), w.now.load.end(), SlipLimits());
     std::fill(w.now.limit.begin(), w.now.limit.end(), 0.0);
     std::fill(w.now.slip_force.begin(), w.now.slip_force.end(), none);
     w.now.renew();

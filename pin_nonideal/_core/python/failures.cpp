@@ -43,6 +43,8 @@ void bind_failures(nb::module_& m) {
         .value("closure", Kind::closure, "elements: the block of rows; value: gap")
         .value("step_size", Kind::step_size, "value: number of steps so far, when it would never end")
         .value("stiff", Kind::stiff, "elements: the degree of freedom; value: rate")
+        .value("growing", Kind::growing,
+               "elements: the degree of freedom, and what feeds it: 0 the actuation, 1 given forces, 2 laws; value: rate")
         .value("steps", Kind::steps, "value: number of steps, which is all that the run may take")
         .value("wall", Kind::wall, "value: wall time, which is all that the run may take")
         .value("interrupted", Kind::interrupted);

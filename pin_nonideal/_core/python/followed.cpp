@@ -4,6 +4,7 @@
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
@@ -75,6 +76,10 @@ void bind_followed(nb::module_& m) {
         .def_prop_ro("done", [](const Followed& f) { return f.run.done(); })
         .def_prop_ro("y", [](const Followed& f) { return to_numpy(f.run.state()); }, own)
         .def_prop_ro("rate", [](const Followed& f) { return to_numpy(f.run.state_rate()); }, own)
+        .def_prop_ro("singular_onset", [](Followed& f) -> std::optional<std::string> {
+            const auto e = f.run.singular_onset();
+            return e ? std::optional(f.p->frictions[*e].name) : std::nullopt;
+        })
         .def("outcome", [](Followed& f) { return Outcome{f.w.counters, std::move(f.out)}; });
 }
 

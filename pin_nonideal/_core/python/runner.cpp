@@ -98,8 +98,7 @@ Instant Runner::solve(const Array& q_in, const Array& v_in, double t, const std:
         const Mode mode = w->state.mode[e];
         Vec3 f = friction_force(*p, *w, element);
         out.friction.push_back(to_numpy(&f[0], p->frictions[e].dim));
-        out.limits.push_back(mode == sticking   ? static_limit(*p, *w, element, t, q, v)
-                             : mode == unloaded ? 0.0 : w->now.limit[e]);
+        out.limits.push_back(limit_at_hand(*p, *w, element, t, q, v));
         out.modes.push_back(mode);
     }
     Split split;

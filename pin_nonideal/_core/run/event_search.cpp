@@ -65,8 +65,8 @@ double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
     }
     if (watch.kind == Watch::Kind::slip) return slip_along_mode(p, w, watch.index) + allowance(watch.index);
     system_.read(y);
-    return static_limit(p, w, watch.index, t, system_.q, system_.v) * (1.0 + limit_rounding) -
-           friction_force(p, w, watch.index).norm();
+    const HoldingForce held = holding_force(p, w, watch.index, t, system_.q, system_.v);
+    return held.limit * (1.0 + limit_rounding) - held.force.norm();
 }
 
 // --- What may have crossed ------------------------------------------------------------------------------------------
@@ -343,7 +343,7 @@ Crossing EventSearch::confirmed(const Crossing& told) {
         const auto part = confirm(told.watch, told.part, told.slope, system_.load(stepper_.start_rate(), told.watch.index));
         return part ? Crossing{told.watch, *part, told.slope} : cross(told.watch, Source::evaluation);
     }
-    const double limit = static_limit(p, w, told.watch.index, stepper_.t0 + stepper_.h, system_.q, system_.v);
+    const double limit = static_limits(p, w, told.watch.index, stepper_.t0 + stepper_.h, system_.q, system_.v).reach();
     const double at_start = limit * (1.0 - std::abs(system_.share(stepper_.start_rate(), told.watch.index)));
     const auto part = confirm(told.watch, told.part, told.slope * limit, at_start);
     return part ? Crossing{told.watch, *part, told.slope * limit} : cross(told.watch, Source::evaluation);

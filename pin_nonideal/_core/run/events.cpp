@@ -55,8 +55,7 @@ bool shares_load(System& system, double t, const std::vector<int>& resting, int 
     if (!p.needs_reactions && !w.now.rows.redundant) return shares;
     for (int e : resting)
         shares |= w.state.mode[e] == sticking &&
-                  (e == held || friction_force(p, w, e).norm() >
-                                    static_limit(p, w, e, t, system.q, system.v) * (1.0 + limit_rounding));
+                  (e == held || !holding_force(p, w, e, t, system.q, system.v).is_within(limit_rounding));
     return shares;
 }
 

@@ -3,11 +3,17 @@
 #include <algorithm>
 
 #include "dynamics/projection.hpp"
+#include "dynamics/slip.hpp"
+#include "friction/modes.hpp"
+#include "friction/problem.hpp"
 
 namespace pn {
 
 // Relative step of central differences: the cube root of the rounding, where rounding and curvature cost the same.
 constexpr double difference = 6e-6;
+// Acceleration of an onset beside that of its friction alone, whose inverse is the rate at which the direction relaxes over
+// the time since the onset: implicit steps follow it to about thirty.
+constexpr double least_onset = 1.0 / 30.0;
 
 void FollowedRun::derivative(double at, const VecX& y_outside, VecX& rate_outside) {
     inside_ = inside_rate_ = VecX::Zero(system.ny);
@@ -31,6 +37,17 @@ MatX FollowedRun::jacobian(double at, const VecX& y_outside) {
         ahead[k] = back[k] = y_outside[k];
     }
     return out;
+}
+
+std::optional<int> FollowedRun::singular_onset() {
+    for (int e : w.now.slipping) {
+        const Friction& friction = p.frictions[e];
+        if (friction.dim == 1 || !at_rest(p, w, e, system.v)) continue;
+        const FrictionProblem problem(p, w, {e});
+        const double by_friction = w.now.limit[e] * problem.W.trace() / friction.dim;
+        if (slip_rate_along_mode(p, w, e) < least_onset * by_friction) return e;
+    }
+    return std::nullopt;
 }
 
 // Events came too thick a moment ago: implicit steps go over them with the modes as they are.

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 
 #include "run/simulation.hpp"
 
@@ -25,6 +26,11 @@ public:
         if (!p.users_motions.empty()) breaks.look(end);
         return std::min(end, breaks.next());
     }
+
+    // An element of several directions whose slip begins from rest so slowly, beside the acceleration that its friction
+    // alone would cause, that its direction relaxes faster than any step of an integrator without that direction among
+    // its unknowns; none at most states.
+    std::optional<int> singular_onset();
 
     double time() const { return t; }
     using Simulation::done;

@@ -31,8 +31,8 @@ std::vector<int> all_elements(const System& system) {
 
 Moreau::Moreau(System& system)
     : system_(system), p(system.p), w(system.w), problem_(p, all_elements(system)), modes_(system.ne, unloaded),
-      unloaded_(modes_), q_mid_(VecX::Zero(system.nq)), limit_(VecX::Zero(system.ne)), force_limit_(limit_),
-      power_(VecX::Zero(system.nw)) {
+      unloaded_(modes_), q_mid_(VecX::Zero(system.nq)), power_(VecX::Zero(system.nw)), limit_(system.ne, problem_.rows),
+      force_limit_(limit_) {
     problem_.alpha0 = alpha_ = near_ = VecX::Zero(problem_.rows);
     for (int dim : problem_.dims) boxes_ = boxes_ && dim == 1;
 }
@@ -103,13 +103,16 @@ void Moreau::apply_forces() {
 // Limits for the load of the motion in the workspace; returns their largest change.
 double Moreau::update_limits(double t) {
     double change = 0.0;
-    for (int e = 0; e < system_.ne; ++e) {
+    even_ = true;
+    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const Friction& friction = p.frictions[e];
         const double speed = slip_velocity(w.now, friction).norm();
-        const double load = load_limit(p, w, friction, t, w.now.terms.q, v0_);
-        const double limit = speed == 0.0 ? friction.holding_limit(load) : friction.kinetic_limit(load, speed);
-        change = std::max(change, std::abs(limit - limit_[e]));
-        limit_[e] = limit;
+        const SlipLimits load = load_limits(p, w, friction, t, w.now.terms.q, v0_);
+        const SlipLimits limit = load * (speed == 0.0 ? friction.static_ratio : friction.speed_factor(speed));
+        change = std::max({change, std::abs(limit.reach() - limit_[e]), std::abs(limit.middle() - limit_.middle[at])});
+        limit_.size[e] = limit.reach();
+        limit_.middle[at] = limit.middle();
+        even_ = even_ && limit.middle() == 0.0;
     }
     return change;
 }
@@ -124,10 +127,11 @@ void Moreau::solve_friction(double t) {
         // Limits that no load decides need no motion.
         if (pass == 0 || p.needs_reactions) apply_forces();
         const double change = update_limits(t + 0.5 * h_);
-        const double largest = system_.ne > 0 ? std::max(0.0, limit_.maxCoeff()) : 0.0;
+        const double largest = system_.ne > 0 ? std::max(0.0, limit_.size.maxCoeff()) : 0.0;
         if (pass > 0 && (change <= load_tolerance * largest || !p.needs_reactions)) return;
-        if (problem_.rows > 0 && boxes_) box_.solve(problem_.W, problem_.alpha0, limit_, &near_, force_);
-        else force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_, &near_);
+        if (!even_) force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_);
+        else if (problem_.rows > 0 && boxes_) box_.solve(problem_.W, problem_.alpha0, limit_.size, &near_, force_);
+        else force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_.size, &near_);
         near_ = force_;
         force_limit_ = limit_;
         if (pass + 1 == load_passes) throw Failure(Failure::Kind::not_converged, t, problem_.elements);
@@ -143,7 +147,9 @@ void Moreau::end_velocity() {
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const int dim = problem_.dims[e];
         w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim) = force_.segment(at, dim);
-        const bool held = force_.segment(at, dim).norm() < force_limit_[e] * (1.0 - limit_rounding);
+        shifted_ = force_.segment(at, dim);
+        if (dim == 1) shifted_[0] -= force_limit_.middle[at];
+        const bool held = shifted_.norm() < force_limit_[e] * (1.0 - limit_rounding);
         modes_[e] = held ? sticking : dim > 1 || alpha_[at] > 0.0 ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[e].block];
         if (held && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "friction/box_program.hpp"
+#include "friction/friction_limits.hpp"
 #include "friction/problem.hpp"
 #include "run/system.hpp"
 
@@ -42,7 +43,10 @@ private:
     VecX a_friction_, alpha_, near_;
     BoxProgram box_;
     bool boxes_ = true;  // every element has one direction
-    VecX force_, limit_, force_limit_, power_;  // of the elements; force_limit is the one that force was found for
+    VecX force_, power_;                  // of the elements
+    FrictionLimits limit_, force_limit_;  // the second: those that force was found for
+    bool even_ = true;                    // all elements rub alike forward and backward
+    VecX shifted_;
 };
 
 }  // namespace pn

@@ -286,18 +286,30 @@ bool MoreauContacts::limits_settle(double t) {
         if (!cones_[e].is(ConeElement::Kind::box)) continue;
         const Friction& friction = p.frictions[parts_[e].element];
         const double speed = slip_velocity(w.now, friction).norm();
-        const double load = friction.gap >= 0 ? friction.constant + friction.mu * w.now.lam[friction.row]
-                                              : load_limit(p, w, friction, t, w.now.terms.q, v0_);
-        const double limit = speed == 0.0 ? friction.holding_limit(load) : friction.kinetic_limit(load, speed);
-        change = std::max(change, std::abs(limit - cones_[e].bound));
+        const SlipLimits load = friction.gap >= 0 ? SlipLimits(friction.constant + friction.mu * w.now.lam[friction.row])
+                                                  : load_limits(p, w, friction, t, w.now.terms.q, v0_);
+        const SlipLimits limits = load * (speed == 0.0 ? friction.static_ratio : friction.speed_factor(speed));
+        const double limit = limits.reach();
+        change = std::max({change, std::abs(limit - cones_[e].bound), std::abs(limits.middle() - parts_[e].middle)});
         largest = std::max(largest, limit);
         cones_[e].bound = std::max(0.0, limit);
+        parts_[e].middle = limits.middle();
     }
     const bool settles = change <= load_tolerance * largest ||
                          (change > contracting * last_change_ &&
                           change <= most_miss * f_.head(static_cast<int>(rows_.size())).cwiseAbs().maxCoeff());
     last_change_ = change;
     return settles;
+}
+
+// Boxes of the cone problem lie about no force: forces from the middles of their limits, and back.
+void MoreauContacts::measure_from_middles(double sign) {
+    const int n = static_cast<int>(rows_.size());
+    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
+        if (parts_[e].middle == 0.0) continue;
+        f_[at] -= sign * parts_[e].middle;
+        w0_.head(n) += sign * parts_[e].middle * W_.col(at).head(n);
+    }
 }
 
 void MoreauContacts::solve(double t) {
@@ -309,7 +321,9 @@ void MoreauContacts::solve(double t) {
         if (loads || pass > 0) apply();
         if (limits_settle(t) && pass > 0) break;
         if (pass == load_passes) throw Failure(Failure::Kind::not_converged, t);
+        measure_from_middles(1.0);
         const ConeStatus status = solver_.solve(W, w0_.head(n), cones_, true, f_.head(n), true);
+        measure_from_middles(-1.0);
         if (status != ConeStatus::solved) throw Failure(Failure::Kind::not_converged, t);
         ++w.counters.iterations;
     }
@@ -318,7 +332,9 @@ void MoreauContacts::solve(double t) {
     presses_ = n > 0;
     for (int i = 0; i < n; ++i) w.state.percussion[p.blocks[rows_[i].block].row + rows_[i].k] = f_[i];
     if (n == 0) return;
+    measure_from_middles(1.0);
     const ConeResiduals r = ConeComplementarity::residuals(W, w0_.head(n), cones_, f_.head(n));
+    measure_from_middles(-1.0);
     w.counters.signorini = std::max(w.counters.signorini, r.signorini);
     w.counters.coulomb = std::max(w.counters.coulomb, r.coulomb);
     w.counters.dissipation = std::max(w.counters.dissipation, r.dissipation);
@@ -344,7 +360,7 @@ void MoreauContacts::end_velocity() {
         if (head) closed_[part.gap] = w1_[at] - part.approach <= still;
         if (part.element < 0 || (head && !closed_[part.gap])) continue;
         const double limit = cones_[e].bound * (head ? f_[at] : 1.0);
-        const double size = f_.segment(at + head, dim).norm();
+        const double size = dim == 1 ? std::abs(f_[at + head] - part.middle) : f_.segment(at + head, dim).norm();
         const bool rests = w1_.segment(at + head, dim).norm() <= still;
         const bool held = limit - size > clear || (rests && (limit <= clear || size < limit * (1.0 - limit_rounding)));
         const bool forward = dim > 1 || (dim > 0 && w1_[at + head] > 0.0);

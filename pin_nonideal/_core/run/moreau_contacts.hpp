@@ -33,6 +33,7 @@ private:
         int gap = -1;          // a contact's,
         int element = -1;      // and of dry friction: its sliding, or one that is a box
         double approach = 0.0; // restitution times the rate at which its gap closed, over the step
+        double middle = 0.0;   // of the limits of a box of one direction
     };
 
     bool tells_way_out(int gap, double width) const { return width > -nearly_all * rounded_by_[gap]; }
@@ -44,6 +45,7 @@ private:
     void add_part(Part part, int first_block, int kept, ConeElement element);
     void respond();
     void measure_free();
+    void measure_from_middles(double sign);
     void solve(double t);
     void apply();
     bool limits_settle(double t);

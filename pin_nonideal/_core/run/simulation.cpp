@@ -40,7 +40,7 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       system(program, workspace, options.record.energy), norm(system, options.rtol, options.atol, rounding),
       stepper(options.method, system, norm), control(options.method, options.rtol),
       choice(system, stepper, *this, run_options), stiffness(system, stepper, *this, run_options),
-      floor(system, stepper, norm, *this, recording),
+      floor(system, stepper, norm, *this, recording), growth(system, *this, run_options),
       watch(system, gaps), locator(system, stepper, slip_at_start, pulls, watch),
       output(system, stepper, *this, run_options, recording), notices(system, stepper, *this, recording),
       value_events(run_options.events, system, stepper, *this), breaks(system, *this, output, recording),
@@ -315,6 +315,7 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     remember_directions(system, slip_at_start);
     y.head(stepper.active) = stepper.y1.head(stepper.active);
     rate.head(stepper.active) = stepper.end_rate().head(stepper.active);
+    growth.look();
     output.configured_now();
     landing.remember_gaps(!event);
     output.keep_step();

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "run/event_location.hpp"
+#include "run/growth.hpp"
 #include "run/mode_changes.hpp"
 #include "run/rounding.hpp"
 #include "run/step_control.hpp"
@@ -69,6 +70,7 @@ protected:
     StepperChoice choice;
     StiffnessGuard stiffness;
     RoundingFloor floor;
+    GrowthGuard growth;
     GapWatch watch;
     EventLocator locator;
     Output output;

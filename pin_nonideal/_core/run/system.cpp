@@ -71,8 +71,8 @@ void System::watch(double t, VecX& dy) {
             share = speed;
             rate = change;
         } else if (w.state.mode[e] == sticking && !w.state.indeterminate) {
-            const double limit = static_limit(p, w, e, t, q, v);
-            const Vec3 force = friction_force(p, w, e);  // of one direction with its sign: smooth where it passes zero
+            const auto [force, limit] = holding_force(p, w, e, t, q, v);
+            // Of one direction with its sign: smooth where it passes zero.
             share = (p.frictions[e].dim == 1 ? force[0] : force.norm()) / std::max(limit, least_limit);
             if (p.frictions[e].gap >= 0) share = std::clamp(share, -most_share, most_share);
         }
