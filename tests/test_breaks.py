@@ -112,7 +112,8 @@ def test_no_break_is_leapt_over(kind, many):
             for rtol in (1e-6, 1e-9, 1e-12):
                 run = case.run(method=method, rtol=rtol, atol=1e-2 * rtol, record=("energy",))
                 assert case.miss(run) < max(ADDED * rtol, FLOOR), (seed, method, rtol)
-                assert np.abs(run.energy["balance"]).max() < max(ADDED * rtol, BALANCE), (seed, method, rtol)
+                size = max(1.0, np.ptp(run.energy["kinetic"]))
+                assert np.abs(run.energy["balance"]).max() < max(ADDED * rtol, BALANCE) * size, (seed, method, rtol)
 
 
 @pytest.mark.parametrize("kind", ["pulse", "zigzag", "profile"])
@@ -130,8 +131,8 @@ def test_breaks_that_a_function_tells_are_those_that_are_found(kind, seed):
 def test_fixed_steps_have_their_order_across_breaks(kind, seed):
     case = Case(seed, kind)
     for method, order, dt in (("rk4", 4, 2e-3), ("semi_implicit_euler", 1, 1e-3)):
-        whole, half = (case.miss(case.run(method=method, dt=size)) for size in (dt, dt / 2))
-        assert half < max(1.8 * whole / 2**order, FLOOR), method
+        misses = [case.miss(case.run(method=method, dt=dt / 2**k)) for k in range(4)]
+        assert misses[3] < max(1.6 * max(misses[:2]) / 2 ** (2 * order), FLOOR), method
 
 
 @pytest.mark.slow
@@ -170,7 +171,8 @@ def test_what_rests_is_moved_by_a_spline_far_in_its_future(ends):
     run = pn.simulate(scene, 100.0, record=("a", "energy"))
     for t, q, v in zip(run.t, run.q, run.v, strict=True):
         if 50.0 < t < 50.02:
-            assert [q[0], v[0]] == pytest.approx(spline(t)[:2], abs=1e-12)
+            # At 2,000 m/s^2 the rounding of t = 50 s alone is 1e-11 m/s.
+            assert [q[0], v[0]] == pytest.approx(spline(t)[:2], abs=1e-10)
     assert {50.0, 50.01, 50.02} <= set(run.t)
     assert run.q[-1, 0] == pytest.approx(0.3, abs=1e-14)
     assert np.abs(run.energy["balance"]).max() < 1e-9
@@ -189,7 +191,7 @@ def test_a_jump_throws_what_rests_on_the_cart():
     scene = pn.Scene(
         model,
         constraints=[pn.PrescribedMotion("table", lift, name="lift")],
-        contacts=[pn.Contact("foot", plane="top", name="rests")],
+        contacts=[pn.PointContact("foot", plane="top", name="rests")],
     )
     run = pn.simulate(scene, 1.0, rtol=1e-10, atol=1e-12, record=("energy",))
     assert at(run, "jump") == pytest.approx([0.5, 0.7], abs=1e-12)

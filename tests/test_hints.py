@@ -22,7 +22,7 @@ def stiff_on_the_ground(**parts):
     frame(model, "ground", 0)
     return pn.Scene(
         model,
-        contacts=[pn.PointContact("sole", "ground", mu=0.5, name="sole")],
+        contacts=[pn.PointContact("sole", 0.5, plane="ground", name="sole")],
         laws=[pn.JointFriction("finger", viscous=0.1)],
         v0=[0.0, 1.0],
         **parts,

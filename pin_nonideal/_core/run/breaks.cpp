@@ -24,6 +24,8 @@ constexpr double unexplained = 1e-4, uneven = 0.2;
 constexpr double kept_part = 0.3;
 // A value that jumps by more than this is no motion [m or rad].
 constexpr double value_jump = 1e-9;
+// Intervals of a step between whose ends a function of the user's is compared.
+constexpr int intervals = 16;
 
 struct Probe {
     double t;
@@ -151,17 +153,17 @@ void Breaks::look(double end) {
         if (!is_users(f)) continue;
         const double begin = w.now.row_time(now_.t);
         if (!(begin < end)) return;
-        const Probe ends[] = {probe(f, begin), probe(f, begin + 0.5 * (end - begin)), probe(f, end)};
         std::optional<Probe> found;
-        Probe before = ends[0];
-        for (int half = 0; half < 2 && !found; ++half) {
-            const Probe &a = ends[half], &b = ends[half + 1];
-            before = a;
+        Probe before = probe(f, begin);
+        for (int k = 1; k <= intervals && !found; ++k) {
+            const Probe a = before, b = probe(f, begin + (end - begin) * k / intervals);
+            if (!(a.t < b.t)) break;
             if (rate_defect(a, b) > unexplained * rate_size(a, b)) found = find_jump(f, before, b, rate_defect);
             if (found) break;
             before = a;
             if (acceleration_change(a, b) > uneven * std::max(std::abs(a.f[2]), std::abs(b.f[2])))
                 found = find_jump(f, before, b, acceleration_change);
+            if (!found) before = b;
         }
         if (!found) continue;
         if (std::abs(found->f[0] - before.f[0]) > value_jump)

@@ -22,8 +22,8 @@ public:
     // Goes behind the break that was reached, where the rate is taken anew; whether the velocity has jumped. Modes of
     // contacts and friction behind a jump are still to be found.
     bool pass();
-    // Looks for a break of a function of the user's in a step from now to `end`. One that comes and goes between the start,
-    // middle and end of a step is not seen.
+    // Looks for a break of a function of the user's in a step from now to `end`. A pulse that begins and ends within one of
+    // its sixteen intervals is not seen.
     void look(double end);
 
 private:

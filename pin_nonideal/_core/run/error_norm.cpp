@@ -18,6 +18,8 @@ constexpr double shortest_resolved = 1e-9;
 // Rounding in one velocity, as a part of the largest: a joint that constraints drive slowly beside fast ones has no
 // digits below it, and no step is short enough to find some.
 constexpr double velocity_rounding = 64 * std::numeric_limits<double>::epsilon();
+// A projection moves a state by its rounding, this part of the largest position (and of one) and of the largest velocity.
+constexpr double projection_rounding = 1e-13;
 
 // The first step [Hairer, Norsett, Wanner, sec. II.4]: Euler's rule may move by this part of the state's own size, and
 // the method's error, by the derivatives seen there, by this part of the tolerance.
@@ -106,8 +108,15 @@ double ErrorNorm::operator()(const VecX& dy, const VecX& y) {
 
 double ErrorNorm::of_projection(const VecX& dy, const VecX& y) {
     to_tangent(dy, y);
-    const int n = system_.on_constraints ? system_.nv : 2 * system_.nv;
-    return std::sqrt((tangent_.head(n).array() / tolerance_.head(n).array()).square().mean());
+    const int nv = system_.nv, n = system_.on_constraints ? nv : 2 * nv;
+    double sum = 0.0;
+    for (int part = 0, first = 0; first < n; ++part, first += nv) {
+        const double largest = part == 0 ? y.head(system_.nq).cwiseAbs().maxCoeff() : system_.velocity(y).cwiseAbs().maxCoeff();
+        const double rounding = projection_rounding * std::max(1.0, largest);
+        for (int k = first; k < first + nv; ++k)
+            if (std::abs(tangent_[k]) > rounding) sum += std::pow(tangent_[k] / tolerance_[k], 2);
+    }
+    return std::sqrt(sum / n);
 }
 
 double ErrorNorm::initial_step(int order, double t, const VecX& y, const VecX& dy, double limit) {
