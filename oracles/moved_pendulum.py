@@ -14,8 +14,6 @@ import pinocchio as pin
 from scipy.integrate import solve_ivp
 
 REFERENCE = 1e-13
-# Part of the time by which a break is told from what lies beside it.
-BESIDE = 1e-13
 GRAVITY = 9.81
 CART_MASS = 2.0
 
@@ -46,7 +44,7 @@ class Pendulum:
         state, begin, work = np.array(start, float), 0.0, 0.0
         stops = [t for t in sorted(breaks) if 0.0 < t < duration] + [duration]
         for stop in stops:
-            low, high = begin + BESIDE * max(1.0, begin), stop - BESIDE * max(1.0, stop)
+            low, high = np.nextafter(begin, np.inf), np.nextafter(stop, -np.inf)
 
             def rate(t, y, low=low, high=high):
                 x2 = function(min(max(t, low), high))[2]
@@ -55,7 +53,7 @@ class Pendulum:
             run = solve_ivp(rate, (begin, stop), state, method="DOP853", rtol=REFERENCE, atol=REFERENCE)
             state, begin = run.y[:, -1].copy(), stop
             if stop < duration:
-                before, after = (function(stop + side * BESIDE * max(1.0, stop))[1] for side in (-1, 1))
+                before, after = (function(np.nextafter(stop, side * np.inf))[1] for side in (-1, 1))
                 energy = self.kinetic(before, state)
                 state[1] += lever * np.cos(state[0]) * (after - before) / J
                 work += self.kinetic(after, state) - energy

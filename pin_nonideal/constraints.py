@@ -232,8 +232,8 @@ class PrescribedMotion:
     Args:
         joint: name of the joint.
         function: t -> (value, rate, acceleration), for example `sinusoid(...)`.  A function of the user's may
-            tell its breaks [s] by an attribute `breaks`; otherwise they are searched for in sixteen intervals of
-            each step: a pulse within one interval is seen with the attribute only.
+            tell its breaks [s] by an attribute `breaks`; otherwise they are searched for in sixteen intervals
+            of each adaptive step and over each fixed one: a shorter pulse is seen with the attribute only.
         name: used in messages and results.
     """
 

@@ -11,6 +11,7 @@ import pytest
 import pin_nonideal as pn
 from oracles.moved_pendulum import CART_MASS, Pendulum
 
+from .orders import SIZES, is_of_order
 from .seeds import ranges, seeds
 
 DURATION = 4.0
@@ -112,8 +113,8 @@ def test_no_break_is_leapt_over(kind, many):
             for rtol in (1e-6, 1e-9, 1e-12):
                 run = case.run(method=method, rtol=rtol, atol=1e-2 * rtol, record=("energy",))
                 assert case.miss(run) < max(ADDED * rtol, FLOOR), (seed, method, rtol)
-                size = max(1.0, np.ptp(run.energy["kinetic"]))
-                assert np.abs(run.energy["balance"]).max() < max(ADDED * rtol, BALANCE) * size, (seed, method, rtol)
+                allowed = max(ADDED * rtol, BALANCE) * max(1.0, np.ptp(run.energy["kinetic"]))
+                assert np.abs(run.energy["balance"]).max() < allowed, (seed, method, rtol)
 
 
 @pytest.mark.parametrize("kind", ["pulse", "zigzag", "profile"])
@@ -127,12 +128,12 @@ def test_breaks_that_a_function_tells_are_those_that_are_found(kind, seed):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", seeds(range(30), always=[0])[:3])
+@pytest.mark.parametrize("seed", seeds(range(30), always=[0])[:1])
 def test_fixed_steps_have_their_order_across_breaks(kind, seed):
     case = Case(seed, kind)
     for method, order, dt in (("rk4", 4, 2e-3), ("semi_implicit_euler", 1, 1e-3)):
-        misses = [case.miss(case.run(method=method, dt=dt / 2**k)) for k in range(4)]
-        assert misses[3] < max(1.6 * max(misses[:2]) / 2 ** (2 * order), FLOOR), method
+        misses = [case.miss(case.run(method=method, dt=dt * size)) for size in SIZES]
+        assert is_of_order(misses, order, FLOOR), method
 
 
 @pytest.mark.slow
@@ -175,7 +176,8 @@ def test_what_rests_is_moved_by_a_spline_far_in_its_future(ends):
             assert [q[0], v[0]] == pytest.approx(spline(t)[:2], abs=1e-10)
     assert {50.0, 50.01, 50.02} <= set(run.t)
     assert run.q[-1, 0] == pytest.approx(0.3, abs=1e-14)
-    assert np.abs(run.energy["balance"]).max() < 1e-9
+    # The work is integrated to the run's own rtol.
+    assert np.abs(run.energy["balance"]).max() < 1e-8 * np.ptp(run.energy["kinetic"])
 
 
 def test_a_jump_throws_what_rests_on_the_cart():

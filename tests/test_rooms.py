@@ -54,8 +54,8 @@ contact: gaps reach ways separation contact_rows impact resting closing moving_o
 run: archive method step outside_step step_control runge_kutta system semi_implicit_euler error_norm \
 collocation stepper gap_watch gap_search moreau moreau_contacts dense_output recorder inside_samples \
 checkpoint options output stiffness growth rounding event_search event_location events stepper_choice \
-bouncing notices value_events breaks torques landing time_stepping clusters mode_changes simulation followed_run \
-stepped_run
+bouncing notices value_events breaks torques landing time_stepping clusters mode_changes simulation \
+followed_run stepped_run
 python: arrays buffers failures callbacks builder constraints cleared kept_run options runner \
 run_programs share_out runs batch followed stepped program cones module
 """

@@ -120,7 +120,7 @@ def _growing(model: Model, dof: int, source: str, rate: float, t: float) -> RunE
     joint = str(model.names[joint_of(model, dof)])
     return DivergenceError(
         f'the speed of joint "{joint}" grows without bound by t = {t:.4g} s, by a factor of e every '
-        f"{1.0 / rate:.2g} s over many decades, and {source} does most work on it: the motion is unstable; "
+        f"{1.0 / rate:.2g} s, over many decades, and {source} does most work on it: the motion is unstable; "
         "look at the signs, gains and delays there, or follow it all the same with max_steps",
         joint=joint,
         source=source,

@@ -222,6 +222,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
         if (!configured) evaluate_residuals(p, w, t, q, v);
         largest = gather_residuals(p, w);
         floor = position_floor(p, w);
+        w.now.projected_gap = std::max(w.now.projected_gap, largest / std::max(floor, no_floor));
     }
     const bool moves = largest > floor;
     configured &= !moves;
@@ -351,6 +352,7 @@ bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
     if (w.now.rows.blocks.empty()) return false;
     const double floor = velocity_floor(w, v);
     double last = gather_rates(p, w, t, v);
+    w.now.projected_rate = std::max(w.now.projected_rate, last / std::max(floor, no_floor));
     bool moved = false;
     for (int it = 0; it < projection_limit && last > floor; ++it) {
         least_move(p, w, w.scratch.scaled);

@@ -82,6 +82,7 @@ struct Evaluation {
     VecX b, lam;  // by kept row
     VecX closing_lam;  // multipliers of the move that closed the position last
     bool has_closing = false;  // they may differ from zero
+    double projected_gap = 0.0, projected_rate = 0.0;  // largest residuals that projections met, over their rounding
     VecX tau, external, F, C, C_smooth, base_C, a;  // generalized forces and acceleration
     // F as the solution takes it, where trees are deep: their bias and the given forces on their bodies are wrenches.
     VecX joint_F, joint_external;

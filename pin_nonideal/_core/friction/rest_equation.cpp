@@ -195,7 +195,8 @@ std::vector<bool> RestEquation::sticks(const VecX& x) const {
     std::vector<bool> out;
     for (size_t i = 0; i < elements.size(); ++i) {
         const RestElement& e = elements[i];
-        out.push_back(e.may_stick && (part(from_middle, e) - e.rho * part(alpha, e)).norm() <= limits[i] * (1.0 + limit_rounding));
+        out.push_back(e.may_stick &&
+                      (part(from_middle, e) - e.rho * part(alpha, e)).norm() <= limits[i] * (1.0 + limit_rounding));
     }
     return out;
 }
@@ -226,7 +227,8 @@ double RestEquation::determinant_far_away() const {
         differentiate(x, dalpha, dlimits, dmiddle);
         MatX slope = MatX::Zero(count, count);
         for (int i = 0; i < count; ++i)
-            dlimits.row(i) += part(x, elements[i]).normalized().transpose() * dmiddle.middleRows(elements[i].row, elements[i].dim);
+            dlimits.row(i) += part(x, elements[i]).normalized().transpose() *
+                              dmiddle.middleRows(elements[i].row, elements[i].dim);
         for (int i = 0; i < count; ++i)
             for (int j = 0; j < count; ++j)
                 slope(i, j) =

@@ -60,6 +60,9 @@ std::shared_ptr<const Program> Builder::finish() const {
 
 namespace {
 
+// Limits (forward, backward) by t, q, v and the reaction.
+using UserLimit = Function<std::pair<double, double>(double, Numbers, Numbers, ReactionView)>;
+
 // Frictional elements, which act along their directions of slip.
 void bind_friction(nb::class_<Builder>& builder) {
     builder
@@ -67,7 +70,7 @@ void bind_friction(nb::class_<Builder>& builder) {
                                 Reaction reaction, int joint, int anchor, int row, const std::vector<double>& axis,
                                 int axis_dof, double constant, double mu, double radius, double axial_radius,
                                 double inverse_span, double static_ratio, double stribeck_velocity,
-                                const Function<std::pair<double, double>(double, Numbers, Numbers, ReactionView)>& user_limit) {
+                                const UserLimit& user_limit) {
             Friction f;
             f.name = name;
             f.law = law;

@@ -24,8 +24,8 @@ constexpr double unexplained = 1e-4, uneven = 0.2;
 constexpr double kept_part = 0.3;
 // A value that jumps by more than this is no motion [m or rad].
 constexpr double value_jump = 1e-9;
-// Intervals of a step between whose ends a function of the user's is compared.
-constexpr int intervals = 16;
+// Intervals of an adaptive step, which may be long, between whose ends a function of the user's is compared.
+constexpr int adaptive_intervals = 16;
 
 struct Probe {
     double t;
@@ -99,10 +99,16 @@ bool Breaks::pass() {
     const double allowed = rate_rounding * (1.0 + system_.v.cwiseAbs().maxCoeff());
     bool jumps = false;
     for (size_t i = 0; i < motions_.size(); ++i) jumps |= std::abs(after[i] - before[i]) > allowed;
-    if (jumps) jump(before, after);
-    else begin_step(p, w, now_.t, system_.q, system_.v);
-    if (jumps && system_.has_events()) return true;
-    if (jumps) begin_step(p, w, now_.t, system_.q, system_.v);
+    if (jumps) {
+        jump(before, after);
+        if (system_.has_events()) return true;
+    } else {
+        // The rates agree up to the rounding of the time, which fast accelerations magnify.
+        begin_rows(p, w, now_.t, system_.q, system_.v);
+        project_velocity(p, w, now_.t, system_.v);
+        system_.write(now_.y);
+    }
+    begin_step(p, w, now_.t, system_.q, system_.v);
     system_.rate_of_evaluation(now_.t, now_.y, now_.rate);
     output_.configured_now();
     return jumps;
@@ -146,7 +152,8 @@ void Breaks::tell(const std::vector<double>& before, const std::vector<double>& 
     }
 }
 
-void Breaks::look(double end) {
+void Breaks::look(double end, bool adaptive) {
+    const int intervals = adaptive ? adaptive_intervals : 1;
     end = w.now.row_time(end);
     for (const Motion& motion : motions_) {
         const TimeFunction& f = *motion.function;

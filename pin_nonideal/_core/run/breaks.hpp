@@ -24,7 +24,7 @@ public:
     bool pass();
     // Looks for a break of a function of the user's in a step from now to `end`. A pulse that begins and ends within one of
     // its sixteen intervals is not seen.
-    void look(double end);
+    void look(double end, bool adaptive = true);
 
 private:
     struct Motion {

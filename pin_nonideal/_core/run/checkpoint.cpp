@@ -46,7 +46,7 @@ static void fields(Archive& a, GapState& x) {
 static void fields(Archive& a, Progress& x) {
     auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, found_break, recent_events,
            last_changes, sides, bridged_time, bridged_end, slip_at_start, pulls, gaps, left, impact_energy, several,
-           stiff_steps, quiet_steps, rounding, next_look, growth_times, growth_speeds, turning_steps] = x;
+           stiff_steps, quiet_steps, rounding, next_look, growth_times, growth_speeds, growth_steps, turning_steps] = x;
     a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, found_break, sides, bridged_time,
       bridged_end, slip_at_start, pulls, left, impact_energy, several, stiff_steps, quiet_steps, rounding, next_look,
       turning_steps);
@@ -54,6 +54,7 @@ static void fields(Archive& a, Progress& x) {
     a.list(recent_events);
     a.list(growth_times);
     a.list(growth_speeds);
+    a.list(growth_steps);
     a.list(last_changes);
 }
 

@@ -18,8 +18,10 @@ constexpr double shortest_resolved = 1e-9;
 // Rounding in one velocity, as a part of the largest: a joint that constraints drive slowly beside fast ones has no
 // digits below it, and no step is short enough to find some.
 constexpr double velocity_rounding = 64 * std::numeric_limits<double>::epsilon();
-// A projection moves a state by its rounding, this part of the largest position (and of one) and of the largest velocity.
-constexpr double projection_rounding = 1e-13;
+// Residuals below so many times the rounding that a projection leaves are no error of a step.
+constexpr double residual_spacings = 8.0;
+// A prescribed motion moves by the rounding of the time; the moves of a step's stages are so many spacings off.
+constexpr double time_spacings = 4.0;
 
 // The first step [Hairer, Norsett, Wanner, sec. II.4]: Euler's rule may move by this part of the state's own size, and
 // the method's error, by the derivatives seen there, by this part of the tolerance.
@@ -106,16 +108,20 @@ double ErrorNorm::operator()(const VecX& dy, const VecX& y) {
     return std::sqrt(sum / n);
 }
 
-double ErrorNorm::of_projection(const VecX& dy, const VecX& y) {
-    to_tangent(dy, y);
+double ErrorNorm::of_projection(const VecX& dy, const VecX& y0, const VecX& y1, double t, double h) {
+    to_tangent(dy, y0);
     const int nv = system_.nv, n = system_.on_constraints ? nv : 2 * nv;
+    const double time_rounding = time_spacings * std::numeric_limits<double>::epsilon() * std::abs(t);
+    const double speed = system_.velocity(y1).cwiseAbs().maxCoeff();
+    const double acceleration = (system_.velocity(y1) - system_.velocity(y0)).cwiseAbs().maxCoeff() / std::abs(h);
     double sum = 0.0;
-    for (int part = 0, first = 0; first < n; ++part, first += nv) {
-        const double largest = part == 0 ? y.head(system_.nq).cwiseAbs().maxCoeff() : system_.velocity(y).cwiseAbs().maxCoeff();
-        const double rounding = projection_rounding * std::max(1.0, largest);
+    const auto add = [&](int first, double open, double rounding) {
+        if (open < residual_spacings) return;
         for (int k = first; k < first + nv; ++k)
             if (std::abs(tangent_[k]) > rounding) sum += std::pow(tangent_[k] / tolerance_[k], 2);
-    }
+    };
+    add(0, system_.w.now.projected_gap, time_rounding * speed);
+    if (n > nv) add(nv, system_.w.now.projected_rate, time_rounding * acceleration);
     return std::sqrt(sum / n);
 }
 

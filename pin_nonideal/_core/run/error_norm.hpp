@@ -21,7 +21,7 @@ public:
     double operator()(const VecX& dy, const VecX& y);
     // The same of a move of positions, and of velocities where stages are not projected, by which a projection has put a
     // step's end back; no part of it is removed.
-    double of_projection(const VecX& dy, const VecX& y);
+    double of_projection(const VecX& dy, const VecX& y0, const VecX& y1, double t, double h);
     // Step of a method of this order from y, where the rate is dy; `limit` at most. Leaves the workspace elsewhere.
     double initial_step(int order, double t, const VecX& y, const VecX& dy, double limit);
 

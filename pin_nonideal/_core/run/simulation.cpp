@@ -40,7 +40,7 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       system(program, workspace, options.record.energy), norm(system, options.rtol, options.atol, rounding),
       stepper(options.method, system, norm), control(options.method, options.rtol),
       choice(system, stepper, *this, run_options), stiffness(system, stepper, *this, run_options),
-      floor(system, stepper, norm, *this, recording), growth(system, *this, run_options),
+      floor(system, stepper, norm, *this, recording), growth(system, *this, run_options, recording),
       watch(system, gaps), locator(system, stepper, slip_at_start, pulls, watch),
       output(system, stepper, *this, run_options, recording), notices(system, stepper, *this, recording),
       value_events(run_options.events, system, stepper, *this), breaks(system, *this, output, recording),
@@ -147,7 +147,7 @@ Simulation::Proposal Simulation::propose() {
     if (breaks.reached()) pass_break();
     torques.sample();
     const bool adaptive = options.method.adaptive();
-    if (!p.users_motions.empty()) breaks.look(std::min(t_end, t + (adaptive ? h : options.dt)));
+    if (!p.users_motions.empty()) breaks.look(std::min(t_end, t + (adaptive ? h : options.dt)), adaptive);
     double stop = torques.next_stop(t_end);
     if (!adaptive)  // the fixed grid, whatever events cut out of it
         stop = std::min(stop, options.t0 + (whole_lengths(t - options.t0, options.dt) + 1.0) * options.dt);
@@ -223,7 +223,10 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
         return error;
     }
     const bool measures = p.moves_in_time && options.method.adaptive();
-    if (measures) moved_ = stepper.y1;
+    if (measures) {
+        moved_ = stepper.y1;
+        w.now.projected_gap = w.now.projected_rate = 0.0;
+    }
     if (!leaves_rate(proposal) || !system.is_on_constraints(t + size, stepper.y1))
         system.project_and_evaluate(t + size, stepper.y1, stepper.end_rate());
     stepper.learn();
@@ -231,7 +234,7 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
     if (measures) {
         // What projection puts back is an error that stages do not see where the constraints drive the motion.
         moved_ -= stepper.y1;
-        error = std::max(error, norm.of_projection(moved_, stepper.y0));
+        error = std::max(error, norm.of_projection(moved_, stepper.y0, stepper.y1, t, size));
     }
     choice.look();
     return error;
