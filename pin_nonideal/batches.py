@@ -198,7 +198,7 @@ def _run(
         if outcome is None:  # not begun when an interrupt ended all
             continue
         try:
-            moved = scene._moved(q[i], on[i])
+            moved = scene._moved(q[i], on[i]) + scene._followed(v[i], v_on[i])
             results[i] = finish(scene, outcome, outcome.stopped, options, wall, moved)
         except PinNonidealError as error:
             results[i] = error

@@ -130,7 +130,7 @@ def simulate(
     if checkpoint is not None:
         from .runs.checkpoint import Saver
 
-        saver = Saver(checkpoint, scene, options, checkpoint_interval)
+        saver = Saver(checkpoint, scene, options, checkpoint_interval, notes=notes)
     hints: list[str] = []
     explicit_only = scene._compiled.explicit_only
 

@@ -98,4 +98,7 @@ def assert_close(value, reference, tolerance):
 def again(scene, **changes):
     """The scene made again, with some of its arguments changed."""
     names = ("constraints", "laws", "contacts", "forces", "actuation", "q0", "v0", "name", "terms")
-    return pn.Scene(scene.model, **{**{name: getattr(scene, name) for name in names}, **changes})
+    made = pn.Scene(scene.model, **{**{name: getattr(scene, name) for name in names}, **changes})
+    if not {"q0", "v0"} & set(changes):
+        made._held = scene._held
+    return made

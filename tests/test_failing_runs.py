@@ -210,7 +210,7 @@ def test_a_step_too_long_for_its_spring():
     """Fixed steps beyond the stability limit double the motion until it overflows."""
     model = tree(["prismatic y"], np.random.default_rng(0))
     scene = pn.Scene(model, forces=[pn.JointSpring("j0", 1e8)], v0=[1.0])
-    with pytest.raises(NonFiniteError, match=r"acceleration is not finite at t = \d\.\d+ s; the") as caught:
+    with pytest.raises(NonFiniteError, match=r"acceleration is not finite at t = \d\.\d+ s: where") as caught:
         pn.simulate(scene, 10.0, method="rk4", dt=0.01)
     run = caught.value.trajectory
     assert 2 < len(run) < 200

@@ -63,8 +63,8 @@ def test_an_onset_in_several_directions_names_the_method_that_follows_it(name, m
         pn.simulate(scene, 1.5, method=method)
     assert re.search(
         rf'{method} cannot go on at t = 0\.6\d+ s: "JointFriction\({element}\)[^"]*" begins to slip in '
-        r"several directions with hardly any acceleration, where its direction relaxes faster than any step; use "
-        r'method="dop853",',
+        r"several directions with hardly any acceleration, where its direction relaxes faster than any "
+        r'step; use method="dop853",',
         str(caught.value),
     )
     assert caught.value.trajectory.stats.evaluations < 2000

@@ -11,6 +11,7 @@ import json
 import os
 import time
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -31,7 +32,7 @@ from pin_nonideal.version import __version__
 
 from .options import RunOptions
 
-FORMAT = 1
+FORMAT = 2
 # Longer than any run [s].
 FOREVER = 1e8
 
@@ -47,6 +48,7 @@ class Checkpoint:
         options: of the run, as `simulate` checked them.
         interval: wall time between checkpoints [s].
         wall_s: wall time so far [s].
+        notes: on the start of the run.
         state: of the core.
     """
 
@@ -56,6 +58,7 @@ class Checkpoint:
     options: RunOptions
     interval: float
     wall_s: float
+    notes: list[str]
     state: bytes
 
 
@@ -68,6 +71,7 @@ class Saver:
         options: of the run.
         interval: wall time between checkpoints [s].
         wall_s: wall time that earlier parts of the run took [s].
+        notes: notes on the start of the run.
 
     Attributes:
         interval: see above, bounded.
@@ -80,6 +84,7 @@ class Saver:
         options: RunOptions,
         interval: float,
         wall_s: float = 0.0,
+        notes: Sequence[str] = (),
     ) -> None:
         self._path = file_path("simulate: checkpoint", path)
         self._wall = wall_s - time.perf_counter()
@@ -93,6 +98,7 @@ class Saver:
             "fingerprint": fingerprint(scene),
             "options": {**vars(options), "atol": options.atol.tolist()},
             "interval": self.interval,
+            "notes": list(notes),
         }
 
     def __call__(self, state: bytes) -> None:
@@ -146,6 +152,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
             options=RunOptions(**{**held, "atol": np.array(held["atol"], dtype=float)}),
             interval=float(header["interval"]),
             wall_s=float(header["wall_s"]),
+            notes=[str(note) for note in header["notes"]],
             state=state,
         )
     except LoadingError:

@@ -66,7 +66,7 @@ def resume(
     choice("resume: progress", progress, (True, False, None))
     options = held.options
     interval = held.interval if checkpoint_interval is None else checkpoint_interval
-    saver = Saver(source, scene, options, interval, held.wall_s)
+    saver = Saver(source, scene, options, interval, held.wall_s, held.notes)
     begin = time.perf_counter()
     try:
         with progress_bar(progress, options) as tick:
@@ -75,4 +75,4 @@ def resume(
     except ValueError as error:
         raise LoadingError(f'"{source}" is damaged: {error}') from error
     wall = held.wall_s + time.perf_counter() - begin
-    return finish(scene, outcome, outcome.stopped, options, wall)
+    return finish(scene, outcome, outcome.stopped, options, wall, held.notes)

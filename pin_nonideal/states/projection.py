@@ -420,7 +420,9 @@ class Projection:
         if not change.any():
             return report
         dof = self._furthest(change)
-        distance = float(np.sqrt(max(float(change @ _mass(self.model, runner)(on) @ change), 0.0)))
+        largest = np.abs(change).max()
+        part = change / largest
+        distance = float(largest * np.sqrt(max(float(part @ _mass(self.model, runner)(on) @ part), 0.0)))
         return replace(
             report,
             velocity_distance=distance,

@@ -27,7 +27,7 @@ def no_warnings():
     """Overflow is reported by name, not as a warning of NumPy."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        warnings.filterwarnings("ignore", message="simulate: the initial configuration")
+        warnings.filterwarnings("ignore", message="simulate: the initial (configuration|velocity)")
         yield
 
 

@@ -15,7 +15,8 @@ constexpr double least_speed = 1.0, decade = 10.0;
 constexpr size_t half = 3;
 constexpr double as_fast = 0.8, much_faster = 100.0;
 // A chaotic motion that is fed grows by a power of time. Its last decade takes so many steps, and each decade on the mean
-// less than so many times as long as the one before; under a constant force each takes ten times as long.
+// longer than the one before, less than so many times as long; under a constant force each takes ten times as long, and
+// near a singular position each is shorter.
 constexpr long many_steps = 1000;
 constexpr double longer = 5.0;
 // Growth by more than this in one fixed step is the method's: the step is too long, and the motion overflows.
@@ -55,7 +56,7 @@ bool GrowthGuard::is_costly() const {
     const size_t last = times.size() - 1;
     if (last < half + 2 || steps[last] - steps[last - 1] < many_steps) return false;
     const double before = times[last - 2] - times[last - 3], now = times[last] - times[last - 1];
-    return now < longer * longer * before;
+    return before < now && now < longer * longer * before;
 }
 
 void GrowthGuard::judge() {

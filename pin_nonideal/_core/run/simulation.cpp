@@ -21,6 +21,8 @@ constexpr double whole_way = 1.0 - 1e-10, even_part = 0.5;
 
 // Part of a step that is tried next where the event inside it is not found.
 constexpr double shortened = 0.3;
+// Steps shorter than this [s, and of the time] go on where their constraints turn or open, which the next one shows.
+constexpr double shortest_measured = 1e-7;
 // A step of fewer spacings of floating-point times than these leads nowhere.
 constexpr double least_spacings = 4.0;
 // A run that has come less than this part of its way after so many steps never ends.
@@ -222,7 +224,8 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
         w.state.seeks_directions &= !stepper.collocates() || size > shortest_sought;
         return error;
     }
-    const bool measures = p.moves_in_time && options.method.adaptive();
+    const bool measures = p.moves_in_time && options.method.adaptive() &&
+                          size > shortest_measured * std::max(1.0, std::abs(t));
     if (measures) {
         moved_ = stepper.y1;
         w.now.projected_gap = w.now.projected_rate = 0.0;
