@@ -50,6 +50,11 @@ class FailureKind(enum.Enum):
     stiff = 7
     """elements: the degree of freedom; value: rate"""
 
+    growing = 12
+    """
+    elements: the degree of freedom, and what feeds it: 0 the actuation, 1 given forces, 2 laws; value: rate
+    """
+
     steps = 8
     """value: number of steps, which is all that the run may take"""
 
@@ -167,7 +172,7 @@ class Builder:
 
     def finish(self) -> Program: ...
 
-    def add_friction(self, law: int, block: int, *, name: str, load: Load = Load.none, reaction: Reaction = Reaction.none, joint: int = -1, anchor: int = -1, row: int = 0, axis: Sequence[float] = [0.0, 0.0, 1.0], axis_dof: int = -1, constant: float = 0.0, mu: float = 0.0, radius: float = 0.0, axial_radius: float = 0.0, inverse_span: float = 0.0, static_ratio: float = 1.0, stribeck_velocity: float = 0.0, user_limit: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], ReactionView], float] | None = None) -> None: ...
+    def add_friction(self, law: int, block: int, *, name: str, load: Load = Load.none, reaction: Reaction = Reaction.none, joint: int = -1, anchor: int = -1, row: int = 0, axis: Sequence[float] = [0.0, 0.0, 1.0], axis_dof: int = -1, constant: float = 0.0, mu: float = 0.0, radius: float = 0.0, axial_radius: float = 0.0, inverse_span: float = 0.0, static_ratio: float = 1.0, stribeck_velocity: float = 0.0, user_limit: Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], ReactionView], tuple[float, float]] | None = None) -> None: ...
 
     def add_law(self, name: str) -> int: ...
 
@@ -610,6 +615,9 @@ class FollowedRun:
 
     @property
     def rate(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+
+    @property
+    def singular_onset(self) -> str | None: ...
 
     def outcome(self) -> Outcome: ...
 
