@@ -66,10 +66,11 @@ def equilibrium(
     stable: bool = True,
     starts: int = 8,
 ) -> Equilibrium:
-    """A state of rest with all constraints and contacts held, found from q0; dry friction counts for nothing.
+    """A state of rest with all constraints held, found from q0; dry friction counts for nothing.
 
     The forces along the motions that the constraints allow are brought to zero: free^T F(q) = 0 where
-    phi(q, t) = 0.
+    phi(q, t) = 0.  Contacts that touch at q0, or come to touch in the search, are held; open ones give no
+    force.
     Steps of Newton's method with the stiffness made positive in the metric of M go downhill, to a stable
     state; from q0 first, then from others around it.  `rest` tells what friction holds besides.
 
@@ -96,7 +97,7 @@ def equilibrium(
     torque = None if tau is None else named_velocity(scene.model, tau, still, "equilibrium: tau")
     time, attempts = number("equilibrium: t", t), count("equilibrium: starts", starts, least=1)
     start = scene.project(q0, still, time)[0]
-    search = _Search(AtRest(scene, torque, time), downhill)
+    search = _Search(AtRest(scene, torque, time, start), downhill)
     best: Equilibrium | None = None
     for k in range(attempts):
         q = start if k == 0 else _elsewhere(scene, start, k, time)
@@ -134,6 +135,7 @@ class _Search:
 
     def run(self, q: Array, start: int) -> Equilibrium | None:
         """From one configuration; None where it leads nowhere."""
+        self.rest.begin(q)
         now, longest = self.rest.balance(q), LONGEST
         for _ in range(MOST):
             self.note(q, now)
@@ -147,6 +149,8 @@ class _Search:
             taken = self.step(q, now, scale * move)
             if taken is not None:
                 q, now = taken
+                if self.rest.touch(q):
+                    now = self.rest.balance(q)
                 longest = min(LONGEST, 2.0 * max(longest, scale * size))
             elif (longest := min(longest, scale * size) / 4.0) < SHORTEST:
                 break

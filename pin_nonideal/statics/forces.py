@@ -8,7 +8,7 @@ import numpy as np
 
 from pin_nonideal.core import core
 from pin_nonideal.scene import Scene, program_of
-from pin_nonideal.states.rows import DEPENDENT, holonomic_rows, row_lengths, rows_at, shortest
+from pin_nonideal.states.rows import DEPENDENT, gap_rows, holonomic_rows, row_lengths, rows_at, shortest
 from pin_nonideal.types import Array
 
 
@@ -17,7 +17,7 @@ class Balance(NamedTuple):
 
     Attributes:
         F: given forces and laws at rest, without dry friction [N or N m], (nv,).
-        A: rows of all constraints and contacts, (m, nv).
+        A: rows of all constraints and contacts, zero where these are open, (m, nv).
         lam: multipliers that leave the least of F + A^T lam in the metric of M^-1, those of least norm, (m,).
         free: velocities that the rows allow, orthonormal columns, (nv, k).
         left: free^T F, which is zero in equilibrium, (k,).
@@ -30,6 +30,10 @@ class Balance(NamedTuple):
     left: Array
 
 
+# A contact touches where its gap is below this [m]: projections leave gaps of rounding.
+TOUCHING = 1e-9
+
+
 class AtRest:
     """A scene at rest: its forces at any configuration, without dry friction.
 
@@ -37,14 +41,42 @@ class AtRest:
         scene: the scene.
         tau: torques in place of the scene's actuation, (nv,), or None.
         t: time [s].
+        q: configuration that tells which contacts are open, (nq,).
+
+    Attributes:
+        gaps: rows of contacts that may open, (m,).
+        open: those of open contacts, which give no force, (m,).
     """
 
-    def __init__(self, scene: Scene, tau: Array | None, t: float) -> None:
+    def __init__(self, scene: Scene, tau: Array | None, t: float, q: Array) -> None:
         self.scene, self.tau, self.t = scene, tau, t
         self.program = program_of(scene)
         self.runner = self.program.runner()
         self.still = np.zeros(scene.model.nv)
         self._smooth = [core.Mode.unloaded] * len(scene.element_names)
+        self.gaps = gap_rows(self.program)
+        self.begin(q)
+
+    def begin(self, q: Array) -> None:
+        """Holds the contacts that touch at a configuration, and no others.
+
+        Args:
+            q: configuration, (nq,).
+        """
+        self.open = self.gaps
+        self.touch(q)
+
+    def touch(self, q: Array) -> bool:
+        """Holds the contacts that touch at a configuration too; returns whether there are more than before.
+
+        Args:
+            q: configuration, (nq,).
+        """
+        if not self.open.any():
+            return False
+        before = self.open
+        self.open = before & (rows_at(self.runner, q, self.still, self.t)[2] > TOUCHING)
+        return bool((before != self.open).any())
 
     def forces(self, q: Array) -> Array:
         """Given forces and laws at rest, without dry friction, (nv,).
@@ -65,7 +97,7 @@ class AtRest:
         return np.asarray(now.F + now.C)
 
     def rows(self, q: Array) -> Array:
-        """Rows of all constraints and contacts, (m, nv); a row that rounding alone makes is zero.
+        """Rows of all constraints and closed contacts, (m, nv); a row that rounding alone makes is zero.
 
         Args:
             q: configuration, (nq,).
@@ -92,7 +124,7 @@ class AtRest:
         A = rows_at(self.runner, q, self.still, self.t)[0]
         lengths = row_lengths(self.runner, q, self.still, self.t)[: len(A)]
         scaled = np.linalg.solve(root, A.T).T / np.where(lengths > 0.0, lengths, 1.0)[:, None]
-        short = np.linalg.norm(scaled, axis=1) <= DEPENDENT
+        short = self.open | (np.linalg.norm(scaled, axis=1) <= DEPENDENT)
         return np.where(short[:, None], 0.0, A), lengths, np.where(short[:, None], 0.0, scaled)
 
     def balance(self, q: Array) -> Balance:

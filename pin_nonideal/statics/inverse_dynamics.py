@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from pin_nonideal.checks import array, number, sequence
 from pin_nonideal.core import core
@@ -59,6 +60,7 @@ def inverse_dynamics(
     free^T (M a - F - C - tau) = 0 along the motions `free` that the constraints allow, with tau on the
     actuated joints only and friction C of the very reactions that come with it; the scene's own actuation
     counts for nothing.  An element that rests and shall go on resting gives nothing: torques hold alone.
+    Contacts that are open, or that the motion opens, give no force.
 
     Args:
         scene: the scene.
@@ -86,9 +88,10 @@ def inverse_dynamics(
     time = number("inverse_dynamics: t", t)
     dofs = _driven(scene, actuated)
     limits = None if bounds is None else _bounds(bounds, len(dofs))
-    rest = AtRest(scene, still, time)
-    A, b = rows_at(rest.runner, at, speed, time)[:2]
-    _check_follows(scene, A, b, wanted)
+    rest = AtRest(scene, still, time, at)
+    A, b, _, rate = rows_at(rest.runner, at, speed, time)
+    _open_contacts(rest, A, b, rate, wanted)
+    _check_follows(scene, A, b, wanted, rest.open)
     return _Torques(rest, at, speed, wanted, dofs).solve(limits)
 
 
@@ -119,12 +122,24 @@ def _bounds(bounds: Any, count: int) -> tuple[Array, Array]:
     return least, largest
 
 
-def _check_follows(scene: Scene, A: Array, b: Array, a: Array) -> None:
-    """Refuses an acceleration that breaks the constraints: A a = b."""
+def _allowed(A: Array, b: Array, a: Array) -> Array:
+    """By how much each row of A a = b may be missed, (m,)."""
+    return np.asarray(FOLLOWS * (np.abs(A) @ np.abs(a) + np.abs(b) + 1.0))
+
+
+def _open_contacts(rest: AtRest, A: Array, b: Array, rate: Array, a: Array) -> None:
+    """Opens the contacts that the motion takes apart, by their rate or by their acceleration A a - b."""
+    if rest.gaps.any():
+        parts = (rate > AT_REST * (1.0 + np.abs(rate).max())) | (A @ a - b > _allowed(A, b, a))
+        rest.open = rest.open | (rest.gaps & parts)
+
+
+def _check_follows(scene: Scene, A: Array, b: Array, a: Array, open_rows: NDArray[np.bool_]) -> None:
+    """Refuses an acceleration that breaks the constraints, A a = b, or enters a closed contact."""
     if not len(A):
         return
-    missed = np.abs(A @ a - b)
-    allowed = FOLLOWS * (np.abs(A) @ np.abs(a) + np.abs(b) + 1.0)
+    missed = np.where(open_rows, 0.0, np.abs(A @ a - b))
+    allowed = _allowed(A, b, a)
     if (missed > allowed).any():
         worst = int(np.argmax(missed / allowed))
         name = next(n for n, s in scene.constraint_slices.items() if s.start <= worst < s.stop)

@@ -51,10 +51,10 @@ def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: f
     """Whether a scene can stay at rest: forces in all cones that balance it, and the margin.
 
     Sought are multipliers lam and friction forces f with F + A^T lam + D^T f = 0, contacts pressing
-    (lam >= 0) and |f_e| <= k limit_e of every frictional element, and the least factor k of static limits.
-    Limits of contacts follow the lam sought; those of joints that rub under load are those that the reactions
-    of the stuck scene give, of least norm where they are not unique.  Disks and balls are cut as finely as
-    needed by planes, each program is linear and solved exactly.
+    (lam >= 0, and 0 where they are open) and |f_e| <= k limit_e of every frictional element, and the least
+    factor k of static limits.  Limits of contacts follow the lam sought; those of joints that rub under load
+    are those that the reactions of the stuck scene give, of least norm where they are not unique.  Disks and
+    balls are cut as finely as needed by planes, each program is linear and solved exactly.
 
     Args:
         scene: the scene.
@@ -74,7 +74,7 @@ def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: f
     torque = None if tau is None else named_velocity(scene.model, tau, still, "rest: tau")
     time = number("rest: t", t)
     at = scene.project(q, still, time)[0]
-    cones = _Cones(scene, AtRest(scene, torque, time), at)
+    cones = _Cones(scene, AtRest(scene, torque, time, at), at)
     factor = cones.least_factor()
     if factor > MOST_FACTOR:
         return Rest(False, -np.inf, {}, np.zeros(len(cones.A)))
@@ -100,6 +100,11 @@ class _Cones:
         self.sizes = list(program.element_sizes)
         F, self.A, D = at_rest.forces(q), at_rest.rows(q), at_rest.directions(q)
         m, ends = len(self.A), np.cumsum([0, *self.sizes])
+        limits, self.following = self._limits(scene, at_rest, q)
+        self.open = np.flatnonzero(at_rest.open)
+        for (first, end), follows in zip(pairwise(ends.tolist()), self.following, strict=True):
+            if follows is not None and at_rest.open[follows[0]]:
+                D[first:end] = 0.0
         self.parts = [slice(m + a, m + b) for a, b in pairwise(ends.tolist())]
         self.count = m + int(ends[-1])
         balance = np.vstack([self.A, D]).T if self.count else np.zeros((scene.model.nv, 0))
@@ -107,7 +112,6 @@ class _Cones:
         self.balance = balance
         self.scale = np.where(size > 0.0, size, 1.0)
         self.contacts = [first for first, _, contact in scene._compiled.rows.values() if contact]
-        limits, self.following = self._limits(scene, at_rest, q)
         acting = float(np.abs(F).max(initial=0.0))
         self.unit = max(acting, CUT * float(limits.max(initial=0.0))) or 1.0
         self.constant, self.load = limits / self.unit, -F / self.unit
@@ -178,6 +182,8 @@ class _Cones:
         limits = [(None, None)] * self.count + [(0.0, None)]
         for first in self.contacts:
             limits[first] = (0.0, None)
+        for row in self.open:
+            limits[row] = (0.0, 0.0)
         equal = np.hstack([self.balance / self.scale[:, None], np.zeros((len(self.load), 1))])
         found = linprog(
             np.append(np.zeros(self.count), 1.0),
