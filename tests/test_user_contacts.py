@@ -164,5 +164,5 @@ def test_a_table_that_moves():
 )
 def test_bad_input(make, message):
     with pytest.raises(pn.InputError) as error:
-        make()
+        make().project()
     assert message in str(error.value)

@@ -15,12 +15,13 @@ from pin_nonideal.scene import Scene
 from pin_nonideal.states.named import named_velocity
 from pin_nonideal.types import Array, State
 
-from .forces import AtRest, Balance
+from .forces import TOUCHING, AtRest, Balance
 
 # Central differences of forces: the cube root of rounding, where rounding and curvature cost the same.
 DIFFERENCE = 6e-6
 # Longest step [rad or m], the shortest that still leads somewhere, and most of them.
 LONGEST, SHORTEST, MOST = 0.5, 1e-13, 300
+CLOSINGS = 20  # iterations to the place where a contact closes
 # What is left to the equilibrium by Newton's method when it counts as found [rad or m].
 CLOSE = 1e-9
 # A motion has no stiffness where it is below this part of the forces in play along it over a unit of motion,
@@ -237,9 +238,22 @@ class _Search:
             return now.free @ steps, distance, bool(pushed.any())
         return now.free @ (shapes @ steps), distance, bool(pushed.any())
 
+    def to_contact(self, q: Array, move: Array) -> Array:
+        """The part of a move up to where the first open contact closes, by regula falsi."""
+        if not self.rest.open.any():
+            return move
+        before = self.rest.gaps_at(q)
+        for _ in range(CLOSINGS):
+            after = self.rest.gaps_at(pin.integrate(self.model, q, move))
+            enters = after < -TOUCHING
+            if not enters.any():
+                break
+            move = move * float((before[enters] / (before - after)[enters]).min())
+        return move
+
     def step(self, q: Array, now: Balance, move: Array) -> tuple[Array, Balance] | None:
         """Where a step leads, unless it climbs: the work of the forces along it must not be negative."""
-        scene = self.rest.scene
+        scene, move = self.rest.scene, self.to_contact(q, move)
         try:
             there = scene.project(pin.integrate(self.model, q, move), self.rest.still, self.rest.t)[0]
             then = self.rest.balance(there)

@@ -78,6 +78,14 @@ class AtRest:
         self.open = before & (rows_at(self.runner, q, self.still, self.t)[2] > TOUCHING)
         return bool((before != self.open).any())
 
+    def gaps_at(self, q: Array) -> Array:
+        """Gaps of the open contacts [m], (k,).
+
+        Args:
+            q: configuration, (nq,).
+        """
+        return rows_at(self.runner, q, self.still, self.t)[2][self.open]
+
     def forces(self, q: Array) -> Array:
         """Given forces and laws at rest, without dry friction, (nv,).
 

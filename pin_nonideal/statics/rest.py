@@ -179,7 +179,7 @@ class _Cones:
             row[self.parts[e]] += n
             rows.append(np.append(row, -1.0))
             bounds.append(constant)
-        limits = [(None, None)] * self.count + [(0.0, None)]
+        limits: list[tuple[float | None, float | None]] = [(None, None)] * self.count + [(0.0, None)]
         for first in self.contacts:
             limits[first] = (0.0, None)
         for row in self.open:
