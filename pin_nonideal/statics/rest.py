@@ -182,8 +182,8 @@ class _Cones:
         limits: list[tuple[float | None, float | None]] = [(None, None)] * self.count + [(0.0, None)]
         for first in self.contacts:
             limits[first] = (0.0, None)
-        for row in self.open:
-            limits[row] = (0.0, 0.0)
+        for idle in self.open:
+            limits[idle] = (0.0, 0.0)
         equal = np.hstack([self.balance / self.scale[:, None], np.zeros((len(self.load), 1))])
         found = linprog(
             np.append(np.zeros(self.count), 1.0),
