@@ -138,8 +138,12 @@ void Program::finish() {
     // Kinds stand together, so that the order of their descriptions decides no sum.
     std::stable_sort(laws.begin(), laws.end(), [](const Law& a, const Law& b) { return a.index() < b.index(); });
     each_law<UserLaw>(laws, [&](const UserLaw& law) { needs_reactions |= law.reaction != Reaction::none; });
+    bool by_differences = false;
     for (int i = 0; i < constraints; ++i) {
-        moves_in_time |= pn::moves_in_time(blocks[i].kind);
+        const bool moves = pn::moves_in_time(blocks[i].kind), by_time = !time_functions(blocks[i].kind).empty();
+        moves_in_time |= moves;
+        driven_exactly |= moves && by_time;
+        by_differences |= moves && !by_time;
         affine_rates &= blocks[i].affine_rate;
         for (const TimeFunction* f : time_functions(blocks[i].kind)) {
             const std::vector<double> known = pn::breaks(*f);
@@ -147,6 +151,7 @@ void Program::finish() {
             if (pn::is_users(*f)) users_motions.push_back(i);
         }
     }
+    driven_exactly &= !by_differences;
     std::sort(breaks.begin(), breaks.end());
     breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());
     std::vector<char> constrained(mechanism.joints.size(), 0);

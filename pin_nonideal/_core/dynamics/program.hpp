@@ -68,6 +68,7 @@ struct Program {
     bool driven = false;                 // forces or actuation
     bool has_body_forces = false;        // given forces that act on bodies
     bool moves_in_time = false;          // some constraint moves by itself
+    bool driven_exactly = false;         // some does by a function of time, and none by rates that may be differences
     std::vector<double> breaks;          // times at which functions of time break, as they know them, ascending
     std::vector<int> users_motions;      // blocks that functions of time of the user's move
     bool asks_functions = false;         // of the user's, for forces that may change while nothing moves

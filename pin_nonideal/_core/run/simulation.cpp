@@ -224,7 +224,7 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
         w.state.seeks_directions &= !stepper.collocates() || size > shortest_sought;
         return error;
     }
-    const bool measures = p.moves_in_time && options.method.adaptive() &&
+    const bool measures = p.driven_exactly && options.method.adaptive() &&
                           size > shortest_measured * std::max(1.0, std::abs(t));
     if (measures) {
         moved_ = stepper.y1;
