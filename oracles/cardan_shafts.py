@@ -82,7 +82,7 @@ class Shafts:
                 self.bearings.append((f"shaft{k + 1}", self.axes[k + 1]))
 
     def angles(self, angle):
-        """Of all shafts, (crosses + 1, n), continuous from zero."""
+        """Angles of all shafts, (crosses + 1, n), continuous from zero."""
         found = [angle]
         for k, (own, other) in enumerate(self.pins):
             p, _ = _turned(self.axes[k], own, found[-1])
@@ -93,7 +93,7 @@ class Shafts:
         return np.array(found)
 
     def _pins(self, angle):
-        """Of each cross both pins and their derivatives by the input's angle; the ratios of all shafts."""
+        """Both pins of each cross and their derivatives by the input's angle; the ratios of all shafts."""
         angles, ratios, pins = self.angles(angle), [np.ones_like(angle)], []
         for k, (own, other) in enumerate(self.pins):
             p, dp = _turned(self.axes[k], own, angles[k])

@@ -60,7 +60,7 @@ class Pendulum:
         return state, work
 
     def kinetic(self, speed, state):
-        """Of cart and pendulum [J]."""
+        """Kinetic energy of cart and pendulum [J]."""
         angle, rate = state
         lever = self.mass * self.length
         J = lever * self.length + self.inertia

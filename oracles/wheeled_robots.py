@@ -1,6 +1,6 @@
 """Robots on wheels that roll without slip, and where their wheels take them: planar kinematics.
 
-The models are Pinocchio's; what moves them is integrated by SciPy from the no-slip conditions alone.
+The models are Pinocchio's; their motion is integrated by SciPy from the no-slip conditions alone.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import pinocchio as pin
 from scipy.integrate import solve_ivp
 
 KINDS = ("differential", "casters", "ackermann", "omni")
-# Of the reference: a hundredth of the tightest tolerance asked for.
+# Tolerance of the reference: a hundredth of the tightest that is asked for.
 REFERENCE = 1e-13
 
 
@@ -147,7 +147,7 @@ def differential(rng, functions, casters=0):
 
 
 def _steering(angle, length, offset):
-    """Of a wheel beside the middle, so that all axles meet in one point: t -> jet."""
+    """Rate of a wheel beside the middle, so that all axles meet in one point: t -> jet."""
 
     def function(t):
         d, d1, d2 = angle(t)

@@ -47,7 +47,7 @@ from .records import Event, FrameRecord, JointRecord, LawRecord, Stats
 from .scene import Scene
 from .scene_steps import Stepper
 from .simulation import simulate
-from .states.projection import ProjectionReport
+from .states.report import ProjectionReport
 from .timefunctions import constant, polynomial, sinusoid, spline
 from .trajectory import Trajectory
 from .version import __version__ as __version__

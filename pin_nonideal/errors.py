@@ -178,12 +178,12 @@ class StiffnessError(StepSizeError):
 
 
 class DivergenceError(RunError):
-    """Speeds grow exponentially over many decades: the motion is unstable.
+    """Speeds grow without bound, over many decades: the motion is unstable.
 
     Attributes:
         joint: name of the fastest joint.
-        source: words for what does most work on the motion: the actuation, forces or laws.
-        rate: of the growth [1/s].
+        source: the actuation, forces or laws that do most work on the motion, in words.
+        rate: of the growth over the last decades [1/s].
     """
 
     def __init__(

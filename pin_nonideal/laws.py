@@ -323,7 +323,7 @@ class UserFriction:
     With d = direction(t, q) and slip velocity s = d . v, sliding gives C = -limit sgn(s) d, and sticking is
     an ideal row that holds s at zero while the force it needs is below static_ratio times the limit.
 
-    Where friction differs between both ways of slip, as in a one-way clutch or a ratchet, `limit` returns
+    If friction differs between both ways of slip, as in a one-way clutch or a ratchet, `limit` returns
     (forward, backward): C = -forward d for s > 0, C = backward d for s < 0, and sticking holds with C = f d
     while -static_ratio forward <= f <= static_ratio backward.
 

@@ -29,8 +29,9 @@ from .scene_steps import Steps
 from .scene_tables import Tables
 from .states.closure import CLOSURE_TOLERANCE
 from .states.configurations import unit_parts
+from .states.held import Held
 from .states.named import named_configuration, named_coordinates, named_entries
-from .states.projection import Held, ProjectionReport
+from .states.report import ProjectionReport
 from .types import Array, GeometryModel, Model, State, Table
 
 Rest = ParamSpec("Rest")

@@ -9,9 +9,9 @@ import numpy as np
 from .checks import choice, number
 from .errors import InputError
 from .states.configurations import require_resolved
-from .states.held import changed, changes, told
+from .states.held import Held, changed, changes, told
 from .states.named import named_configuration, named_coordinates, named_entries, named_velocity
-from .states.projection import Held, ProjectionReport
+from .states.report import ProjectionReport
 from .types import Array, Model, State
 
 if TYPE_CHECKING:

@@ -57,8 +57,8 @@ def simulate(
         duration: length of time [s].
         q: initial configuration, (nq,) or by joint name (see `Scene`); the scene's when None.  It is
             projected onto the constraints first (`Scene.project`): an array by the least move, while entries
-            that are named are held and the others follow.  `Trajectory.notes` tells of what moved more than a
-            little, and of an array that was given here a RuntimeWarning does.
+            that are named are held and the others follow.  `Trajectory.notes` lists moves of more than a
+            little, and those of an array that was given here are a RuntimeWarning.
         v: initial velocity, (nv,) or by joint name; the scene's when None.  The same holds for it.
         t0: initial time [s].
         method: "dop853" (order 8) or "dopri5" (order 5), adaptive; "rk4", "semi_implicit_euler" or "moreau"
@@ -101,7 +101,7 @@ def simulate(
         OutputError: the checkpoint cannot be written.
         LoopClosureError: the initial state cannot be put on the constraints, or the run was pulled off them.
         StiffnessError: the scene is stiff, and the method explicit; `joint` and `rate` say where and how.
-        DivergenceError: speeds grow exponentially over many decades, and max_steps was not given; `joint`,
+        DivergenceError: speeds grow without bound over many decades, and max_steps was not given; `joint`,
             `source` and `rate` say where, by what and how.
         WallTimeError: `max_wall` is over.
         RunError: the run stopped early; its `trajectory` holds the samples up to there.

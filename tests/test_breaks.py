@@ -16,7 +16,7 @@ from .seeds import ranges, seeds
 
 DURATION = 4.0
 KINDS = ("clamped", "natural", "pulse", "zigzag", "profile")
-# Errors of all steps, in tolerances of one; and what rounding leaves of fast pulses.
+# Errors of all steps, in tolerances of one; and the rounding of fast pulses.
 ADDED, FLOOR = 300.0, 1e-10
 BALANCE = 1e-9
 

@@ -72,6 +72,32 @@ def test_a_driven_shaft_is_where_the_closure_has_it(many, crosses):
             assert force < FORCE, (seed, options)
 
 
+def by_rows(shafts, function):
+    """The drive of the input as rows of the user's."""
+    joint = shafts.model.joints[1]
+    row = np.zeros((1, shafts.model.nv))
+    row[0, joint.idx_v] = 1.0
+    return pn.UserConstraint(
+        lambda t, q, v, data: (row, [function(t)[2]]),
+        1,
+        residual=lambda t, q: [q[joint.idx_q] - function(t)[0]],
+        rate=lambda t, q, v: [v[joint.idx_v] - function(t)[1]],
+        name="drive",
+    )
+
+
+@pytest.mark.parametrize("many", ranges(2, 20, 300))
+def test_a_shaft_that_rows_of_the_users_drive(many):
+    for seed in many:
+        rng = np.random.default_rng(seed)
+        shafts, function = Shafts(rng, 2), drive(rng)
+        driven = pn.Scene(shafts.model, constraints=[*scene(shafts).constraints, by_rows(shafts, function)])
+        for method, rtol in (("dop853", 1e-6), ("dop853", 1e-12), ("dopri5", 1e-8)):
+            run = pn.simulate(driven, DURATION, method=method, rtol=rtol, record=("forces", "a"))
+            place, speed, force = misses(shafts, run, [function(t) for t in run.t])
+            assert max(place / POSITION, speed / VELOCITY, force / FORCE) < 1.0, (seed, method, rtol)
+
+
 @pytest.mark.parametrize("many", ranges(3, 30, 300))
 def test_a_driven_shaft_at_any_time(many):
     for seed in many:

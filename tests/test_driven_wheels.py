@@ -15,7 +15,7 @@ from .seeds import ranges, seeds
 FUNCTIONS = (pn.sinusoid, pn.polynomial)
 # Over 20 s to 200 s the errors of all steps add up, to so many tolerances of a step and a meter of the way.
 ADDED = 1e3
-# Where rounding of accelerations, which light wheels magnify, is more than the tolerance asks for.
+# Rounding of accelerations, which light wheels magnify beyond the tightest tolerance.
 FLOOR = 1e-9
 
 

@@ -11,7 +11,7 @@ import pin_nonideal as pn
 from .mechanisms import body, empty
 from .refusals import refuses
 
-NEAR = 0.6  # of what is called from the circle of radius one, steps of the search and probes included
+NEAR = 0.6  # distance of calls from the circle of radius one, steps of the search and probes included
 
 
 def plane():

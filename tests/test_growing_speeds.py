@@ -43,7 +43,7 @@ def test_an_unstable_spring_is_named_with_its_growth(method):
 
 
 def late_impedance(model, delay, stiffness, damping, period=1e-3):
-    """Torques that hold a joint still by what it was some periods ago."""
+    """Torques that hold joints still by their states some periods ago."""
     kept = []
 
     def torque(t, q, v):

@@ -153,7 +153,7 @@ def test_files_start_with_the_numbers_that_they_name(name):
 
 
 def test_a_named_place_stays_while_the_body_turns_onto_its_anchor():
-    """Of a floating base the pieces that are named are held: here a rod hangs from a point by a distance."""
+    """Named pieces of a floating base are held: here a rod hangs from a point by a distance."""
     model = empty()
     rod = body(model, 0, pin.JointModelFreeFlyer(), "rod", 1.0, inertia=np.diag([0.1, 0.2, 0.3]))
     frame(model, "end", rod, pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.0])))

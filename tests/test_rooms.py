@@ -19,7 +19,8 @@ version errors types checks files equation
 timefunctions constraints laws contact_checks round_contacts hulls solid_contacts contacts collision_shapes \
 revolved_shapes revolved_manifolds manifolds geometry_contacts forces actuation
 _core core cones
-states: placements configurations orders named rows extents least_moves closure ways_out unmet held projection
+states: placements configurations orders named rows extents least_moves closure ways_out unmet held \
+report projection
 compilation: failures callbacks names constraints contacts friction laws forces lowering analysis scene \
 run_numbers description report
 scene_states scene_geometry scene_tables scene_steps scene_copy scene

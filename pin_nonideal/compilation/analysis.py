@@ -1,4 +1,4 @@
-"""What is found once, before the first step: bad numbers in the model, idle rows, wrong derivatives.
+"""Checks before the first step: bad numbers in the model, idle rows, wrong derivatives.
 
 Functions of the user are called near states of a run only: rows that they make are never idle.
 """
@@ -84,7 +84,7 @@ def without_functions(said: Descriptions, nv: int) -> Descriptions | None:
     """A scene with the same rows, in which nothing stands for functions of the user; None where it has none.
 
     Args:
-        said: what the scene is made of.
+        said: descriptions of the scene.
         nv: number of degrees of freedom.
     """
     constraints = tuple(_without_function(c, nv) for c in said.constraints)

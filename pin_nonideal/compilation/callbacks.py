@@ -103,7 +103,7 @@ def checked_limits(function: Callable[..., Any], who: str) -> Callable[..., tupl
     """The user's limit of friction as two numbers, against slip forward and backward.
 
     Args:
-        function: what the user passed, which returns one number for both, or two.
+        function: the user's; it returns one number for both, or two.
         who: words for messages.
     """
     ask = named(function, who)

@@ -47,7 +47,7 @@ class Circumstances(NamedTuple):
     """Parts of a scene that errors of its runs refer to.
 
     Attributes:
-        explicit_only: words for what no implicit method here takes, empty where they take all.
+        explicit_only: words on a part of the scene that no implicit method here takes, or empty.
         sources: words for the actuation, the given forces and the laws.
     """
 
@@ -155,7 +155,7 @@ def stiff_hint(model: Model, dof: int, rate: float, decays: bool, explicit_only:
         dof: the one whose force does most to the fastest motion.
         rate: of that motion [1/s].
         decays: whether it decays; else it swings.
-        explicit_only: words for what no implicit method here takes, empty where they take all.
+        explicit_only: words on a part of the scene that no implicit method here takes, or empty.
     """
     joint = str(model.names[joint_of(model, dof)])
     if decays:

@@ -350,7 +350,7 @@ def _user_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[
 
 
 def _shape_of_directions(directions: Callable[..., Any], where: Resolution) -> tuple[int, ...]:
-    """The shape of what it returns at q0, or near there where it has no value at q0."""
+    """The shape of its value at q0, or near q0 if it has none there."""
     generator = np.random.default_rng(5)
     for part in AROUND:
         with suppress(UserFunctionError):

@@ -10,7 +10,9 @@ from pin_nonideal.constraints import UserConstraint
 from pin_nonideal.core import core
 from pin_nonideal.errors import InputError, RunError
 from pin_nonideal.states.configurations import joint_places
-from pin_nonideal.states.projection import NOTHING_HELD, Held, Projection, ProjectionReport
+from pin_nonideal.states.held import NOTHING_HELD, Held
+from pin_nonideal.states.projection import Projection
+from pin_nonideal.states.report import ProjectionReport
 from pin_nonideal.states.rows import row_slices
 from pin_nonideal.types import Array, Model
 
@@ -133,7 +135,7 @@ class CompiledScene:
 
     @property
     def explicit_only(self) -> str:
-        """Words for what no implicit method here takes, empty where they take all."""
+        """Words on a part of the scene that no implicit method here takes, or empty."""
         if self.opening_names:
             return f'no implicit method here opens and closes contacts such as "{self.opening_names[0]}" yet'
         if isinstance(asked_by(self.said.actuation), SampledControl):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pin_nonideal.checks import array
 from pin_nonideal.errors import InputError, LoadingError, UnknownNameError, nearest
+from pin_nonideal.states.held import Held
 from pin_nonideal.states.named import (
     joint_named,
     named_configuration,
@@ -20,7 +21,6 @@ from pin_nonideal.states.named import (
     with_unit_lengths,
 )
 from pin_nonideal.states.orders import order_words, tell_order
-from pin_nonideal.states.projection import Held
 from pin_nonideal.types import Model
 
 from .robot_yaml import check_keys
@@ -139,7 +139,7 @@ def held_start(robot: RobotFile, table: Mapping[str, Any], start: Start, speed: 
     """Entries that the caller of `load` names, or else the tables of the file.
 
     Args:
-        robot: what the robot's file holds, its joints as the scene has them.
+        robot: content of the robot's file, its joints as the scene has them.
         table: content of robot.yaml.
         start: configuration that is asked for, or None.
         speed: velocity that is asked for, or None.

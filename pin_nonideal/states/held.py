@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -22,6 +24,26 @@ ROUNDING = 1e-12
 LITTLE = 1e-3
 # Newton steps from a closure that a search has found, which is near enough for each to square its gap.
 SETTLINGS = 8
+
+
+class Held(NamedTuple):
+    """Entries of a state that were named and stay.
+
+    Attributes:
+        q: tangent coordinates of the configuration, (nv,), or None.
+        v: entries of the velocity, (nv,), or None.
+        firm_q: whether it is an error that they cannot stay; else all are projected then, as entries that
+            were named for another time.
+        firm_v: the same of the velocity.
+    """
+
+    q: NDArray[np.bool_] | None = None
+    v: NDArray[np.bool_] | None = None
+    firm_q: bool = True
+    firm_v: bool = True
+
+
+NOTHING_HELD = Held()
 
 
 def changes(asked: Array, found: Array, held: NDArray[np.bool_]) -> bool:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from copy import copy
-from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -18,7 +16,19 @@ from pin_nonideal.types import Array, Model
 
 from .closure import CLOSURE_TOLERANCE, FAR, WELL_CONDITIONED, Closure, Rows, Search, conditioning
 from .extents import VANISHING, chain, coordinate, slides
-from .held import changes, holding, moves, moving, require_rounding, settled, told_coordinates, with_entries
+from .held import (
+    NOTHING_HELD,
+    Held,
+    changes,
+    holding,
+    moves,
+    moving,
+    require_rounding,
+    settled,
+    told_coordinates,
+    with_entries,
+)
+from .report import ProjectionReport, report_of
 from .rows import copies, gap_rows, holonomic_rows, rows_at
 from .unmet import largest_loop_gap, lost_velocity, no_way_out, open_loops, refuse_deep_starts
 from .ways_out import SearchOutside
@@ -43,60 +53,6 @@ LEAST_INERTIA = 1e-9
 NEARER = (1.0, 0.1, 1e-2, 1e-3)
 # A search in more freedoms takes minutes: Newton's method has the first word, however large the gap.
 MANY_FREEDOMS = 300
-
-
-@dataclass(frozen=True)
-class ProjectionReport:
-    """How far a projection moved a state.
-
-    Attributes:
-        distance: sqrt(d^T M(q) d) of the move d = q' - q in tangent coordinates [sqrt(kg) m].
-        coordinate: the one that moved most, by the name of its joint, with a number from 0 on where the joint
-            has several; of lengths and angles the one that moved by more of its unit, a radian or the length
-            of the mechanism.  Empty where nothing moved.
-        moved: how far that one moved [rad or m].
-        gap: largest residual before [m or rad, in the scale of its row].
-        iterations: steps of the search; 0 where Newton's method sufficed.
-        nearest: whether this is the nearest consistent configuration as far as can be told: no nearer one
-            lies around it, nor was one found from other starts, of which two ended here.
-        velocity_distance: sqrt(d^T M d) of the change d = v' - v of the velocity [sqrt(kg) m/s].
-        velocity_coordinate: the one whose velocity changed most, as `coordinate`; empty where none changed.
-        velocity_changed: by how much that one did [rad/s or m/s].
-        held: coordinates whose values were named and stayed as they were, by the same names.
-        held_velocities: the same of velocities.
-    """
-
-    distance: float = 0.0
-    coordinate: str = ""
-    moved: float = 0.0
-    gap: float = 0.0
-    iterations: int = 0
-    nearest: bool = True
-    velocity_distance: float = 0.0
-    velocity_coordinate: str = ""
-    velocity_changed: float = 0.0
-    held: tuple[str, ...] = ()
-    held_velocities: tuple[str, ...] = ()
-
-
-class Held(NamedTuple):
-    """Entries of a state that were named and stay.
-
-    Attributes:
-        q: tangent coordinates of the configuration, (nv,), or None.
-        v: entries of the velocity, (nv,), or None.
-        firm_q: whether it is an error that they cannot stay; else all are projected then, as entries that
-            were named for another time.
-        firm_v: the same of the velocity.
-    """
-
-    q: NDArray[np.bool_] | None = None
-    v: NDArray[np.bool_] | None = None
-    firm_q: bool = True
-    firm_v: bool = True
-
-
-UNMOVED, NOTHING_HELD = ProjectionReport(), Held()
 
 
 class Projection:
@@ -169,7 +125,13 @@ class Projection:
             InconsistentConstraintsError: no velocity does.
         """
         if not self.program.rows:
-            return q, v, self._with_held(UNMOVED, held)
+            return (
+                q,
+                v,
+                report_of(
+                    self.model, self.unit, _mass(self.model, self.program.runner()), (q, v), (q, v), held
+                ),
+            )
         self.measure_at(q)
         runner = self.program.runner()
         phi = rows_at(runner, q, v, t)[2]
@@ -183,26 +145,55 @@ class Projection:
             met = after <= self._closed or found.gap <= CLOSURE_TOLERANCE
             self._require_met(runner, q, found.q, met, nearest, t)
         if held.q is not None and held.q.any():
-            free = ~held.q
-            if moves(self.model, q, on, held.q, self.unit):
-                found, nearest = self._search(runner, q, t, None, free)
-                iterations += found.iterations
-                there = settled(self.model, runner, found.q, free, self._loops, t)
-                phi = self._residuals(runner, there, t)
-                if _largest(phi[self._loops]) <= self._closed and self._is_outside(there, phi):
-                    on = there
-                elif held.firm_q:
-                    require_rounding(self.model, q, on, held.q, LITTLE * self.unit, t)
-            on = with_entries(self.model, on, q, held.q & ~moving(self.model, q, on, self.unit))
+            on, search = self._hold(runner, q, on, held.q, held.firm_q, t)
+            if search is not None:
+                iterations, nearest = iterations + search[0], search[1]
             _, v_on, _, _, rate = runner.project(on, v, t, np.inf)
         if not rate <= RATE_TOLERANCE * min(1.0, self.length) * (1.0 + _largest(v_on)):
             raise lost_velocity(rows_at(runner, on, v_on, t)[3], self.program, t)
+        mass = _mass(self.model, runner)
         if held.v is not None and changes(v, v_on, held.v):
-            metric = self._metric(_mass(self.model, runner)(on))
             with suppress(*(() if held.firm_v else (InputError,))):
-                v_on = holding(self.model, self.program, on, v, held.v, ~self._gaps, metric, t)
-        report = self._report(runner, q, on, before, iterations, nearest)
-        return on, v_on, self._with_held(self._with_velocity(report, runner, on, v, v_on), held)
+                v_on = holding(
+                    self.model, self.program, on, v, held.v, ~self._gaps, self._metric(mass(on)), t
+                )
+        return (
+            on,
+            v_on,
+            report_of(self.model, self.unit, mass, (q, v), (on, v_on), held, before, iterations, nearest),
+        )
+
+    def _hold(
+        self, runner: core.Runner, q: Array, on: Array, held: NDArray[np.bool_], firm: bool, t: float
+    ) -> tuple[Array, tuple[int, bool] | None]:
+        """The configuration near q that keeps its named coordinates.
+
+        Args:
+            runner: a workspace of the core.
+            q: configuration as it was given, (nq,).
+            on: the nearest one on the constraints, (nq,).
+            held: named coordinates, (nv,).
+            firm: whether it is an error that they cannot stay; else the nearest configuration is returned.
+            t: time [s].
+
+        Returns:
+            The configuration, (nq,); and the steps of a search for it with whether it is known to be the
+            nearest, or None where it took none.
+
+        Raises:
+            InputError: the constraints do not allow the named coordinates together.
+        """
+        search = None
+        if moves(self.model, q, on, held, self.unit):
+            found, nearest = self._search(runner, q, t, None, ~held)
+            search = found.iterations, nearest
+            there = settled(self.model, runner, found.q, ~held, self._loops, t)
+            phi = self._residuals(runner, there, t)
+            if _largest(phi[self._loops]) <= self._closed and self._is_outside(there, phi):
+                on = there
+            elif firm:
+                require_rounding(self.model, q, on, held, LITTLE * self.unit, t)
+        return with_entries(self.model, on, q, held & ~moving(self.model, q, on, self.unit)), search
 
     def _require_met(
         self, runner: core.Runner, q: Array, found: Array, met: bool, nearest: bool, t: float
@@ -399,46 +390,6 @@ class Projection:
         if conditioning(M) > WELL_CONDITIONED:
             return M
         return M + np.diag(LEAST_INERTIA * (np.diag(M) * self.unit**2).max() / self.unit**2)
-
-    def _report(
-        self, runner: core.Runner, q: Array, on: Array, gap: float, iterations: int, nearest: bool
-    ) -> ProjectionReport:
-        move = pin.difference(self.model, q, on)
-        if not move.any():
-            return ProjectionReport(gap=gap)
-        dof = self._furthest(move)
-        distance = float(np.sqrt(max(move @ _mass(self.model, runner)(q) @ move, 0.0)))
-        return ProjectionReport(
-            distance, coordinate(self.model, dof), float(move[dof]), gap, iterations, nearest
-        )
-
-    def _with_velocity(
-        self, report: ProjectionReport, runner: core.Runner, on: Array, v: Array, v_on: Array
-    ) -> ProjectionReport:
-        """The report with the change of the velocity."""
-        change = v_on - v
-        if not change.any():
-            return report
-        dof = self._furthest(change)
-        largest = np.abs(change).max()
-        part = change / largest
-        distance = float(largest * np.sqrt(max(float(part @ _mass(self.model, runner)(on) @ part), 0.0)))
-        return replace(
-            report,
-            velocity_distance=distance,
-            velocity_coordinate=coordinate(self.model, dof),
-            velocity_changed=float(change[dof]),
-        )
-
-    def _with_held(self, report: ProjectionReport, held: Held) -> ProjectionReport:
-        """The report with the names of what was held."""
-        if held.q is None and held.v is None:
-            return report
-        names = [
-            () if each is None else tuple(coordinate(self.model, int(dof)) for dof in np.flatnonzero(each))
-            for each in (held.q, held.v)
-        ]
-        return replace(report, held=names[0], held_velocities=names[1])
 
     def _furthest(self, move: Array) -> int:
         """The coordinate that moves by most of its unit."""

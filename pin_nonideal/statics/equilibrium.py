@@ -15,7 +15,7 @@ from pin_nonideal.scene import Scene
 from pin_nonideal.states.named import named_velocity
 from pin_nonideal.types import Array, State
 
-from .forces import TOUCHING, AtRest, Balance
+from .forces import AtRest, Balance
 
 # Central differences of forces: the cube root of rounding, where rounding and curvature cost the same.
 DIFFERENCE = 6e-6
@@ -245,7 +245,7 @@ class _Search:
         before = self.rest.gaps_at(q)
         for _ in range(CLOSINGS):
             after = self.rest.gaps_at(pin.integrate(self.model, q, move))
-            enters = after < -TOUCHING
+            enters = after < -self.rest.touching
             if not enters.any():
                 break
             move = move * float((before[enters] / (before - after)[enters]).min())

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pin_nonideal.core import core
 from pin_nonideal.scene import Scene, program_of
@@ -30,8 +31,9 @@ class Balance(NamedTuple):
     left: Array
 
 
-# A contact touches where its gap is below this [m]: projections leave gaps of rounding.
-TOUCHING = 1e-9
+# A contact touches if its gap is below this part of the scene's length, and of one meter, as at starts of
+# runs.
+TOUCHING = 1e-10
 
 
 class AtRest:
@@ -45,6 +47,7 @@ class AtRest:
 
     Attributes:
         gaps: rows of contacts that may open, (m,).
+        touching: gap up to which they touch [m].
         open: those of open contacts, which give no force, (m,).
     """
 
@@ -55,6 +58,7 @@ class AtRest:
         self.still = np.zeros(scene.model.nv)
         self._smooth = [core.Mode.unloaded] * len(scene.element_names)
         self.gaps = gap_rows(self.program)
+        self.touching = TOUCHING * max(1.0, scene._compiled.projection.length)
         self.begin(q)
 
     def begin(self, q: Array) -> None:
@@ -75,8 +79,16 @@ class AtRest:
         if not self.open.any():
             return False
         before = self.open
-        self.open = before & (rows_at(self.runner, q, self.still, self.t)[2] > TOUCHING)
+        self.open = before & (rows_at(self.runner, q, self.still, self.t)[2] > self.touching)
         return bool((before != self.open).any())
+
+    def release(self, rows: NDArray[np.bool_]) -> None:
+        """Opens contacts.
+
+        Args:
+            rows: their rows, (m,).
+        """
+        self.open = self.open | (self.gaps & rows)
 
     def gaps_at(self, q: Array) -> Array:
         """Gaps of the open contacts [m], (k,).

@@ -130,8 +130,7 @@ def _allowed(A: Array, b: Array, a: Array) -> Array:
 def _open_contacts(rest: AtRest, A: Array, b: Array, rate: Array, a: Array) -> None:
     """Opens the contacts that the motion takes apart, by their rate or by their acceleration A a - b."""
     if rest.gaps.any():
-        parts = (rate > AT_REST * (1.0 + np.abs(rate).max())) | (A @ a - b > _allowed(A, b, a))
-        rest.open = rest.open | (rest.gaps & parts)
+        rest.release((rate > AT_REST * (1.0 + np.abs(rate).max())) | (A @ a - b > _allowed(A, b, a)))
 
 
 def _check_follows(scene: Scene, A: Array, b: Array, a: Array, open_rows: NDArray[np.bool_]) -> None:

@@ -140,18 +140,16 @@ void Program::finish() {
     each_law<UserLaw>(laws, [&](const UserLaw& law) { needs_reactions |= law.reaction != Reaction::none; });
     bool by_differences = false;
     for (int i = 0; i < constraints; ++i) {
-        const bool moves = pn::moves_in_time(blocks[i].kind), by_time = !time_functions(blocks[i].kind).empty();
-        moves_in_time |= moves;
-        driven_exactly |= moves && by_time;
-        by_differences |= moves && !by_time;
+        moves_in_time |= pn::moves_in_time(blocks[i].kind);
+        by_differences |= std::holds_alternative<UserGapRow>(blocks[i].kind);
         affine_rates &= blocks[i].affine_rate;
         for (const TimeFunction* f : time_functions(blocks[i].kind)) {
             const std::vector<double> known = pn::breaks(*f);
             breaks.insert(breaks.end(), known.begin(), known.end());
-            if (pn::is_users(*f)) users_motions.push_back(i);
+            searches_breaks |= pn::is_users(*f);
         }
     }
-    driven_exactly &= !by_differences;
+    driven_exactly = moves_in_time && !by_differences;
     std::sort(breaks.begin(), breaks.end());
     breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());
     std::vector<char> constrained(mechanism.joints.size(), 0);

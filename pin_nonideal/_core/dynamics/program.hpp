@@ -68,9 +68,9 @@ struct Program {
     bool driven = false;                 // forces or actuation
     bool has_body_forces = false;        // given forces that act on bodies
     bool moves_in_time = false;          // some constraint moves by itself
-    bool driven_exactly = false;         // some does by a function of time, and none by rates that may be differences
+    bool driven_exactly = false;         // some does, and all rates are derivatives to rounding, not differences
     std::vector<double> breaks;          // times at which functions of time break, as they know them, ascending
-    std::vector<int> users_motions;      // blocks that functions of time of the user's move
+    bool searches_breaks = false;        // some function of time is the user's and does not tell its breaks
     bool asks_functions = false;         // of the user's, for forces that may change while nothing moves
     bool affine_rates = true;            // the rate of every row is A(q, t) v + phi_t
     std::vector<int> constrained_joints;     // whose bodies the constraints tie, and all before them in the tree

@@ -65,7 +65,7 @@ bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 // And evaluates them there.
 void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 
-// Take from a small change of the velocity, or from a small move, what a projection takes of it, by the factors in the
+// Remove the part of a small change of the velocity, or of a small move, that a projection removes, by the factors in the
 // workspace. Nonholonomic rows bind velocities only: no projection puts a position back along them.
 void remove_normal_velocity(const Program& p, Workspace& w, Eigen::Ref<VecX> change);
 void remove_normal_move(const Program& p, Workspace& w, Eigen::Ref<VecX> move);

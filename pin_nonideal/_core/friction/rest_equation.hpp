@@ -2,8 +2,8 @@
 // linear: slip accelerations are alpha = alpha0 + W x, and limits come from lengths of vectors that are linear in x. An
 // element sticks (alpha = 0, |x| <= limit) or begins to slip (x = -limit alpha / |alpha|); either is
 //     x = P(x - rho alpha),    P the nearest point of the ball of the limit, rho > 0 any.
-// One whose slip is known (it slips already, or is driven) has x = -limit times its direction. Where limits differ between
-// forward and backward the ball lies about the middle of them. Pure functions on arrays.
+// One whose slip is known (it slips already, or is driven) has x = -limit times its direction. If the limits differ
+// forward and backward, the ball lies about their middle. Pure functions on arrays.
 #pragma once
 
 #include <functional>

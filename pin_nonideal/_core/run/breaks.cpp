@@ -20,7 +20,7 @@ constexpr double rate_rounding = 1e-11;
 // A change of a rate is looked into where accelerations leave this part of it unexplained; one of an acceleration where it
 // is this part of the acceleration.
 constexpr double unexplained = 1e-4, uneven = 0.2;
-// A jump keeps at least this part of such a change in one half of the stretch; what is smooth leaves less.
+// A jump keeps at least this part of such a change in one half of the stretch; a smooth function leaves less.
 constexpr double kept_part = 0.3;
 // A value that jumps by more than this is no motion [m or rad].
 constexpr double value_jump = 1e-9;
@@ -34,7 +34,8 @@ struct Probe {
 
 Probe probe(const TimeFunction& f, double t) { return {t, evaluate(f, t)}; }
 
-// What the accelerations at both ends leave of the change of the rate, and the rates and they of that of the value.
+// The change of the rate beyond the integral of the accelerations, and the change of the value beyond that of the rates, by
+// the trapezoidal rule and its correction.
 double rate_defect(const Probe& a, const Probe& b) {
     const double h = b.t - a.t;
     const double rate = b.f[1] - a.f[1] - 0.5 * h * (a.f[2] + b.f[2]);

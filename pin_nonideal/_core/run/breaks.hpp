@@ -1,5 +1,5 @@
-// Times at which functions of time break: steps end there, and the run goes on by what the functions are behind. Where the
-// rate of a prescribed motion jumps, the velocity does too, by an impulse of the motion's rows.
+// Times at which functions of time break: steps end there, and the next step takes the functions as they are behind. If
+// the rate of a prescribed motion jumps, an impulse of the motion's rows makes the velocity jump.
 #pragma once
 
 #include <optional>

@@ -33,7 +33,7 @@ struct Progress {
     long stiff_steps = 0, quiet_steps = 0;  // near the border of stability, and since then away from it
     VecX rounding;          // of the rates as measured last, raised to what tolerances must allow
     long next_look = 0;     // at that: number of the step
-    // Of the largest speed, decade by decade; the number of steps by then.
+    // The largest speed decade by decade: when it was reached, its value, and the number of steps by then.
     std::vector<double> growth_times, growth_speeds;
     std::vector<long> growth_steps;
     int turning_steps = 0;  // in a row that were stiff while slip turned; negative: not to be counted yet

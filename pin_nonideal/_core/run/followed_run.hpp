@@ -21,9 +21,9 @@ public:
     // state as it is then.
     bool follow(double end, const OutsideStep::Interpolant& interpolant);
 
-    // Where a step that an integrator may take next, to this time at most, has to end for a function of time breaks.
+    // The time at which the integrator's next step has to end: the next break of a function of time, `end` at most.
     double stop_before(double end) {
-        if (!p.users_motions.empty()) breaks.look(end);
+        if (p.searches_breaks) breaks.look(end);
         return std::min(end, breaks.next());
     }
 

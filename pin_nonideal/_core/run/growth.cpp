@@ -9,14 +9,14 @@ namespace {
 
 // Speeds below this [rad/s or m/s] are any motion's; from there on every decade is kept in mind.
 constexpr double least_speed = 1.0, decade = 10.0;
-// Decades of a growth, in two halves: under a force that is constant, or a polynomial of time, the second takes much
-// longer than the first, as the first does in a fall and in what a singular position or a force that grows with a power of
-// the speed throws away, whose steps end by themselves.
+// Decades of a growth, in two halves. Exponential growth takes as long for both. Under a constant force, or a polynomial of
+// time, the second half takes much longer; near a singular position, or under a force that grows with a power of the speed,
+// much less, and the steps end by themselves.
 constexpr size_t half = 3;
 constexpr double as_fast = 0.8, much_faster = 100.0;
-// A chaotic motion that is fed grows by a power of time. Its last decade takes so many steps, and each decade on the mean
-// longer than the one before, less than so many times as long; under a constant force each takes ten times as long, and
-// near a singular position each is shorter.
+// A chaotic motion with a source of energy grows by a power of time. Its last decade takes so many steps, and each decade
+// takes longer than the one before, on the mean less than so many times as long; under a constant force it takes ten times
+// as long, and near a singular position it is shorter.
 constexpr long many_steps = 1000;
 constexpr double longer = 5.0;
 // Growth by more than this in one fixed step is the method's: the step is too long, and the motion overflows.

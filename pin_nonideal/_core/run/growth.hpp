@@ -1,4 +1,4 @@
-// Speeds that grow without bound: a controller, or a law, that feeds what it should damp.
+// Speeds that grow without bound: a controller, or a law, that drives a motion instead of damping it.
 #pragma once
 
 #include "run/checkpoint.hpp"

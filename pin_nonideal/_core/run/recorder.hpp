@@ -21,7 +21,7 @@ struct Event {
     double time;
     Kind kind;
     int element;  // of friction; of a contact or prescribed motion its block; of the user his function; of a drive its dof
-    // Of an impact: along the normal, then the directions of slip; of a prescribed motion in place of the first.
+    // An impact has components along the normal and the directions of slip; a prescribed motion has the first alone.
     Vec3 impulse = Vec3::Zero();
     double energy_change = 0.0;
     VecX v_minus = {}, v_plus = {};

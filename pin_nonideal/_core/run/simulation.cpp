@@ -149,7 +149,7 @@ Simulation::Proposal Simulation::propose() {
     if (breaks.reached()) pass_break();
     torques.sample();
     const bool adaptive = options.method.adaptive();
-    if (!p.users_motions.empty()) breaks.look(std::min(t_end, t + (adaptive ? h : options.dt)), adaptive);
+    if (p.searches_breaks) breaks.look(std::min(t_end, t + (adaptive ? h : options.dt)), adaptive);
     double stop = torques.next_stop(t_end);
     if (!adaptive)  // the fixed grid, whatever events cut out of it
         stop = std::min(stop, options.t0 + (whole_lengths(t - options.t0, options.dt) + 1.0) * options.dt);
@@ -235,7 +235,7 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
     stepper.learn();
     if (needs_end) error = stepper.error();
     if (measures) {
-        // What projection puts back is an error that stages do not see where the constraints drive the motion.
+        // Where the constraints drive the motion the stages do not see this error: the projection takes it back.
         moved_ -= stepper.y1;
         error = std::max(error, norm.of_projection(moved_, stepper.y0, stepper.y1, t, size));
     }

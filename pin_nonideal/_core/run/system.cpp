@@ -72,7 +72,7 @@ void System::watch(double t, VecX& dy) {
             rate = change;
         } else if (w.state.mode[e] == sticking && !w.state.indeterminate) {
             const auto [force, limit] = holding_force(p, w, e, t, q, v);
-            // Of one direction with its sign: smooth where it passes zero.
+            // The force along one direction keeps its sign: it is smooth through zero.
             share = (p.frictions[e].dim == 1 ? force[0] : force.norm()) / std::max(limit, least_limit);
             if (p.frictions[e].gap >= 0) share = std::clamp(share, -most_share, most_share);
         }

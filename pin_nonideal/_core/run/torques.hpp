@@ -18,7 +18,7 @@ public:
     bool ask_callback();
     // In place of the actuation's from here on.
     void set(const VecX& torque);
-    // Where actuation jumps or bends, or a function of time breaks next, not beyond the end of the run.
+    // The next time at which actuation jumps or bends, or a function of time breaks; the end of the run at most.
     double next_stop(double t_end) const;
 
 private:
