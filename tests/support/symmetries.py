@@ -1,0 +1,547 @@
+"""Transformations of cases that change no answer but for how it is written down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+import pin_nonideal as pn
+from pin_nonideal.states.rows import holonomic_rows
+
+from ..random_trees import place_of
+from .cases import Carrier, Case, Maps
+from .models import Units, other_order, rebuilt
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """A case made of another one, and how its answers are read.
+
+    Attributes:
+        case: the image.
+        of: the case that it was made of.
+        carrier: of coordinates and rows.
+        place: of the image's world in that of the case.
+        tolerance: what it costs in accuracy, a factor.
+        moving: whether nothing of it is at rest.
+        without: kinds of values that are not compared.
+    """
+
+    case: Case
+    of: Case
+    carrier: Carrier
+    place: pin.SE3 = field(default_factory=pin.SE3.Identity)
+    tolerance: float = 1.0
+    moving: bool = False
+    without: frozenset[str] = frozenset()
+
+    def back(self, kind: str, value: Any) -> Any:
+        """A value of the image as one of the case."""
+        maps = self.carrier.maps
+        units = maps.units
+        if kind == "q":
+            return maps.q_back(value)
+        if kind == "v":
+            return maps.v_back(value)
+        if kind == "a":
+            return units.T * maps.v_back(value)
+        if kind == "force":
+            return maps.force_back(value)
+        if kind == "lam":
+            names = self.of.scene.constraint_slices
+            return {name: self.carrier.rows_back(name, lambda called: value[called]) for name in names}
+        if kind == "poses":
+            return {name: self._poses(np.array(value[name])) for name in self.of.model.names if name in value}
+        if kind == "by element":
+            return {name: value[name] for name in value if not name.startswith(ADDED)}
+        if kind == "events":
+            return [self._event(*e) for e in value if not e[2].startswith(ADDED)]
+        if kind == "energies":
+            return {k: x / units.energy for k, x in value.items() if not k.startswith(ADDED)}
+        factors = {"t": None, "energy": 1.0 / units.energy, "number": 1.0, "rates": units.T**2}
+        return maps.time_back(value) if kind == "t" else factors[kind] * value
+
+    def _poses(self, poses: np.ndarray) -> np.ndarray:
+        back = self.place.inverse()
+        poses[:, :3] = poses[:, :3] / self.carrier.maps.units.L @ back.rotation.T + back.translation
+        for k, quaternion in enumerate(poses[:, 3:]):
+            poses[k, 3:] = (pin.Quaternion(back.rotation) * pin.Quaternion(quaternion)).coeffs()
+        return poses
+
+    def _event(self, t: float, kind: str, element: str, impulse: Any) -> tuple[Any, ...]:
+        units = self.carrier.maps.units
+        size = None
+        if impulse is not None:
+            unit = self.carrier.row_units(element)[0]
+            size = np.asarray(impulse) * unit / (units.energy * units.T)
+        return self.carrier.maps.time_back(t), kind, element, size
+
+
+ADDED = "added "  # begins the names of whatever an image has beside its case
+
+
+@dataclass(frozen=True, eq=False)
+class Transformation:
+    """What makes an image of a case.
+
+    Attributes:
+        name: of the transformation.
+        make: the image of a case; None where the symmetry does not hold for it.
+        runs_only: whether only runs can tell.
+    """
+
+    name: str
+    make: Callable[[Case], Image | None]
+    runs_only: bool = False
+
+
+ALL: dict[str, Transformation] = {}
+
+
+def transformation(name: str, **more: Any) -> Callable[[Callable[[Case], Image | None]], Any]:
+    """Registers a function from a case to its image."""
+
+    def register(make: Callable[[Case], Image | None]) -> Any:
+        ALL[name] = Transformation(name, make, **more)
+        return make
+
+    return register
+
+
+def then(first: Image, make: Callable[[Case], Image | None]) -> Image | None:
+    """The image of an image whose coordinates and names are those of its case."""
+    second = make(first.case)
+    if second is None:
+        return None
+    carrier = replace(second.carrier, case=first.of)
+    return replace(second, of=first.of, carrier=carrier)
+
+
+def unchanged(case: Case, **changes: Any) -> Image:
+    """The case with some of its fields changed, in the same coordinates."""
+    changed = replace(case, **changes)
+    return Image(changed, case, Carrier(case, Maps.same(case.model)))
+
+
+# --- The world and the mount ------------------------------------------------------------------------------------
+
+
+def explicit(case: Case) -> Image:
+    """What stands in the world by default (planes, second frames) on frames of its own there."""
+    model = case.model.copy()
+    q0 = case.scene.q0
+    known = {f.name for f in model.frames}
+
+    def frame(name: str, joint: int, place: pin.SE3) -> str:
+        if name not in known:
+            model.addFrame(pin.Frame(name, joint, 0, place, pin.FrameType.OP_FRAME), False)
+            known.add(name)
+        return name
+
+    def pair(d: Any) -> Any:
+        here = place_of(model, q0, d.frame1)
+        first = model.frames[model.getFrameId(d.frame1)]
+        level = pin.SE3(first.placement.rotation @ here.rotation.T, first.placement.translation)
+        one = frame(f"{d.name} level", first.parentJoint, level)
+        two = frame(f"{d.name} world", 0, pin.SE3(np.eye(3), here.translation))
+        axis = {"axis": tuple(here.rotation @ np.array(d.axis))} if isinstance(d, pn.HingeAnchor) else {}
+        return replace(d, frame1=one, frame2=two, **axis)
+
+    def placed(d: Any) -> Any:
+        if hasattr(d, "frame2") and d.frame2 is None:
+            return pair(d)
+        if hasattr(d, "plane") and d.plane is None:
+            return replace(d, plane=frame("world axes", 0, pin.SE3.Identity()))
+        return d
+
+    lists = {key: tuple(map(placed, getattr(case, key))) for key in ("constraints", "contacts", "forces")}
+    return unchanged(case, model=model, **lists)
+
+
+transformation("world by name")(explicit)
+
+
+def mounted(case: Case, place: pin.SE3) -> Image:
+    made = rebuilt(case.model, mount=place)
+    carrier = Carrier(case, Maps.same(case.model), turn=place.rotation)
+    return Image(carrier.image(made.model), case, carrier, place)
+
+
+def _somewhere(case: Case, size: float, turned: bool) -> pin.SE3:
+    rng = np.random.default_rng(sum(map(ord, case.name)))
+    quaternion = rng.standard_normal(4)
+    R = pin.Quaternion(quaternion / np.linalg.norm(quaternion)).toRotationMatrix()
+    return pin.SE3(R if turned else np.eye(3), size * rng.standard_normal(3))
+
+
+@transformation("turned mount")
+def _(case: Case) -> Image | None:
+    return then(explicit(case), lambda c: mounted(c, _somewhere(case, 0.0, turned=True)))
+
+
+@transformation("moved mount")
+def _(case: Case) -> Image | None:
+    return then(explicit(case), lambda c: mounted(c, _somewhere(case, 3.0, turned=False)))
+
+
+def carried_along(case: Case, rate: float, growth: float) -> Image | None:
+    """Everything on a mount that moves along a line; gravity makes up for its acceleration."""
+    if case.has(pn.Drag, pn.KnifeEdge):  # the air and the ice stay behind
+        return None
+    rng = np.random.default_rng(len(case.name))
+    along = rng.standard_normal(3)
+    along /= np.linalg.norm(along)
+    made = rebuilt(case.model, moving=pin.JointModelPrismaticUnaligned(along))
+    new = made.model
+    new.gravity = pin.Motion(new.gravity.linear + growth * along, np.zeros(3))
+
+    def q(t: float) -> np.ndarray:
+        x = pin.neutral(new) * (maps.Sq.sum(axis=1) == 0.0)
+        x[0] = rate * t + 0.5 * growth * t * t
+        return x
+
+    def v(t: float) -> np.ndarray:
+        return np.eye(new.nv)[0] * (rate + growth * t)
+
+    maps = Maps.chosen(case.model, new, made.joints)
+    maps = replace(maps, more_q=q, more_v=v)
+    carrier = Carrier(case, maps)
+    drive = pn.PrescribedMotion("mount", pn.polynomial([0.0, rate, 0.5 * growth]), name="added drive")
+    image = carrier.image(new)
+    image = replace(image, constraints=(*image.constraints, drive))
+    return Image(image, case, carrier, moving=True, without=frozenset({"energies", "poses", "rank"}))
+
+
+@transformation("boosted")
+def _(case: Case) -> Image | None:
+    return then(explicit(case), lambda c: carried_along(c, 2.0, 0.0))
+
+
+@transformation("accelerated")
+def _(case: Case) -> Image | None:
+    return then(explicit(case), lambda c: carried_along(c, 0.5, 3.0))
+
+
+# --- Units ------------------------------------------------------------------------------------------------------
+
+
+def in_units(case: Case, units: Units) -> Image:
+    from .models import model_letters
+
+    of_v, of_q = (units.of(x) for x in model_letters(case.model))
+    maps = Maps(np.diag(1.0 / of_v), np.diag(of_v), np.diag(1.0 / of_q), np.diag(of_q), units)
+    carrier = Carrier(case, maps)
+    made = rebuilt(case.model, units=units)
+    return Image(carrier.image(made.model), case, carrier)
+
+
+for _name, _units in {
+    "millimeters": Units(L=1e3),
+    "grams": Units(M=1e3),
+    "milliseconds": Units(T=1e3),
+    "tonnes, kilometers, hours": Units(L=1e-3, M=1e-3, T=1.0 / 3600.0),
+}.items():
+    transformation(_name)(lambda case, units=_units: in_units(case, units))
+
+
+# --- Order, copies and factors ----------------------------------------------------------------------------------
+
+
+@transformation("reversed lists")
+def _(case: Case) -> Image:
+    return unchanged(
+        case, **{key: getattr(case, key)[::-1] for key in ("constraints", "contacts", "laws", "forces")}
+    )
+
+
+@transformation("branches in another order")
+def _(case: Case) -> Image | None:
+    order = other_order(case.model)
+    if order == list(range(1, case.model.njoints)):
+        return None
+    made = rebuilt(case.model, order=order)
+    carrier = Carrier(case, Maps.chosen(case.model, made.model, made.joints))
+    return Image(carrier.image(made.model), case, carrier)
+
+
+def loaded_names(case: Case) -> set[str]:
+    """Constraints whose reactions a law reads: copies would share the load."""
+    if case.has(pn.UserLaw, pn.UserFriction):
+        return {c.name for c in case.constraints}
+    return {law.joint for law in case.laws if isinstance(law, pn.JointFriction)}
+
+
+def shares_loads(case: Case) -> bool:
+    """Whether friction depends on how rows share a load that they could share otherwise."""
+    loaded = case.has(pn.UserLaw, pn.UserFriction, pn.JointFriction, pn.Rolling) or any(
+        getattr(c, "mu", 0.0) for c in case.contacts
+    )
+    return loaded and not independent(case)
+
+
+def independent(case: Case) -> bool:
+    """Whether all rows that act are independent at the start."""
+    scene = case.scene
+    q, v = case.states[0]
+    try:
+        s = scene.solve(q, v, case.t0)
+    except pn.PinNonidealError:
+        return False
+    dropped = len(scene.dropped)
+    kept = sum(len(range(r.start, r.stop)) for r in scene.constraint_slices.values())
+    return bool(s.rank == kept - dropped - int((~s.closed).sum()))
+
+
+@transformation("stated twice")
+def _(case: Case) -> Image | None:
+    if shares_loads(case):
+        return None
+    loaded = loaded_names(case)
+    doubles = [c for c in case.constraints if c.name not in loaded and not isinstance(c, pn.Rolling)]
+    touches = [c for c in case.contacts if not isinstance(c, pn.JointLimit)]
+    again = [replace(c, name=f"{ADDED}{c.name}") for c in (*doubles, *touches)]
+    if not again:
+        return None
+    image = unchanged(
+        case,
+        constraints=(*again[: len(doubles)], *case.constraints),
+        contacts=(*case.contacts, *again[len(doubles) :]),
+    )
+    one = np.eye(50)
+    rows = {
+        c.name: [(c.name, one[: _size(case, c.name), : _size(case, c.name)]),
+                 (f"{ADDED}{c.name}", one[: _size(case, c.name), : _size(case, c.name)])]
+        for c in (*doubles, *touches)
+    }
+    return replace(image, carrier=replace(image.carrier, rows=rows), without=frozenset({"forces by contact"}))
+
+
+def _size(case: Case, name: str) -> int:
+    rows = case.scene.constraint_slices[name]
+    return rows.stop - rows.start
+
+
+def by_hand(case: Case, scale: float) -> Image | None:
+    """Each constraint as functions of the user's, all rows times a factor."""
+    if shares_loads(case) or case.has(pn.UserLaw, pn.UserFriction):
+        return None
+    if any(getattr(law, "mu", 0.0) for law in case.laws):  # rows of a user's have no wrench on bodies
+        return None
+    loaded = loaded_names(case)
+    chosen = [c for c in case.constraints if c.name not in loaded and _writable(c)]
+    if not chosen:
+        return None
+    rows, written = {}, {}
+    for c in chosen:
+        written[c.name] = _as_functions(case, c, scale)
+        rows[c.name] = [(c.name, scale * np.eye(written[c.name].size))]
+    image = unchanged(case, constraints=tuple(written.get(c.name, c) for c in case.constraints))
+    return replace(image, carrier=replace(image.carrier, rows=rows), without=frozenset({"poses"}))
+
+
+def _writable(c: Any) -> bool:
+    """Whether functions can say all of a constraint: its torques of resistance they cannot.
+
+    Of angles between frames the rate is the derivative of the residual on the constraint only, where functions are
+    not always checked.
+    """
+    resists = getattr(c, "torsional", 0.0) or getattr(c, "rolling", 0.0)
+    return not (resists or isinstance(c, (pn.FrameAnchor, pn.HingeAnchor)))
+
+
+def _as_functions(case: Case, c: Any, scale: float) -> pn.UserConstraint:
+    if isinstance(c, pn.UserConstraint):
+        def times(key: str) -> Any:
+            f = getattr(c, key)
+            return None if f is None else lambda *x: scale * np.asarray(f(*x))
+
+        def both(*x: Any) -> Any:
+            A, b = c.function(*x)
+            return scale * np.asarray(A), scale * np.asarray(b)
+
+        return replace(c, function=both, residual=times("residual"), rate=times("rate"))
+    alone = pn.Scene(case.model, constraints=[c], q0=case.q0)
+    program = alone._compiled.program
+    runner, nv = program.runner(), case.model.nv
+
+    def at(t: float, q: Any, v: Any) -> Any:
+        A, b, phi, rate = runner.rows(np.array(q), np.array(v), float(t))
+        return scale * A.reshape(-1, nv), scale * b, scale * phi, scale * rate
+
+    size = at(0.0, case.q0, case.v0)[1].size
+    return pn.UserConstraint(
+        lambda t, q, v, data: at(t, q, v)[:2],
+        size,
+        residual=(lambda t, q: at(t, q, np.zeros(nv))[2]) if holonomic_rows(program).all() else None,
+        rate=lambda t, q, v: at(t, q, v)[3],
+        name=c.name,
+    )
+
+
+transformation("rows by hand, times 1e4")(lambda case: by_hand(case, 1e4))
+transformation("rows by hand, times 1e-4")(lambda case: by_hand(case, 1e-4))
+
+
+# --- Bodies -----------------------------------------------------------------------------------------------------
+
+
+def split(case: Case, by: Any, hold: Callable[[Any], tuple[Any, list[Any]]]) -> Image | None:
+    """The body of the last joint but one or two in two parts that a joint and a constraint hold together."""
+    if loaded_names(case) and not independent(case):
+        return None
+    j = 1 + (case.model.njoints - 1) // 2
+    if j >= case.model.njoints or case.model.inertias[j].mass <= 0.0:
+        return None
+    made = rebuilt(case.model, split=j, by=by)
+    carrier = Carrier(case, Maps.chosen(case.model, made.model, made.joints))
+    image = carrier.image(made.model)
+    for name, joint in (("split a", made.joints[j]), ("split b", made.parts[j])):
+        image.model.addFrame(pin.Frame(name, joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME), False)
+    held = replace(image, constraints=(*image.constraints, hold(image)))
+    return Image(held, case, carrier, without=frozenset({"rank"}))
+
+
+@transformation("split by a weld")
+def _(case: Case) -> Image | None:
+    weld = pn.FrameAnchor("split a", "split b", name="added weld")
+    return split(case, pin.JointModelRX(), lambda image: weld)
+
+
+@transformation("split by a lock")
+def _(case: Case) -> Image | None:
+    lock = pn.PrescribedMotion("split", pn.constant(0.0), name="added lock")
+    return split(case, pin.JointModelPY(), lambda image: lock)
+
+
+# --- Time and steps ---------------------------------------------------------------------------------------------
+
+
+@transformation("later")
+def _(case: Case) -> Image:
+    carrier = Carrier(case, Maps.same(case.model, later=2.0))
+    return Image(carrier.image(case.model), case, carrier)
+
+
+@transformation("cut in two", runs_only=True)
+def _(case: Case) -> Image | None:
+    if case.has(pn.LuGre, pn.actuation.SampledControl) or any(getattr(law, "states", 0) for law in case.laws):
+        return None  # a state of their own is left behind
+    return unchanged(case, parts=(0.37,))
+
+
+@transformation("sampled more finely", runs_only=True)
+def _(case: Case) -> Image:
+    return unchanged(case, finer=5)
+
+
+@transformation("rtol 1e-12", runs_only=True)
+def _(case: Case) -> Image:
+    return replace(unchanged(case, rtol=1e-12, atol=1e-14), tolerance=1.0)
+
+
+@transformation("rtol 1e-6", runs_only=True)
+def _(case: Case) -> Image:
+    return replace(unchanged(case, rtol=1e-6, atol=1e-8), tolerance=3e3)
+
+
+@transformation("dopri5", runs_only=True)
+def _(case: Case) -> Image:
+    return unchanged(case, method="dopri5")
+
+
+@transformation("rk4", runs_only=True)
+def _(case: Case) -> Image:
+    return replace(unchanged(case, method="rk4"), tolerance=1e2)
+
+
+@transformation("Radau", runs_only=True)
+def _(case: Case) -> Image | None:
+    if case.contacts or case.has(pn.JointFriction, pn.UserFriction, pn.actuation.SampledControl):
+        return None  # events need the core's methods
+    return replace(unchanged(case, method="Radau"), tolerance=1e2)
+
+
+@transformation("Pinocchio's terms")
+def _(case: Case) -> Image:
+    return unchanged(case, terms="pinocchio")
+
+
+# --- What cannot act --------------------------------------------------------------------------------------------
+
+
+def body_frames(model: pin.Model, case: Case) -> tuple[int, str]:
+    """The last joint, and a frame "added tip" of its body."""
+    joint = model.njoints - 1
+    place = pin.SE3(np.eye(3), np.array([0.1, 0.2, 0.3]))
+    model.addFrame(pin.Frame("added tip", joint, 0, place, pin.FrameType.OP_FRAME), False)
+    model.addFrame(pin.Frame("added root", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME), False)
+    return joint, "added tip"
+
+
+@transformation("an idle row")
+def _(case: Case) -> Image:
+    """A rod between two points of one body, and a row of zeros."""
+    model, nv = case.model.copy(), case.model.nv
+    body_frames(model, case)
+    rod = pn.Distance("added tip", "added root", name="added rod")
+    nothing = pn.UserConstraint(
+        lambda t, q, v, data: (np.zeros((1, nv)), np.zeros(1)),
+        1,
+        residual=lambda t, q: np.zeros(1),
+        rate=lambda t, q, v: np.zeros(1),
+        name="added nothing",
+    )
+    return unchanged(case, model=model, constraints=(rod, *case.constraints, nothing))
+
+
+@transformation("a far contact")
+def _(case: Case) -> Image:
+    model = case.model.copy()
+    _, tip = body_frames(model, case)
+    far = pn.PointContact(tip, mu=0.5, height=-1e3, restitution=0.5, name="added far contact")
+    return unchanged(case, model=model, contacts=(far, *case.contacts))
+
+
+@transformation("laws and forces of nothing")
+def _(case: Case) -> Image:
+    model, nv = case.model.copy(), case.model.nv
+    _, tip = body_frames(model, case)
+    single = [model.names[j] for j in range(1, model.njoints) if model.joints[j].nv == 1]
+    laws: list[Any] = [
+        pn.Drag(tip, 0.0, name="added drag"),
+        pn.UserLaw(lambda t, q, v, r: np.zeros(nv), reaction=None, name="added law"),
+    ]
+    if single:
+        laws.append(pn.SigmoidFriction(single[-1], 0.0, 1.0, name="added sigmoid"))
+    forces = (pn.Wrench(tip, np.zeros(6), name="added wrench"), *case.forces)
+    return unchanged(case, model=model, laws=(*case.laws, *laws), forces=forces)
+
+
+@transformation("friction without limit")
+def _(case: Case) -> Image | None:
+    """An element of dry friction whose limit is zero: it may stick for nothing."""
+    model = case.model
+    single = [j for j in range(1, model.njoints) if model.joints[j].nv == 1]
+    if not single:
+        return None
+    row = np.eye(model.nv)[model.joints[single[0]].idx_v]
+    rub = pn.UserFriction(lambda t, q: row, lambda t, q, v, r: 0.0, name="added friction")
+    return unchanged(case, laws=(*case.laws, rub))
+
+
+@transformation("a body apart")
+def _(case: Case) -> Image:
+    """A balanced wheel that nothing joins to the rest."""
+    model = case.model.copy()
+    k = model.addJoint(0, pin.JointModelRY(), pin.SE3(np.eye(3), np.array([0.0, 9.0, 0.0])), "added wheel")
+    Y = pin.Inertia(1.0, np.zeros(3), 0.01 * np.eye(3))
+    model.appendBodyToJoint(k, Y, pin.SE3.Identity())
+    carrier = Carrier(case, Maps.chosen(case.model, model, {j: j for j in range(case.model.njoints)}))
+    image = carrier.image(model, q0=None)
+    maps = carrier.maps
+    q0, v0 = maps.state(case.q0, case.v0, 0.0)
+    return Image(replace(image, q0=q0, v0=v0), case, carrier, without=frozenset({"energies", "stable", "rates"}))
