@@ -79,15 +79,30 @@ def cardan(seed: int, driven: bool = True) -> pn.Scene:
     out = np.array([1.0, 0.0, 0.0]) if rng.random() < 0.5 else np.array([np.cos(2 * bend), np.sin(2 * bend), 0.0])
     pins = [(0.0, 0.0, 1.0), (-m[1], m[0], 0.0), (-m[1], m[0], 0.0), (0.0, 0.0, 1.0)]
     model = empty((0.0, 0.0, -9.81) if rng.random() < 0.5 else (0.0, 0.0, 0.0))
-    inertia = 0.01 * np.eye(3)
-    joint = body(model, 0, hinge(1, 0, 0), "input", 1.0, inertia=inertia)
-    places = [at((0.2, 0.0, 0.0)), pin.SE3.Identity(), at(0.5 * m), pin.SE3.Identity()]
-    for k, (axis, place) in enumerate(zip(pins, places, strict=True)):
-        joint = body(model, joint, hinge(*axis), f"pin{k}", 0.5, place=place, inertia=0.2 * inertia)
-    frame(model, "shaft", joint, at(0.2 * out))
-    frame(model, "bearing", 0, at(np.array([0.2, 0.0, 0.0]) + 0.5 * m + 0.2 * out))
-    held: list[Any] = [pn.HingeAnchor("shaft", "bearing", axis=tuple(out), name="bearing")]
-    rate = rng.uniform(5.0, 20.0)
+
+    def solid() -> dict[str, Any]:
+        """Of a cross or a shaft: light ones hang between heavy ones."""
+        lever = (10.0 ** rng.uniform(-2.0, 0.0), 0.0, 0.0)
+        return {"mass": 10.0 ** rng.uniform(-3.0, 1.0), "lever": lever, "inertia": 10.0 ** rng.uniform(-8.0, -1.0) * np.eye(3)}
+
+    joint = body(model, 0, hinge(1, 0, 0), "input", **solid())
+    first, second = np.array([0.2, 0.0, 0.0]), np.array([0.2, 0.0, 0.0]) + 0.5 * m  # the crosses
+    at_bearing = rng.random() < 0.5  # where the loop is closed
+    places = [at(first), pin.SE3.Identity(), at(0.5 * m), pin.SE3.Identity()][: 4 if at_bearing else 2]
+    for k, place in enumerate(places):
+        joint = body(model, joint, hinge(*pins[k]), f"pin{k}", place=place, **solid())
+    if at_bearing:
+        frame(model, "shaft", joint, at(0.2 * out))
+        frame(model, "bearing", 0, at(second + 0.2 * out))
+        axis = out
+    else:
+        frame(model, "shaft", joint, at(0.5 * m))
+        joint = body(model, 0, hinge(*out), "output", place=at(second), **solid())
+        joint = body(model, joint, hinge(*pins[3]), "pin3", **solid())
+        frame(model, "bearing", joint)
+        axis = np.array(pins[2])
+    held: list[Any] = [pn.HingeAnchor("shaft", "bearing", axis=tuple(axis), name="bearing")]
+    rate = rng.uniform(20.0, 80.0)
     if driven:
         held.append(pn.PrescribedMotion("input", pn.polynomial([0.0, rate]), name="drive"))
     return pn.Scene(model, constraints=held, v0=np.eye(5)[0] * rate, name=f"Cardan {seed}")
