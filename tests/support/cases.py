@@ -29,6 +29,8 @@ class Case:
         finer: samples are taken so many times as finely as `outputs` says.
         method: that runs in place of the function's own one, with `dt`.
         still: whether it has states of rest at all.
+        units: those in which its numbers are.
+        skips: functions that are not asked about it.
     """
 
     name: str
@@ -54,6 +56,8 @@ class Case:
     dt: float = 1e-3
     method: str | None = None
     still: bool = True
+    units: Units = SI
+    skips: frozenset[str] = frozenset()
 
     @cached_property
     def scene(self) -> pn.Scene:
@@ -416,6 +420,7 @@ class Carrier:
             duration=maps.units.T * case.duration,
             t0=maps.time(case.t0),
             dt=maps.units.T * case.dt,
+            units=maps.units,
             states=tuple(maps.state(q, v, case.t0) for q, v in case.states),
             off=tuple(maps.state(q, v, case.t0) for q, v in case.off),
             atol=case.atol if np.ptp(atol) == 0.0 and (small == 1.0).all() and maps.units.T == 1.0
