@@ -16,7 +16,7 @@ from .configurations import JointPlace, joint_places
 from .extents import coordinate
 from .rows import DEPENDENT, row_lengths, rows_at, shortest
 
-# Part of the terms A_j v_j and phi_t of a row by which their sum may miss zero.
+# Part of the velocities in play by which rows over their greatest lengths may miss their rates.
 MISSED = 1e-9
 # Part of the largest velocity by which a projection changes velocities that meet the constraints already.
 ROUNDING = 1e-12
@@ -221,6 +221,7 @@ def holding(
     held: NDArray[np.bool_],
     rows: NDArray[np.bool_],
     metric: Array,
+    unit: Array,
     t: float,
 ) -> Array:
     """The velocity v' with A v' + phi_t = 0, v' = v in held entries and the least d^T M d, d = v' - v.
@@ -233,6 +234,7 @@ def holding(
         held: entries that stay, (nv,).
         rows: rows that must hold, (m,).
         metric: M, positive definite, (nv, nv).
+        unit: a long move of each coordinate, (nv,).
         t: time [s].
 
     Returns:
@@ -243,9 +245,9 @@ def holding(
     """
     runner, free = program.runner(), ~held
     A, _, _, rate = rows_at(runner, q, v, t)
-    lengths = row_lengths(runner, q, v, t)[: len(A)]
-    whole = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(metric), A.T), axis=0)
-    acting = np.flatnonzero(rows & (whole > DEPENDENT * lengths))
+    lengths, all_root = row_lengths(runner, q, v, t)[: len(A)], np.linalg.cholesky(metric)
+    whole = np.linalg.norm(np.linalg.solve(all_root, A.T), axis=0)
+    acting = np.flatnonzero(rows & (lengths > 0.0) & (whole > DEPENDENT * lengths))
     A, rate, lengths = A[acting], rate[acting], lengths[acting]
     root = np.linalg.cholesky(metric[np.ix_(free, free)])
     B = np.linalg.solve(root, A[:, free].T).T
@@ -254,9 +256,9 @@ def holding(
     x = shortest(B[moved] / scale[:, None], -rate[moved] / scale, np.ones(B.shape[1]))
     found: Array = v.copy()
     found[free] += np.linalg.solve(root.T, x)
-    missed = rows_at(runner, q, found, t)[3][acting]
-    terms = np.abs(A) @ (np.abs(v) + np.abs(found)) + np.abs(rate - A @ v)
-    if (np.abs(missed) > MISSED * terms).any():
+    missed = np.abs(rows_at(runner, q, found, t)[3][acting]) / lengths
+    in_play = sum(float(np.linalg.norm(all_root.T @ x)) for x in (v, found, unit))  # one unit per second
+    if (missed > MISSED * max(in_play, float(np.abs((rate - A @ v) / lengths).max(initial=0.0)))).any():
         raise InputError(
             f"v: no velocity on the constraints has {_told(model, v, held)} at t = {t:.2f} s; name fewer "
             "entries, so that the others can follow, or give velocities that are consistent"

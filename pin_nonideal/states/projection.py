@@ -155,7 +155,7 @@ class Projection:
         if held.v is not None and changes(v, v_on, held.v):
             with suppress(*(() if held.firm_v else (InputError,))):
                 v_on = holding(
-                    self.model, self.program, on, v, held.v, ~self._gaps, self._metric(mass(on)), t
+                    self.model, self.program, on, v, held.v, ~self._gaps, self._metric(mass(on)), self.unit, t
                 )
         return (
             on,

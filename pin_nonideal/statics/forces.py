@@ -39,6 +39,8 @@ TOUCHING = 1e-10
 class AtRest:
     """A scene at rest: its forces at any configuration, without dry friction.
 
+    Functions of time stand still: constraints that they move hold the places of that time.
+
     Args:
         scene: the scene.
         tau: torques in place of the scene's actuation, (nv,), or None.
@@ -104,7 +106,7 @@ class AtRest:
         Args:
             q: configuration, (nq,).
         """
-        now = self.runner.solve(q, self.still, self.t, self.tau, self._smooth)
+        now = self.runner.solve(q, self.still, self.t, self.tau, self._smooth, frozen=True)
         return np.asarray(now.F + now.C)
 
     def undriven(self, q: Array) -> Array:
@@ -113,7 +115,7 @@ class AtRest:
         Args:
             q: configuration, (nq,).
         """
-        now = self.runner.solve(q, self.still, self.t, self.still, self._smooth)
+        now = self.runner.solve(q, self.still, self.t, self.still, self._smooth, frozen=True)
         return np.asarray(now.F + now.C)
 
     def rows(self, q: Array) -> Array:
@@ -122,25 +124,42 @@ class AtRest:
         Args:
             q: configuration, (nq,).
         """
-        return self._rows(q, self._root(q))[0]
+        return self.scaled_rows(q, self.root(q))[0]
 
-    def directions(self, q: Array) -> Array:
-        """Slip directions of frictional elements, (d, nv); a direction that rounding alone makes is zero.
+    def directions(self, q: Array) -> tuple[Array, Array, Array]:
+        """Slip directions of frictional elements; a direction that rounding alone makes is zero.
+
+        Args:
+            q: configuration, (nq,).
+
+        Returns:
+            The directions, (d, nv), their greatest lengths, (d,), and the directions in the metric of M^-1,
+            (d, nv).
+        """
+        D = self.runner.slip_rows(q, self.still, self.t).reshape(-1, len(self.still))
+        lengths = row_lengths(self.runner, q, self.still, self.t)[self.program.rows :]
+        scaled = np.linalg.solve(self.root(q), D.T).T
+        short = (np.linalg.norm(scaled, axis=1) <= DEPENDENT * lengths)[:, None]
+        return np.where(short, 0.0, D), lengths, np.where(short, 0.0, scaled)
+
+    def root(self, q: Array) -> Array:
+        """Lower triangular, M = root root^T, (nv, nv).
 
         Args:
             q: configuration, (nq,).
         """
-        D = self.runner.slip_rows(q, self.still, self.t).reshape(-1, len(self.still))
-        lengths = row_lengths(self.runner, q, self.still, self.t)[self.program.rows :]
-        scaled = np.linalg.norm(np.linalg.solve(self._root(q), D.T), axis=0)
-        return np.where((scaled <= DEPENDENT * lengths)[:, None], 0.0, D)
-
-    def _root(self, q: Array) -> Array:
-        """Lower triangular, M = root root^T."""
         return np.asarray(np.linalg.cholesky(self.mass(q)))
 
-    def _rows(self, q: Array, root: Array) -> tuple[Array, Array, Array]:
-        """Rows A, their greatest lengths, and the rows over these in the metric of M^-1, M = root root^T."""
+    def scaled_rows(self, q: Array, root: Array) -> tuple[Array, Array, Array]:
+        """Rows A, their greatest lengths, and the rows over these in the metric of M^-1, M = root root^T.
+
+        Args:
+            q: configuration, (nq,).
+            root: see above, (nv, nv).
+
+        Returns:
+            A (m, nv), lengths (m,), and scaled rows (m, nv).
+        """
         A = rows_at(self.runner, q, self.still, self.t)[0]
         lengths = row_lengths(self.runner, q, self.still, self.t)[: len(A)]
         scaled = np.linalg.solve(root, A.T).T / np.where(lengths > 0.0, lengths, 1.0)[:, None]
@@ -153,8 +172,8 @@ class AtRest:
         Args:
             q: configuration, (nq,).
         """
-        F, root = self.forces(q), self._root(q)
-        A, lengths, scaled = self._rows(q, root)
+        F, root = self.forces(q), self.root(q)
+        A, lengths, scaled = self.scaled_rows(q, root)
         lam = shortest(scaled.T, np.asarray(np.linalg.solve(root, -F)), lengths)
         free = _free(scaled, root)
         return Balance(F, A, lam, free, free.T @ F)
@@ -165,8 +184,8 @@ class AtRest:
         Args:
             q: configuration, (nq,).
         """
-        root = self._root(q)
-        return _free(self._rows(q, root)[2], root)
+        root = self.root(q)
+        return _free(self.scaled_rows(q, root)[2], root)
 
     def mass(self, q: Array) -> Array:
         """M(q), (nv, nv).

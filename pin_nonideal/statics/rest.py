@@ -14,6 +14,7 @@ from pin_nonideal.core import core
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene import Scene, program_of
 from pin_nonideal.states.named import named_velocity
+from pin_nonideal.states.rows import DEPENDENT
 from pin_nonideal.types import Array, State
 
 from .forces import AtRest
@@ -24,6 +25,8 @@ CUT, MOST_CUTS = 1e-9, 60
 FIRST = 8
 # The margin is found to this; factors of friction beyond this one mean that no friction would do.
 FOUND, MOST_FACTOR = 1e-9, 1e6
+# Part of the weight beside which forces are small: they balance to CUT of this.
+LIGHT = 1e-3
 PARTS = ("", "torsional", "rolling")  # of what rubs in a contact, by the ends of the elements' names
 
 
@@ -87,34 +90,44 @@ def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: f
 class _Cones:
     """The program of one configuration.
 
-    Unknowns are lam (m), the friction forces (d) and an excess s by which every limit may be passed, over the
-    largest force in play.
+    Unknowns are lam (m), the friction forces (d) and an excess s by which every limit may be passed.  All of them
+    are measured in the metric of M^-1, each over the greatest length of its row or element and over the largest
+    force in play, so that neither units nor the mount change what counts as rounding.
 
     Attributes:
         A: rows of constraints and contacts, (m, nv).
         parts: place of each element's forces among the unknowns.
+        balance: what the unknowns give along the directions that they reach, orthonormal ones, (r, m + d).
+        load: what they have to give there, (r,).
+        holds: whether nothing is left beside those directions.
     """
 
     def __init__(self, scene: Scene, at_rest: AtRest, q: Array) -> None:
-        program = program_of(scene)
-        self.sizes = list(program.element_sizes)
-        F, self.A, D = at_rest.forces(q), at_rest.rows(q), at_rest.directions(q)
+        self.sizes = list(program_of(scene).element_sizes)
+        root = at_rest.root(q)
+        self.A, reach, rows = at_rest.scaled_rows(q, root)
+        _, lengths, D = at_rest.directions(q)
         m, ends = len(self.A), np.cumsum([0, *self.sizes])
-        limits, self.following = self._limits(scene, at_rest, q)
+        known, self.following = self._limits(scene, at_rest, q)
         self.open = np.flatnonzero(at_rest.open)
         for (first, end), follows in zip(pairwise(ends.tolist()), self.following, strict=True):
+            lengths[first:end] = lengths[first:end].max(initial=0.0)
             if follows is not None and at_rest.open[follows[0]]:
                 D[first:end] = 0.0
         self.parts = [slice(m + a, m + b) for a, b in pairwise(ends.tolist())]
         self.count = m + int(ends[-1])
-        balance = np.vstack([self.A, D]).T if self.count else np.zeros((scene.model.nv, 0))
-        size = np.abs(balance).max(axis=1, initial=0.0)
-        self.balance = balance
-        self.scale = np.where(size > 0.0, size, 1.0)
+        self.lengths = np.concatenate([reach, lengths])
+        self.lengths[self.lengths == 0.0] = 1.0
         self.contacts = [first for first, _, contact in scene._compiled.rows.values() if contact]
-        acting = float(np.abs(F).max(initial=0.0))
-        self.unit = max(acting, CUT * float(limits.max(initial=0.0))) or 1.0
-        self.constant, self.load = limits / self.unit, -F / self.unit
+        limits = known * np.array([self.lengths[part.start] for part in self.parts])
+        scaled, acting = np.vstack([rows, D / self.lengths[m:, None]]), np.linalg.solve(root, -at_rest.forces(q))
+        largest = float(np.linalg.norm(acting))
+        self.unit = max(largest, CUT * float(limits.max(initial=0.0)), LIGHT * _weight(scene)) or 1.0
+        self.constant = limits / self.unit
+        reached, values, _ = np.linalg.svd(scaled.T)
+        reached = reached[:, : int((values > DEPENDENT).sum())].T
+        self.balance, self.load = reached @ scaled.T, reached @ acting / self.unit
+        self.holds = bool(np.linalg.norm(acting - reached.T @ (reached @ acting)) <= CUT * self.unit)
         self.cuts: list[tuple[int, Array]] = [
             (e, n) for e, size in enumerate(self.sizes) for n in _directions(size)
         ]
@@ -138,7 +151,7 @@ class _Cones:
         known = np.zeros(elements)
         if any(each is None for each in following):
             stuck = at_rest.runner.solve(
-                q, at_rest.still, at_rest.t, at_rest.tau, [core.Mode.sticking] * elements
+                q, at_rest.still, at_rest.t, at_rest.tau, [core.Mode.sticking] * elements, frozen=True
             )
             known = np.array([0.0 if f else x for f, x in zip(following, stuck.limits, strict=True)])
         return known, following
@@ -154,14 +167,16 @@ class _Cones:
             if not worst or not np.isfinite(excess):
                 break
             self.cuts += [(e, x[self.parts[e]] / np.linalg.norm(x[self.parts[e]])) for e, _ in worst]
-        return excess, x * self.unit
+        return excess, x * self.unit / self.lengths
 
     def _limit(self, e: int, factor: float) -> tuple[Array, float]:
         """A limit as coefficients of the unknowns and a number."""
         row = np.zeros(self.count)
         follows = self.following[e]
         if follows is not None:
-            row[follows[0]] = factor * follows[1]
+            row[follows[0]] = (
+                factor * follows[1] * self.lengths[self.parts[e].start] / self.lengths[follows[0]]
+            )
         return row, factor * self.constant[e]
 
     def _beyond(self, e: int, x: Array, factor: float) -> float:
@@ -184,13 +199,15 @@ class _Cones:
             limits[first] = (0.0, None)
         for idle in self.open:
             limits[idle] = (0.0, 0.0)
-        equal = np.hstack([self.balance / self.scale[:, None], np.zeros((len(self.load), 1))])
+        if not self.holds:
+            return np.inf, np.zeros(self.count)
+        equal = np.hstack([self.balance, np.zeros((len(self.load), 1))])
         found = linprog(
             np.append(np.zeros(self.count), 1.0),
             A_ub=np.array(rows) if rows else None,
             b_ub=bounds or None,
-            A_eq=equal,
-            b_eq=self.load / self.scale,
+            A_eq=equal if len(equal) else None,
+            b_eq=self.load if len(equal) else None,
             bounds=limits,
             method="highs",
             options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
@@ -213,6 +230,12 @@ class _Cones:
             else:
                 low = middle
         return high / (1.0 - high)
+
+
+def _weight(scene: Scene) -> float:
+    """Length of the weight of all bodies in the metric of M^-1, if each could move freely."""
+    mass = sum(body.mass for body in scene.model.inertias)
+    return float(np.sqrt(mass) * np.linalg.norm(scene.model.gravity.linear))
 
 
 def _directions(size: int) -> Iterator[Array]:

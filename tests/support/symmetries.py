@@ -28,6 +28,9 @@ class Image:
         place: of the image's world in that of the case.
         tolerance: what it costs in accuracy, a factor.
         moving: whether nothing of it is at rest.
+        as_steps_shorten: whether methods of first order give the same only as their steps shorten: beside a motion
+            that accelerates, the position of a step's end misses h^2 a/2, and the projection that puts it back moves
+            all coordinates; and events that do nothing end steps.
         without: kinds of values that are not compared.
     """
 
@@ -37,6 +40,7 @@ class Image:
     place: pin.SE3 = field(default_factory=pin.SE3.Identity)
     tolerance: float = 1.0
     moving: bool = False
+    as_steps_shorten: bool = False
     without: frozenset[str] = frozenset()
 
     def back(self, kind: str, value: Any) -> Any:
@@ -213,7 +217,14 @@ def carried_along(case: Case, rate: float, growth: float) -> Image | None:
     drive = pn.PrescribedMotion("mount", pn.polynomial([0.0, rate, 0.5 * growth]), name="added drive")
     image = carrier.image(new)
     image = replace(image, constraints=(*image.constraints, drive))
-    return Image(image, case, carrier, moving=True, without=frozenset({"energies", "poses", "rank"}))
+    return Image(
+        image,
+        case,
+        carrier,
+        moving=True,
+        as_steps_shorten=growth != 0.0,
+        without=frozenset({"energies", "poses", "rank"}),
+    )
 
 
 @transformation("boosted")
@@ -337,9 +348,13 @@ def by_hand(case: Case, scale: float) -> Image | None:
         return None
     rows, written = {}, {}
     for c in chosen:
-        written[c.name] = _as_functions(case, c, scale)
-        rows[c.name] = [(c.name, scale * np.eye(written[c.name].size))]
-    image = unchanged(case, constraints=tuple(written.get(c.name, c) for c in case.constraints))
+        parts = _as_functions(case, c, scale)
+        written[c.name] = [part for part, _ in parts]
+        one = scale * np.eye(_size(case, c.name))
+        rows[c.name] = [(part.name, one[:, of]) for part, of in parts]
+    image = unchanged(
+        case, constraints=tuple(part for c in case.constraints for part in written.get(c.name, [c]))
+    )
     return replace(image, carrier=replace(image.carrier, rows=rows), without=frozenset({"poses"}))
 
 
@@ -353,7 +368,8 @@ def _writable(c: Any) -> bool:
     return not (resists or isinstance(c, (pn.FrameAnchor, pn.HingeAnchor)))
 
 
-def _as_functions(case: Case, c: Any, scale: float) -> pn.UserConstraint:
+def _as_functions(case: Case, c: Any, scale: float) -> list[tuple[pn.UserConstraint, np.ndarray]]:
+    """A constraint as one of the user's, or as two where some rows hold no position; and which rows each has."""
     if isinstance(c, pn.UserConstraint):
         def times(key: str) -> Any:
             f = getattr(c, key)
@@ -363,23 +379,34 @@ def _as_functions(case: Case, c: Any, scale: float) -> pn.UserConstraint:
             A, b = c.function(*x)
             return scale * np.asarray(A), scale * np.asarray(b)
 
-        return replace(c, function=both, residual=times("residual"), rate=times("rate"))
+        again = replace(c, function=both, residual=times("residual"), rate=times("rate"))
+        return [(again, np.arange(c.size))]
     alone = pn.Scene(case.model, constraints=[c], q0=case.q0)
     program = alone._compiled.program
     runner, nv = program.runner(), case.model.nv
+    places = holonomic_rows(program)
 
-    def at(t: float, q: Any, v: Any) -> Any:
+    def at(t: float, q: Any, v: Any, of: Any) -> Any:
         A, b, phi, rate = runner.rows(np.array(q), np.array(v), float(t))
-        return scale * A.reshape(-1, nv), scale * b, scale * phi, scale * rate
+        return [scale * x[of] for x in (A.reshape(-1, nv), b, phi, rate)]
 
-    size = at(0.0, case.q0, case.v0)[1].size
-    return pn.UserConstraint(
-        lambda t, q, v, data: at(t, q, v)[:2],
-        size,
-        residual=(lambda t, q: at(t, q, np.zeros(nv))[2]) if holonomic_rows(program).all() else None,
-        rate=lambda t, q, v: at(t, q, v)[3],
-        name=c.name,
-    )
+    def part(of: Any, name: str, residual: Any) -> pn.UserConstraint:
+        return pn.UserConstraint(
+            lambda t, q, v, data: at(t, q, v, of)[:2],
+            int(of.sum()),
+            residual=residual,
+            rate=lambda t, q, v: at(t, q, v, of)[3],
+            name=name,
+        )
+
+    found = []
+    if places.any():
+        placed = part(places, c.name, lambda t, q: at(t, q, np.zeros(nv), places)[2])
+        found.append((placed, np.flatnonzero(places)))
+    if not places.all():
+        rolled = part(~places, f"{ADDED}{c.name}" if found else c.name, None)
+        found.append((rolled, np.flatnonzero(~places)))
+    return found
 
 
 transformation("rows by hand, times 1e4")(lambda case: by_hand(case, 1e4))
@@ -530,7 +557,7 @@ def _(case: Case) -> Image | None:
         return None
     row = np.eye(model.nv)[model.joints[single[0]].idx_v]
     rub = pn.UserFriction(lambda t, q: row, lambda t, q, v, r: 0.0, name="added friction")
-    return unchanged(case, laws=(*case.laws, rub))
+    return replace(unchanged(case, laws=(*case.laws, rub)), as_steps_shorten=True)
 
 
 @transformation("a body apart")

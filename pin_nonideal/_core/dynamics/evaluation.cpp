@@ -61,7 +61,7 @@ static void move_rows(const Program& p, Workspace& w, double t, const VecX& v) {
         RowValues& values = w.now.values[i];
         evaluate(block.kind, state, Part::motion, values);
         for (size_t k = 0; k < block.kept.size(); ++k)
-            w.now.b[block.row + k] = -values.drift[block.kept[k]];  // Eq. (3)
+            w.now.b[block.row + k] = w.now.frozen ? 0.0 : -values.drift[block.kept[k]];  // Eq. (3)
     }
 }
 

@@ -64,6 +64,7 @@ struct Reactions {
 // What one evaluation at (t, q, v) yields.
 struct Evaluation {
     Terms terms;
+    bool frozen = false;  // functions of time stand still: rows have no accelerations of their own
     // Rows are evaluated in this stretch of time: at its ends, where functions of time break, as inside of it.
     double not_before = -HUGE_VAL, not_after = HUGE_VAL;
     void set_stretch(double begin, double end) {

@@ -87,9 +87,26 @@ void Runner::acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle
     std::copy(w->now.a.data(), w->now.a.data() + w->now.a.size(), target.data());
 }
 
+namespace {
+
+// Lets functions of time stand still while it lives.
+class Frozen {
+public:
+    Frozen(Evaluation& now, bool frozen) : now_(now) { now_.frozen = frozen; }
+    ~Frozen() { now_.frozen = false; }
+    Frozen(const Frozen&) = delete;
+    Frozen& operator=(const Frozen&) = delete;
+
+private:
+    Evaluation& now_;
+};
+
+}  // namespace
+
 Instant Runner::solve(const Array& q_in, const Array& v_in, double t, const std::optional<Array>& tau,
-                      const std::optional<std::vector<Mode>>& modes) {
+                      const std::optional<std::vector<Mode>>& modes, bool frozen) {
     set(q_in, v_in, tau);
+    const Frozen stands_still(w->now, frozen);
     choose_modes(t, modes);
     const Uniqueness unique = w->now.several ? Uniqueness::several : w->state.unique;
     Instant out;
@@ -313,7 +330,8 @@ nb::class_<Runner> bind_runner(nb::module_& m) {
     nb::class_<Runner> runner(m, "Runner");
     runner
         .def("acceleration", &Runner::acceleration, "q"_a, "v"_a, "t"_a, "tau"_a.none(), "out"_a)
-        .def("solve", &Runner::solve, "q"_a, "v"_a, "t"_a = 0.0, "tau"_a = nb::none(), "modes"_a = nb::none())
+        .def("solve", &Runner::solve, "q"_a, "v"_a, "t"_a = 0.0, "tau"_a = nb::none(), "modes"_a = nb::none(),
+             "frozen"_a = false)
         .def("rows", &Runner::rows, "q"_a, "v"_a, "t"_a)
         .def("row_lengths", &Runner::row_lengths, "q"_a, "v"_a, "t"_a)
         .def("slip_rows", &Runner::slip_rows, "q"_a, "v"_a, "t"_a)

@@ -48,8 +48,9 @@ struct Runner {
 
     // Writes the acceleration into `out`, an array of nv numbers; plain buffers, since this is called in tight loops.
     void acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle tau, nb::handle out);
+    // Frozen: at a state of rest, as if functions of time stood still there.
     Instant solve(const Array& q_in, const Array& v_in, double t, const std::optional<Array>& tau,
-                  const std::optional<std::vector<Mode>>& modes);
+                  const std::optional<std::vector<Mode>>& modes, bool frozen);
     int constraint_rank() const;
     // All rows of all constraints, dropped ones too: A (by rows), b, residual, rate.
     std::tuple<Numbers, Numbers, Numbers, Numbers> rows(const Array& q_in, const Array& v_in, double t);
