@@ -343,11 +343,14 @@ class Projection:
             return Closure(q, np.inf, 0.0, False, 0), False
 
     def _unit_at(self, runner: core.Runner, q: Array, t: float) -> Array:
-        """The units of a search: slides go as far as the gaps ask for."""
+        """The units of a search: slides go as far as the least moves do that close one gap each."""
         A, _, phi, _ = rows_at(runner, q, np.zeros(self.model.nv), t)
         phi = np.where(self._gaps, np.minimum(phi, 0.0), phi)
-        slope = np.abs(A[:, self._slides]).max(axis=1, initial=0.0)
-        far = np.divide(np.abs(phi), slope, out=np.zeros_like(phi), where=slope > 0.0)
+        weighted = A * self.unit
+        reach = np.linalg.norm(weighted, axis=1)
+        most = np.abs(weighted[:, self._slides]).max(axis=1, initial=0.0)
+        acts = reach > VANISHING * reach.max(initial=0.0)
+        far = self.length * np.divide(np.abs(phi) * most, reach**2, out=np.zeros_like(phi), where=acts)
         return np.where(self._slides, max(self.length, _largest(far)), 1.0)
 
     def _rows(

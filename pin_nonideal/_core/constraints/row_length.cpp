@@ -9,10 +9,17 @@ namespace pn {
 
 namespace {
 
+// Part of the length of a force that moves all mass, below which the length of a row may be rounding: a force through the
+// only pin of a body moves nothing, wherever the pin is.
+constexpr double least_part = 1e-4;
+
 class Lengths {
 public:
     Lengths(const Mechanism& m, Terms& terms, const Block& block) : m_(m), terms_(terms), block_(block), x_(m.nv) {
         if (block.deep) body_.resize(m.joints.size());
+        double mass = 0.0;
+        for (const Joint& joint : m.joints) mass += joint.mass;
+        if (mass > 0.0) least_ = least_part * least_part / mass;
     }
 
     // Square of the length of the row of one unit wrench.
@@ -32,8 +39,8 @@ public:
     }
 
     double of_forces(const Vec3& point) {
-        return square(force_at(point, Vec3::UnitX())) + square(force_at(point, Vec3::UnitY())) +
-               square(force_at(point, Vec3::UnitZ()));
+        return std::max(least_, square(force_at(point, Vec3::UnitX())) + square(force_at(point, Vec3::UnitY())) +
+                                    square(force_at(point, Vec3::UnitZ())));
     }
 
     double of_couples(const Vec3& point) {
@@ -53,6 +60,7 @@ private:
     const Block& block_;
     VecX x_;
     std::vector<Force> body_;
+    double least_ = 0.0;
 };
 
 bool same_point(const Vec3& a, const Vec3& b) { return (a - b).squaredNorm() == 0.0; }
