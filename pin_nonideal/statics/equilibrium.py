@@ -121,7 +121,7 @@ def _elsewhere(scene: Scene, start: Array, k: int, t: float) -> Array | None:
     move = np.random.default_rng(k).standard_normal(scene.model.nv) * min(1.5, 0.3 * k)
     try:
         return scene.project(pin.integrate(scene.model, start, move), np.zeros(scene.model.nv), t)[0]
-    except LoopClosureError:
+    except (LoopClosureError, InputError):  # of a contact that would start inside
         return None
 
 
@@ -257,7 +257,7 @@ class _Search:
         try:
             there = scene.project(pin.integrate(self.model, q, move), self.rest.still, self.rest.t)[0]
             then = self.rest.balance(there)
-        except LoopClosureError:
+        except (LoopClosureError, InputError):
             return None
         before, after = np.linalg.norm(now.left), np.linalg.norm(then.left)
         if not self.downhill:

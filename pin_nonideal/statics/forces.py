@@ -206,6 +206,16 @@ def _free(scaled: Array, root: Array) -> Array:
     return np.asarray(np.linalg.qr(np.linalg.solve(root.T, turned[rank:].T))[0])
 
 
+def weight(scene: Scene) -> float:
+    """Length of the weight of all bodies in the metric of M^-1, if each could move freely [sqrt(kg) m/s^2].
+
+    Args:
+        scene: the scene.
+    """
+    mass = sum(body.mass for body in scene.model.inertias)
+    return float(np.sqrt(mass) * np.linalg.norm(scene.model.gravity.linear))
+
+
 def restricts_velocity_only(scene: Scene) -> bool:
     """Whether some row restricts the velocity and not the position, as that of a knife edge does.
 

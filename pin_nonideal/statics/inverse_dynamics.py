@@ -14,14 +14,16 @@ from pin_nonideal.checks import array, number, sequence
 from pin_nonideal.core import core
 from pin_nonideal.errors import FrictionConvergenceError, InputError
 from pin_nonideal.scene import Scene
+from pin_nonideal.states.extents import slides
 from pin_nonideal.states.named import joint_named, named_configuration, named_velocity
 from pin_nonideal.states.rows import DEPENDENT, rows_at, shortest
 from pin_nonideal.types import Array, State
 
-from .forces import AtRest
+from .forces import AtRest, weight
 
 # An acceleration follows the constraints to this part of its terms.
 FOLLOWS = 1e-6
+ROUNDING = 1e-6  # of accelerations where nothing weighs [m/s^2 or rad/s^2], to FOLLOWS of it
 # Slip below this part of the scene's speed is rest, and so it is for its acceleration.
 AT_REST = 1e-9
 # Passes over friction that depends on the torques, and the part of the forces to which they balance.
@@ -57,6 +59,9 @@ def inverse_dynamics(
 ) -> InverseDynamics:
     """Torques with which the scene accelerates by a: of least norm where several do.
 
+    Where forces drive beside torques, the norm takes them times an arm, the root mean radius of gyration of
+    the driven joints.
+
     free^T (M a - F - C - tau) = 0 along the motions `free` that the constraints allow, with tau on the
     actuated joints only and friction C of the very reactions that come with it; the scene's own actuation
     counts for nothing.  An element that rests and shall go on resting gives nothing: torques hold alone.
@@ -90,8 +95,10 @@ def inverse_dynamics(
     limits = None if bounds is None else _bounds(bounds, len(dofs))
     rest = AtRest(scene, still, time, at)
     A, b, _, rate = rows_at(rest.runner, at, speed, time)
-    _open_contacts(rest, A, b, rate, wanted)
-    _check_follows(scene, A, b, wanted, rest.open)
+    if len(A):
+        allowed = _allowed(rest, at, A, b, wanted)
+        _open_contacts(rest, A, b, rate, wanted, allowed)
+        _check_follows(scene, A, b, wanted, rest.open, allowed)
     return _Torques(rest, at, speed, wanted, dofs).solve(limits)
 
 
@@ -122,23 +129,23 @@ def _bounds(bounds: Any, count: int) -> tuple[Array, Array]:
     return least, largest
 
 
-def _allowed(A: Array, b: Array, a: Array) -> Array:
-    """By how much each row of A a = b may be missed, (m,)."""
-    return np.asarray(FOLLOWS * (np.abs(A) @ np.abs(a) + np.abs(b) + 1.0))
+def _allowed(rest: AtRest, q: Array, A: Array, b: Array, a: Array) -> Array:
+    """By how much each row of A a = b may be missed, beside its terms and what weight gives to it, (m,)."""
+    falls = rest.scaled_rows(q, rest.root(q))[1] * weight(rest.scene)
+    return np.asarray(FOLLOWS * (np.abs(A) @ np.abs(a) + np.abs(b) + falls + ROUNDING))
 
 
-def _open_contacts(rest: AtRest, A: Array, b: Array, rate: Array, a: Array) -> None:
+def _open_contacts(rest: AtRest, A: Array, b: Array, rate: Array, a: Array, allowed: Array) -> None:
     """Opens the contacts that the motion takes apart, by their rate or by their acceleration A a - b."""
     if rest.gaps.any():
-        rest.release((rate > AT_REST * (1.0 + np.abs(rate).max())) | (A @ a - b > _allowed(A, b, a)))
+        rest.release((rate > AT_REST * (1.0 + np.abs(rate).max())) | (A @ a - b > allowed))
 
 
-def _check_follows(scene: Scene, A: Array, b: Array, a: Array, open_rows: NDArray[np.bool_]) -> None:
+def _check_follows(
+    scene: Scene, A: Array, b: Array, a: Array, open_rows: NDArray[np.bool_], allowed: Array
+) -> None:
     """Refuses an acceleration that breaks the constraints, A a = b, or enters a closed contact."""
-    if not len(A):
-        return
     missed = np.where(open_rows, 0.0, np.abs(A @ a - b))
-    allowed = _allowed(A, b, a)
     if (missed > allowed).any():
         worst = int(np.argmax(missed / allowed))
         name = next(n for n, s in scene.constraint_slices.items() if s.start <= worst < s.stop)
@@ -156,7 +163,9 @@ class _Torques:
         self.rest, self.q, self.v, self.a, self.free = rest, q, v, a, rest.free(q)
         self.select = np.eye(len(v))[:, dofs]
         self.M = rest.mass(q)
-        self.lengths = np.sqrt(np.diag(np.linalg.inv(self.M))[dofs])  # of the torques in the metric of M^-1
+        self.arms = _arms(self.M, self.free, slides(rest.scene.model), dofs)
+        # Of the torques in the metric of M^-1.
+        self.lengths = np.sqrt(np.diag(np.linalg.inv(self.M))[dofs]) / self.arms
         self.modes, self.slipping = self._modes()
 
     def _modes(self) -> tuple[list[Any], Array]:
@@ -185,17 +194,18 @@ class _Torques:
 
     def solve(self, limits: tuple[Array, Array] | None) -> InverseDynamics:
         """Torques of least norm, within their limits, until friction is that of their own reactions."""
-        G = self.free.T @ self.select
+        G = self.free.T @ self.select / self.arms
         root = np.linalg.cholesky(self.free.T @ self.M @ self.free)
         scaled = np.linalg.solve(root, G) / self.lengths
+        moments = None if limits is None else (limits[0] * self.arms, limits[1] * self.arms)
         tau, before = np.zeros(len(self.v)), np.inf
         for _ in range(PASSES):
             now = self.rest.runner.solve(self.q, self.slipping, self.rest.t, tau, self.modes)
             given = now.F - tau + now.C  # beside the torques
             needed = self.free.T @ (self.M @ self.a - given)
-            u = _least(scaled, np.linalg.solve(root, needed), self.lengths, limits)
-            change = self.select @ u - tau
-            tau = self.select @ u
+            u = _least(scaled, np.linalg.solve(root, needed), self.lengths, moments)
+            change = self.select @ (u / self.arms) - tau
+            tau = self.select @ (u / self.arms)
             scale = float(
                 np.abs(given).max(initial=0.0) + np.abs(tau).max(initial=0.0) + np.abs(self.M @ self.a).max()
             )
@@ -212,6 +222,20 @@ class _Torques:
         lam = self.rest.runner.solve(self.q, self.slipping, self.rest.t, tau, self.modes).lam
         left = float(np.abs(self.free @ (G @ u - needed)).max(initial=0.0))
         return InverseDynamics(tau, np.asarray(lam), left)
+
+
+def _arms(M: Array, free: Array, slides_of: NDArray[np.bool_], dofs: list[int]) -> Array:
+    """Arms by which driving forces count beside torques, 1 for torques, (k,).
+
+    They are the root mean radius of gyration, by the motions that the constraints allow, so that no unit of
+    length changes which torques are the least; 1 where forces alone drive.
+    """
+    along = slides_of[dofs]
+    if not along.any() or along.all():
+        return np.ones(len(dofs))
+    light = np.einsum("ij,ji->i", free, np.linalg.solve(free.T @ M @ free, free.T))[dofs]
+    forces, torques = light[along].mean(), light[~along].mean()
+    return np.where(along, np.sqrt(forces / torques) if min(forces, torques) > 0.0 else 1.0, 1.0)
 
 
 def _least(scaled: Array, needed: Array, lengths: Array, limits: tuple[Array, Array] | None) -> Array:

@@ -17,7 +17,7 @@ from pin_nonideal.states.named import named_velocity
 from pin_nonideal.states.rows import DEPENDENT
 from pin_nonideal.types import Array, State
 
-from .forces import AtRest
+from .forces import AtRest, weight
 
 # A cone is met when a force lies outside of it by less than this part of the largest; so many cuts at most.
 CUT, MOST_CUTS = 1e-9, 60
@@ -90,9 +90,9 @@ def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: f
 class _Cones:
     """The program of one configuration.
 
-    Unknowns are lam (m), the friction forces (d) and an excess s by which every limit may be passed.  All of them
-    are measured in the metric of M^-1, each over the greatest length of its row or element and over the largest
-    force in play, so that neither units nor the mount change what counts as rounding.
+    Unknowns are lam (m), the friction forces (d) and an excess s by which every limit may be passed.  All of
+    them are measured in the metric of M^-1, each over the greatest length of its row or element and over the
+    largest force in play, so that neither units nor the mount change what counts as rounding.
 
     Attributes:
         A: rows of constraints and contacts, (m, nv).
@@ -120,9 +120,12 @@ class _Cones:
         self.lengths[self.lengths == 0.0] = 1.0
         self.contacts = [first for first, _, contact in scene._compiled.rows.values() if contact]
         limits = known * np.array([self.lengths[part.start] for part in self.parts])
-        scaled, acting = np.vstack([rows, D / self.lengths[m:, None]]), np.linalg.solve(root, -at_rest.forces(q))
+        scaled, acting = (
+            np.vstack([rows, D / self.lengths[m:, None]]),
+            np.linalg.solve(root, -at_rest.forces(q)),
+        )
         largest = float(np.linalg.norm(acting))
-        self.unit = max(largest, CUT * float(limits.max(initial=0.0)), LIGHT * _weight(scene)) or 1.0
+        self.unit = max(largest, CUT * float(limits.max(initial=0.0)), LIGHT * weight(scene)) or 1.0
         self.constant = limits / self.unit
         reached, values, _ = np.linalg.svd(scaled.T)
         reached = reached[:, : int((values > DEPENDENT).sum())].T
@@ -149,11 +152,16 @@ class _Cones:
                 coefficient = getattr(about, part or "mu", 0.0) * getattr(about, "static_ratio", 1.0)
                 following[e] = (row + (2 if isinstance(about, Rolling) else 0), coefficient)
         known = np.zeros(elements)
-        if any(each is None for each in following):
-            stuck = at_rest.runner.solve(
-                q, at_rest.still, at_rest.t, at_rest.tau, [core.Mode.sticking] * elements, frozen=True
-            )
+        modes, lasts = [core.Mode.sticking] * elements, any(each is None for each in following)
+        while lasts:
+            stuck = at_rest.runner.solve(q, at_rest.still, at_rest.t, at_rest.tau, modes, frozen=True)
             known = np.array([0.0 if f else x for f, x in zip(following, stuck.limits, strict=True)])
+            before = modes
+            modes = [
+                core.Mode.unloaded if mode == core.Mode.sticking and x == 0.0 else mode
+                for mode, x in zip(modes, stuck.limits, strict=True)
+            ]  # what has no limit holds nothing
+            lasts = modes != before
         return known, following
 
     def solve(self, factor: float) -> tuple[float, Array]:
@@ -230,12 +238,6 @@ class _Cones:
             else:
                 low = middle
         return high / (1.0 - high)
-
-
-def _weight(scene: Scene) -> float:
-    """Length of the weight of all bodies in the metric of M^-1, if each could move freely."""
-    mass = sum(body.mass for body in scene.model.inertias)
-    return float(np.sqrt(mass) * np.linalg.norm(scene.model.gravity.linear))
 
 
 def _directions(size: int) -> Iterator[Array]:

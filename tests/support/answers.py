@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import pinocchio as pin
 
 import pin_nonideal as pn
 from pin_nonideal.page.motion import sample
+from pin_nonideal.statics.forces import AtRest
 
 from .cases import Case
 from .symmetries import Image, independent
@@ -32,7 +34,7 @@ WALL = 10.0  # s, of one run
 
 @dataclass(frozen=True)
 class Answer:
-    """Values by name, each with its kind (which `Image.back` reads), and the tolerance that they are given to.
+    """Values by name, each with its kind (which `Image.back` reads), and the tolerance of all.
 
     Attributes:
         first_order: whether steps of a method of first order found them.
@@ -74,7 +76,7 @@ def multipliers(scene: pn.Scene, lam: np.ndarray) -> dict[str, np.ndarray]:
     return {name: lam[..., rows] for name, rows in scene.constraint_slices.items()}
 
 
-# --- One instant ------------------------------------------------------------------------------------------------
+# --- One instant ----------------------------------------------------------------------------------------
 
 
 @function("solve")
@@ -95,7 +97,9 @@ def _(case: Case) -> Answer:
 
 @function("acceleration")
 def _(case: Case) -> Answer:
-    return Answer({f"a {k}": ("a", case.scene.acceleration(q, v, t=case.t0)) for k, (q, v) in enumerate(case.states)})
+    return Answer(
+        {f"a {k}": ("a", case.scene.acceleration(q, v, t=case.t0)) for k, (q, v) in enumerate(case.states)}
+    )
 
 
 @function("project")
@@ -112,12 +116,11 @@ def _(case: Case) -> Answer:
     """The first joint's velocity alone is named; it is held and the others follow."""
     scene, values = case.scene, {}
     model, (q, v) = scene.model, case.states[0]
-    names = [name for name in model.names[1:] if model.joints[model.getJointId(name)].nv == 1]
-    own = [name for name in sorted(names) if name not in ("mount", "split", "added wheel")]
+    own = [name for name in sorted(own_joints(model)) if model.joints[model.getJointId(name)].nv == 1]
     for name in own[:3]:
         dof = model.joints[model.getJointId(name)].idx_v
         try:
-            at, speed = scene.project(q, {name: 1.3 * v[dof]}, case.t0)
+            _, speed = scene.project(q, {name: 1.3 * v[dof]}, case.t0)
         except pn.InputError:
             values[f"v of {name}"] = ("flag", "refused")
             continue
@@ -126,7 +129,7 @@ def _(case: Case) -> Answer:
     return Answer(values, OF_SEARCHES)
 
 
-# --- Statics ----------------------------------------------------------------------------------------------------
+# --- Statics --------------------------------------------------------------------------------------------
 
 
 @function("rest", static=True)
@@ -144,13 +147,18 @@ def _(case: Case) -> Answer:
     return Answer(values, OF_SEARCHES)
 
 
+def own_joints(model: pin.Model) -> list[str]:
+    """Joints of the case, those that an image adds left out."""
+    return [str(name) for name in model.names[1:] if name not in ("mount", "split", "added wheel")]
+
+
 @function("inverse_dynamics")
 def _(case: Case) -> Answer:
     """Torques that give the accelerations of the states, and those that hold the start."""
     scene, values = case.scene, {}
     for k, (q, v) in enumerate(case.states):
         a = scene.acceleration(q, v, t=case.t0)
-        found = pn.inverse_dynamics(scene, q, v, a, t=case.t0)
+        found = pn.inverse_dynamics(scene, q, v, a, actuated=own_joints(scene.model), t=case.t0)
         again = scene.acceleration(q, v, tau=found.tau, t=case.t0)
         values[f"left {k}"] = ("small force", found.left)
         values[f"work {k}"] = ("power", found.tau @ v)
@@ -164,9 +172,9 @@ def _(case: Case) -> Answer:
     scene, values = case.scene, {}
     model, q = scene.model, case.states[0][0]
     still = np.zeros(model.nv)
-    for name in sorted(model.names[1:]):
+    for name in sorted(own_joints(model)):
         joint = model.joints[model.getJointId(name)]
-        if joint.nv != 1 or name in ("mount", "split", "added wheel") or len(values) > 6:
+        if joint.nv != 1 or len(values) > 6:
             continue
         found = pn.inverse_dynamics(scene, q, still, still, actuated=[name], t=case.t0)
         size = max(float(np.abs(found.tau).max()), LEAST_LOAD * case.units.energy)
@@ -177,7 +185,7 @@ def _(case: Case) -> Answer:
     return Answer(values, OF_SEARCHES)
 
 
-# --- Runs -------------------------------------------------------------------------------------------------------
+# --- Runs -----------------------------------------------------------------------------------------------
 
 # Of all events those of motion; of impacts those before bouncing is summed up to its end.
 EVENTS, LEAST_STRIKE = ("stick", "slip", "reverse", "impact", "touch_down", "lift_off"), 1e-3
@@ -188,7 +196,11 @@ def simulated(case: Case, method: str, **more: Any) -> list[pn.Trajectory]:
     """The parts of a run."""
     if case.method is not None and method in ("dop853",):
         method = case.method
-    own: dict[str, Any] = {"method": method, "record": RECORD, "output_dt": case.duration / case.outputs / case.finer}
+    own: dict[str, Any] = {
+        "method": method,
+        "record": RECORD,
+        "output_dt": case.duration / case.outputs / case.finer,
+    }
     if method in ("dop853", "dopri5", "Radau"):
         atol = case.atol
         own |= {"rtol": case.rtol, "atol": float(np.min(atol)) if method == "Radau" else atol}
@@ -199,7 +211,7 @@ def simulated(case: Case, method: str, **more: Any) -> list[pn.Trajectory]:
     own |= {"max_wall": WALL, **more}
     ends = [0.0, *(case.duration * round(p * case.outputs) / case.outputs for p in case.parts), case.duration]
     runs: list[pn.Trajectory] = []
-    for begin, end in zip(ends[:-1], ends[1:], strict=True):
+    for begin, end in pairwise(ends):
         state = (runs[-1].q[-1], runs[-1].v[-1]) if runs else (None, None)
         runs.append(pn.simulate(case.scene, end - begin, *state, t0=case.t0 + begin, **own))
     return runs
@@ -225,7 +237,11 @@ def of_run(case: Case, method: str, **more: Any) -> Answer:
         columns = [c for c in runs[0].energy if c not in ("kinetic", "potential", "total", "balance")]
         values["works"] = ("energies", {c: sum(r.energy[c][-1] for r in runs) for c in columns})
     if len(runs) == 1 and runs[0].energy is not None and method in ("dop853", "dopri5"):
-        size = np.ptp(runs[0].energy["kinetic"]), np.ptp(runs[0].energy["potential"]), 1e-3 * case.units.energy
+        size = (
+            np.ptp(runs[0].energy["kinetic"]),
+            np.ptp(runs[0].energy["potential"]),
+            1e-3 * case.units.energy,
+        )
         values["balance"] = ("balance", float(np.abs(runs[0].energy["balance"]).max() / max(size)))
     return Answer(values, OF_RUNS, method == "semi_implicit_euler")
 
@@ -241,7 +257,9 @@ def _(case: Case) -> Answer:
     dt = period / np.ceil(period / case.dt - 1e-6)
     stepper = case.scene.stepper(period, t0=case.t0, method="rk4", dt=dt)
     states = [stepper.step() for _ in range(10)]
-    return Answer({"q": ("q", np.array([q for q, _ in states])), "v": ("v", np.array([v for _, v in states]))}, OF_RUNS)
+    return Answer(
+        {"q": ("q", np.array([q for q, _ in states])), "v": ("v", np.array([v for _, v in states]))}, OF_RUNS
+    )
 
 
 @function("poses of a replay", run=True)
@@ -253,7 +271,7 @@ def _(case: Case) -> Answer:
     return Answer({"poses": ("poses", poses)}, OF_RUNS)
 
 
-# --- The same ---------------------------------------------------------------------------------------------------
+# --- The same -------------------------------------------------------------------------------------------
 
 
 def asks(name: str, case: Case) -> bool:
@@ -290,7 +308,9 @@ def _differ(kind: str, value: Any, said: Any, image: Image, tolerance: float) ->
     if kind in ("flag", "rank", "stable"):
         return [] if value == said else [f"{value} | {said}"]
     if kind == "balance":
-        return [] if said <= max(1e-5, 1e-5 * image.tolerance) else [f"energy balance {said:.1e} of the energy"]
+        return (
+            [] if said <= max(1e-5, 1e-5 * image.tolerance) else [f"energy balance {said:.1e} of the energy"]
+        )
     if kind == "small force":
         return []
     if kind == "power":
@@ -312,6 +332,8 @@ def _differ(kind: str, value: Any, said: Any, image: Image, tolerance: float) ->
         size = max(map(abs, value.values()), default=0.0)
         return [f"{n} {d}" for n, x in value.items() for d in _apart(x, back[n], tolerance, max(size, 1e-2))]
     if kind == "events":
+        if coupled(image.of) or coupled(image.case):
+            value, back = together(value), together(said_of_all(image, said))
         return _other_events(value, back, tolerance, image.of.duration)
     return _apart(value, back, tolerance, FLOORS[kind])
 
@@ -324,7 +346,11 @@ def _apart(one: Any, other: Any, tolerance: float, floor: float) -> list[str]:
         return []
     apart = float(np.abs(one - other).max())
     size = max(float(np.abs(one).max()), floor)
-    return [] if apart <= tolerance * size else [f"differs by {apart:.2g} of {size:.2g} (allowed {tolerance:.0e})"]
+    return (
+        []
+        if apart <= tolerance * size
+        else [f"differs by {apart:.2g} of {size:.2g} (allowed {tolerance:.0e})"]
+    )
 
 
 def _apart_q(model: pin.Model, one: Any, other: Any, tolerance: float) -> list[str]:
@@ -334,7 +360,11 @@ def _apart_q(model: pin.Model, one: Any, other: Any, tolerance: float) -> list[s
     moves = np.array([pin.difference(model, a, b) for a, b in zip(one, other, strict=True)])
     apart = float(np.abs(moves).max(initial=0.0))
     size = max(1.0, float(np.abs(one).max(initial=0.0)))
-    return [] if apart <= tolerance * size else [f"differs by {apart:.2g} of {size:.2g} (allowed {tolerance:.0e})"]
+    return (
+        []
+        if apart <= tolerance * size
+        else [f"differs by {apart:.2g} of {size:.2g} (allowed {tolerance:.0e})"]
+    )
 
 
 def _apart_poses(one: np.ndarray, other: np.ndarray, tolerance: float) -> list[str]:
@@ -342,8 +372,43 @@ def _apart_poses(one: np.ndarray, other: np.ndarray, tolerance: float) -> list[s
     return _apart(one, np.hstack([other[:, :3], sign * other[:, 3:]]), tolerance, 1.0)
 
 
+RUBBING = ("stick", "slip", "reverse")
+
+
+def coupled(case: Case) -> bool:
+    """Whether several elements of friction slip as one, so that none of them sticks alone."""
+    scene = case.scene
+    if len(scene.element_names) < 2 or case.contacts:
+        return False
+    at = AtRest(scene, None, case.t0, case.states[0][0])
+    slip = at.directions(case.states[0][0])[0] @ at.free(case.states[0][0])
+    size = np.linalg.norm(slip, axis=1, keepdims=True)
+    slip = slip[size[:, 0] > 0.0] / size[size > 0.0][:, None]
+    return bool(len(slip) and np.linalg.matrix_rank(slip, tol=1e-6) < len(slip))
+
+
+def said_of_all(image: Image, events: list[Any]) -> list[Any]:
+    """Events of the image, those of what it has beside its case among them."""
+    maps = image.carrier.maps
+    return [(maps.time_back(t), kind, element, impulse) for t, kind, element, impulse in events]
+
+
+def together(events: list[Any]) -> list[Any]:
+    """Events of friction under one name, those at one time as one; which of them reverses rounding tells."""
+    found: list[Any] = []
+    for t, kind, element, impulse in events:
+        if kind == "reverse":
+            continue
+        if kind not in RUBBING:
+            found.append((t, kind, element, impulse))
+        elif not any(k == kind and abs(t - at) <= 1e-9 for at, k, _, _ in found):
+            found.append((t, kind, "", None))
+    return found
+
+
 def _other_events(one: list[Any], other: list[Any], tolerance: float, duration: float) -> list[str]:
     """Events by kind and element; times as of the motion, and impulses."""
+
     def key(e: Any) -> Any:
         return (e[1], e[2])
 

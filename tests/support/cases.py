@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -22,8 +23,8 @@ class Case:
     """A scene and how it runs; each thing that it is made of has a name.
 
     Attributes:
-        states: consistent states at which instantaneous answers are taken.
-        off: states near them that break the constraints.
+        drawn: consistent states at which instantaneous answers are taken; drawn near the start when None.
+        moved: states that break the constraints; the start moved the way in which they push when None.
         outputs: samples of a run beside its start.
         parts: fractions of the duration at which a run is cut.
         finer: samples are taken so many times as finely as `outputs` says.
@@ -46,8 +47,8 @@ class Case:
     terms: str = "core"
     duration: float = 0.3
     t0: float = 0.0
-    states: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
-    off: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    drawn: tuple[tuple[np.ndarray, np.ndarray], ...] | None = None
+    moved: tuple[tuple[np.ndarray, np.ndarray], ...] | None = None
     outputs: int = 20
     finer: int = 1
     parts: tuple[float, ...] = ()
@@ -61,8 +62,27 @@ class Case:
 
     @cached_property
     def scene(self) -> pn.Scene:
-        names = ("constraints", "laws", "contacts", "forces", "actuation", "q0", "v0", "impact", "terms", "name")
+        names = (
+            "constraints",
+            "laws",
+            "contacts",
+            "forces",
+            "actuation",
+            "q0",
+            "v0",
+            "impact",
+            "terms",
+            "name",
+        )
         return pn.Scene(self.model, **{name: getattr(self, name) for name in names})
+
+    @cached_property
+    def states(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        return _states(self) if self.drawn is None else self.drawn
+
+    @cached_property
+    def off(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        return _off(self) if self.moved is None else self.moved
 
     @cached_property
     def descriptions(self) -> tuple[Any, ...]:
@@ -88,8 +108,10 @@ def case_of(scene: pn.Scene, name: str | None = None, **more: Any) -> Case:
         called = called if used[called] == 1 else f"{called} {used[called]}"
         return replace(d, name=called)
 
-    lists = {key: tuple(map(named, getattr(scene, key))) for key in ("constraints", "contacts", "laws", "forces")}
-    case = Case(
+    lists = {
+        key: tuple(map(named, getattr(scene, key))) for key in ("constraints", "contacts", "laws", "forces")
+    }
+    return Case(
         name or scene.name,
         scene.model,
         **lists,
@@ -99,41 +121,39 @@ def case_of(scene: pn.Scene, name: str | None = None, **more: Any) -> Case:
         impact=scene.impact,
         **more,
     )
-    case = case if case.states else replace(case, states=_states(case))
-    return replace(case, off=_off(case))
 
 
 def _states(case: Case) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-    """The start, and a state near it; the start alone where its constraints cannot be met nearby."""
+    """The start, and the state to which a kick leads; the start alone where none is allowed."""
     scene, rng = case.scene, np.random.default_rng(7)
     q, v = scene.initial_state()
     found = [(q, v)]
     speed = 0.3 * (np.abs(v).max(initial=0.0) + 1.0)
     try:
-        near = pin.integrate(scene.model, q, 0.05 * rng.standard_normal(scene.model.nv))
-        found.append(scene.project(near, v + speed * rng.standard_normal(scene.model.nv)))
+        kicked = scene.project(q, v + speed * rng.standard_normal(scene.model.nv), case.t0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            run = pn.simulate(scene, 20.0 * case.dt, *kicked, t0=case.t0, method="rk4", dt=case.dt)
+        found.append(scene.project(run.q[-1], run.v[-1], case.t0))
     except pn.PinNonidealError:
         pass
     return tuple(found)
 
 
 def _off(case: Case) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-    """The states moved by up to a hundredth of a unit the way in which constraints push."""
-    scene, found = case.scene, []
-    for q, v in case.states:
-        try:
-            force = np.asarray(scene.solve(q, v, case.t0).F_ideal)
-        except pn.PinNonidealError:
-            continue
-        M = pin.crba(scene.model, scene.model.createData(), q)
-        push = np.linalg.solve(np.triu(M) + np.triu(M, 1).T, force)
-        size = float(np.abs(push).max(initial=0.0))
-        if size > 0.0:
-            found.append((pin.integrate(scene.model, q, 1e-2 * push / size), v))
-    return tuple(found)
+    """The start moved by up to a hundredth of a unit the way in which constraints push."""
+    scene, (q, v) = case.scene, case.states[0]
+    try:
+        force = np.asarray(scene.solve(q, v, case.t0).F_ideal)
+    except pn.PinNonidealError:
+        return ()
+    M = pin.crba(scene.model, scene.model.createData(), q)
+    push = np.linalg.solve(np.triu(M) + np.triu(M, 1).T, force)
+    size = float(np.abs(push).max(initial=0.0))
+    return ((pin.integrate(scene.model, q, 1e-2 * push / size), v),) if size > 0.0 else ()
 
 
-# --- Maps of coordinates ----------------------------------------------------------------------------------------
+# --- Maps of coordinates --------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +221,7 @@ class Maps:
         return self.units.energy * (np.asarray(F, dtype=float) @ self.P)
 
 
-# --- Functions of time ------------------------------------------------------------------------------------------
+# --- Functions of time ----------------------------------------------------------------------------------
 
 
 def carried_function(f: Any, maps: Maps, unit: float) -> Any:
@@ -225,7 +245,7 @@ def carried_function(f: Any, maps: Maps, unit: float) -> Any:
     return g
 
 
-# --- Functions of the user --------------------------------------------------------------------------------------
+# --- Functions of the user ------------------------------------------------------------------------------
 
 
 class Reactions:
@@ -368,14 +388,16 @@ class Carrier:
             effort = given.effort if given.effort is None else np.broadcast_to(given.effort, nv)
             if effort is not None:
                 effort = maps.force(effort) + (np.abs(maps.P).sum(axis=0) == 0.0)
-            return replace(
-                given, actuation=replace_case(self, inner).actuation(model), effort=effort
-            )
+            return replace(given, actuation=replace_case(self, inner).actuation(model), effort=effort)
         if isinstance(given, SampledControl):
-            return replace(given, function=self.function(given, "function"), period=maps.units.T * given.period)
+            return replace(
+                given, function=self.function(given, "function"), period=maps.units.T * given.period
+            )
         if isinstance(given, Table):
             return replace(
-                given, times=maps.units.T * np.asarray(given.times) + maps.later, values=maps.force(given.values)
+                given,
+                times=maps.units.T * np.asarray(given.times) + maps.later,
+                values=maps.force(given.values),
             )
         if isinstance(given, HoldPosition):
             kp, kd = (self._gain(g) for g in (given.kp, given.kd))
@@ -409,8 +431,10 @@ class Carrier:
         atol = np.broadcast_to(case.atol, 2 * case.model.nv)
         size = np.abs(maps.S).max(axis=1, initial=0.0)
         small = np.where(size > 0.0, size, 1.0)
-        near, fast = (np.where(size > 0.0, np.abs(maps.S) @ part, part.min(initial=1e-11)) for part in
-                      (atol[: case.model.nv], atol[case.model.nv :]))
+        near, fast = (
+            np.where(size > 0.0, np.abs(maps.S) @ part, part.min(initial=1e-11))
+            for part in (atol[: case.model.nv], atol[case.model.nv :])
+        )
         given = dict(
             model=model,
             **lists,
@@ -421,9 +445,10 @@ class Carrier:
             t0=maps.time(case.t0),
             dt=maps.units.T * case.dt,
             units=maps.units,
-            states=tuple(maps.state(q, v, case.t0) for q, v in case.states),
-            off=tuple(maps.state(q, v, case.t0) for q, v in case.off),
-            atol=case.atol if np.ptp(atol) == 0.0 and (small == 1.0).all() and maps.units.T == 1.0
+            drawn=tuple(maps.state(q, v, case.t0) for q, v in case.states),
+            moved=tuple(maps.state(q, v, case.t0) for q, v in case.off),
+            atol=case.atol
+            if np.ptp(atol) == 0.0 and (small == 1.0).all() and maps.units.T == 1.0
             else np.concatenate([near, fast / maps.units.T]),
         )
         return replace(case, **{**given, **changes})

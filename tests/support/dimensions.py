@@ -14,14 +14,49 @@ from .models import Units, joint_letter
 Factor = Callable[[Units], float]
 
 # Pure numbers, names and flags.
-PLAIN = set(
-    "axis normal mu static_ratio restitution rpy rpy1 rpy2 exponent lead_angle pressure_angle efficiency "
-    "efficiency_back states size".split()
-)
-LENGTHS = set(
-    "radius radius1 radius2 axial_radius span offset height torsional rolling length below above end xyz xyz1 "
-    "xyz2 rim solid1 solid2 semiaxes points segment1 segment2 rest_length".split()
-)
+PLAIN = {
+    "axis",
+    "normal",
+    "mu",
+    "static_ratio",
+    "restitution",
+    "rpy",
+    "rpy1",
+    "rpy2",
+    "exponent",
+    "lead_angle",
+    "pressure_angle",
+    "efficiency",
+    "efficiency_back",
+    "states",
+    "size",
+}
+LENGTHS = {
+    "radius",
+    "radius1",
+    "radius2",
+    "axial_radius",
+    "span",
+    "offset",
+    "height",
+    "torsional",
+    "rolling",
+    "length",
+    "below",
+    "above",
+    "end",
+    "xyz",
+    "xyz1",
+    "xyz2",
+    "rim",
+    "solid1",
+    "solid2",
+    "semiaxes",
+    "points",
+    "segment1",
+    "segment2",
+    "rest_length",
+}
 # In units of force over one of length or angle u, and of time: (forces, u, times).
 OF_JOINT = {
     (pn.JointFriction, "coulomb"): (1, 0, 0),
@@ -52,7 +87,7 @@ SPECIAL: dict[tuple[type, str], Callable[[Any, Units], float]] = {
 
 
 def rubbing_letter(model: pin.Model, name: str, constraints: tuple[Any, ...]) -> str:
-    """Whether friction is a torque or a force: in a joint, an anchor, or in a coupling at its second joint."""
+    """Whether friction is a torque or a force: in a joint, an anchor, or a coupling at its second joint."""
     for c in constraints:
         if c.name == name:
             return joint_letter(model, c.joint2) if isinstance(c, pn.JointCoupling) else "1"
@@ -84,4 +119,6 @@ def factor(d: Any, key: str, model: pin.Model, constraints: tuple[Any, ...]) -> 
         return lambda units: 1.0
     if key in LENGTHS:
         return lambda units: units.L
-    raise KeyError(f"{kind.__name__}.{key} has no dimension here; add its line to tests/support/dimensions.py")
+    raise KeyError(
+        f"{kind.__name__}.{key} has no dimension here; add its line to tests/support/dimensions.py"
+    )

@@ -14,7 +14,7 @@ class Known:
     Attributes:
         reason: in plain words.
         example: scene, transformation and function that show it.
-        scenes, transformations, functions: where else it shows, as regular expressions that match from the start.
+        scenes, transformations, functions: where else it shows, as regular expressions of the whole name.
     """
 
     reason: str
@@ -26,7 +26,9 @@ class Known:
 
     def covers(self, scene: str, transformation: str, function: str) -> bool:
         parts = zip(
-            (self.scenes, self.transformations, self.functions), (scene, transformation, function), strict=True
+            (self.scenes, self.transformations, self.functions),
+            (scene, transformation, function),
+            strict=True,
         )
         return all(re.fullmatch(pattern, text) for pattern, text in parts)
 

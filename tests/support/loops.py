@@ -32,7 +32,13 @@ def bennett(seed: int) -> pn.Scene:
     for k, link in enumerate(links[:3]):
         lever = 0.5 * link.translation
         joint = body(
-            model, joint, pin.JointModelRZ(), f"hinge{k}", rng.uniform(0.5, 2.0), place=place, lever=lever,
+            model,
+            joint,
+            pin.JointModelRZ(),
+            f"hinge{k}",
+            rng.uniform(0.5, 2.0),
+            place=place,
+            lever=lever,
             inertia=0.01 * np.eye(3),
         )
         place = link
@@ -40,10 +46,14 @@ def bennett(seed: int) -> pn.Scene:
     frame(model, "ground", 0, links[3].inverse())
     th1 = rng.uniform(0.5, 2.0)
     q = min(
-        (np.array([th1, 2.0 * np.arctan(K / np.tan(0.5 * th1)), -th1])
-         for ratio in [np.sin(0.5 * (beta + alpha)) / np.sin(0.5 * (beta - alpha))]
-         for K in (ratio, -ratio, 1.0 / ratio, -1.0 / ratio)),
-        key=lambda x: np.linalg.norm(pin.log6(place_of(model, x, "tip").actInv(place_of(model, x, "ground"))).linear),
+        (
+            np.array([th1, 2.0 * np.arctan(K / np.tan(0.5 * th1)), -th1])
+            for ratio in [np.sin(0.5 * (beta + alpha)) / np.sin(0.5 * (beta - alpha))]
+            for K in (ratio, -ratio, 1.0 / ratio, -1.0 / ratio)
+        ),
+        key=lambda x: np.linalg.norm(
+            pin.log6(place_of(model, x, "tip").actInv(place_of(model, x, "ground"))).linear
+        ),
     )
     v = np.array([3.0, 0.0, 0.0])
     loop = pn.HingeAnchor("tip", "ground", axis="z", name="loop")
@@ -59,7 +69,9 @@ def side_rods(seed: int) -> pn.Scene:
     joints = []
     for k in range(wheels):
         place = at((places[k], 0.0, 0.0))
-        joints.append(body(model, 0, pin.JointModelRY(), f"wheel{k}", 2.0, place=place, inertia=0.05 * np.eye(3)))
+        joints.append(
+            body(model, 0, pin.JointModelRY(), f"wheel{k}", 2.0, place=place, inertia=0.05 * np.eye(3))
+        )
         frame(model, f"pin{k}", joints[-1], at((radius, 0.0, 0.0)))
     rod = body(model, joints[0], pin.JointModelRY(), "rod", 1.0, place=at((radius, 0.0, 0.0)), inertia=ROD)
     for k in range(1, wheels):
@@ -76,14 +88,22 @@ def cardan(seed: int, driven: bool = True) -> pn.Scene:
     rng = np.random.default_rng(seed)
     bend = rng.uniform(0.1, 0.6)
     m = np.array([np.cos(bend), np.sin(bend), 0.0])
-    out = np.array([1.0, 0.0, 0.0]) if rng.random() < 0.5 else np.array([np.cos(2 * bend), np.sin(2 * bend), 0.0])
+    out = (
+        np.array([1.0, 0.0, 0.0])
+        if rng.random() < 0.5
+        else np.array([np.cos(2 * bend), np.sin(2 * bend), 0.0])
+    )
     pins = [(0.0, 0.0, 1.0), (-m[1], m[0], 0.0), (-m[1], m[0], 0.0), (0.0, 0.0, 1.0)]
     model = empty((0.0, 0.0, -9.81) if rng.random() < 0.5 else (0.0, 0.0, 0.0))
 
     def solid() -> dict[str, Any]:
         """Of a cross or a shaft: light ones hang between heavy ones."""
         lever = (10.0 ** rng.uniform(-2.0, 0.0), 0.0, 0.0)
-        return {"mass": 10.0 ** rng.uniform(-3.0, 1.0), "lever": lever, "inertia": 10.0 ** rng.uniform(-8.0, -1.0) * np.eye(3)}
+        return {
+            "mass": 10.0 ** rng.uniform(-3.0, 1.0),
+            "lever": lever,
+            "inertia": 10.0 ** rng.uniform(-8.0, -1.0) * np.eye(3),
+        }
 
     joint = body(model, 0, hinge(1, 0, 0), "input", **solid())
     first, second = np.array([0.2, 0.0, 0.0]), np.array([0.2, 0.0, 0.0]) + 0.5 * m  # the crosses
@@ -113,16 +133,37 @@ def drive(seed: int, caster: bool = False) -> pn.Scene:
     rng = np.random.default_rng(seed)
     radius, half = rng.uniform(0.05, 0.15), rng.uniform(0.1, 0.3)
     model, held = empty(), []
-    base = body(model, 0, pin.JointModelPlanar(), "base", 5.0, place=at((0.0, 0.0, radius)), inertia=0.1 * np.eye(3))
+    base = body(
+        model, 0, pin.JointModelPlanar(), "base", 5.0, place=at((0.0, 0.0, radius)), inertia=0.1 * np.eye(3)
+    )
     for side, y in (("left", half), ("right", -half)):
-        wheel = body(model, base, pin.JointModelRY(), side, 0.5, place=at((0.0, y, 0.0)), inertia=2e-3 * np.eye(3))
+        wheel = body(
+            model, base, pin.JointModelRY(), side, 0.5, place=at((0.0, y, 0.0)), inertia=2e-3 * np.eye(3)
+        )
         frame(model, f"{side} wheel", wheel)
         held.append(pn.Rolling(f"{side} wheel", radius, axis="y", name=f"{side} rolls"))
-        held.append(pn.PrescribedMotion(side, pn.polynomial([0.0, rng.uniform(0.5, 4.0)]), name=f"{side} motor"))
+        held.append(
+            pn.PrescribedMotion(side, pn.polynomial([0.0, rng.uniform(0.5, 4.0)]), name=f"{side} motor")
+        )
     if caster:
-        swivel = body(model, base, pin.JointModelRZ(), "swivel", 0.2, place=at((0.3, 0.0, 0.0)), inertia=1e-3 * np.eye(3))
-        wheel = body(model, swivel, pin.JointModelRY(), "roller", 0.2, place=at((-0.06, 0.0, -0.5 * radius)),
-                     inertia=1e-3 * np.eye(3))
+        swivel = body(
+            model,
+            base,
+            pin.JointModelRZ(),
+            "swivel",
+            0.2,
+            place=at((0.3, 0.0, 0.0)),
+            inertia=1e-3 * np.eye(3),
+        )
+        wheel = body(
+            model,
+            swivel,
+            pin.JointModelRY(),
+            "roller",
+            0.2,
+            place=at((-0.06, 0.0, -0.5 * radius)),
+            inertia=1e-3 * np.eye(3),
+        )
         frame(model, "caster wheel", wheel)
         held.append(pn.Rolling("caster wheel", 0.5 * radius, axis="y", name="caster rolls"))
     v = np.zeros(model.nv)
@@ -140,10 +181,14 @@ def linkage(seed: int = 0) -> pn.Scene:
     for k, name in enumerate(("crank", "coupler")):
         place = pin.SE3.Identity() if k == 0 else at((lengths[0], 0.0, 0.0))
         lever = (0.5 * lengths[k], 0.0, 0.0)
-        joint = body(model, joint, hinge(0, -1, 0), name, (0.5, 1.0)[k], place=place, lever=lever, inertia=ROD)
+        joint = body(
+            model, joint, hinge(0, -1, 0), name, (0.5, 1.0)[k], place=place, lever=lever, inertia=ROD
+        )
     frame(model, "coupler_tip", joint, at((lengths[1], 0.0, 0.0)))
     lever = (0.5 * lengths[2], 0.0, 0.0)
-    joint = body(model, 0, hinge(0, -1, 0), "rocker", 0.8, place=at((0.3, 0.0, 0.0)), lever=lever, inertia=ROD)
+    joint = body(
+        model, 0, hinge(0, -1, 0), "rocker", 0.8, place=at((0.3, 0.0, 0.0)), lever=lever, inertia=ROD
+    )
     frame(model, "rocker_tip", joint, at((lengths[2], 0.0, 0.0)))
     kinds = (pn.PointAnchor, lambda *f, name: pn.HingeAnchor(*f, axis="y", name=name))
     q = [1.0, -0.5, 1.5]
@@ -157,18 +202,32 @@ def ball_loop(seed: int) -> pn.Scene:
     model = empty()
     turned = at((0.0, 0.0, 0.0), rng.uniform(-0.5, 0.5, 3))
     crank = body(model, 0, pin.JointModelRZ(), "crank", 1.0, place=turned, lever=(0.1, 0.0, 0.0), inertia=ROD)
-    coupler = body(model, crank, pin.JointModelSpherical(), "coupler", 0.7, place=at((0.2, 0.0, 0.0)),
-                   lever=(0.25, 0.01, 0.0), inertia=0.01 * np.eye(3))
+    coupler = body(
+        model,
+        crank,
+        pin.JointModelSpherical(),
+        "coupler",
+        0.7,
+        place=at((0.2, 0.0, 0.0)),
+        lever=(0.25, 0.01, 0.0),
+        inertia=0.01 * np.eye(3),
+    )
     frame(model, "coupler_tip", coupler, at((0.5, 0.0, 0.0)))
     turned = at((0.5, 0.1, 0.1), rng.uniform(-0.5, 0.5, 3))
-    rocker = body(model, 0, pin.JointModelRX(), "rocker", 1.0, place=turned, lever=(0.0, 0.0, 0.2), inertia=ROD)
+    rocker = body(
+        model, 0, pin.JointModelRX(), "rocker", 1.0, place=turned, lever=(0.0, 0.0, 0.2), inertia=ROD
+    )
     frame(model, "rocker_tip", rocker, at((0.0, 0.0, 0.4)))
     mu = rng.uniform(0.1, 0.5)
-    laws = [pn.JointFriction("ball", mu=mu, radius=0.03, static_ratio=rng.choice([1.0, 1.3]), name="ball rubs")]
+    laws = [
+        pn.JointFriction("ball", mu=mu, radius=0.03, static_ratio=rng.choice([1.0, 1.3]), name="ball rubs")
+    ]
     laws.append(pn.JointFriction("crank", viscous=0.05, name="grease"))
     ball = pn.PointAnchor("coupler_tip", "rocker_tip", name="ball")
     v = rng.normal(0.0, 3.0, model.nv)
-    return pn.Scene(model, constraints=[ball], laws=laws, q0=pin.neutral(model), v0=v, name=f"ball loop {seed}")
+    return pn.Scene(
+        model, constraints=[ball], laws=laws, q0=pin.neutral(model), v0=v, name=f"ball loop {seed}"
+    )
 
 
 def cart(seed: int) -> pn.Scene:
@@ -177,7 +236,9 @@ def cart(seed: int) -> pn.Scene:
     model = empty()
     joint = body(model, 0, pin.JointModelPX(), "cart", 1.0, inertia=0.01 * np.eye(3))
     length = rng.uniform(0.5, 5.0)
-    body(model, joint, pin.JointModelRY(), "pendulum", 1.0, lever=(0.0, 0.0, -length), inertia=0.01 * np.eye(3))
+    body(
+        model, joint, pin.JointModelRY(), "pendulum", 1.0, lever=(0.0, 0.0, -length), inertia=0.01 * np.eye(3)
+    )
     begin, within = rng.uniform(1.0, 3.0), 10.0 ** rng.uniform(-2.0, 0.0)
     move = pn.spline([begin, begin + within], [0.0, 0.3])
     held = [pn.PrescribedMotion("cart", move, name="drive")]
@@ -187,11 +248,16 @@ def cart(seed: int) -> pn.Scene:
 def chain(seed: int) -> pn.Scene:
     """A chain in space closed by an anchor of any kind, without friction."""
     rng = np.random.default_rng(seed)
-    kinds = [str(k) for k in rng.choice(["revolute x", "revolute unaligned", "prismatic y", "helical z", "universal"], 8)]
+    kinds = [
+        str(k)
+        for k in rng.choice(["revolute x", "revolute unaligned", "prismatic y", "helical z", "universal"], 8)
+    ]
     model = tree(kinds, rng, parents=range(len(kinds)))
     q = pin.integrate(model, pin.neutral(model), rng.normal(0.0, 0.7, model.nv))
     tip = f"j{len(kinds) - 1} tip"
     attach(model, "ground", 0, q, place_of(model, q, tip))
     kind = (pn.PointAnchor, pn.FrameAnchor, pn.HingeAnchor)[seed % 3]
     v = rng.normal(0.0, 1.0, model.nv)
-    return pn.Scene(model, constraints=[kind(tip, "ground", name="closure")], q0=q, v0=v, name=f"chain {seed}")
+    return pn.Scene(
+        model, constraints=[kind(tip, "ground", name="closure")], q0=q, v0=v, name=f"chain {seed}"
+    )

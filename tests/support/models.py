@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-# Coordinates of a velocity and of a configuration that are lengths, by kind of joint; all others are pure numbers.
+# Coordinates of a velocity and of a configuration that are lengths, by kind of joint; the rest are numbers.
 LENGTHS = {
     "JointModelPX": ("L", "L"),
     "JointModelPY": ("L", "L"),
@@ -126,7 +126,7 @@ def rebuilt(
         mount: placement of all that is fixed to the world, gravity included.
         moving: joint "mount" that carries all that was fixed to the world.
         order: of the joints, branch by branch.
-        split: joint whose body becomes two of 0.6 and 0.4 of its inertia; the second carries frames and children.
+        split: joint whose body becomes two of 0.6 and 0.4 of its inertia; the second carries all frames.
         by: joint "split" between the two.
     """
     new, away = pin.Model(), pin.SE3.Identity() if mount is None else mount

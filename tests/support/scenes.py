@@ -21,8 +21,16 @@ from . import loops
 from .cases import Case, case_of
 from .loops import at
 
-DURATIONS = {"andrews_squeezer": 0.005, "solo12_dropped": 0.4, "loaded_joint": 3.5, "worm_drive": 4.5,
-             "belt_oscillator": 2.0, "panda_settling": 0.5, "rough_four_bar": 1.0}
+DURATIONS = {
+    "andrews_squeezer": 0.005,
+    "solo12_dropped": 0.4,
+    "loaded_joint": 3.5,
+    "worm_drive": 4.5,
+    "belt_oscillator": 2.0,
+    "panda_settling": 0.5,
+    "rough_four_bar": 1.0,
+}
+FALLING = frozenset({"equilibrium"})  # what falls freely has none, and `equilibrium` looks for one for long
 CUBE = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-0.2, 0.2)]
 RUBS: dict[str, Any] = {"mu": 0.5, "restitution": 0.3, "name": "it"}
 
@@ -32,16 +40,20 @@ def robot(name: str) -> Case:
     duration = DURATIONS.get(name, 0.3)
     # They have no equilibrium, and `equilibrium` looks for one for up to minutes.
     skips = frozenset({"equilibrium"} if name in ("rolling_disk", "slider_crank") else ())
-    return case_of(pn.load(name, **more), name, duration=duration, dt=min(1e-3, duration / 300.0), skips=skips)
+    return case_of(
+        pn.load(name, **more), name, duration=duration, dt=min(1e-3, duration / 300.0), skips=skips
+    )
 
 
-# --- Contacts ---------------------------------------------------------------------------------------------------
+# --- Contacts -------------------------------------------------------------------------------------------
 
 
 def slid(joint: Any) -> tuple[pin.Model, int]:
     """A body of 1 kg with frames "body" and "far", and a frame "base" of the world."""
     model = empty()
-    k = body(model, 0, joint, "floating", 1.0, lever=(0.01, -0.02, 0.0), inertia=np.diag([0.01, 0.012, 0.015]))
+    k = body(
+        model, 0, joint, "floating", 1.0, lever=(0.01, -0.02, 0.0), inertia=np.diag([0.01, 0.012, 0.015])
+    )
     frame(model, "body", k)
     frame(model, "far", k, at((0.2, 0.1, 0.05), (0.3, -0.2, 0.1)))
     frame(model, "base", 0, pin.SE3.Identity())
@@ -54,17 +66,31 @@ def _gap(t: float, q: Any, v: Any, data: Any) -> tuple[Any, Any]:
 
 
 TOUCHES: dict[type, Callable[[], Any]] = {
-    pn.PointContact: lambda: pn.PointContact("body", radius=0.1, height=0.2, torsional=0.01, rolling=0.002, **RUBS),
+    pn.PointContact: lambda: pn.PointContact(
+        "body", radius=0.1, height=0.2, torsional=0.01, rolling=0.002, **RUBS
+    ),
     pn.SphereContact: lambda: pn.SphereContact("body", "base", 0.1, 0.2, **RUBS),
     pn.CapsuleContact: lambda: pn.CapsuleContact(
-        "body", "base", ((0.0, -0.2, 0.0), (0.0, 0.2, 0.0)), ((-0.5, 0.0, 0.0), (0.5, 0.0, 0.0)), 0.1, 0.2, **RUBS
+        "body",
+        "base",
+        ((0.0, -0.2, 0.0), (0.0, 0.2, 0.0)),
+        ((-0.5, 0.0, 0.0), (0.5, 0.0, 0.0)),
+        0.1,
+        0.2,
+        **RUBS,
     ),
     pn.BoxContact: lambda: pn.BoxContact("body", "base", (2.0, 2.0, 0.4), 0.1, **RUBS),
     pn.EllipsoidContact: lambda: pn.EllipsoidContact("body", (0.4, 0.2, 0.1), height=0.2, **RUBS),
     pn.HullContact: lambda: pn.HullContact("body", "base", CUBE, 0.1, **RUBS),
-    pn.CylinderContact: lambda: pn.CylinderContact("body", "base", length=0.4, below=1.0, radius1=0.1, **RUBS),
-    pn.RimContact: lambda: pn.RimContact("body", "base", CUBE, 0.09, 0.01, rpy=(0.5 * np.pi, 0.0, 0.0), **RUBS),
-    pn.RevolvedContact: lambda: pn.RevolvedContact("body", "base", (0.18, 0.0, 0.1), (0.4, 1.0, 1.0), 0.01, **RUBS),
+    pn.CylinderContact: lambda: pn.CylinderContact(
+        "body", "base", length=0.4, below=1.0, radius1=0.1, **RUBS
+    ),
+    pn.RimContact: lambda: pn.RimContact(
+        "body", "base", CUBE, 0.09, 0.01, rpy=(0.5 * np.pi, 0.0, 0.0), **RUBS
+    ),
+    pn.RevolvedContact: lambda: pn.RevolvedContact(
+        "body", "base", (0.18, 0.0, 0.1), (0.4, 1.0, 1.0), 0.01, **RUBS
+    ),
     pn.JointLimit: lambda: pn.JointLimit("floating", lower=0.3, restitution=0.3, name="it"),
     pn.UserContact: lambda: pn.UserContact(
         _gap, gap=lambda t, q: q[2] - 0.3, directions=lambda t, q: np.eye(3)[:2], **RUBS
@@ -74,7 +100,9 @@ TOUCHES: dict[type, Callable[[], Any]] = {
 
 def touching(kind: type) -> Case:
     """A body that falls by 1 cm on something fixed, strikes and slides."""
-    joint = {pn.JointLimit: pin.JointModelPZ, pn.UserContact: pin.JointModelTranslation}.get(kind, pin.JointModelFreeFlyer)()
+    joint = {pn.JointLimit: pin.JointModelPZ, pn.UserContact: pin.JointModelTranslation}.get(
+        kind, pin.JointModelFreeFlyer
+    )()
     model, _ = slid(joint)
     q, v = pin.neutral(model), np.zeros(model.nv)
     q[min(2, model.nq - 1)] = 0.31
@@ -97,12 +125,14 @@ def feet_on_ramp(mu: float) -> Case:
     return case_of(pn.Scene(model, contacts=feet, q0=q, name=f"feet on a ramp, mu {mu}"), duration=0.3)
 
 
-# --- Laws, forces and drives ------------------------------------------------------------------------------------
+# --- Laws, forces and drives ----------------------------------------------------------------------------
 
 
 def arm(**more: Any) -> pn.Scene:
     """Two turning joints and a slide, at an angle to gravity."""
-    model = tree(["revolute x", "revolute unaligned", "prismatic y"], np.random.default_rng(5), parents=range(3))
+    model = tree(
+        ["revolute x", "revolute unaligned", "prismatic y"], np.random.default_rng(5), parents=range(3)
+    )
     frame(model, "post", 0, at((1.0, 0.5, 0.2)))
     q, v = np.array([0.3, -0.4, 0.1]), np.array([1.0, -0.7, 0.3])
     return pn.Scene(model, q0=q, v0=v, **more)
@@ -113,14 +143,25 @@ def _swing(t: float, q: Any, v: Any) -> Any:
 
 
 LAWS: dict[type, Callable[[], Any]] = {
-    pn.JointFriction: lambda: pn.JointFriction("j1", coulomb=0.1, mu=0.2, radius=0.03, span=0.3, viscous=0.01,
-                                               static_ratio=1.3, stribeck_velocity=0.1),
+    pn.JointFriction: lambda: pn.JointFriction(
+        "j1",
+        coulomb=0.1,
+        mu=0.2,
+        radius=0.03,
+        span=0.3,
+        viscous=0.01,
+        static_ratio=1.3,
+        stribeck_velocity=0.1,
+    ),
     pn.SigmoidFriction: lambda: pn.SigmoidFriction("j0", 0.4, 5.0, 0.1),
     pn.LuGre: lambda: pn.LuGre("j2", 300.0, 1.0, 0.4, stribeck_velocity=0.1),
     pn.Drag: lambda: pn.Drag("j2 tip", 0.3, 1.7),
-    pn.UserLaw: lambda: pn.UserLaw(lambda t, q, v, r: -0.1 * v * (1.0 + 0.01 * np.linalg.norm(r.wrench("j0")[:3]))),
+    pn.UserLaw: lambda: pn.UserLaw(
+        lambda t, q, v, r: -0.1 * v * (1.0 + 0.01 * np.linalg.norm(r.wrench("j0")[:3]))
+    ),
     pn.UserFriction: lambda: pn.UserFriction(
-        lambda t, q: np.array([1.0, -0.5, 0.0]), lambda t, q, v, r: 0.1 + 0.01 * np.linalg.norm(r.wrench("j1")[:3])
+        lambda t, q: np.array([1.0, -0.5, 0.0]),
+        lambda t, q, v, r: 0.1 + 0.01 * np.linalg.norm(r.wrench("j1")[:3]),
     ),
 }
 FORCES: dict[type, Callable[[], Any]] = {
@@ -150,10 +191,14 @@ def _random(make: Callable[[int], Any], name: str, seed: int, **more: Any) -> Ca
     made = make(seed)
     scene = made if isinstance(made, pn.Scene) else made.scene
     case = case_of(scene, f"{name} {seed}", **more)
-    return case if made is scene else replace(case, q0=made.q, v0=made.v, states=((made.q, made.v), *case.states[1:]))
+    return (
+        case
+        if made is scene
+        else replace(case, q0=made.q, v0=made.v, drawn=((made.q, made.v), *case.states[1:]))
+    )
 
 
-# --- All of them ------------------------------------------------------------------------------------------------
+# --- All of them ----------------------------------------------------------------------------------------
 
 Maker = Callable[[], Case]
 
@@ -162,7 +207,9 @@ def kinds() -> dict[str, Maker]:
     """Samples of robots and kinds of descriptions, by name."""
     made: dict[str, Maker] = {f"robot {name}": lambda name=name: robot(name) for name, _ in pn.robots()}
     for name, build in TREES.items():
-        made[f"rows of {name}"] = lambda name=name, build=build: case_of(build(np.random.default_rng(3)), name, duration=0.1)
+        made[f"rows of {name}"] = lambda name=name, build=build: case_of(
+            build(np.random.default_rng(3)), name, duration=0.1, skips=FALLING
+        )
     for kind in TOUCHES:
         made[f"touching {kind.__name__}"] = lambda kind=kind: touching(kind)
     for mu in (0.2, 0.6):

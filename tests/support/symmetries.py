@@ -28,9 +28,9 @@ class Image:
         place: of the image's world in that of the case.
         tolerance: what it costs in accuracy, a factor.
         moving: whether nothing of it is at rest.
-        as_steps_shorten: whether methods of first order give the same only as their steps shorten: beside a motion
-            that accelerates, the position of a step's end misses h^2 a/2, and the projection that puts it back moves
-            all coordinates; and events that do nothing end steps.
+        as_steps_shorten: whether methods of first order give the same only as their steps shorten: beside a
+            motion that accelerates, the position of a step's end misses h^2 a/2, and the projection that puts
+            it back moves all coordinates; and events that do nothing end steps.
         without: kinds of values that are not compared.
     """
 
@@ -127,11 +127,11 @@ def then(first: Image, make: Callable[[Case], Image | None]) -> Image | None:
 
 def unchanged(case: Case, **changes: Any) -> Image:
     """The case with some of its fields changed, in the same coordinates."""
-    changed = replace(case, **changes)
+    changed = replace(case, **{"drawn": case.states, "moved": case.off, **changes})
     return Image(changed, case, Carrier(case, Maps.same(case.model)))
 
 
-# --- The world and the mount ------------------------------------------------------------------------------------
+# --- The world and the mount ----------------------------------------------------------------------------
 
 
 def explicit(case: Case) -> Image:
@@ -237,7 +237,7 @@ def _(case: Case) -> Image | None:
     return then(explicit(case), lambda c: carried_along(c, 0.5, 3.0))
 
 
-# --- Units ------------------------------------------------------------------------------------------------------
+# --- Units ----------------------------------------------------------------------------------------------
 
 
 def in_units(case: Case, units: Units) -> Image:
@@ -259,7 +259,7 @@ for _name, _units in {
     transformation(_name)(lambda case, units=_units: in_units(case, units))
 
 
-# --- Order, copies and factors ----------------------------------------------------------------------------------
+# --- Order, copies and factors --------------------------------------------------------------------------
 
 
 @transformation("reversed lists")
@@ -324,8 +324,10 @@ def _(case: Case) -> Image | None:
     )
     one = np.eye(50)
     rows = {
-        c.name: [(c.name, one[: _size(case, c.name), : _size(case, c.name)]),
-                 (f"{ADDED}{c.name}", one[: _size(case, c.name), : _size(case, c.name)])]
+        c.name: [
+            (c.name, one[: _size(case, c.name), : _size(case, c.name)]),
+            (f"{ADDED}{c.name}", one[: _size(case, c.name), : _size(case, c.name)]),
+        ]
         for c in (*doubles, *touches)
     }
     return replace(image, carrier=replace(image.carrier, rows=rows), without=frozenset({"forces by contact"}))
@@ -361,16 +363,17 @@ def by_hand(case: Case, scale: float) -> Image | None:
 def _writable(c: Any) -> bool:
     """Whether functions can say all of a constraint: its torques of resistance they cannot.
 
-    Of angles between frames the rate is the derivative of the residual on the constraint only, where functions are
-    not always checked.
+    Of angles between frames the rate is the derivative of the residual on the constraint only, and functions
+    are checked elsewhere too.
     """
     resists = getattr(c, "torsional", 0.0) or getattr(c, "rolling", 0.0)
     return not (resists or isinstance(c, (pn.FrameAnchor, pn.HingeAnchor)))
 
 
 def _as_functions(case: Case, c: Any, scale: float) -> list[tuple[pn.UserConstraint, np.ndarray]]:
-    """A constraint as one of the user's, or as two where some rows hold no position; and which rows each has."""
+    """A constraint as one of the user's, or two where some rows hold no position; and the rows of each."""
     if isinstance(c, pn.UserConstraint):
+
         def times(key: str) -> Any:
             f = getattr(c, key)
             return None if f is None else lambda *x: scale * np.asarray(f(*x))
@@ -413,13 +416,16 @@ transformation("rows by hand, times 1e4")(lambda case: by_hand(case, 1e4))
 transformation("rows by hand, times 1e-4")(lambda case: by_hand(case, 1e-4))
 
 
-# --- Bodies -----------------------------------------------------------------------------------------------------
+# --- Bodies ---------------------------------------------------------------------------------------------
 
 
 def split(case: Case, by: Any, hold: Any) -> Image | None:
     """The body of the last joint but one or two in two parts that a joint and a constraint hold together."""
     j = 1 + (case.model.njoints - 1) // 2
-    if j >= case.model.njoints or min(case.model.inertias[j].mass, *np.diag(case.model.inertias[j].inertia)) <= 0.0:
+    if (
+        j >= case.model.njoints
+        or min(case.model.inertias[j].mass, *np.diag(case.model.inertias[j].inertia)) <= 0.0
+    ):
         return None  # nothing that a joint of its own could move
     made = rebuilt(case.model, split=j, by=by)
     carrier = Carrier(case, Maps.chosen(case.model, made.model, made.joints))
@@ -444,7 +450,7 @@ def _(case: Case) -> Image | None:
     return split(case, pin.JointModelPY(), lock)
 
 
-# --- Time and steps ---------------------------------------------------------------------------------------------
+# --- Time and steps -------------------------------------------------------------------------------------
 
 
 @transformation("later")
@@ -497,7 +503,7 @@ def _(case: Case) -> Image:
     return unchanged(case, terms="pinocchio")
 
 
-# --- What cannot act --------------------------------------------------------------------------------------------
+# --- What cannot act ------------------------------------------------------------------------------------
 
 
 def body_frames(model: pin.Model, case: Case) -> tuple[int, str]:
