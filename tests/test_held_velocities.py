@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import pickle
 
 import numpy as np
@@ -107,6 +108,44 @@ def test_too_many_named_are_refused_in_any_unit(seed, speed, length):
     named = {f"j{k}": speed * float(draw.normal()) for k in range(scene.model.nv)}
     with refuses("v: no velocity on the constraints has", pn.InputError):
         scene.project(v=named)
+
+
+def pinned(scene):
+    """The scene with a wheel on its last body that is held still by a drive, and by a weld as well."""
+    model = scene.model.copy()
+    wheel = body(model, model.njoints - 1, pin.JointModelRX(), "wheel", 0.3, inertia=0.01 * np.eye(3))
+    frame(model, "rim", wheel)
+    frame(model, "hub", model.njoints - 2)
+    held = [pn.FrameAnchor("rim", "hub"), pn.PrescribedMotion("wheel", pn.constant(0.0))]
+    return pn.Scene(model, constraints=[*scene.constraints, *held], q0=np.append(scene.q0, 0.0))
+
+
+@pytest.mark.parametrize("seed", seeds(range(60)))
+def test_bodies_that_are_held_still_change_nothing(seed):
+    """Their rows see no velocity at all, but for rounding."""
+    scene, named = chain(seed)
+    heavier = scene.model.copy()
+    Y = pin.Inertia(0.3, np.zeros(3), 0.01 * np.eye(3))
+    heavier.appendBodyToJoint(heavier.njoints - 1, Y, pin.SE3.Identity())
+    _, v = pn.Scene(heavier, constraints=scene.constraints, q0=scene.q0).project(v=named)
+    _, same = pinned(scene).project(v=named)
+    np.testing.assert_allclose(same, np.append(v, 0.0), rtol=0.0, atol=1e-9 * (1.0 + np.abs(v).max()))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_disk_rolls_on_any_mount(seed):
+    """Rows of its point on the ground see little of it where it stands upright, whatever their axes."""
+    scene = pn.load("rolling_disk")
+    turn = pin.SE3(pin.exp3(np.random.default_rng(seed).normal(size=3)), np.zeros(3))
+    model = scene.model.copy()
+    model.jointPlacements[1] = turn * model.jointPlacements[1]
+    frame(model, "floor", 0, turn)
+    rolls = [dataclasses.replace(c, plane="floor") for c in scene.constraints]
+    turned = pn.Scene(model, constraints=rolls, q0=scene.q0, v0=scene.v0)
+    for name in ("spin", "x"):
+        v = float(scene.v0[model.joints[model.getJointId(name)].idx_v])
+        _, expected = scene.project(v={name: 1.3 * v})
+        np.testing.assert_allclose(turned.project(v={name: 1.3 * v})[1], expected, rtol=0.0, atol=1e-9)
 
 
 def test_copies_files_and_other_processes_hold_the_same():

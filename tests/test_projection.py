@@ -213,3 +213,26 @@ def test_a_loop_that_does_not_close_by_a_hair_of_a_small_mechanism():
         scene = pn.Scene(model, constraints=[pn.PointAnchor("tip", "pin", axes="xz", name="loop")])
         with pytest.raises(pn.LoopClosureError, match='loop "loop" does not close'):
             scene.project()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_slide_that_a_row_hardly_moves_changes_no_search(seed):
+    """A slider-crank on a turned mount: one row of its loop sees the slide by rounding alone."""
+
+    def slider_crank(turn):
+        model = empty()
+        crank = body(model, 0, pin.JointModelRY(), "crank", 1.0, place=turn, inertia=0.01 * np.eye(3))
+        rod = body(model, crank, pin.JointModelRY(), "rod", 1.0, place=at(0.2), inertia=0.01 * np.eye(3))
+        frame(model, "tip", rod, at(0.5))
+        piston = body(model, 0, pin.JointModelPX(), "piston", 1.0, place=turn, inertia=0.01 * np.eye(3))
+        frame(model, "pin", piston)
+        loop = pn.PointAnchor("tip", "pin", axes="xz", name="loop")
+        return pn.Scene(model, constraints=[loop])
+
+    def at(x):
+        return pin.SE3(np.eye(3), np.array([x, 0.0, 0.0]))
+
+    start = np.array([0.7, -0.9, 0.3])
+    turn = pin.SE3(pin.exp3(np.random.default_rng(seed).normal(size=3)), np.zeros(3))
+    expected = slider_crank(pin.SE3.Identity()).project(q=start)[0]
+    np.testing.assert_allclose(slider_crank(turn).project(q=start)[0], expected, rtol=0.0, atol=1e-8)

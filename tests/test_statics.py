@@ -216,6 +216,72 @@ def test_rest_agrees_with_the_motion():
         assert pn.rest(scene).rests == (np.abs(pn.simulate(scene, 0.2).v).max() == 0.0)
 
 
+# --- The mount, and drives ----------------------------------------------------------------------------------
+
+
+def on_mount(scene, turn):
+    """A scene whose model and gravity are turned together; what it stands on is fixed to the model."""
+    model = scene.model.copy()
+    for j in range(1, model.njoints):
+        if model.parents[j] == 0:
+            model.jointPlacements[j] = turn * model.jointPlacements[j]
+    for k in range(1, model.nframes):
+        if model.frames[k].parentJoint == 0:
+            model.frames[k].placement = turn * model.frames[k].placement
+    model.gravity = pin.Motion(turn.rotation @ model.gravity.linear, np.zeros(3))
+    parts = {key: getattr(scene, key) for key in ("constraints", "laws", "forces", "actuation", "q0", "v0")}
+    return pn.Scene(model, **parts)
+
+
+def sled():
+    """A body that slides in a level plane."""
+    model = pin.Model()
+    model.addJoint(0, pin.JointModelPlanar(), pin.SE3.Identity(), "sled")
+    model.appendBodyToJoint(
+        1, pin.Inertia(2.0, np.array([0.1, 0.0, 0.0]), 0.1 * np.eye(3)), pin.SE3.Identity()
+    )
+    return pn.Scene(model)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_margins_of_rest_do_not_depend_on_the_mount(seed):
+    turn = pin.SE3(pin.exp3(np.random.default_rng(seed).normal(size=3)), np.zeros(3))
+    assert pn.rest(on_mount(sled(), turn)).margin == 1.0  # gravity across its plane moves nothing
+    four_bar = pn.load("four_bar")
+    margin = pn.rest(four_bar).margin
+    assert pn.rest(on_mount(four_bar, turn)).margin == pytest.approx(margin, rel=1e-7)
+
+
+def test_a_drive_that_accelerates_stands_still_in_statics():
+    """A drive moves a joint that rubs: the scene is asked at the place of that time, and is not moved on."""
+    model = pin.Model()
+    bar(model, 0, pin.SE3.Identity(), "swing", 1.0)
+    rubs = pn.JointFriction("swing", mu=0.2, radius=0.1)
+    for drive in (pn.constant(0.3), pn.polynomial([0.3, 1.0, 5.0])):
+        held = pn.Scene(
+            model, constraints=[pn.PrescribedMotion("swing", drive, name="drive")], laws=[rubs], q0=[0.3]
+        )
+        found = pn.rest(held)
+        assert (found.rests, found.margin) == (True, 1.0)
+        np.testing.assert_allclose(found.lam, [-0.5 * G * np.cos(0.3)], rtol=1e-7)
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+def test_least_torques_do_not_depend_on_the_unit_of_length(unit):
+    """A slide that lifts what a crank can lift as well: half of the work each, in any unit."""
+    model = pin.Model()
+    model.addJoint(0, pin.JointModelRY(), pin.SE3.Identity(), "crank")
+    model.appendBodyToJoint(1, pin.Inertia(1.0, np.zeros(3), unit**2 * np.eye(3)), pin.SE3.Identity())
+    model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "slide")
+    model.appendBodyToJoint(2, pin.Inertia(2.0, np.zeros(3), np.eye(3)), pin.SE3.Identity())
+    model.gravity = pin.Motion(unit * model.gravity.linear, np.zeros(3))
+    belt = pn.JointCoupling("slide", "crank", ratio=0.3 * unit)
+    found = pn.inverse_dynamics(pn.Scene(model, constraints=[belt]), *np.zeros((3, 2)))
+    work = found.tau * [1.0, 0.3 * unit]
+    np.testing.assert_allclose(work / work.sum(), [0.5, 0.5], rtol=1e-9)
+    np.testing.assert_allclose(work.sum(), 0.3 * 2.0 * G * unit**2, rtol=1e-9)
+
+
 # --- Inverse dynamics --------------------------------------------------------------------------------------
 
 
