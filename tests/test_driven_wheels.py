@@ -39,7 +39,7 @@ def miss(seed, kind, duration, **options):
 
 
 @pytest.mark.parametrize("kind", wheeled_robots.KINDS)
-@pytest.mark.parametrize("many", ranges(5, 40, 300))
+@pytest.mark.parametrize("many", ranges(2, 40, 300))
 def test_prescribed_wheels_go_where_they_roll(kind, many):
     for seed in many:
         for method in ("dop853", "dopri5"):

@@ -51,7 +51,15 @@ def test_a_saved_run_becomes_a_moving_picture(run: Any, tmp_path: Path, capsys: 
 
 
 @needs_browser
-@pytest.mark.parametrize("ending", ["mp4", pytest.param("webm", marks=pytest.mark.slow)])
+def test_a_video_is_written(run: Any, tmp_path: Path) -> None:
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    video = pn.render(run, tmp_path / "a.mp4", width=160, height=100, seconds=0.25, fps=8)
+    assert imageio_ffmpeg.count_frames_and_secs(str(video)) == (2, 0.25)
+
+
+@needs_browser
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", ["mp4", "webm"])
 def test_a_video_is_played(run: Any, tmp_path: Path, ending: str) -> None:
     """What a player shows of it is the picture of that time."""
     video = pn.render(run, tmp_path / f"a.{ending}", width=319, height=200, seconds=1.0, fps=8)

@@ -89,6 +89,7 @@ def test_plots_hold_the_curves_of_all_runs_and_their_differences(page: Watched) 
     page.page.locator("#differences").click()
 
 
+@pytest.mark.slow
 def test_a_hundred_rollouts_are_one_page_of_ghosts(browser: Any, tmp_path: Path) -> None:
     model = jointed(pin.JointModelRY(), pin.JointModelRY())
     runs = [

@@ -119,18 +119,18 @@ def test_an_event_is_named_under_the_pointer(arm: Any) -> None:
     assert pixel / box["width"] == pytest.approx(0.4, abs=0.1)
 
 
-def test_the_camera_turns_and_returns(arm: Any) -> None:
-    before = arm.watched.picture(0.0)
-    box = arm.page.locator("#scene").bounding_box()
-    arm.page.mouse.move(box["x"] + 300, box["y"] + 150)
-    arm.page.mouse.down()
-    arm.page.mouse.move(box["x"] + 450, box["y"] + 170, steps=4)
-    arm.page.mouse.up()
-    turned = arm.watched.picture(0.0)
+def test_the_camera_turns_and_returns(loop: Any) -> None:
+    before = loop.watched.picture(0.0)
+    box = loop.page.locator("#scene").bounding_box()
+    loop.page.mouse.move(box["x"] + 300, box["y"] + 150)
+    loop.page.mouse.down()
+    loop.page.mouse.move(box["x"] + 450, box["y"] + 170, steps=4)
+    loop.page.mouse.up()
+    turned = loop.watched.picture(0.0)
     assert changed(before, turned) > MOVED
-    arm.page.keyboard.press("r")
+    loop.page.keyboard.press("r")
     inside = (slice(4, -4), slice(4, -4))  # the ring around what has the focus left out
-    assert changed(before[inside], arm.watched.picture(0.0)[inside]) == 0
+    assert changed(before[inside], loop.watched.picture(0.0)[inside]) == 0
 
 
 def test_it_plays_by_itself_unless_told_not_to(browser: Any, loop: Any) -> None:

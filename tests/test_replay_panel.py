@@ -69,7 +69,11 @@ def test_forces_and_constraints_have_boxes_of_their_own(loop: Watched) -> None:
         box.check()
 
 
-@pytest.mark.parametrize("name", ["#show-frames", "#show-masses", "#show-inertias", "#fade"])
+MORE = ("#show-masses", "#show-inertias", "#fade")
+OVERLAYS = ["#show-frames", *(pytest.param(name, marks=pytest.mark.slow) for name in MORE)]
+
+
+@pytest.mark.parametrize("name", OVERLAYS)
 def test_overlays_are_drawn_and_taken_away(loop: Watched, name: str) -> None:
     box = loop.page.locator(name)
     assert moved(loop, box.check) > 50

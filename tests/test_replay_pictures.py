@@ -120,7 +120,10 @@ def paper_runs() -> dict[str, tuple[Any, Any]]:
     }
 
 
-@pytest.mark.parametrize("name", ["particle", "ring", "incline"])
+SEEN = ["ring", *(pytest.param(name, marks=pytest.mark.slow) for name in ("particle", "incline"))]
+
+
+@pytest.mark.parametrize("name", SEEN)
 def test_the_papers_examples_show_constraint_path_and_forces(opened: Any, name: str) -> None:
     run, paper = paper_runs()[name]
     page = opened(run)
@@ -227,6 +230,7 @@ def test_a_travel_of_a_thousand_seconds_is_followed(opened: Any) -> None:
     stays_in_view(opened(run), "cart")
 
 
+@pytest.mark.slow
 def test_forty_windows_take_few_draw_calls(opened: Any) -> None:
     page = opened(pn.simulate(pn.load("n_four_bar", N=40), 0.2, record=("forces", "energy")))
     drawn = page.run("() => replay.draws")
@@ -324,8 +328,11 @@ def test_legends_are_whole_and_what_is_left_out_is_said(opened: Any) -> None:
     assert page.page.locator(".plot li").count() == 8
 
 
+WIDER = ((900, 500), (1400, 900))
+
+
 @pytest.mark.parametrize(
-    ("width", "height"), [(420, 800), pytest.param(900, 500, marks=pytest.mark.slow), (1400, 900)]
+    ("width", "height"), [(420, 800), *(pytest.param(*size, marks=pytest.mark.slow) for size in WIDER)]
 )
 def test_controls_are_within_reach_on_every_screen(opened: Any, width: int, height: int) -> None:
     run = pn.simulate(pn.load("solo12_standing"), 0.1, record=("forces", "energy"))
@@ -376,6 +383,7 @@ def test_curves_are_seen_on_their_paper(opened: Any, scheme: str) -> None:
         assert (bright + 0.05) / (dim + 0.05) > 4.5, (color, paper)
 
 
+@pytest.mark.slow
 def test_on_a_phone_names_of_modes_and_bands_are_whole(opened: Any) -> None:
     page = opened(pn.simulate(pn.load("panda_friction"), 0.3, record="forces"))
     page.page.set_viewport_size({"width": 420, "height": 800})
