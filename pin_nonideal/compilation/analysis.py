@@ -21,7 +21,7 @@ from pin_nonideal.core import core
 from pin_nonideal.errors import InconsistentConstraintsError, InputError, LoopClosureError, UserFunctionError
 from pin_nonideal.laws import UserFriction
 from pin_nonideal.states.closure import CLOSURE_TOLERANCE
-from pin_nonideal.states.rows import copies, row_slices, rows_at
+from pin_nonideal.states.rows import copies, row_lengths, row_slices, rows_at
 from pin_nonideal.timefunctions import Constant, Polynomial, Sinusoid, Spline
 from pin_nonideal.types import Array, Model
 
@@ -31,13 +31,11 @@ Rows = NDArray[np.bool_]
 
 # Functions of time that call none of the user's.
 KNOWN = (Constant, Polynomial, Sinusoid, Spline)
-# Rows below this part of the largest entry of A at random states vanish structurally: rounding of the
+# Rows below this part of their greatest length at random states vanish structurally: rounding of the
 # kinematics.
 STRUCTURAL = 1e-11
 # What such a row asks for beside the largest: rounding of long sums.
 SUM_ROUNDING = 1e-9
-# Stands for the length of rows that are all zero.
-LEAST_LENGTH = 1e-300
 # The derivatives of a user's constraint are compared with differences, which carry about this relative error.
 DERIVATIVE_TOLERANCE = 1e-4
 # Step of these [s], the cube root of unit roundoff, and how long after a start they are taken: at an instant
@@ -159,14 +157,16 @@ def idle_rows(
     if fixed.all():
         return [], []
     runner, generator, samples = sampled.runner(), np.random.default_rng(1), []
+    vanishing = ~fixed
     for _ in range(3):
         q = pin.integrate(model, q0, generator.standard_normal(model.nv))
-        samples.append(rows_at(runner, q, generator.standard_normal(model.nv), 0.37)[:3])
+        v = generator.standard_normal(model.nv)
+        samples.append(rows_at(runner, q, v, 0.37)[:3])
+        own, greatest = (row_lengths(runner, q, v, 0.37, own=own)[: len(owners)] for own in (True, False))
+        vanishing &= own <= STRUCTURAL * greatest
     wide = np.hstack([A for A, _, _ in samples])
     right = np.column_stack([b for _, b, _ in samples])
     gaps = np.abs(np.column_stack([phi for _, _, phi in samples])).max(axis=1)
-    length = np.linalg.norm(wide, axis=1)
-    vanishing = (length <= STRUCTURAL * max(float(length.max()), LEAST_LENGTH)) & ~fixed
     dropped = []
     for row in map(int, np.flatnonzero(vanishing)):
         gap = 0.0 if opens[row] else gaps[row]

@@ -59,20 +59,21 @@ def rows_at(runner: core.Runner, q: Array, v: Array, t: float) -> tuple[Array, A
     return A.reshape(len(phi), len(v)), b, phi, rate
 
 
-def row_lengths(runner: core.Runner, q: Array, v: Array, t: float) -> Array:
-    """The greatest length that rows could have at q in the metric of M^-1, (m + d,).
+def row_lengths(runner: core.Runner, q: Array, v: Array, t: float, *, own: bool = False) -> Array:
+    """The greatest length that rows could have at q in the metric of M^-1, or their own, (m + d,).
 
-    The rows of `rows_at` come first, then the d directions along which frictional elements slip.  The length
-    of a row between two bodies is taken over all directions of its force and couple at its point.  A row is
-    short beside it where the joints leave no freedom, as out of the plane of a planar loop.
+    The rows of `rows_at` come first, then the d directions along which frictional elements slip.  The
+    greatest length of a row between two bodies is taken over all directions of its force and couple at its
+    point.  A row is short beside it where the joints leave no freedom, as out of the plane of a planar loop.
 
     Args:
         runner: a workspace of the core, whose friction carries nothing afterwards.
         q: configuration, (nq,).
         v: velocity, (nv,).
         t: time [s].
+        own: whether to return the lengths that the rows have.
     """
-    return np.asarray(runner.row_lengths(q, v, t))
+    return np.asarray(runner.row_lengths(q, v, t, own))
 
 
 # Rows over their greatest lengths depend on others, or vanish, below this singular value: closures and

@@ -47,6 +47,10 @@ int pressing_row(const Kind& kind) {
     }, kind);
 }
 
+Role role(const Kind& kind) {
+    return std::visit([](const auto& k) { return k.role; }, kind);
+}
+
 Shown shown(const Kind& kind) {
     return std::visit([](const auto& k) { return k.shown; }, kind);
 }

@@ -81,6 +81,7 @@ bool has_affine_rate(const Kind& kind);
 bool has_comparable_rows(const Kind& kind);
 // The row whose multiplier should press, or -1.
 int pressing_row(const Kind& kind);
+Role role(const Kind& kind);
 Shown shown(const Kind& kind);
 // Its two frames, where it acts between bodies; else none.
 std::pair<const Frame*, const Frame*> frames(const Kind& kind);

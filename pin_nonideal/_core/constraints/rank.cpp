@@ -11,13 +11,16 @@ namespace pn {
 // Part of the square of a length, or of a pivot, below which another choice of rows is looked for.
 static constexpr double faded_part = 0.1;
 
-// Whether a row holds a position for good. Contacts and friction count by their own length, as in the programs that decide
-// who sticks.
-static bool is_of_loop(const Block& block) {
-    return pressing_row(block.kind) < 0 && !block.holonomic.empty() && block.holonomic.front();
+// Whether a block is a constraint that holds for good: contacts and friction count by their own length, as in the programs
+// that decide which elements stick.
+static bool is_lasting(const Block& block) { return role(block.kind) == Role::constraint && pressing_row(block.kind) < 0; }
+
+// Whether rows hold a position, of coordinates that are as long as they were at any pose so far.
+static bool keeps_length(const Block& block, const RowValues& values) {
+    return !values.geometric && !block.holonomic.empty() && block.holonomic.front();
 }
 
-static void own_lengths(const Block& block, const std::vector<double>& B, double* length) {
+static void present_lengths(const Block& block, const std::vector<double>& B, double* length) {
     const size_t r = block.kept.size();
     std::fill_n(length, r, 0.0);
     for (size_t l = 0; l < block.support.size(); ++l)
@@ -31,11 +34,11 @@ void decide_rows(const Mechanism& m, Terms& terms, const std::vector<Block>& blo
     for (int i : s.blocks) {
         const Block& block = blocks[i];
         double* length = s.scale.data() + block.row;
-        const bool lasts = is_of_loop(block);
+        const bool lasts = is_lasting(block), kept = lasts && keeps_length(block, values[i]);
         if (lasts) greatest_lengths(m, terms, block, block.kept, values[i], length);
-        else own_lengths(block, B, length);
+        else present_lengths(block, B, length);
         for (size_t k = 0; k < block.kept.size(); ++k) {
-            if (lasts && !values[i].geometric) length[k] = std::max(length[k], std::sqrt(s.longest[block.row + k]));
+            if (kept) length[k] = std::max(length[k], std::sqrt(s.longest[block.row + k]));
             length[k] = length[k] > 0.0 ? 1.0 / length[k] : 1.0;
         }
     }

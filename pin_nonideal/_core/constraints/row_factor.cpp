@@ -9,6 +9,9 @@
 
 namespace pn {
 
+// Part of the square of the longest row of a block below which a row is rounding.
+constexpr double vanishing_square = 1e-28;
+
 // G of n1 rows of one block, from position p1, with n2 of another, from p2: B B^T summed over their common dofs, below
 // the diagonal.
 template <int n1, int n2>
@@ -62,12 +65,13 @@ void scale_to_unit_length(const RowLayout& layout, const std::vector<char>& use,
     }
 }
 
-// Square of the shortest row of a block whose rows are comparable, beside the longest there: the least of all blocks.
-static PN_INLINE double shortest_row(const RowLayout& layout, const std::vector<Block>& blocks, const RowSystem& s) {
+// Square of the shortest row of a block beside the longest one there: the least of all blocks whose rows are comparable.
+// Sets `vanishes` where a row of any block is rounding beside another one.
+static PN_INLINE double shortest_row(const RowLayout& layout, const std::vector<Block>& blocks, const RowSystem& s,
+                                     bool& vanishes) {
     double shortest = 1.0;
     for (int index : s.blocks) {
         const Block& block = blocks[index];
-        if (!block.comparable_rows) continue;
         double least = HUGE_VAL, most = 0.0;
         for (size_t k = 0; k < block.kept.size(); ++k) {
             if (!s.active[block.row + k]) continue;
@@ -76,7 +80,8 @@ static PN_INLINE double shortest_row(const RowLayout& layout, const std::vector<
             least = std::min(least, square);
             most = std::max(most, square);
         }
-        if (least < shortest * most) shortest = least / most;
+        vanishes |= least < vanishing_square * most;
+        if (block.comparable_rows && least < shortest * most) shortest = least / most;
     }
     return shortest;
 }
@@ -124,8 +129,10 @@ PN_WIDE void factor_rows(const RowLayout& layout, const std::vector<Block>& bloc
     delassus(layout, blocks, B, s);
     scale_to_unit_length(layout, s.active, s);
     s.min_pivot = 1.0;
-    s.orthogonal = !factor_cholesky(layout, s);
-    s.distance = std::min(shortest_row(layout, blocks, s), s.min_pivot);
+    bool vanishes = false;
+    const double shortest = shortest_row(layout, blocks, s, vanishes);
+    s.orthogonal = !factor_cholesky(layout, s) || vanishes;
+    s.distance = std::min(shortest, s.min_pivot);
     if (s.redundant) s.distance = std::min(s.distance, shortest_passing(layout, s));
     if (s.orthogonal) factor_orthogonally(blocks, B, s);
 }

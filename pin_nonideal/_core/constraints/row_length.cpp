@@ -12,6 +12,9 @@ namespace {
 // Part of the length of a force that moves all mass, below which the length of a row may be rounding: a force through the
 // only pin of a body moves nothing, wherever the pin is.
 constexpr double least_part = 1e-4;
+// Part of the longest row of a user's function below which a row counts as this long: rounding of a direction without
+// freedom is far shorter, rows in other units are longer.
+constexpr double least_of_function = 1e-4;
 
 class Lengths {
 public:
@@ -83,6 +86,18 @@ void greatest_lengths(const Mechanism& m, Terms& terms, const Block& block, cons
         if (force > 0.0 && forces < 0.0) forces = lengths.of_forces(w.point);
         if (couple > 0.0 && couples < 0.0) couples = lengths.of_couples(w.point);
         length[k] = std::sqrt((force > 0.0 ? force * forces : 0.0) + (couple > 0.0 ? couple * couples : 0.0));
+    }
+    if (values.geometric || rows.empty()) return;
+    const double least = least_of_function * *std::max_element(length, length + rows.size());
+    std::transform(length, length + rows.size(), length, [&](double own) { return std::max(own, least); });
+}
+
+void own_lengths(const Mechanism& m, Terms& terms, const Block& block, const std::vector<int>& rows,
+                 const RowValues& values, double* length) {
+    Lengths lengths(m, terms, block);
+    for (size_t k = 0; k < rows.size(); ++k) {
+        const int row = rows[k];
+        length[k] = std::sqrt(values.geometric ? lengths.square(values.wrench[row]) : lengths.of_coordinates(values, row));
     }
 }
 

@@ -172,7 +172,7 @@ std::tuple<Numbers, Numbers, Numbers, Numbers> Runner::rows(const Array& q_in, c
     return {to_numpy(std::move(A)), to_numpy(std::move(b)), to_numpy(std::move(phi)), to_numpy(std::move(rate))};
 }
 
-Numbers Runner::row_lengths(const Array& q_in, const Array& v_in, double t) {
+Numbers Runner::row_lengths(const Array& q_in, const Array& v_in, double t, bool own) {
     set(q_in, v_in, {});
     set_modes(*p, *w, std::vector<Mode>(p->frictions.size(), unloaded));  // no joint is locked
     configure(*p, *w, t, q, v);
@@ -182,7 +182,7 @@ Numbers Runner::row_lengths(const Array& q_in, const Array& v_in, double t) {
         std::vector<int> rows(block.total);
         std::iota(rows.begin(), rows.end(), 0);
         evaluate_block(*p, *w, t, v, i);  // of open contacts too
-        greatest_lengths(p->mechanism, w->now.terms, block, rows, w->now.values[i], length);
+        (own ? own_lengths : greatest_lengths)(p->mechanism, w->now.terms, block, rows, w->now.values[i], length);
     };
     for (int i = 0; i < p->constraints; ++i) find(i, lengths.data() + p->blocks[i].user_row);
     for (const Friction& f : p->frictions) {
@@ -333,7 +333,7 @@ nb::class_<Runner> bind_runner(nb::module_& m) {
         .def("solve", &Runner::solve, "q"_a, "v"_a, "t"_a = 0.0, "tau"_a = nb::none(), "modes"_a = nb::none(),
              "frozen"_a = false)
         .def("rows", &Runner::rows, "q"_a, "v"_a, "t"_a)
-        .def("row_lengths", &Runner::row_lengths, "q"_a, "v"_a, "t"_a)
+        .def("row_lengths", &Runner::row_lengths, "q"_a, "v"_a, "t"_a, "own"_a = false)
         .def("slip_rows", &Runner::slip_rows, "q"_a, "v"_a, "t"_a)
         .def("pressing_lines", &Runner::pressing_lines, "q"_a, "v"_a, "t"_a)
         .def("terms", &Runner::terms, "q"_a, "v"_a)

@@ -55,7 +55,7 @@ struct Runner {
     // All rows of all constraints, dropped ones too: A (by rows), b, residual, rate.
     std::tuple<Numbers, Numbers, Numbers, Numbers> rows(const Array& q_in, const Array& v_in, double t);
     // The greatest length that each of these rows could have at q, then each direction of the frictional elements.
-    Numbers row_lengths(const Array& q_in, const Array& v_in, double t);
+    Numbers row_lengths(const Array& q_in, const Array& v_in, double t, bool own);
     // Directions along which frictional elements slip: rows of all, whose rates are slip velocities.
     Numbers slip_rows(const Array& q_in, const Array& v_in, double t);
     // Of each contact between two frames a point of the line along which it presses, and the normal that its row pushes
