@@ -19,10 +19,10 @@ from .forces import AtRest, Balance
 
 # Central differences of forces: the cube root of rounding, where rounding and curvature cost the same.
 DIFFERENCE = 6e-6
-# Longest step [rad or m], the shortest that still leads somewhere, and most of them.
+# Longest step [units, see `AtRest.units`], the shortest that still leads somewhere, and most of them.
 LONGEST, SHORTEST, MOST = 0.5, 1e-13, 300
 CLOSINGS = 20  # iterations to the place where a contact closes
-# What is left to the equilibrium by Newton's method when it counts as found [rad or m].
+# What is left to the equilibrium by Newton's method when it counts as found [units].
 CLOSE = 1e-9
 # A motion has no stiffness where it is below this part of the forces in play along it over a unit of motion,
 # or below that part of the stiffnesses that cancel in it: the state is neutral that way.
@@ -101,7 +101,7 @@ def equilibrium(
     search = _Search(AtRest(scene, torque, time, start), downhill)
     best: Equilibrium | None = None
     for k in range(attempts):
-        q = start if k == 0 else _elsewhere(scene, start, k, time)
+        q = start if k == 0 else search.elsewhere(start, k)
         found = None if q is None else search.run(q, k + 1)
         if found is None:
             continue
@@ -116,15 +116,6 @@ def equilibrium(
     return best
 
 
-def _elsewhere(scene: Scene, start: Array, k: int, t: float) -> Array | None:
-    """Another start, farther away with each; always the same ones."""
-    move = np.random.default_rng(k).standard_normal(scene.model.nv) * min(1.5, 0.3 * k)
-    try:
-        return scene.project(pin.integrate(scene.model, start, move), np.zeros(scene.model.nv), t)[0]
-    except (LoopClosureError, InputError):  # of a contact that would start inside
-        return None
-
-
 class _Search:
     """One search after another."""
 
@@ -133,10 +124,21 @@ class _Search:
         self.model: Any = rest.scene.model
         self.least = np.inf
         self.nearest = np.array(rest.scene.q0)
+        self.unit = np.ones(rest.scene.model.nv)  # a long move of each coordinate
+
+    def elsewhere(self, start: Array, k: int) -> Array | None:
+        """Another start, farther away with each; always the same ones."""
+        rest, unit = self.rest, self.rest.units(self.rest.mass(start), self.rest.free(start))
+        move = unit * np.random.default_rng(k).standard_normal(self.model.nv) * min(1.5, 0.3 * k)
+        try:
+            return rest.scene.project(pin.integrate(self.model, start, move), rest.still, rest.t)[0]
+        except (LoopClosureError, InputError):  # of a contact that would start inside
+            return None
 
     def run(self, q: Array, start: int) -> Equilibrium | None:
         """From one configuration; None where it leads nowhere."""
         self.rest.begin(q)
+        self.unit = self.rest.units(self.rest.mass(q), self.rest.free(q))
         now, longest = self.rest.balance(q), LONGEST
         for _ in range(MOST):
             self.note(q, now)
@@ -145,7 +147,7 @@ class _Search:
             if distance <= CLOSE and not unopposed:
                 q, now = self.polished(q, now, move)
                 return self.result(q, now, self.stiffness(q, now), start)
-            size = float(np.abs(move).max(initial=0.0))
+            size = float(np.abs(move / self.unit).max(initial=0.0))
             scale = min(1.0, longest / size) if size > 0.0 else 1.0
             taken = self.step(q, now, scale * move)
             if taken is not None:
@@ -216,7 +218,8 @@ class _Search:
     def neutral(self, now: Balance, stiffness: Array, shapes: Array) -> Array:
         """Stiffness of each shape, a column, that counts as none: each by what adds up in it alone, (k,)."""
         size = np.abs(shapes)
-        canceled = CANCELED * np.abs(stiffness) + NEUTRAL * np.diag(self.in_play(now))
+        motion = np.linalg.norm(now.free / self.unit[:, None], axis=0)
+        canceled = CANCELED * np.abs(stiffness) + NEUTRAL * np.diag(motion * self.in_play(now))
         return np.asarray(np.einsum("ik,ij,jk->k", size, canceled, size))
 
     def move(self, q: Array, now: Balance, stiffness: Array) -> tuple[Array, float, bool]:
@@ -232,7 +235,8 @@ class _Search:
         rounding = BALANCED * self.in_play(now) + ROUNDING * np.abs(stiffness).sum(axis=1)
         pushed = neutral & (np.abs(pull) > np.abs(shapes).T @ rounding)
         steps = np.where(neutral & ~pushed, 0.0, pull / np.where(neutral, least + LEAST_RATE, np.abs(rates)))
-        distance = float(np.abs(shapes @ np.where(neutral, 0.0, steps)).max())
+        away = now.free @ (shapes @ np.where(neutral, 0.0, steps))
+        distance = float(np.abs(away / self.unit).max(initial=0.0))
         if not self.downhill:
             steps = np.linalg.lstsq(stiffness, now.left, rcond=CANCELED)[0]
             return now.free @ steps, distance, bool(pushed.any())
@@ -264,7 +268,7 @@ class _Search:
             return (there, then) if after < before else None
         way = pin.difference(self.model, q, there)
         work = 0.5 * float((now.F + then.F) @ way)
-        near = float(np.abs(move).max(initial=0.0)) < 1e-4 and after < 0.5 * before
+        near = float(np.abs(move / self.unit).max(initial=0.0)) < 1e-4 and after < 0.5 * before
         return (there, then) if work > 0.0 or near else None
 
     def result(self, q: Array, now: Balance, stiffness: Array, start: int) -> Equilibrium:

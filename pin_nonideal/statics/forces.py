@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from pin_nonideal.core import core
 from pin_nonideal.scene import Scene, program_of
+from pin_nonideal.states.extents import slides
 from pin_nonideal.states.rows import DEPENDENT, gap_rows, holonomic_rows, row_lengths, rows_at, shortest
 from pin_nonideal.types import Array
 
@@ -58,6 +60,7 @@ class AtRest:
         self.program = program_of(scene)
         self.runner = self.program.runner()
         self.still = np.zeros(scene.model.nv)
+        self._slides = slides(scene.model)
         self._smooth = [core.Mode.unloaded] * len(scene.element_names)
         self.gaps = gap_rows(self.program)
         self.touching = TOUCHING * max(1.0, scene._compiled.projection.length)
@@ -195,6 +198,25 @@ class AtRest:
         """
         n = len(self.still)
         return np.asarray(self.runner.terms(q, self.still)[0].reshape(n, n))
+
+    def units(self, M: Array, free: Array, dofs: Collection[int] | None = None) -> Array:
+        """Moves of coordinates that compare with a radian: 1, and of slides a length, (k,).
+
+        The length is the root mean radius of gyration by the motions that the constraints allow, so that
+        neither the unit of length nor the mount changes it; 1 where nothing turns or nothing slides.
+
+        Args:
+            M: mass matrix, (nv, nv).
+            free: those motions, (nv, r).
+            dofs: the coordinates, k of them; all when None.
+        """
+        own = list(range(len(M)) if dofs is None else dofs)
+        along = self._slides[own]
+        if not along.any() or along.all():
+            return np.ones(len(own))
+        light = np.einsum("ij,ji->i", free, np.linalg.solve(free.T @ M @ free, free.T))[own]
+        slide, turn = light[along].mean(), light[~along].mean()
+        return np.where(along, np.sqrt(slide / turn) if min(slide, turn) > 0.0 else 1.0, 1.0)
 
 
 def _free(scaled: Array, root: Array) -> Array:

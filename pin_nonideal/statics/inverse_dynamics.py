@@ -14,7 +14,6 @@ from pin_nonideal.checks import array, number, sequence
 from pin_nonideal.core import core
 from pin_nonideal.errors import FrictionConvergenceError, InputError
 from pin_nonideal.scene import Scene
-from pin_nonideal.states.extents import slides
 from pin_nonideal.states.named import joint_named, named_configuration, named_velocity
 from pin_nonideal.states.rows import DEPENDENT, rows_at, shortest
 from pin_nonideal.types import Array, State
@@ -163,7 +162,7 @@ class _Torques:
         self.rest, self.q, self.v, self.a, self.free = rest, q, v, a, rest.free(q)
         self.select = np.eye(len(v))[:, dofs]
         self.M = rest.mass(q)
-        self.arms = _arms(self.M, self.free, slides(rest.scene.model), dofs)
+        self.arms = rest.units(self.M, self.free, dofs)
         # Of the torques in the metric of M^-1.
         self.lengths = np.sqrt(np.diag(np.linalg.inv(self.M))[dofs]) / self.arms
         self.modes, self.slipping = self._modes()
@@ -222,20 +221,6 @@ class _Torques:
         lam = self.rest.runner.solve(self.q, self.slipping, self.rest.t, tau, self.modes).lam
         left = float(np.abs(self.free @ (G @ u - needed)).max(initial=0.0))
         return InverseDynamics(tau, np.asarray(lam), left)
-
-
-def _arms(M: Array, free: Array, slides_of: NDArray[np.bool_], dofs: list[int]) -> Array:
-    """Arms by which driving forces count beside torques, 1 for torques, (k,).
-
-    They are the root mean radius of gyration, by the motions that the constraints allow, so that no unit of
-    length changes which torques are the least; 1 where forces alone drive.
-    """
-    along = slides_of[dofs]
-    if not along.any() or along.all():
-        return np.ones(len(dofs))
-    light = np.einsum("ij,ji->i", free, np.linalg.solve(free.T @ M @ free, free.T))[dofs]
-    forces, torques = light[along].mean(), light[~along].mean()
-    return np.where(along, np.sqrt(forces / torques) if min(forces, torques) > 0.0 else 1.0, 1.0)
 
 
 def _least(scaled: Array, needed: Array, lengths: Array, limits: tuple[Array, Array] | None) -> Array:
