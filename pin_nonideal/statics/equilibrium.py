@@ -15,7 +15,7 @@ from pin_nonideal.scene import Scene
 from pin_nonideal.states.named import named_velocity
 from pin_nonideal.types import Array, State
 
-from .forces import AtRest, Balance
+from .forces import AtRest, Balance, weight
 
 # Central differences of forces: the cube root of rounding, where rounding and curvature cost the same.
 DIFFERENCE = 6e-6
@@ -191,11 +191,11 @@ class _Search:
             f"and {others}; drive less, or hold more{rubs}"
         )
 
-    def in_play(self, now: Balance) -> Array:
+    def in_play(self, now: Balance, inertia: Array) -> Array:
         """Forces beside which those along the columns of free must be small: what acts, the weight, (k,)."""
-        weight = sum(body.mass for body in self.model.inertias) * np.linalg.norm(self.model.gravity.linear)
-        acting = np.abs(now.F) + np.abs(now.A.T) @ np.abs(now.lam) + weight
-        return np.asarray(np.abs(now.free).T @ acting)
+        acting = np.abs(now.F) + np.abs(now.A.T) @ np.abs(now.lam)
+        pull = weight(self.rest.scene) * np.sqrt(np.diag(inertia))  # the most that it does along each
+        return np.asarray(np.abs(now.free).T @ acting + pull)
 
     def polished(self, q: Array, now: Balance, move: Array) -> tuple[Array, Balance]:
         """After one more step, down to rounding, where that leaves less."""
@@ -207,19 +207,19 @@ class _Search:
         """- free^T d(F + A^T lam)/dq free with lam held, by central differences."""
         columns = []
         for direction in now.free.T:
-            ends = []
+            ends, part = [], DIFFERENCE / float(np.linalg.norm(direction / self.unit))
             for sign in (1.0, -1.0):
-                there = pin.integrate(self.model, q, sign * DIFFERENCE * direction)
+                there = pin.integrate(self.model, q, sign * part * direction)
                 ends.append(self.rest.forces(there) + self.rest.rows(there).T @ now.lam)
-            columns.append(-(ends[0] - ends[1]) / (2.0 * DIFFERENCE))
+            columns.append(-(ends[0] - ends[1]) / (2.0 * part))
         k = now.free.shape[1]
         return now.free.T @ np.array(columns).T if k else np.zeros((0, 0))
 
-    def neutral(self, now: Balance, stiffness: Array, shapes: Array) -> Array:
+    def neutral(self, now: Balance, inertia: Array, stiffness: Array, shapes: Array) -> Array:
         """Stiffness of each shape, a column, that counts as none: each by what adds up in it alone, (k,)."""
         size = np.abs(shapes)
         motion = np.linalg.norm(now.free / self.unit[:, None], axis=0)
-        canceled = CANCELED * np.abs(stiffness) + NEUTRAL * np.diag(motion * self.in_play(now))
+        canceled = CANCELED * np.abs(stiffness) + NEUTRAL * np.diag(motion * self.in_play(now, inertia))
         return np.asarray(np.einsum("ik,ij,jk->k", size, canceled, size))
 
     def move(self, q: Array, now: Balance, stiffness: Array) -> tuple[Array, float, bool]:
@@ -230,9 +230,9 @@ class _Search:
             return np.zeros(self.model.nv), 0.0, False
         inertia = now.free.T @ self.rest.mass(q) @ now.free
         rates, shapes = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (inertia + inertia.T))
-        pull, least = shapes.T @ now.left, self.neutral(now, stiffness, shapes)
+        pull, least = shapes.T @ now.left, self.neutral(now, inertia, stiffness, shapes)
         neutral = np.abs(rates) <= least
-        rounding = BALANCED * self.in_play(now) + ROUNDING * np.abs(stiffness).sum(axis=1)
+        rounding = BALANCED * self.in_play(now, inertia) + ROUNDING * np.abs(stiffness).sum(axis=1)
         pushed = neutral & (np.abs(pull) > np.abs(shapes).T @ rounding)
         steps = np.where(neutral & ~pushed, 0.0, pull / np.where(neutral, least + LEAST_RATE, np.abs(rates)))
         away = now.free @ (shapes @ np.where(neutral, 0.0, steps))
@@ -281,7 +281,7 @@ class _Search:
         rates: NDArray[np.complex128] = np.asarray(found[order], dtype=complex)
         shapes = np.abs(shapes[:, order])
         weights = np.einsum("ik,ij,jk->k", shapes, np.abs(inertia), shapes)
-        least = self.neutral(now, stiffness, shapes) / np.where(weights > 0.0, weights, 1.0)
+        least = self.neutral(now, inertia, stiffness, shapes) / np.where(weights > 0.0, weights, 1.0)
         neutral = np.abs(rates) <= least
         grows = ~neutral & ((rates.real < 0.0) | (np.abs(rates.imag) > 1e-3 * np.abs(rates)))
         verdict = False if grows.any() else None if neutral.any() else True

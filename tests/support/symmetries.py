@@ -47,7 +47,7 @@ class Image:
         """A value of the image as one of the case."""
         maps = self.carrier.maps
         units = maps.units
-        if kind == "q":
+        if kind in ("q", "place of rest"):
             return maps.q_back(value)
         if kind == "v":
             return maps.v_back(value)
@@ -579,4 +579,5 @@ def _(case: Case) -> Image:
     q0, v0 = maps.state(case.q0, case.v0, 0.0)
     spring = pn.JointSpring("added wheel", 1.0, name="added spring")
     made = replace(image, q0=q0, v0=v0, forces=(*image.forces, spring))
-    return Image(made, case, carrier, without=frozenset({"energies", "rates"}))
+    # A search goes in steps of all coordinates, and to another one of several states of rest.
+    return Image(made, case, carrier, without=frozenset({"energies", "rates", "place of rest"}))
