@@ -231,7 +231,13 @@ def of_run(case: Case, method: str, **more: Any) -> Answer:
     values["q"] = ("q", np.concatenate([run.q[chosen] for run, chosen in pairs]))
     values["v"] = ("v", np.concatenate([run.v[chosen] for run, chosen in pairs]))
     values["t"] = ("t", np.concatenate([run.t[chosen] for run, chosen in pairs]))
-    events = [(e.time, e.kind, e.element, e.impulse) for r in runs for e in r.events if e.kind in EVENTS]
+    sizes = dict(zip(case.scene.element_names, case.scene._compiled.program.element_sizes, strict=True))
+    events = [
+        (e.time, e.kind, e.element, e.impulse)
+        for r in runs
+        for e in r.events
+        if e.kind in EVENTS and (e.kind != "reverse" or sizes.get(e.element) == 1)  # others turn, fast or slowly
+    ]
     strongest = max((np.abs(e[3]).max() for e in events if e[3] is not None), default=0.0)
     events = [e for e in events if e[3] is None or np.abs(e[3]).max() > LEAST_STRIKE * strongest]
     values["events"] = ("events", events)

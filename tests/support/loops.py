@@ -218,9 +218,9 @@ def ball_loop(seed: int) -> pn.Scene:
         model, 0, pin.JointModelRX(), "rocker", 1.0, place=turned, lever=(0.0, 0.0, 0.2), inertia=ROD
     )
     frame(model, "rocker_tip", rocker, at((0.0, 0.0, 0.4)))
-    mu = rng.uniform(0.1, 0.5)
+    mu = rng.uniform(0.5, 1.0)
     laws = [
-        pn.JointFriction("ball", mu=mu, radius=0.03, static_ratio=rng.choice([1.0, 1.3]), name="ball rubs")
+        pn.JointFriction("ball", mu=mu, radius=0.1, static_ratio=rng.choice([1.0, 1.3]), name="ball rubs")
     ]
     laws.append(pn.JointFriction("crank", viscous=0.05, name="grease"))
     ball = pn.PointAnchor("coupler_tip", "rocker_tip", name="ball")

@@ -239,7 +239,7 @@ def random_cases(count: int) -> dict[str, Maker]:
         "drive": (loops.drive, {"duration": 20.0}),
         "drive with caster": (lambda seed: loops.drive(seed, caster=True), {"duration": 10.0}),
         "linkage": (loops.linkage, {"duration": 0.5}),
-        "ball loop": (loops.ball_loop, {"duration": 0.6, "outputs": 200}),
+        "ball loop": (loops.ball_loop, {"duration": 1.5, "outputs": 300}),
         "cart": (loops.cart, {"duration": 6.0}),
     }
     return {
