@@ -28,7 +28,10 @@ class DenseOutput:
         times: start and end of each step [s], (n, 2).
         states: q, v, states of laws and work of the ledger at each point of each step, (n, points, size).
         modes: of the frictional elements over each step, (n, ne).
-        directions: of their slip, (n, 3 ne).
+        directions: of their slip at each point of each step, (n, points, 3 ne), or without columns if every
+            element slips along one direction.  A step that did not seek them holds those of its end.
+        sought: of each element, whether its slip was too slow to tell its direction, so that the step sought
+            it, (n, ne).
         torque: held over each step, (n, nv), not a number where none is; (0, nv) where none ever is.
         moved: energy moved by projection up to the end of each step [J], (n,).
         options: what the run was asked for, a RunOptions.
@@ -38,6 +41,7 @@ class DenseOutput:
     states: Array
     modes: NDArray[np.int8]
     directions: Array
+    sought: NDArray[np.int8]
     torque: Array
     moved: Array
     options: Any
@@ -50,7 +54,9 @@ class DenseOutput:
         """
         n, elements = len(self.times), self.modes.shape[1]
         shapes = [self.times.shape[1:] == (2,), self.states.ndim == 3, self.moved.shape == (n,)]
-        shapes += [self.torque.ndim == 2, self.directions.shape == (n, 3 * elements)]
+        shapes += [self.torque.ndim == 2, self.sought.shape == (n, elements), self.directions.ndim == 3]
+        shapes += [self.directions.shape[:2] == self.states.shape[:2]]
+        shapes += [self.directions.shape[2:] in ((0,), (3 * elements,))]
         rows = {len(x) for x in (self.states, self.modes, self.moved)} | {len(self.torque) or n}
         if not all(shapes) or rows != {n} or not np.isin(self.modes, [int(mode) for mode in core.Mode]).all():
             raise ValueError("dense output does not fit together")
@@ -92,7 +98,8 @@ class DenseOutput:
             np.ascontiguousarray(t),
             np.ascontiguousarray(states),
             np.ascontiguousarray(self.modes[step], dtype=float),
-            np.ascontiguousarray(self.directions[step]),
+            inside_steps(self.directions, step, part),
+            np.ascontiguousarray(self.sought[step], dtype=float),
             np.ascontiguousarray(self.torque[step] if len(self.torque) else self.torque),
             moved,
         )
@@ -125,11 +132,15 @@ def dense_output(outcome: core.Outcome, options: Any, nv: int, elements: int) ->
     times = outcome.dense_times.reshape(-1, 2)
     n = len(times)
     points = core.dense_points(options.method)
+    turns = 3 * elements if outcome.dense_directions.size else 0
     return DenseOutput(
         times,
         outcome.dense_states.reshape(n, points, -1) if n else np.zeros((0, points, 0)),
         outcome.dense_modes.reshape(n, elements),
-        outcome.dense_directions.reshape(n, 3 * elements),
+        outcome.dense_directions.reshape(n, points, turns),
+        np.broadcast_to(outcome.dense_sought.reshape(n, -1), (n, elements))
+        if n
+        else np.zeros((0, elements), np.int8),
         outcome.dense_torque.reshape(-1, nv),
         outcome.dense_moved,
         options,

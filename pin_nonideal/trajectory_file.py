@@ -35,7 +35,7 @@ REQUIRED = ("t", "q", "v", "violation", "violation_rate")
 OPTIONAL = ("a", "tau", "F_ideal", "F_nonideal", "lam", "lam_ideal", "z", "modes", "closed", "limits")
 # By name, with one row or number a sample: of these a file holds a table, or nothing.
 GROUPS = ("energy", "power", "law_forces", "reactions", "contact_forces")
-DENSE = ("times", "states", "modes", "directions", "torque", "moved")
+DENSE = ("times", "states", "modes", "directions", "sought", "torque", "moved")
 LISTS = ("element_names", "element_laws", "law_names", "law_dofs")
 
 
@@ -245,7 +245,14 @@ def _from_loose(loose: Table, header: Table, samples: int) -> Table:
     if "dense" in header:
         options = SimpleNamespace(**header["dense"])
         options.atol = np.array(options.atol, dtype=float)
-        fields["dense"] = DenseOutput(**{key: loose[f"loose/dense/{key}"] for key in DENSE}, options=options)
+        dense = {key: loose[f"loose/dense/{key}"] for key in DENSE if key != "sought"}
+        if "loose/dense/sought" in loose:
+            dense["sought"] = loose["loose/dense/sought"]
+        else:  # a file of an earlier version holds the directions of each step's end
+            points = dense["states"].shape[1]
+            dense["directions"] = np.repeat(dense["directions"][:, None], points, axis=1)
+            dense["sought"] = np.zeros_like(dense["modes"])
+        fields["dense"] = DenseOutput(**dense, options=options)
         fields["dense"].check()
     return fields
 

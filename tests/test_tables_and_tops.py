@@ -104,7 +104,8 @@ def test_a_table_stands_while_its_load_slides(draw):
 
 # Of a hundred tables two ended in errors where the last of them dwindles.
 @pytest.mark.parametrize(
-    "draw", seeds([*range(DRAWS), 101, 154, 167, 286, 441, 517, 540, 566, 650, 690], always=[101, 441])
+    "draw",
+    seeds([*range(DRAWS), 101, 154, 167, 286, 441, 504, 517, 540, 566, 650, 690], always=[101, 441, 504]),
 )
 def test_a_table_that_its_load_jerks_rattles_to_rest(draw):
     """The driven mass starts with a jerk, which throws the table; feet land where others come to rest."""
@@ -115,12 +116,6 @@ def test_a_table_that_its_load_jerks_rattles_to_rest(draw):
     for q in run.q:
         pin.framesForwardKinematics(scene.model, data, q)
         assert min(data.oMf[foot].translation[2] for foot in feet) > -ENTERED
-
-
-@pytest.mark.parametrize("draw", [504])
-def test_what_is_shown_to_have_no_motion_or_several_is_told_amid_a_cascade(draw):
-    with pytest.raises(pn.FrictionParadoxError, match=r"has (no solution|several solutions) at"):
-        pn.simulate(with_slider(draw)[0], 3.0)
 
 
 def top(m, lever, about_tip, about_axis, mu, q0, v0):

@@ -17,7 +17,7 @@ from .components import Component
 from .options import RunOptions
 
 COUNTERS = ("steps", "rejected", "evaluations", "factorizations", "projections", "iterations", "limited")
-Motion = tuple[Array, Array, Array, Array]  # states, modes, directions, moved
+Motion = tuple[Array, Array, Array, Array, Array]  # states, modes, directions, sought, moved
 
 
 class JoinedEvent(NamedTuple):
@@ -79,13 +79,18 @@ def joined_outcome(
 
 
 def _motion(scene: Scene, parts: Sequence[Component], dense: Sequence[DenseOutput], t: Array) -> Motion:
-    """States of the whole at some times, with the modes, directions of slip and moved energy there."""
+    """States of the whole at some times, with the modes, directions of slip and moved energy there.
+
+    Directions have no columns if every element slips along one direction.
+    """
     nq, nv, ne = scene.model.nq, scene.model.nv, len(scene.element_names)
     work = dense[0].states.shape[2] - parts[0].q.size - parts[0].v.size if dense else 0
     columns = len(scene._compiled.program.power_names) if work else 0
     # A row for each coordinate, in which times stand one after the other, as each component fills them.
     states, moved = np.zeros((nq + nv + columns, t.size)), np.zeros(t.size)
-    modes, directions = np.zeros((ne, t.size), dtype=np.int8), np.zeros((ne, 3, t.size))
+    modes, sought = np.zeros((2, ne, t.size), dtype=np.int8)
+    turns = any(one.directions.shape[2] for one in dense)
+    directions = np.zeros((ne if turns else 0, 3, t.size))
     for part, one in zip(parts, dense, strict=True):
         step = np.searchsorted(one.times[:, 0], t, side="right") - 1
         np.minimum(np.maximum(step, 0, out=step), len(one) - 1, out=step)
@@ -97,16 +102,24 @@ def _motion(scene: Scene, parts: Sequence[Component], dense: Sequence[DenseOutpu
         if columns:
             states[nq + nv + part.works] += own[last:]
         modes[part.elements] = one.modes[step].T
-        turns = one.directions.reshape(len(one), -1, 3)
-        if turns.any():
-            directions[part.elements] = turns[step].transpose(1, 2, 0)
+        sought[part.elements] = one.sought[step].T
+        if one.directions.shape[2]:
+            own = inside_steps(one.directions, step, at).reshape(t.size, -1, 3)
+            directions[part.elements] = own.transpose(1, 2, 0)
         before = np.concatenate([[0.0], one.moved])[step]
         moved += before + at * (one.moved[step] - before)
-    return states.T, modes.T, directions.reshape(3 * ne, t.size).T, moved
+    return states.T, modes.T, directions.reshape(-1, t.size).T, sought.T, moved
 
 
 def _samples(
-    scene: Scene, options: RunOptions, t: Array, states: Array, modes: Array, directions: Array, moved: Array
+    scene: Scene,
+    options: RunOptions,
+    t: Array,
+    states: Array,
+    modes: Array,
+    directions: Array,
+    sought: Array,
+    moved: Array,
 ) -> dict[str, Any]:
     """The samples as the core has them: evaluated where more than the state of a tree is asked for."""
     program, (nq, nv) = scene._compiled.program, (scene.model.nq, scene.model.nv)
@@ -121,8 +134,10 @@ def _samples(
     )
     evaluated = any(asked) or program.rows or nq != nv
     k, none = t.size if evaluated else 0, np.zeros((0, nv))
-    y, held, turns = (np.ascontiguousarray(x[:k], dtype=float) for x in (states, modes, directions))
-    inside = core.sample_inside(program, options, t[:k], y, held, turns, none, moved[:k])
+    y, held, turns, found = (
+        np.ascontiguousarray(x[:k], dtype=float) for x in (states, modes, directions, sought)
+    )
+    inside = core.sample_inside(program, options, t[:k], y, held, turns, found, none, moved[:k])
     samples = {name: getattr(inside, name) for name in dir(core.Outcome) if not name.startswith("_")}
     if evaluated:
         return samples
@@ -147,9 +162,9 @@ def _join_dense(
     # Inside, so that the ends of a stretch belong to it.
     inside = np.clip(part, 1e-9, 1.0 - 1e-9)
     t = (stretches[:, :1] + inside * np.diff(stretches, axis=1)).ravel()
-    states, modes, directions, _ = _motion(scene, parts, dense, t)
+    states, modes, directions, sought, _ = _motion(scene, parts, dense, t)
     joined.dense_times, joined.dense_states = stretches.ravel(), states.ravel()
     joined.dense_modes = modes[::points].ravel()
-    joined.dense_directions = directions[::points].ravel()
+    joined.dense_directions, joined.dense_sought = directions.ravel(), sought[::points].ravel()
     joined.dense_torque = np.zeros(0)
-    joined.dense_moved = _motion(scene, parts, dense, ends[1:])[3]
+    joined.dense_moved = _motion(scene, parts, dense, ends[1:])[4]

@@ -1,12 +1,11 @@
 #include "dynamics/slip.hpp"
 
+#include <algorithm>
+
 #include "dynamics/reactions.hpp"
 #include "dynamics/solution.hpp"
 
 namespace pn {
-
-// Slip slower than this part of the scene's speed has no direction of its own but rounding.
-constexpr double directed_speed = 1e-9;
 
 Vec3 slip_velocity(const Evaluation& now, const Friction& f) {
     const RowValues& values = now.values[f.block];
@@ -132,6 +131,10 @@ double limit_at_hand(const Program& p, Workspace& w, int e, double t, const VecX
     if (w.state.mode[e] != sticking) return w.now.limit[e];
     const SlipLimits limits = static_limits(p, w, e, t, q, v);
     return limits.bounding(p.frictions[e].dim == 1 ? friction_force(p, w, e)[0] : 0.0);
+}
+
+void forget_slip_directions(Workspace& w) {
+    std::fill(w.state.slip_direction.begin(), w.state.slip_direction.end(), Vec3::Zero());
 }
 
 // Unit direction of the friction force of a slipping element.

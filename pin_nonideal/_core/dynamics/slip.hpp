@@ -8,6 +8,9 @@
 
 namespace pn {
 
+// Slip slower than this part of the scene's speed has no direction of its own but rounding.
+constexpr double directed_speed = 1e-9;
+
 // Slip velocity along an element's directions, of the rows evaluated last.
 Vec3 slip_velocity(const Evaluation& now, const Friction& f);
 // Slip speed the way that the element's mode says, and its rate in the motion at hand.
@@ -28,6 +31,8 @@ void update_limit(const Program& p, Workspace& w, int element, double t, const V
 // Limits of the force with which an element can stick now.
 SlipLimits static_limits(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
 
+// Lets states between the ends of a step tell the directions of their slip themselves, in which no reversal lies.
+void forget_slip_directions(Workspace& w);
 // Friction force of an element in the evaluation at hand: the multiplier of what sticks, the law's force of what slips.
 Vec3 friction_force(const Program& p, Workspace& w, int element);
 // The force of an element that sticks, from the middle of its limits, and how far it may lie from there.

@@ -60,7 +60,7 @@ void tell(Options& o, const Hint& hint) {
 
 // Samples inside steps of a run with record "dense": states there, and what each of their steps held.
 Outcome samples_inside(const Program& p, const Options& options, const Array& t, const Array2& y, const Array2& modes,
-                      const Array2& directions, const Array2& torque, const Array& moved) {
+                      const Array2& directions, const Array2& sought, const Array2& torque, const Array& moved) {
     InsideStates inside;
     inside.t.assign(t.data(), t.data() + t.shape(0));
     inside.moved.assign(moved.data(), moved.data() + moved.shape(0));
@@ -71,8 +71,13 @@ Outcome samples_inside(const Program& p, const Options& options, const Array& t,
         inside.directions.emplace_back(map(directions).row(k));
         if (torque.shape(0) > 0) inside.torque.emplace_back(map(torque).row(k));
         std::vector<Mode> held(elements);
-        for (size_t e = 0; e < elements; ++e) held[e] = static_cast<Mode>(static_cast<int>(map(modes)(k, e)));
+        std::vector<char> found(elements);
+        for (size_t e = 0; e < elements; ++e) {
+            held[e] = static_cast<Mode>(static_cast<int>(map(modes)(k, e)));
+            found[e] = map(sought)(k, e) != 0.0;
+        }
         inside.modes.push_back(std::move(held));
+        inside.sought.push_back(std::move(found));
     }
     Workspace w(p);
     w.continues = options.continues;
@@ -280,6 +285,7 @@ static void bind_outcome(nb::module_& m) {
         .def_prop_ro("dense_states", dense<&DenseOutput::states>)
         .def_prop_ro("dense_modes", dense<&DenseOutput::modes>)
         .def_prop_ro("dense_directions", dense<&DenseOutput::directions>)
+        .def_prop_ro("dense_sought", dense<&DenseOutput::sought>)
         .def_prop_ro("dense_torque", dense<&DenseOutput::torque>)
         .def_prop_ro("dense_moved", dense<&DenseOutput::moved>)
         .def_prop_ro("closed", recorded<&R::closed>)
@@ -329,8 +335,8 @@ void bind_runs(nb::module_& m, nb::class_<Runner>& runner) {
           "names"_a, "values"_a);
     m.def("dense_points", [](const std::string& method) { return DenseRecorder::points(method_named(method)); }, "method"_a);
     m.def("inside_steps", &inside_steps, "states"_a, "step"_a, "part"_a);
-    m.def("sample_inside", &samples_inside, "program"_a, "options"_a, "t"_a, "y"_a, "modes"_a, "directions"_a, "torque"_a,
-          "moved"_a);
+    m.def("sample_inside", &samples_inside, "program"_a, "options"_a, "t"_a, "y"_a, "modes"_a, "directions"_a,
+          "sought"_a, "torque"_a, "moved"_a);
     m.def("rollout", &rollout, "program"_a, "q"_a, "v"_a, "options"_a, "threads"_a,
           "names"_a, "values"_a);
     m.def("with_numbers", &with_numbers, "program"_a, "names"_a, "values"_a);

@@ -66,9 +66,10 @@ static void fields(Archive& a, Event& x) {
 }
 
 static void fields(Archive& a, DenseOutput& x) {
-    auto& [times, states, step_modes, directions, torque, moved] = x;
+    auto& [times, states, step_modes, directions, sought, torque, moved] = x;
     for (auto* numbers : {&times, &states, &directions, &torque, &moved}) a.list(*numbers);
     a.list(step_modes);
+    a.list(sought);
 }
 
 static void fields(Archive& a, Recording& x) {

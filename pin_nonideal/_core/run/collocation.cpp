@@ -29,7 +29,7 @@ constexpr double solved_part = 0.05, solved_at_once = 0.005;
 constexpr double diverging = 0.9, diverging_first = 3.0;  // ratio of two changes at which the iteration is given up
 constexpr double rounding_part = 0.5;     // of the tolerance: changes below it that no longer shrink are rounding
 constexpr double perturbation = 1e-6;     // of a direction, for its response: root of the rounding, with a margin
-constexpr double rank_threshold = 1e-5;   // of the turns that slip without speed leaves open
+constexpr double rank_threshold = 1e-5;   // of the turns that slip at rest leaves open, and of the step's fastest slip
 
 }  // namespace
 
@@ -163,6 +163,7 @@ void Collocation::solve_turns() {
     const int m = tangents_, nv = system_.nv, nq = system_.nq;
     K_.resize(stages * m, stages * m);
     residual_.resize(stages * m);
+    const VecX fastest = sigma_.cwiseAbs().rowwise().maxCoeff();
     bool at_rest = false;
     for (int i = 0; i < stages; ++i) {
         VecX moved = step_.y0.segment(nq, nv) - Y_[i].segment(nq, nv);
@@ -173,7 +174,7 @@ void Collocation::solve_turns() {
         u_[i] += A_[i] * moved;
         residual_.segment(i * m, m) = T_[i].transpose() * u_[i];
         for (size_t at = 0; at < elements_.size(); ++at) {
-            at_rest |= sigma_(at, i) == 0.0;
+            at_rest |= std::abs(sigma_(at, i)) <= rank_threshold * fastest[at];
             for (int k = 0; k < elements_[at].dim - 1; ++k) {
                 const int row = i * m + elements_[at].tangent + k;
                 K_(row, row) -= sigma_(at, i);
@@ -286,7 +287,7 @@ void Collocation::advance() {
 }
 
 double Collocation::error() {
-    if (!converged_) return step_.h == 0.0 ? 0.0 : failed_error;
+    if (!converged_) return is_solved() ? 0.0 : failed_error;
     const int nq = system_.nq, nv = system_.nv;
     const double part = defect_part * step_.h;
     error_ = part * step_.start_rate();

@@ -23,6 +23,8 @@ public:
 
     // y1, from y0 and the rate there; the workspace then holds the directions of the step's end.
     void advance();
+    // Whether the equations of the stages were solved.
+    bool is_solved() const { return converged_ || step_.h == 0.0; }
     // Norm of the error estimate, 1 at the tolerance, from the rate at the start that the stages do not know; that of a
     // failed step where their equations were not solved.
     double error();

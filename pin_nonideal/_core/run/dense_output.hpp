@@ -13,7 +13,9 @@ struct DenseOutput {
     std::vector<double> times;   // start and end of each step
     std::vector<double> states;  // y without watch at each point, step by step
     std::vector<std::int8_t> modes;  // of the elements over each step
-    std::vector<double> directions;  // of each element's slip by the step's end
+    // Directions of each element's slip, where any has several: at each point of a step that sought them, else by its end.
+    std::vector<double> directions;
+    std::vector<std::int8_t> sought;  // whether the step sought them
     std::vector<double> torque;  // held over each step, not a number where none is; or nothing where none ever is
     std::vector<double> moved;   // energy moved by projection up to the end of each step
 };
@@ -33,11 +35,12 @@ public:
     void straight(double t0, const VecX& y0, double t1, const VecX& y1, double moved_energy);
 
 private:
-    void rest_of_step(double t0, double t1, double moved_energy);
+    void state_at_point();
+    void rest_of_step(double t0, double t1, double moved_energy, bool sought);
 
     System& system_;
     Stepper& stepper_;
-    const bool holds_torque_;
+    const bool holds_torque_, turns_;  // held torques, and elements of several directions, are in the scene
     DenseOutput& out_;
     VecX state_;
 };

@@ -108,6 +108,10 @@ double ErrorNorm::operator()(const VecX& dy, const VecX& y) {
     return std::sqrt(sum / n);
 }
 
+double ErrorNorm::of_speed(double speed) const {
+    return speed / tolerance_.segment(system_.nv, system_.nv).maxCoeff();
+}
+
 double ErrorNorm::of_projection(const VecX& dy, const VecX& y0, const VecX& y1, double t, double h) {
     to_tangent(dy, y0);
     const int nv = system_.nv, n = system_.on_constraints ? nv : 2 * nv;

@@ -22,6 +22,8 @@ public:
     // The same of a move of positions, and of velocities where stages are not projected, by which a projection has put a
     // step's end back; no part of it is removed.
     double of_projection(const VecX& dy, const VecX& y0, const VecX& y1, double t, double h);
+    // A speed as a part of the tolerance of the largest velocity, which set_tolerances has set.
+    double of_speed(double speed) const;
     // Step of a method of this order from y, where the rate is dy; `limit` at most. Leaves the workspace elsewhere.
     double initial_step(int order, double t, const VecX& y, const VecX& dy, double limit);
 

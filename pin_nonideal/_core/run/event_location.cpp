@@ -23,6 +23,9 @@ constexpr double arrived_speed = 1e-7;
 constexpr double rest_part = 0.05, passing_speed = 1e-6;
 // A fixed step covers this part of the time to rest, and this part of its own length at least.
 constexpr double part_toward_rest = 0.5, least_shortened = 1e-3;
+// A step that misses a rest ends before it, by this part of the time to it. A step that begins with slip of fewer
+// tolerances than this may end at rest in any case.
+constexpr double part_before_rest = 0.1, negligible_slip = 10.0;
 
 // --- The step taken again
 constexpr int correction_passes = 12;
@@ -44,9 +47,9 @@ constexpr int places_inside = 8;
 
 }  // namespace
 
-EventLocator::EventLocator(System& system, Stepper& stepper, const std::vector<double>& slip_at_start,
+EventLocator::EventLocator(System& system, Stepper& stepper, ErrorNorm& norm, const std::vector<double>& slip_at_start,
                            const std::vector<char>& pulls, GapWatch& watch)
-    : system_(system), stepper_(stepper), p(system.p), w(system.w), slip_at_start_(slip_at_start),
+    : system_(system), stepper_(stepper), norm_(norm), p(system.p), w(system.w), slip_at_start_(slip_at_start),
       search_(system, stepper, pulls, watch) {}
 
 double EventLocator::shorten_toward_rest(const VecX& rate, double size) {
@@ -82,7 +85,7 @@ bool EventLocator::has_arrived(int e) const {
 }
 
 void EventLocator::end_step_at(double size) {
-    stepper_.take(stepper_.t0, size);
+    stepper_.take_again(size);
     system_.project_and_evaluate(stepper_.t0 + size, stepper_.y1, stepper_.end_rate());
 }
 
@@ -93,16 +96,44 @@ void EventLocator::correct_end_to(double size) {
     system_.project_and_evaluate(stepper_.t0 + stepper_.h, stepper_.y1, stepper_.end_rate());
 }
 
-// Takes the step again up to the event, and corrects the instant by what the margin is there. Its rate is known for slip
-// along one direction, else it is that of the interpolant, then a secant's.
+// Slip of several directions turns as it comes to rest. The component across the final direction vanishes as a power
+// 1 + k of the component along it, with any k > 0, which no polynomial follows to the end. At the instant at which the
+// component along has vanished, the slip that is left is an error of the step. So is what its own estimate says: the step
+// was taken again, with stages at other times than those of the step that was accepted.
+bool EventLocator::misses_rest(const Watch& watch) const {
+    if (watch.kind != Watch::Kind::slip || p.frictions[watch.index].dim == 1) return false;
+    if (!stepper_.method.adaptive() || stepper_.method.outside()) return false;
+    const bool accurate = stepper_.error() <= 1.0;
+    norm_.set_tolerances(stepper_.y0, stepper_.y1, stepper_.h);
+    const bool rests = norm_.of_speed(slip_velocity(w.now, p.frictions[watch.index]).norm()) <= 1.0;
+    return !(accurate && rests) && norm_.of_speed(system_.slip(stepper_.start_rate(), watch.index)) > negligible_slip;
+}
+
+// Ends the step before the rest. The steps that follow begin with less slip, and their errors are smaller in proportion.
+void EventLocator::end_before_rest() {
+    const double to_rest = stepper_.h;
+    end_step_at((1.0 - part_before_rest) * to_rest);
+    if (!(stepper_.error() <= 1.0)) throw Failure(Failure::Kind::not_converged, stepper_.t0);
+    time_to_rest_ = part_before_rest * to_rest;
+}
+
+// Takes the step again up to the event, or to an earlier time if it misses a rest.
 void EventLocator::step_onto(const Crossing& crossing) {
+    const double full = stepper_.h;
+    time_to_rest_.reset();
+    end_step_at(std::clamp(crossing.part, 0.0, 1.0) * full);
+    if (!crossing.leaps) correct_instant(crossing, full);
+    if (misses_rest(crossing.watch)) end_before_rest();
+}
+
+// Corrects the instant by the margin that is left there. Its rate is known for slip along one direction; in other cases it
+// is that of the interpolant, then a secant's.
+void EventLocator::correct_instant(const Crossing& crossing, double full) {
     const Watch& watch = crossing.watch;
     const bool of_gap = watch.kind == Watch::Kind::gap;
     const bool known_rate = of_gap || (watch.kind == Watch::Kind::slip && p.frictions[watch.index].dim == 1);
-    const double full = stepper_.h, resolution = time_rounding * std::max(std::abs(stepper_.t0), full);
+    const double resolution = time_rounding * std::max(std::abs(stepper_.t0), full);
     double rate = crossing.slope / full;
-    end_step_at(std::clamp(crossing.part, 0.0, 1.0) * full);
-    if (crossing.leaps) return;
     // Between an instant before it and one behind it: where the motion is not that of the interpolant, or where what others
     // hold on its plane has no rate but rounding, Newton's method would lead on to the step's end, past other events.
     double size = stepper_.h, here = margin_at_end(watch), low = 0.0, high = full;
@@ -138,6 +169,7 @@ std::optional<FoundEvent> EventLocator::locate() {
     };
     for (auto e = w.now.slipping.rbegin(); e != w.now.slipping.rend(); ++e)
         if (has_arrived(*e)) return found(EventKind::rest_or_limit, *e);
+    time_to_rest_.reset();
     std::optional<Crossing> crossing = search_.first();
     if (crossing) step_onto(*crossing);
     for (int k = 0; k < most_closed_before && crossing; ++k) {
@@ -147,7 +179,7 @@ std::optional<FoundEvent> EventLocator::locate() {
         step_onto(*crossing);
     }
     if (const auto lifted = lift_together()) return lifted;  // which may come earlier
-    if (!crossing) return release_together();
+    if (!crossing || time_to_rest_) return release_together();
     const Watch& watch = crossing->watch;
     const bool reverses = watch.kind == Watch::Kind::slip && passes_by_rest(watch.index);
     if (const auto released = release_together()) return released;  // which may come earlier

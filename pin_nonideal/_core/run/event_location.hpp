@@ -1,7 +1,8 @@
 // Where an event lies inside a step.
 //
 // The search on the interpolant gives the first guess of the instant; the step is then taken again up to there, so that an
-// event is as accurate as a step, and its end moved by what the margin is there.
+// event is as accurate as a step, and its end moved by what the margin is there. Toward a rest of slip in several
+// directions a step that does not reach it within the tolerance ends before it, and a shorter one follows.
 #pragma once
 
 #include <optional>
@@ -32,11 +33,13 @@ struct FoundEvent {
 class EventLocator {
 public:
     // Slip speed of each element of several directions when its step began, and whether each contact pulls by then.
-    EventLocator(System& system, Stepper& stepper, const std::vector<double>& slip_at_start,
+    EventLocator(System& system, Stepper& stepper, ErrorNorm& norm, const std::vector<double>& slip_at_start,
                  const std::vector<char>& pulls, GapWatch& watch);
 
     // Ends the step just taken at its first event; the workspace is evaluated at the step's end either way.
     std::optional<FoundEvent> locate();
+    // Time from the step's end to the rest of slip before which it was ended, if it was.
+    std::optional<double> time_to_rest() const { return time_to_rest_; }
 
     // Fixed steps shrink toward the rest of a slip of several directions, whose direction may turn fast at the end. The
     // workspace must be evaluated at the step's start.
@@ -45,11 +48,14 @@ public:
 private:
     bool has_arrived(int element) const;
     bool passes_by_rest(int element) const;
+    bool misses_rest(const Watch& watch) const;
 
     double margin_at_end(const Watch& watch);
     void end_step_at(double size);
     void correct_end_to(double size);
     void step_onto(const Crossing& crossing);
+    void correct_instant(const Crossing& crossing, double full);
+    void end_before_rest();
 
     std::optional<double> release_rate(double t, const VecX& y, const std::vector<Mode>& modes, ModeQuestion& asked);
     std::optional<double> release_rate_at_end(const std::vector<Mode>& modes, ModeQuestion& asked);
@@ -61,10 +67,12 @@ private:
 
     System& system_;
     Stepper& stepper_;
+    ErrorNorm& norm_;
     const Program& p;
     Workspace& w;
     const std::vector<double>& slip_at_start_;
     EventSearch search_;
+    std::optional<double> time_to_rest_;
 };
 
 }  // namespace pn

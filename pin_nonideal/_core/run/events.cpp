@@ -242,17 +242,19 @@ Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool boun
     return out;
 }
 
-void remember_directions(System& system, std::vector<double>& slip) {
+void remember_directions(System& system, std::vector<double>& slip, int arrived) {
     Workspace& w = system.w;
+    const auto velocity = [&](int e) { return slip_velocity(w.now, system.p.frictions[e]); };
+    const double least = arrived < 0 ? directed_slip : std::max(directed_slip, velocity(arrived).norm());
     for (int e : w.now.loaded) {
         const Friction& f = system.p.frictions[e];
         if (w.state.lingers[e] && !hardly_moves(system, e)) w.state.lingers[e] = 0;
         if (!slips(w.state.mode[e]) || f.dim == 1) continue;
-        const Vec3 u = slip_velocity(w.now, f);
+        const Vec3 u = velocity(e);
         slip[e] = u.norm();
         const Vec3& n = w.state.last_direction[e];
         if (w.state.seeks_directions) w.state.slip_direction[e] = n;
-        else if (slip[e] > directed_slip) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
+        else if (slip[e] > least) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
     }
 }
 

@@ -37,7 +37,8 @@ bool turning(const System& system);
 // Kind of the event in which the mode of an element changes so.
 Event::Kind kind_of_change(Mode before, Mode after);
 
-// Keeps the slip directions at a step's end for the next step; the slip speeds go into `slip`.
-void remember_directions(System& system, std::vector<double>& slip);
+// Keeps the slip directions at a step's end for the next step; the slip speeds go into `slip`. The slip that is left of an
+// element that has `arrived` at rest is an error of the step: this slip, and slower slip, does not change its direction.
+void remember_directions(System& system, std::vector<double>& slip, int arrived = -1);
 
 }  // namespace pn

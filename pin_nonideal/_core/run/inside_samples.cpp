@@ -4,6 +4,7 @@
 
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
+#include "dynamics/slip.hpp"
 #include "dynamics/step_start.hpp"
 
 namespace pn {
@@ -42,11 +43,28 @@ static void enter_stretch(const Program& p, Workspace& w, double t, double end) 
 
 static void hold(const Program& p, Workspace& w, const InsideStates& inside, size_t k) {
     if (k == 0 || !(inside.modes[k] == inside.modes[k - 1])) set_modes(p, w, inside.modes[k]);
-    for (size_t e = 0; e < p.frictions.size(); ++e)
-        w.state.slip_direction[e] = w.state.last_direction[e] = inside.directions[k].segment<3>(3 * e);
     w.state.warm = false;
     w.now.has_override = !inside.torque.empty() && inside.torque[k].allFinite();
     if (w.now.has_override) w.now.override_torque = inside.torque[k];
+}
+
+// The directions of slip of a state: those that its step sought, and others by the slip itself.
+static void take_directions(const Program& p, Workspace& w, const System& system, const InsideStates& inside, size_t k) {
+    RunState& state = w.state;
+    state.seeks_directions = false;
+    forget_slip_directions(w);
+    const VecX& directions = inside.directions[k];
+    for (int e = 0; e < directions.size() / 3; ++e)
+        state.last_direction[e] = directions.segment<3>(3 * e).stableNormalized();
+    const std::vector<char>& sought = inside.sought[k];
+    if (std::find(sought.begin(), sought.end(), 1) == sought.end()) return;
+    update_kinematics(p, w, inside.t[k], system.q, system.v);
+    for (size_t e = 0; e < sought.size(); ++e) {
+        const Vec3 u = slip_velocity(w.now, p.frictions[e]);
+        if (!sought[e] && u.norm() > directed_speed * (1.0 + system.v.cwiseAbs().maxCoeff()))
+            state.last_direction[e] = u.normalized();
+    }
+    state.seeks_directions = true;
 }
 
 void sample_inside(const Program& p, Workspace& w, const InsideStates& inside, const RecordOptions& options,
@@ -60,6 +78,7 @@ void sample_inside(const Program& p, Workspace& w, const InsideStates& inside, c
         enter_stretch(p, w, inside.t[k], inside.end);
         hold(p, w, inside, k);
         system.read(y);
+        take_directions(p, w, system, inside, k);
         system.read_law_states(y);
         configure(p, w, inside.t[k], system.q, system.v);
         choose_rows_near(p, w, inside.t[k], system.q, system.v);

@@ -22,10 +22,12 @@ private:
     std::vector<double> places_, weights_;  // of the points
 };
 
-// States inside steps, each with what its step held.
+// States inside steps, each with what its step held, and for each element the direction of its slip and whether the step
+// sought it. Without elements of several directions the vectors of directions are empty.
 struct InsideStates {
     std::vector<double> t, moved;
     std::vector<VecX> y, torque, directions;
+    std::vector<std::vector<char>> sought;
     std::vector<std::vector<Mode>> modes;
     double end = HUGE_VAL;  // of the run
 };

@@ -5,6 +5,7 @@
 
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
+#include "dynamics/slip.hpp"
 
 namespace pn {
 
@@ -50,7 +51,7 @@ void Output::end_step(bool asked) {
     const bool on_grid = options_.output_dt > 0.0 && std::abs(next() - t) <= same_time(t);
     if (!asked && options_.output_dt != 0.0 && !on_grid && t < options_.end()) return;
     progress_.samples += on_grid;
-    if (stepper_.has_interpolant()) {
+    if (stepper_.has_interpolant() && !system_.has_events()) {  // the workspace may be inside the step
         system_.read(progress_.y);
         evaluate(p, w, t, system_.q, system_.v);
         configured_now();
@@ -65,14 +66,18 @@ void Output::end_time_step() {
     if (options_.output_dt == 0.0 || on_grid || t >= options_.end()) now();
 }
 
-void Output::keep_step() {
-    if (!options_.record.dense) return;
-    const RunState kept = w.state;
-    dense_.step(progress_.moved_energy);
-    w.state = kept;
+template <class Look>
+void Output::look_inside(const Look& look) {
+    kept_ = w.state;
+    look();
+    w.state = kept_;
     system_.read(progress_.y);
     evaluate(p, w, progress_.t, system_.q, system_.v);
-    w.state = kept;
+    w.state = kept_;
+}
+
+void Output::keep_step() {
+    if (options_.record.dense) look_inside([&] { dense_.step(progress_.moved_energy); });
 }
 
 void Output::keep_time_step(double from, const VecX& y_from) {
@@ -93,6 +98,7 @@ void Output::emit_between(double at) {
         progress_.configured_t = at;
         progress_.configured_y.head(system_.ns) = sample_.head(system_.ns);
     }
+    forget_slip_directions(w);
     emit(at, sample_, false);
     if (redundant) choose_as_before(at);
 }
@@ -108,15 +114,23 @@ void Output::choose_as_before(double at) {
 
 void Output::inside_step(std::optional<double> between) {
     const double end = progress_.t - same_time(progress_.t);
-    while (options_.output_dt > 0.0 && next() < end) {
-        if (between && *between < next()) {
-            emit_between(*between);
-            between.reset();
+    const auto due = [&] { return options_.output_dt > 0.0 && next() < end; };
+    if (between && !(*between < end)) between.reset();
+    if (!between && !due()) return;
+    const auto emit_samples = [&] {
+        while (due()) {
+            if (between && *between < next()) {
+                emit_between(*between);
+                between.reset();
+            }
+            emit_between(next());
+            ++progress_.samples;
         }
-        emit_between(next());
-        ++progress_.samples;
-    }
-    if (between && *between < end) emit_between(*between);
+        if (between) emit_between(*between);
+    };
+    if (!system_.has_events()) return emit_samples();
+    look_inside(emit_samples);  // modes and directions of slip follow from the evaluation at the step's end
+    configured_now();
 }
 
 }  // namespace pn

@@ -34,9 +34,12 @@ public:
 
 private:
     void emit(double at, const VecX& state, bool evaluated);
-    // A sample inside the step just taken, from its interpolant.
+    // A sample inside the step just taken, from its interpolant. Leaves the workspace there.
     void emit_between(double at);
     void choose_as_before(double at);
+    // Calls `look`, which may leave the workspace anywhere inside the step just taken, and puts it back to the step's end.
+    template <class Look>
+    void look_inside(const Look& look);
 
     const Program& p;
     Workspace& w;
@@ -49,6 +52,7 @@ private:
     DenseRecorder dense_;
     VecX sample_;
     RowChoice choice_;  // of the step around a sample
+    RunState kept_;  // of the step's end, while the workspace is elsewhere
     bool jumps_ = false;  // after the last sample
 };
 

@@ -32,6 +32,9 @@ constexpr double least_progress = 1e-10;
 // Progress is told after so many steps.
 constexpr long steps_a_tick = 16;
 
+// The step after one that ended before a rest takes this part of the time to it, so that the rest lies inside.
+constexpr double past_rest = 1.02;
+
 // Where directions are not found in a step of this length [s], the method asked for has to find a way.
 constexpr double shortest_sought = 1e-9;
 
@@ -43,7 +46,7 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       stepper(options.method, system, norm), control(options.method, options.rtol),
       choice(system, stepper, *this, run_options), stiffness(system, stepper, *this, run_options),
       floor(system, stepper, norm, *this, recording), growth(system, *this, run_options, recording),
-      watch(system, gaps), locator(system, stepper, slip_at_start, pulls, watch),
+      watch(system, gaps), locator(system, stepper, norm, slip_at_start, pulls, watch),
       output(system, stepper, *this, run_options, recording), notices(system, stepper, *this, recording),
       value_events(run_options.events, system, stepper, *this), breaks(system, *this, output, recording),
       torques(system, *this, run_options, output, breaks),
@@ -316,9 +319,12 @@ void Simulation::back_to_start() {
 void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent>& event) {
     ++out.steps;
     out.limited += norm.is_limited();
-    t = event ? event->time : proposal.last ? proposal.stop : stepper.t0 + stepper.h;
+    const std::optional<double> to_rest = event ? std::nullopt : locator.time_to_rest();
+    if (to_rest) h = past_rest * *to_rest;
+    t = event ? event->time : proposal.last && !to_rest ? proposal.stop : stepper.t0 + stepper.h;
     moved_energy += system.moved_energy;
-    remember_directions(system, slip_at_start);
+    const bool arrives = event && event->kind == FoundEvent::Kind::rest_or_limit;
+    remember_directions(system, slip_at_start, arrives ? event->index : -1);
     y.head(stepper.active) = stepper.y1.head(stepper.active);
     rate.head(stepper.active) = stepper.end_rate().head(stepper.active);
     growth.look();

@@ -37,8 +37,19 @@ void Stepper::take(double t, double size) {
     has_interpolant_ = false;
     collocates_ = system_.w.state.seeks_directions;
     active = system_.active();
-    if (collocates_) return collocation_.advance();
+    if (collocates_) {
+        collocation_.advance();
+        if (collocation_.is_solved() || method.adaptive()) return;
+        RunState& state = system_.w.state;  // the next trial of a fixed step is no shorter
+        collocates_ = state.seeks_directions = false;
+        state.last_direction = state.slip_direction;
+    }
     with_scheme(scheme_, [&](auto& scheme) { scheme.advance(system_); });
+}
+
+void Stepper::take_again(double size) {
+    take(t0, size);
+    if (collocates_ && !collocation_.is_solved()) throw Failure(Failure::Kind::not_converged, t0);
 }
 
 void Stepper::move_end(double dt) {

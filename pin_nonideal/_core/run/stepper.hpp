@@ -16,10 +16,12 @@ public:
 
     const Method& method;
 
-    // y1 = one step of size h from (t0, y0); the rate there must be known.
+    // y1 = one step of size h from (t0, y0); the rate there must be known. The step stands still where it is not solved.
     void take(double t, double size);
     // Moves the end by a time so short that the rate there, which must be known, does not change. The interpolant is lost.
     void move_end(double dt);
+    // The same step, of another length. Throws a Failure where it is not solved.
+    void take_again(double size);
     // The step from t that an integrator outside has taken, and the rates inside it.
     void follow(double t, double size, OutsideStep::Interpolant interpolant);
     // Norm of the error estimate, 1 at the tolerance; 0 of methods without one.

@@ -91,7 +91,7 @@ double ValueEvents::first_crossing(int k) {
 }
 
 void ValueEvents::end_step_at(double size) {
-    stepper_.take(stepper_.t0, size);
+    stepper_.take_again(size);
     system_.project_and_evaluate(stepper_.t0 + size, stepper_.y1, stepper_.end_rate());
 }
 
