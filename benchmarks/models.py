@@ -23,7 +23,7 @@ import pinocchio as pin
 
 import pin_nonideal as pn
 from oracles import mujoco_motion
-from pin_nonideal.mjcf.compile import compile_mjcf
+from pin_nonideal.loading.mjcf.compile import compile_mjcf
 
 RIGHT = 1e-9  # of M, forces and accelerations beside their largest entry
 ROUNDED = 1e-5  # of accelerations of loops whose frames the file has rounded

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 import pin_nonideal as pn
-from pin_nonideal.loading import robots
+from pin_nonideal.loading.load import robots
 
 HERE = Path(__file__).resolve().parent
 RECORD = ("forces", "energy", "reactions")

@@ -11,7 +11,7 @@ from functools import singledispatch
 import numpy as np
 
 import pin_nonideal as pn
-from pin_nonideal.checks import axis_triad
+from pin_nonideal.validation import axis_triad
 
 from .frames import Frames
 

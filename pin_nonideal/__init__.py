@@ -12,10 +12,13 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from . import actuation, constraints, contacts, forces, laws
-from .actuation import *
-from .constraints import *
-from .contacts import *
+from .description import actuation, constraints, contacts, forces, laws
+from .description.actuation import *
+from .description.constraints import *
+from .description.contacts import *
+from .description.forces import *
+from .description.laws import *
+from .description.time_functions import constant, polynomial, sinusoid, spline
 from .equation import Solution, solve
 from .errors import (
     DivergenceError,
@@ -40,57 +43,54 @@ from .errors import (
     UserFunctionError,
     WallTimeError,
 )
-from .forces import *
-from .geometry_contacts import GeometryContact, geometry_contacts
-from .laws import *
-from .records import Event, FrameRecord, JointRecord, LawRecord, Stats
-from .scene import Scene
-from .scene_steps import Stepper
-from .simulation import simulate
+from .geometry.from_model import GeometryContact, geometry_contacts
+from .scene.scene import Scene
+from .scene.stepping import Stepper
+from .simulation.simulate import simulate
 from .states.report import ProjectionReport
-from .timefunctions import constant, polynomial, sinusoid, spline
-from .trajectory import Trajectory
+from .trajectory.records import Event, FrameRecord, JointRecord, LawRecord, Stats
+from .trajectory.trajectory import Trajectory
 from .version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from .batches import rollout
-    from .cones import ConeResiduals, ConeSolution, cone_complementarity
-    from .loading import load, robots
-    from .plotting import plot
-    from .rendering import render
-    from .replaying import replay
-    from .run_arrays import RunArrays
-    from .runs.resume import resume
+    from .cone_problems import ConeResiduals, ConeSolution, cone_complementarity
+    from .loading.load import load, robots
+    from .simulation.resume import resume
+    from .simulation.rollout import rollout
+    from .simulation.rollout_arrays import RunArrays
     from .statics.equilibrium import Equilibrium, equilibrium
     from .statics.inverse_dynamics import InverseDynamics, inverse_dynamics
-    from .statics.rest import Rest, rest
-    from .sweep_points import sweep_grid, sweep_samples
-    from .sweep_store import Sweep
-    from .sweeping import sweep
+    from .statics.static_feasibility import Rest, rest
+    from .sweeps.grid import sweep_grid, sweep_samples
+    from .sweeps.store import Sweep
+    from .sweeps.sweep import sweep
+    from .visualization.plotting import plot
+    from .visualization.rendering import render
+    from .visualization.replay import replay
 
 # What not every program asks for is imported when it is asked for.
 _LATER = {
-    "rollout": "batches",
-    "RunArrays": "run_arrays",
-    "resume": "runs.resume",
-    "load": "loading",
-    "robots": "loading",
-    "ConeResiduals": "cones",
-    "ConeSolution": "cones",
-    "cone_complementarity": "cones",
-    "plot": "plotting",
-    "render": "rendering",
-    "replay": "replaying",
+    "rollout": "simulation.rollout",
+    "RunArrays": "simulation.rollout_arrays",
+    "resume": "simulation.resume",
+    "load": "loading.load",
+    "robots": "loading.load",
+    "ConeResiduals": "cone_problems",
+    "ConeSolution": "cone_problems",
+    "cone_complementarity": "cone_problems",
+    "plot": "visualization.plotting",
+    "render": "visualization.rendering",
+    "replay": "visualization.replay",
     "Equilibrium": "statics.equilibrium",
     "equilibrium": "statics.equilibrium",
     "InverseDynamics": "statics.inverse_dynamics",
     "inverse_dynamics": "statics.inverse_dynamics",
-    "Rest": "statics.rest",
-    "rest": "statics.rest",
-    "sweep_grid": "sweep_points",
-    "sweep_samples": "sweep_points",
-    "Sweep": "sweep_store",
-    "sweep": "sweeping",
+    "Rest": "statics.static_feasibility",
+    "rest": "statics.static_feasibility",
+    "sweep_grid": "sweeps.grid",
+    "sweep_samples": "sweeps.grid",
+    "Sweep": "sweeps.store",
+    "sweep": "sweeps.sweep",
 }
 
 

@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .checks import floats
 from .errors import InconsistentConstraintsError, InputError, NonFiniteError, SingularMassError
+from .validation import floats
 
 Array = NDArray[np.floating[Any]]
 

@@ -32,7 +32,7 @@ _import_oracles()
 @pytest.fixture
 def kept(monkeypatch):
     """Every file that a run writes, in order."""
-    from pin_nonideal.runs import checkpoint
+    from pin_nonideal.simulation import checkpoint
 
     written = []
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pin_nonideal.replaying import replay
+from pin_nonideal.visualization.replay import replay
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 FLAGS = [

@@ -11,10 +11,10 @@ import pinocchio as pin
 
 from pin_nonideal.compilation.constraints import lower_constraint
 from pin_nonideal.compilation.contacts import lower_contacts
-from pin_nonideal.compilation.names import Resolution
-from pin_nonideal.constraints import PointAnchor
-from pin_nonideal.core import core
-from pin_nonideal.trajectory import Stats
+from pin_nonideal.compilation.resolver import Resolution
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.constraints import PointAnchor
+from pin_nonideal.trajectory.trajectory import Stats
 
 STEP = 1e-6  # for rates by central differences: their error is near 1e-9
 

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 import pin_nonideal as pn
-from pin_nonideal.contacts import PointContact
+from pin_nonideal.description.contacts import PointContact
 
 from .mechanisms import again
 from .random_trees import AXIS, add, attach, place_of, three_trees

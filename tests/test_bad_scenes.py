@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.contacts import PointContact
+from pin_nonideal.description.contacts import PointContact
 from pin_nonideal.errors import InputError, SingularMassError, UnknownNameError
 
 from .every_joint import INF, MODEL, NAN, Q, V, scaled, with_entry

@@ -18,9 +18,9 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, LoadingError, OutputError, RunInterrupted
-from pin_nonideal.loading import robot_folders
-from pin_nonideal.runs import checkpoint
-from pin_nonideal.runs.options import run_options
+from pin_nonideal.loading.load import robot_folders
+from pin_nonideal.simulation import checkpoint
+from pin_nonideal.simulation.options import run_options
 
 from .mechanisms import again
 from .random_trees import add

@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.cli import EXIT_ERROR, EXIT_INTERRUPTED, main
-from pin_nonideal.cli_runs import parameters
+from pin_nonideal.cli.main import EXIT_ERROR, EXIT_INTERRUPTED, main
+from pin_nonideal.cli.run import parameters
 
 # A short piece of motion: the command is tested here, the motion elsewhere.
 SHORT = ["--duration", "0.05"]
@@ -181,7 +181,7 @@ class TestErrors:
 COMMAND = """
 import sys
 import pin_nonideal as pn
-from pin_nonideal.cli import main
+from pin_nonideal.cli.main import main
 
 simulate = pn.simulate
 

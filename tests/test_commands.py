@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.cli import main
+from pin_nonideal.cli.main import main
 
 from .small_robots import ARM, folder, link, robot
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.runs.components import components
+from pin_nonideal.simulation.components import components
 
 SAME = 1e-12  # rounding of interpolants at the ends of steps
 COULOMB: dict[str, Any] = {"coulomb": 0.1}

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.dense import inside_steps
+from pin_nonideal.trajectory.dense_output import inside_steps
 
 from .refusals import refuses
 

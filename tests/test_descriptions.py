@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pin_nonideal import checks
-from pin_nonideal.actuation import HoldPosition, SampledControl, Table
-from pin_nonideal.constraints import (
+from pin_nonideal import validation as checks
+from pin_nonideal.description.actuation import HoldPosition, SampledControl, Table
+from pin_nonideal.description.constraints import (
     Distance,
     FrameAnchor,
     HingeAnchor,
@@ -24,11 +24,11 @@ from pin_nonideal.constraints import (
     Rolling,
     UserConstraint,
 )
-from pin_nonideal.contacts import PointContact
+from pin_nonideal.description.contacts import PointContact
+from pin_nonideal.description.forces import JointSpring, SpringDamper, UserForce, Wrench
+from pin_nonideal.description.laws import Drag, JointFriction, LuGre, SigmoidFriction, UserFriction, UserLaw
+from pin_nonideal.description.time_functions import sinusoid
 from pin_nonideal.errors import InputError
-from pin_nonideal.forces import JointSpring, SpringDamper, UserForce, Wrench
-from pin_nonideal.laws import Drag, JointFriction, LuGre, SigmoidFriction, UserFriction, UserLaw
-from pin_nonideal.timefunctions import sinusoid
 
 
 def nothing(*_):

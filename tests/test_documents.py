@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import pytest
 
-from pin_nonideal.loading import load, robots
+from pin_nonideal.loading.load import load, robots
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]

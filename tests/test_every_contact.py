@@ -16,14 +16,14 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal import contacts
-from pin_nonideal.page.bands import gaps_of
-from pin_nonideal.page.elements import elements_of
-from pin_nonideal.page.forces import arrows_of
-from pin_nonideal.page.marks import marks_of
-from pin_nonideal.page.motion import sample
-from pin_nonideal.page.places import touches_of, touching_marks
-from pin_nonideal.page.signals import plots_of
+from pin_nonideal.description import contacts
+from pin_nonideal.visualization.page.contact_points import touches_of, touching_marks
+from pin_nonideal.visualization.page.force_arrows import arrows_of
+from pin_nonideal.visualization.page.frames import sample
+from pin_nonideal.visualization.page.friction_glyphs import elements_of
+from pin_nonideal.visualization.page.markers import marks_of
+from pin_nonideal.visualization.page.mode_timeline import gaps_of
+from pin_nonideal.visualization.page.signals import plots_of
 
 from .replay_browser import Watched, headless_browser
 from .replay_runs import add_frame

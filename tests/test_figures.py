@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, UnknownNameError
-from pin_nonideal.plotting import CLOUD, plot
+from pin_nonideal.visualization.plotting import CLOUD, plot
 
 from .replay_runs import add_frame, four_bar, jointed, panda
 

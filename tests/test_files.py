@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.cli import main
+from pin_nonideal.atomic_files import whole_file
+from pin_nonideal.cli.main import main
 from pin_nonideal.errors import InputError, LoadingError, OutputError, UserFunctionError
-from pin_nonideal.files import whole_file
-from pin_nonideal.scene import TAKEN
+from pin_nonideal.scene.scene import TAKEN
 
 from .refusals import refuses
 from .small_robots import folder, joint, link, robot
 
-LIST = f"{sys.executable} -c 'from pin_nonideal.cli import main; raise SystemExit(main([\"list\"]))'"
+LIST = f"{sys.executable} -c 'from pin_nonideal.cli.main import main; raise SystemExit(main([\"list\"]))'"
 
 
 def write(path, content=b"new"):
@@ -92,7 +92,7 @@ def test_output_that_cannot_be_printed_is_said_in_one_line(where, code, said):
 
 def test_parts_of_killed_processes_are_taken_away(tmp_path):
     code = (
-        "import os, sys\nfrom pathlib import Path\nfrom pin_nonideal.files import whole_file\n"
+        "import os, sys\nfrom pathlib import Path\nfrom pin_nonideal.atomic_files import whole_file\n"
         "with whole_file(Path(sys.argv[1]), 'x') as s:\n    s.write(b'half')\n    s.flush()\n"
         "    os.kill(os.getpid(), 9)\n"
     )

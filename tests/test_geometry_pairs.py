@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.hulls import shrunk
-from pin_nonideal.manifolds import LEAST_ROUNDING
+from pin_nonideal.description.contacts.convex_hull import shrunk
+from pin_nonideal.geometry.manifold import LEAST_ROUNDING
 
 from .mechanisms import body, empty, frame
 

@@ -13,17 +13,17 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal import constraints, laws
 from pin_nonideal.compilation.constraints import lower_constraint
 from pin_nonideal.compilation.laws import lower_law
-from pin_nonideal.core import core
-from pin_nonideal.formats.robot_yaml import CONSTRAINTS, LAWS
+from pin_nonideal.core_loader import core
+from pin_nonideal.description import constraints, laws
+from pin_nonideal.loading.yaml.robot import CONSTRAINTS, LAWS
 
 ROOT = Path(__file__).parents[1]
 CORE = ROOT / "pin_nonideal" / "_core"
 DATA = Path(__file__).parent / "data"
 KINDS = get_args(constraints.Constraint)
-HEADERS = sorted((CORE / "constraints" / "kinds").glob("*.hpp"))
+HEADERS = [path for room in ("rows", "gaps") for path in sorted((CORE / "constraints" / room).glob("*.hpp"))]
 # What a kind's C++ struct must say of itself.
 MEMBERS = (
     "static constexpr const char* name",
@@ -66,12 +66,11 @@ class TestDescription:
 
 
 def structs() -> dict[str, str]:
-    """Name of the kind in each header, with the header's stem; of a template those that are made of it."""
+    """Name of each kind of row, and that in Python; of a template those that are made of it."""
     found = {}
     for header in HEADERS:
         source = header.read_text()
-        kinds = re.findall(r"(?<!>\n)^struct (\w+Rows?) \{", source, re.M)
-        found |= dict.fromkeys(kinds[:1], header.stem)
+        found |= dict(re.findall(r'(?<!>\n)^struct (\w+Rows?) \{\n +static .* name = "(\w+)"', source, re.M))
         found |= {
             kind: kind[:-3].lower() for kind in re.findall(r"^using (\w+Row) = \w+<\w+>;", source, re.M)
         }
@@ -82,7 +81,7 @@ def structs() -> dict[str, str]:
 class TestStruct:
     def test_is_one_of_the_kinds(self, struct: str) -> None:
         (variant,) = re.findall(
-            r"using Kind = std::variant<([^>]*)>", (CORE / "constraints/kind.hpp").read_text()
+            r"using Kind = std::variant<([^>]*)>", (CORE / "constraints/row_type.hpp").read_text()
         )
         assert struct in re.findall(r"\w+", variant)
 

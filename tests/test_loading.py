@@ -8,9 +8,9 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, SingularMassError, UnknownNameError
-from pin_nonideal.formats.inertia import mass_diagnosis
-from pin_nonideal.formats.model_edit import ball_chains, edit_joints
-from pin_nonideal.formats.urdf import read_urdf
+from pin_nonideal.loading.edit.model import ball_chains, edit_joints
+from pin_nonideal.loading.urdf.inertia import mass_diagnosis
+from pin_nonideal.loading.urdf.reader import read_urdf
 
 from .refusals import refuses
 from .small_robots import ARM, DATA, folder, joint, link, robot

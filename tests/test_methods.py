@@ -10,15 +10,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pin_nonideal.core import core
-from pin_nonideal.runs.options import METHODS, SCIPY
+from pin_nonideal.core_loader import core
+from pin_nonideal.simulation.options import METHODS, SCIPY
 
 CORE = Path(__file__).parents[1] / "pin_nonideal" / "_core"
 EIGEN = Path(pin.__file__).parents[4] / "include" / "eigen3"
 
 # Bogacki and Shampine (1989), order 3 with an estimate of order 2, first same as last, on y'' = -y.
 PROGRAM = r"""
-#include "run/runge_kutta.hpp"
+#include "run/integrators/runge_kutta.hpp"
 #include <cmath>
 #include <cstdio>
 
@@ -71,7 +71,7 @@ def test_a_new_table_needs_no_other_line(tmp_path):
         pytest.skip("needs a C++ compiler and Eigen")
     source, program = tmp_path / "pair.cpp", tmp_path / "pair"
     source.write_text(PROGRAM)
-    sources = [source, CORE / "run" / "runge_kutta.cpp"]
+    sources = [source, CORE / "run" / "integrators" / "runge_kutta.cpp"]
     subprocess.run(
         [compiler, "-std=c++17", "-I", CORE, "-isystem", EIGEN, *sources, "-o", program], check=True
     )

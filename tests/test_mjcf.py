@@ -9,7 +9,13 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.constraints import FrameAnchor, JointCoupling, PointAnchor, PrescribedMotion, UserConstraint
+from pin_nonideal.description.constraints import (
+    FrameAnchor,
+    JointCoupling,
+    PointAnchor,
+    PrescribedMotion,
+    UserConstraint,
+)
 
 from .refusals import refuses
 

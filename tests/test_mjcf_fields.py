@@ -9,10 +9,10 @@ import pytest
 import pin_nonideal as pn
 from oracles import mujoco_motion
 from pin_nonideal.errors import LoadingError
-from pin_nonideal.formats.assembly import scene_arguments
-from pin_nonideal.mjcf import fields
-from pin_nonideal.mjcf.reader import translate
-from pin_nonideal.mjcf.told import ALLOWED, Told
+from pin_nonideal.loading.mjcf import fields
+from pin_nonideal.loading.mjcf.reader import translate
+from pin_nonideal.loading.mjcf.unsupported import ALLOWED, Told
+from pin_nonideal.loading.yaml.assembly import scene_arguments
 
 from .refusals import refuses
 

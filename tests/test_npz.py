@@ -8,7 +8,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from pin_nonideal import npz
+from pin_nonideal.trajectory import npz
 
 ARRAYS = {
     "t": np.linspace(0.0, 1.0, 7),

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.states.placements import joint_placements
+from pin_nonideal.states.kinematics import joint_placements
 
 from .random_trees import JOINTS, tree
 

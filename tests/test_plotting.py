@@ -16,7 +16,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, OutputError, UnknownNameError
-from pin_nonideal.plotting import CROWD, plot
+from pin_nonideal.visualization.plotting import CROWD, plot
 
 from .replay_runs import four_bar, jointed, panda, run_of
 

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.runs import checkpoint
+from pin_nonideal.simulation import checkpoint
 
 from .mechanisms import body, empty, frame
 

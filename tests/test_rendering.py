@@ -15,8 +15,9 @@ import pytest
 from PIL import Image
 
 import pin_nonideal as pn
-from pin_nonideal import cli, rendering
+from pin_nonideal.cli import main as cli
 from pin_nonideal.errors import InputError, OutputError
+from pin_nonideal.visualization import rendering
 
 from .replay_browser import BROWSER, headless_browser
 

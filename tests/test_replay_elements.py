@@ -10,13 +10,13 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.checks import unit_axis
-from pin_nonideal.page.elements import elements_of
-from pin_nonideal.page.forces import arrows_of
-from pin_nonideal.page.looks import MODES
-from pin_nonideal.page.marks import marks_of
-from pin_nonideal.page.motion import sample
-from pin_nonideal.page.places import touches_of
+from pin_nonideal.validation import unit_axis
+from pin_nonideal.visualization.page.contact_points import touches_of
+from pin_nonideal.visualization.page.force_arrows import arrows_of
+from pin_nonideal.visualization.page.frames import sample
+from pin_nonideal.visualization.page.friction_glyphs import elements_of
+from pin_nonideal.visualization.page.markers import marks_of
+from pin_nonideal.visualization.page.style import MODES
 
 from .replay_browser import Watched, headless_browser
 from .replay_runs import add_frame, jointed

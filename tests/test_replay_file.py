@@ -19,8 +19,8 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, OutputError
-from pin_nonideal.page.payload import packed_runs
-from pin_nonideal.replaying import replay
+from pin_nonideal.visualization.page.payload import packed_runs
+from pin_nonideal.visualization.replay import replay
 
 from .replay_runs import four_bar, jointed, run_of
 
@@ -151,7 +151,7 @@ def test_writing_a_replay_imports_neither_meshcat_nor_its_server() -> None:
     script = (
         "import sys\n"
         "from tests.replay_runs import four_bar\n"
-        "from pin_nonideal.replaying import replay\n"
+        "from pin_nonideal.visualization.replay import replay\n"
         "replay(four_bar())\n"
         "print(sorted({'meshcat', 'zmq', 'tornado', 'umsgpack', 'matplotlib', 'scipy'} & set(sys.modules)))\n"
     )

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.constraints import (
+from pin_nonideal.description.constraints import (
     Distance,
     FrameAnchor,
     HingeAnchor,
@@ -17,13 +17,13 @@ from pin_nonideal.constraints import (
     PrescribedMotion,
     Rolling,
 )
-from pin_nonideal.contacts import PointContact
-from pin_nonideal.forces import SpringDamper
-from pin_nonideal.page.forces import arrows_of
-from pin_nonideal.page.marks import marks_of
-from pin_nonideal.page.motion import sample
-from pin_nonideal.page.places import touches_of
-from pin_nonideal.timefunctions import constant
+from pin_nonideal.description.contacts import PointContact
+from pin_nonideal.description.forces import SpringDamper
+from pin_nonideal.description.time_functions import constant
+from pin_nonideal.visualization.page.contact_points import touches_of
+from pin_nonideal.visualization.page.force_arrows import arrows_of
+from pin_nonideal.visualization.page.frames import sample
+from pin_nonideal.visualization.page.markers import marks_of
 
 from .replay_runs import add_frame, four_bar, jointed, run_of
 

@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pin_nonideal.page.bare import sticks
-from pin_nonideal.page.geometry import collada_parts, joint_axis, shape_of, visuals_of
+from pin_nonideal.visualization.page.stick_figure import sticks
+from pin_nonideal.visualization.page.visuals import collada_parts, joint_axis, shape_of, visuals_of
 
 from .replay_runs import add_frame, four_bar, jointed, panda
 

@@ -6,13 +6,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pin_nonideal.contacts import PointContact
+from pin_nonideal.description.contacts import PointContact
 from pin_nonideal.errors import InputError
-from pin_nonideal.page.bare import sticks
-from pin_nonideal.page.geometry import Shape, Visual
-from pin_nonideal.page.motion import CLOSE, LEAST_FRAMES, MAX_FRAMES, sample
-from pin_nonideal.page.tracks import Tracks, halfway
-from pin_nonideal.page.view import treads, view
+from pin_nonideal.visualization.page.camera import treads, view
+from pin_nonideal.visualization.page.frames import CLOSE, LEAST_FRAMES, MAX_FRAMES, sample
+from pin_nonideal.visualization.page.joint_tracks import Tracks, halfway
+from pin_nonideal.visualization.page.stick_figure import sticks
+from pin_nonideal.visualization.page.visuals import Shape, Visual
 
 from .replay_runs import add_frame, four_bar, jointed, panda, run_of
 

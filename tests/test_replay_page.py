@@ -14,7 +14,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.replaying import ReplayPage, replay
+from pin_nonideal.visualization.replay import ReplayPage, replay
 
 from .replay_browser import MOVED, TIMEOUT, Watched, changed, headless_browser, opened_replay
 from .replay_runs import CRANK, add_frame, four_bar, jointed, panda, run_of

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.page.choices import inertia_box, signals_of
+from pin_nonideal.visualization.page.signal_list import inertia_box, signals_of
 
 from .replay_browser import Watched, changed, headless_browser
 from .replay_runs import four_bar

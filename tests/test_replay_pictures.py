@@ -13,9 +13,9 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.core import core
-from pin_nonideal.loading import robots
-from pin_nonideal.page.looks import EVENTS, FORCES, MARKS, MODES
+from pin_nonideal.core_loader import core
+from pin_nonideal.loading.load import robots
+from pin_nonideal.visualization.page.style import EVENTS, FORCES, MARKS, MODES
 
 from .paper_examples import example
 from .replay_browser import Watched, changed, headless_browser
@@ -147,8 +147,8 @@ def test_the_papers_examples_show_constraint_path_and_forces(opened: Any, name: 
 
 
 def test_a_ring_closes_and_an_incline_vibrates() -> None:
-    from pin_nonideal.page.guides import guides_of
-    from pin_nonideal.page.motion import sample
+    from pin_nonideal.visualization.page.constraint_curves import guides_of
+    from pin_nonideal.visualization.page.frames import sample
 
     run, _ = paper_runs()["ring"]
     (ring,) = guides_of(run, sample(run))
@@ -167,8 +167,8 @@ def test_a_ring_closes_and_an_incline_vibrates() -> None:
 
 def test_a_surface_is_traced_beside_the_path_of_its_point() -> None:
     """A particle on the sphere x^2 + y^2 + z^2 = 1."""
-    from pin_nonideal.page.guides import guides_of
-    from pin_nonideal.page.motion import sample
+    from pin_nonideal.visualization.page.constraint_curves import guides_of
+    from pin_nonideal.visualization.page.frames import sample
 
     model = jointed(pin.JointModelTranslation(), lever=0.0)
     sphere = pn.UserConstraint(
@@ -313,7 +313,7 @@ def test_dense_events_and_modes_are_drawn_by_their_density(opened: Any) -> None:
 def test_what_rests_is_drawn_as_sticking_to_the_end() -> None:
     run = chattering(3)
     run.modes[:] = 0
-    from pin_nonideal.page.bands import mode_bands
+    from pin_nonideal.visualization.page.mode_timeline import mode_bands
 
     assert mode_bands(run.t, run.modes) == [[(0.0, 1.0, 0)]]
 

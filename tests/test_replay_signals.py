@@ -10,9 +10,9 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, UnknownNameError
-from pin_nonideal.page.bands import mode_bands
-from pin_nonideal.page.coordinates import positions, velocities
-from pin_nonideal.page.signals import (
+from pin_nonideal.visualization.page.coordinates import positions, velocities
+from pin_nonideal.visualization.page.mode_timeline import mode_bands
+from pin_nonideal.visualization.page.signals import (
     INTERVALS,
     MAX_CURVES,
     Plot,

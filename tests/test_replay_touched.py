@@ -10,18 +10,18 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.page.bands import bands_of, gaps_of, opens
-from pin_nonideal.page.bare import sticks
-from pin_nonideal.page.between import between
-from pin_nonideal.page.forces import arrows_of
-from pin_nonideal.page.given import given_arrows
-from pin_nonideal.page.looks import CLOSED, OPEN
-from pin_nonideal.page.marks import marks_of
-from pin_nonideal.page.motion import sample
-from pin_nonideal.page.places import touches_of
-from pin_nonideal.page.signals import plots_of
-from pin_nonideal.page.touched import planes_of, touched_of
-from pin_nonideal.page.view import upward, view
+from pin_nonideal.visualization.page.applied_forces import given_arrows
+from pin_nonideal.visualization.page.camera import upward, view
+from pin_nonideal.visualization.page.contact_points import touches_of
+from pin_nonideal.visualization.page.contact_surfaces import planes_of, touched_of
+from pin_nonideal.visualization.page.force_arrows import arrows_of
+from pin_nonideal.visualization.page.frames import sample
+from pin_nonideal.visualization.page.markers import marks_of
+from pin_nonideal.visualization.page.mode_timeline import bands_of, gaps_of, opens
+from pin_nonideal.visualization.page.resampling import between
+from pin_nonideal.visualization.page.signals import plots_of
+from pin_nonideal.visualization.page.stick_figure import sticks
+from pin_nonideal.visualization.page.style import CLOSED, OPEN
 
 from .replay_browser import Watched, headless_browser
 from .replay_runs import add_frame, jointed

@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
 import pin_nonideal as pn
-from pin_nonideal.hulls import shrunk
-from pin_nonideal.revolved_shapes import FACE_CIRCLE, FACE_POINTS, LEAST_ROUNDING, PASSED_ON
+from pin_nonideal.description.contacts.convex_hull import shrunk
+from pin_nonideal.geometry.cylinder import FACE_CIRCLE, FACE_POINTS, LEAST_ROUNDING, PASSED_ON
 
 from .mechanisms import GRAVITY, body, empty
 from .same_run import assert_same_run

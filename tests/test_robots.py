@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.constraints import (
+from pin_nonideal.description.constraints import (
     HingeAnchor,
     JointCoupling,
     KnifeEdge,

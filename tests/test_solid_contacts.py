@@ -8,8 +8,8 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.hulls import convex_hull, shrunk
-from pin_nonideal.manifolds import LEAST_ROUNDING
+from pin_nonideal.description.contacts.convex_hull import convex_hull, shrunk
+from pin_nonideal.geometry.manifold import LEAST_ROUNDING
 
 from .mechanisms import GRAVITY, body, empty, frame
 from .same_run import assert_same_run

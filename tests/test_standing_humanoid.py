@@ -14,7 +14,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 import pin_nonideal as pn
-from pin_nonideal.actuation import Table
+from pin_nonideal.description.actuation import Table
 
 SOLES = ("left_sole_link", "right_sole_link")
 # By which a sole may leave its place: far above rounding, far below what dropped rows would let it drift [m].

@@ -19,8 +19,8 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal import sweeping
-from pin_nonideal.sweep_packs import runs_in
+from pin_nonideal.sweeps import sweep as sweeping
+from pin_nonideal.sweeps.pack import runs_in
 
 from .refusals import refuses
 from .same_run import assert_same_run

@@ -16,7 +16,12 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal import actuation, constraints, contacts, forces, laws, timefunctions
+from pin_nonideal.description import actuation
+from pin_nonideal.description import constraints
+from pin_nonideal.description import contacts
+from pin_nonideal.description import forces
+from pin_nonideal.description import laws
+from pin_nonideal.description import time_functions as timefunctions
 
 from .support.answers import FUNCTIONS, RUNS, STATIC, Answer, ask, asks, differences
 from .support.cases import Case

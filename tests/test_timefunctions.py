@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from pin_nonideal.description.time_functions import Constant, constant, polynomial, sinusoid, spline
 from pin_nonideal.errors import InputError
-from pin_nonideal.timefunctions import Constant, constant, polynomial, sinusoid, spline
 
 TIMES = np.array([0.0, 0.3, 0.5, 1.4, 2.0])
 VALUES = np.array([1.0, -0.5, 0.25, 2.0, 1.5])

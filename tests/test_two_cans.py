@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import pin_nonideal as pn
-from pin_nonideal.revolved_shapes import FACE_CIRCLE, LEAST_ROUNDING, PASSED_ON
+from pin_nonideal.geometry.cylinder import FACE_CIRCLE, LEAST_ROUNDING, PASSED_ON
 
 from .mechanisms import GRAVITY, body, empty
 from .same_run import assert_same_run

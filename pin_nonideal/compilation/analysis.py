@@ -14,16 +14,16 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pin_nonideal.checks import array
-from pin_nonideal.constraints import Distance, PrescribedMotion, UserConstraint
-from pin_nonideal.contacts import UserContact
-from pin_nonideal.core import core
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.constraints import Distance, PrescribedMotion, UserConstraint
+from pin_nonideal.description.contacts import UserContact
+from pin_nonideal.description.laws import UserFriction
+from pin_nonideal.description.time_functions import Constant, Polynomial, Sinusoid, Spline
 from pin_nonideal.errors import InconsistentConstraintsError, InputError, LoopClosureError, UserFunctionError
-from pin_nonideal.laws import UserFriction
-from pin_nonideal.states.closure import CLOSURE_TOLERANCE
+from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
 from pin_nonideal.states.rows import copies, row_lengths, row_slices, rows_at
-from pin_nonideal.timefunctions import Constant, Polynomial, Sinusoid, Spline
 from pin_nonideal.types import Array, Model
+from pin_nonideal.validation import array
 
 from .lowering import Descriptions
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from pin_nonideal.checks import array, floats
-from pin_nonideal.core import core
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.time_functions import Constant, Polynomial, Sinusoid, Spline
 from pin_nonideal.errors import InputError, RunError, UnknownNameError, UserFunctionError, nearest
-from pin_nonideal.timefunctions import Constant, Polynomial, Sinusoid, Spline
 from pin_nonideal.types import Array
+from pin_nonideal.validation import array, floats
 
 # Where a user's function of time is compared with its differences [s]: at no round time, since it may have
 # corners there, and at several, since one may fall on a corner all the same.
@@ -128,7 +128,7 @@ def time_function(function: Any, who: str) -> Any:
     """A function of time as numbers for the core, or checked when it is the user's.
 
     Args:
-        function: of `pin_nonideal.timefunctions`, or the user's t -> (value, rate, acceleration).
+        function: of `description.time_functions`, or the user's t -> (value, rate, acceleration).
         who: words for messages.
 
     Raises:

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from pin_nonideal.checks import axis_triad, unit_axis
-from pin_nonideal.constraints import (
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.constraints import (
     Distance,
     FrameAnchor,
     HingeAnchor,
@@ -24,13 +24,13 @@ from pin_nonideal.constraints import (
     Rolling,
     UserConstraint,
 )
-from pin_nonideal.core import core
+from pin_nonideal.description.time_functions import Constant
 from pin_nonideal.errors import InputError, UnknownNameError
-from pin_nonideal.timefunctions import Constant
 from pin_nonideal.types import Array
+from pin_nonideal.validation import axis_triad, unit_axis
 
 from .callbacks import breaks, checked, time_function
-from .names import Frame, Resolution, placed_on, words
+from .resolver import Frame, Resolution, placed_on, words
 
 # A rational gear ratio with a larger denominator than this leaves the angle of endless joints undetermined.
 LARGEST_GEAR = 64

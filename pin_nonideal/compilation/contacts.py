@@ -8,21 +8,21 @@ from typing import Any, get_args
 
 import numpy as np
 
-from pin_nonideal.contacts import BoxContact, Contact, JointLimit, PointContact, UserContact
-from pin_nonideal.core import core
-from pin_nonideal.errors import InputError
-from pin_nonideal.solid_contacts import (
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.contacts import BoxContact, Contact, JointLimit, PointContact, UserContact
+from pin_nonideal.description.contacts.solids import (
     CylinderContact,
     EllipsoidContact,
     HullContact,
     RevolvedContact,
     RimContact,
 )
+from pin_nonideal.errors import InputError
 from pin_nonideal.types import Model
 
 from .callbacks import checked
 from .constraints import user_rate, user_rows
-from .names import Resolution, turned, words
+from .resolver import Resolution, turned, words
 
 # What Pinocchio gives joints without limits [rad or m].
 NO_LIMIT = np.finfo(float).max

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from pin_nonideal.actuation import EffortLimits, HoldPosition, SampledControl, Table
-from pin_nonideal.checks import array
-from pin_nonideal.core import core
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.actuation import EffortLimits, HoldPosition, SampledControl, Table
+from pin_nonideal.description.forces import JointSpring, SpringDamper, UserForce, Wrench
 from pin_nonideal.errors import InputError
-from pin_nonideal.forces import JointSpring, SpringDamper, UserForce, Wrench
-from pin_nonideal.states.configurations import configuration
+from pin_nonideal.states.joint_layout import configuration
 from pin_nonideal.types import Array, Model
+from pin_nonideal.validation import array
 
 from .callbacks import checked
-from .names import Resolution, words
+from .resolver import Resolution, words
 
 
 @singledispatch

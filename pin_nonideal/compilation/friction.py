@@ -9,23 +9,23 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from pin_nonideal.constraints import HingeAnchor, JointCoupling, PointAnchor, Rolling
-from pin_nonideal.contacts import Contact, UserContact
-from pin_nonideal.core import core
-from pin_nonideal.errors import InputError, UnknownNameError, UserFunctionError, nearest
-from pin_nonideal.laws import JointFriction
-from pin_nonideal.round_contacts import BoxContact
-from pin_nonideal.solid_contacts import (
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.constraints import HingeAnchor, JointCoupling, PointAnchor, Rolling
+from pin_nonideal.description.contacts import Contact, UserContact
+from pin_nonideal.description.contacts.round import BoxContact
+from pin_nonideal.description.contacts.solids import (
     CylinderContact,
     EllipsoidContact,
     HullContact,
     RevolvedContact,
     RimContact,
 )
+from pin_nonideal.description.laws import JointFriction
+from pin_nonideal.errors import InputError, UnknownNameError, UserFunctionError, nearest
 
 from .callbacks import ReactionNames, checked, named
 from .constraints import frames_of
-from .names import Frame, Resolution, turned, words
+from .resolver import Frame, Resolution, turned, words
 
 # Constraint models of Pinocchio that hold a point on a point.
 BALLS = ("PointAnchorConstraintModel", "RigidConstraintModel")

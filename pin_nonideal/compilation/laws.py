@@ -5,14 +5,14 @@ from __future__ import annotations
 from functools import singledispatch
 from typing import Any
 
-from pin_nonideal.core import core
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.laws import Drag, JointFriction, LuGre, SigmoidFriction, UserFriction, UserLaw
 from pin_nonideal.errors import InputError
-from pin_nonideal.laws import Drag, JointFriction, LuGre, SigmoidFriction, UserFriction, UserLaw
 from pin_nonideal.types import Array
 
 from .callbacks import Reactions, checked, checked_limits
 from .friction import Surroundings, lower_joint_friction, rubbing_joint
-from .names import words
+from .resolver import words
 
 
 @singledispatch

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NamedTuple
 
-from pin_nonideal.constraints import Rolling
-from pin_nonideal.contacts import JointLimit
-from pin_nonideal.core import core
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.constraints import Rolling
+from pin_nonideal.description.contacts import JointLimit
 from pin_nonideal.states.rows import row_slices
 
 from .callbacks import ReactionNames
@@ -17,7 +17,7 @@ from .contacts import lower_contacts, lower_gaps
 from .forces import lower_actuation, lower_force
 from .friction import Surroundings, lower_contact_friction
 from .laws import lower_law
-from .names import Resolution, unique_names
+from .resolver import Resolution, unique_names
 
 
 class Descriptions(NamedTuple):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pin_nonideal.contacts import JointLimit
-from pin_nonideal.laws import JointFriction
+from pin_nonideal.description.contacts import JointLimit
+from pin_nonideal.description.laws import JointFriction
 from pin_nonideal.types import Model
 
-from .scene import CompiledScene
+from .compiled_scene import CompiledScene
 
 UNLIMITED = 1e3  # positions that no joint reaches [rad or m]
 

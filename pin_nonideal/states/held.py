@@ -8,13 +8,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pin_nonideal.core import core
+from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError
 from pin_nonideal.types import Array, Model
 
-from .configurations import JointPlace, joint_places
-from .extents import coordinate
+from .joint_layout import JointPlace, joint_places
 from .rows import DEPENDENT, row_lengths, rows_at, shortest
+from .scales import coordinate
 
 # Part of the velocities in play by which rows over their greatest lengths may miss their rates.
 MISSED = 1e-9

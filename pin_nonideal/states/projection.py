@@ -10,12 +10,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pin_nonideal.core import core
+from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError, PinNonidealError, UserFunctionError
 from pin_nonideal.types import Array, Model
 
-from .closure import CLOSURE_TOLERANCE, FAR, WELL_CONDITIONED, Closure, Rows, Search, conditioning
-from .extents import VANISHING, chain, coordinate, slides
+from .contact_closure import SearchOutside
+from .errors import largest_loop_gap, lost_velocity, no_way_out, open_loops, refuse_deep_starts
 from .held import (
     NOTHING_HELD,
     Held,
@@ -28,10 +28,10 @@ from .held import (
     told_coordinates,
     with_entries,
 )
+from .loop_closure import CLOSURE_TOLERANCE, FAR, WELL_CONDITIONED, Closure, Rows, Search, conditioning
 from .report import ProjectionReport, report_of
 from .rows import copies, gap_rows, holonomic_rows, rows_at
-from .unmet import largest_loop_gap, lost_velocity, no_way_out, open_loops, refuse_deep_starts
-from .ways_out import SearchOutside
+from .scales import VANISHING, chain, coordinate, slides
 
 # Rows that no velocity meets better than this part of 1 + |v| contradict each other.
 RATE_TOLERANCE = 1e-6

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from pin_nonideal.types import Array, Model
 
-from .extents import coordinate
 from .held import Held
+from .scales import coordinate
 
 
 @dataclass(frozen=True)

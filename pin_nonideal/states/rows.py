@@ -7,7 +7,7 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from pin_nonideal.core import core
+from pin_nonideal.core_loader import core
 from pin_nonideal.types import Array
 
 

@@ -9,13 +9,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pin_nonideal.checks import choice, count, number
+from pin_nonideal.validation import choice, count, number
 from pin_nonideal.errors import EquilibriumError, InputError, LoopClosureError
-from pin_nonideal.scene import Scene
-from pin_nonideal.states.named import named_velocity
+from pin_nonideal.scene.scene import Scene
+from pin_nonideal.states.parsing import named_velocity
 from pin_nonideal.types import Array, State
 
-from .forces import AtRest, Balance, weight
+from .residual import AtRest, Balance, weight
 
 # Central differences of forces: the cube root of rounding, where rounding and curvature cost the same.
 DIFFERENCE = 6e-6

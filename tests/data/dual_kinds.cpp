@@ -3,8 +3,8 @@
 #include <cstdio>
 #include <random>
 
-#include "constraints/kind.hpp"
-#include "constraints/kinds/complete.hpp"
+#include "constraints/row_type.hpp"
+#include "constraints/row_completeness.hpp"
 
 struct Dual {  // value and derivative in time
     double x = 0.0, d = 0.0;

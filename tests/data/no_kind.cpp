@@ -1,5 +1,5 @@
 // A kind of constraint that says nothing of itself must not compile.
-#include "constraints/kinds/complete.hpp"
+#include "constraints/row_completeness.hpp"
 
 struct NoKind {};
 static_assert(pn::is_complete<NoKind>());

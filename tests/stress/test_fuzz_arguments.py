@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import pin_nonideal as pn
-from pin_nonideal import rendering
 from pin_nonideal.errors import PinNonidealError
+from pin_nonideal.visualization import rendering
 
 from .fuzzing import few_and_many, for_all, junk, result_or_named_error
 

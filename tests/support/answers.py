@@ -12,8 +12,8 @@ import numpy as np
 import pinocchio as pin
 
 import pin_nonideal as pn
-from pin_nonideal.page.motion import sample
-from pin_nonideal.statics.forces import AtRest
+from pin_nonideal.visualization.page.frames import sample
+from pin_nonideal.statics.residual import AtRest
 
 from .cases import Case
 from .symmetries import Image, independent

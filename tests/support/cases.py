@@ -12,8 +12,8 @@ import numpy as np
 import pinocchio as pin
 
 import pin_nonideal as pn
-from pin_nonideal.actuation import EffortLimits, HoldPosition, SampledControl, Table
-from pin_nonideal.timefunctions import Constant, Polynomial, Sinusoid, Spline
+from pin_nonideal.description.actuation import EffortLimits, HoldPosition, SampledControl, Table
+from pin_nonideal.description.time_functions import Constant, Polynomial, Sinusoid, Spline
 
 from .models import SI, Units, joint_letter
 

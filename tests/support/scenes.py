@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 import pin_nonideal as pn
-from pin_nonideal.actuation import EffortLimits, HoldPosition, SampledControl, Table
+from pin_nonideal.description.actuation import EffortLimits, HoldPosition, SampledControl, Table
 
 from ..mechanisms import body, empty, frame
 from ..random_mechanisms import mechanism

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "constraints/kind.hpp"
+#include "constraints/row_type.hpp"
 
 namespace pn {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "constraints/orthogonal.hpp"
+#include "constraints/qr_factor.hpp"
 #include "constraints/row_length.hpp"
 
 namespace pn {

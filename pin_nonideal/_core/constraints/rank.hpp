@@ -1,7 +1,7 @@
 // Rank of the rows and an independent subset, by the orthogonal factorization of B^T.
 #pragma once
 
-#include "constraints/row_factor.hpp"
+#include "constraints/schur_factor.hpp"
 
 namespace pn {
 

@@ -1,6 +1,6 @@
 #include "constraints/redundancy.hpp"
 
-#include "math/factorizations.hpp"
+#include "math/decompositions.hpp"
 
 namespace pn {
 

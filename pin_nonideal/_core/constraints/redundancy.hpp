@@ -2,7 +2,7 @@
 // scale of the descriptions, among all that exert the same force.
 #pragma once
 
-#include "constraints/row_factor.hpp"
+#include "constraints/schur_factor.hpp"
 
 namespace pn {
 

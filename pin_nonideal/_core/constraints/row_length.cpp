@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tree/factor.hpp"
+#include "tree/mass_factor.hpp"
 
 namespace pn {
 

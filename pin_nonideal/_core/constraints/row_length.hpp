@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "constraints/row_system.hpp"
+#include "constraints/system.hpp"
 
 namespace pn {
 

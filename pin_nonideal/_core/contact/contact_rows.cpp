@@ -1,7 +1,7 @@
 #include "contact/contact_rows.hpp"
 
 #include "dynamics/evaluation.hpp"
-#include "dynamics/solution.hpp"
+#include "dynamics/acceleration.hpp"
 #include "dynamics/step_start.hpp"
 
 namespace pn {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "dynamics/workspace.hpp"
-#include "friction/cone_problem.hpp"
+#include "complementarity/cone/problem.hpp"
 
 namespace pn {
 

@@ -6,9 +6,9 @@
 
 #include "contact/contact_rows.hpp"
 #include "dynamics/evaluation.hpp"
-#include "friction/cone_complementarity.hpp"
-#include "friction/modes.hpp"
-#include "math/factorizations.hpp"
+#include "complementarity/cone/solver.hpp"
+#include "friction/stick_slip.hpp"
+#include "math/decompositions.hpp"
 
 namespace pn {
 

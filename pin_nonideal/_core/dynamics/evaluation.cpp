@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "dynamics/given_forces.hpp"
-#include "dynamics/implicit.hpp"
-#include "dynamics/solution.hpp"
-#include "tree/factor.hpp"
+#include "dynamics/implicit_friction.hpp"
+#include "dynamics/acceleration.hpp"
+#include "tree/mass_factor.hpp"
 
 namespace pn {
 

@@ -4,8 +4,8 @@
 
 #include "dynamics/law_forces.hpp"
 #include "dynamics/reactions.hpp"
-#include "dynamics/slip.hpp"
-#include "dynamics/solution.hpp"
+#include "dynamics/friction_limit.hpp"
+#include "dynamics/acceleration.hpp"
 
 namespace pn {
 

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "dynamics/evaluation.hpp"
-#include "dynamics/solution.hpp"
-#include "tree/factor.hpp"
-#include "tree/liegroup.hpp"
+#include "dynamics/acceleration.hpp"
+#include "tree/mass_factor.hpp"
+#include "tree/lie_group.hpp"
 
 namespace pn {
 

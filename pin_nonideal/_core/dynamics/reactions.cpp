@@ -5,7 +5,7 @@
 
 #include "constraints/redundancy.hpp"
 #include "dynamics/law_forces.hpp"
-#include "math/nonnegative.hpp"
+#include "math/nnls.hpp"
 
 namespace pn {
 

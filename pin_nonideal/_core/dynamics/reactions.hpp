@@ -2,7 +2,7 @@
 // made when first asked for after a motion, and kept until the next.
 #pragma once
 
-#include "constraints/pulls.hpp"
+#include "constraints/pull_feasibility.hpp"
 #include "dynamics/workspace.hpp"
 
 namespace pn {

@@ -6,8 +6,8 @@
 
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
-#include "dynamics/solution.hpp"
-#include "tree/factor.hpp"
+#include "dynamics/acceleration.hpp"
+#include "tree/mass_factor.hpp"
 
 namespace pn {
 

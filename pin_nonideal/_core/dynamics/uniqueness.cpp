@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dynamics/reaction_roots.hpp"
+#include "complementarity/fixed_point/interval_solver.hpp"
 #include "dynamics/reactions.hpp"
 
 namespace pn {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "dynamics/reactions.hpp"
-#include "dynamics/solution.hpp"
+#include "dynamics/acceleration.hpp"
 
 namespace pn {
 

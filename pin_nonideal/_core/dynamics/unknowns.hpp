@@ -3,7 +3,7 @@
 #pragma once
 
 #include "dynamics/law_forces.hpp"
-#include "dynamics/slip.hpp"
+#include "dynamics/friction_limit.hpp"
 
 namespace pn {
 

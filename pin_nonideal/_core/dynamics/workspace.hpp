@@ -7,7 +7,7 @@
 
 #include "constraints/rank.hpp"
 #include "dynamics/program.hpp"
-#include "dynamics/reaction_equation.hpp"
+#include "complementarity/fixed_point/equation.hpp"
 
 namespace pn {
 

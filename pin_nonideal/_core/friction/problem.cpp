@@ -1,8 +1,8 @@
 #include "friction/problem.hpp"
 
-#include "dynamics/solution.hpp"
+#include "dynamics/acceleration.hpp"
 #include "math/lanes.hpp"
-#include "tree/factor.hpp"
+#include "tree/mass_factor.hpp"
 
 namespace pn {
 

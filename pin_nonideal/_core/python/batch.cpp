@@ -9,10 +9,10 @@
 #include <nanobind/stl/vector.h>
 
 #include "python/failures.hpp"
-#include "python/kept_run.hpp"
+#include "python/reused_run.hpp"
 #include "python/options.hpp"
 #include "python/run_programs.hpp"
-#include "python/share_out.hpp"
+#include "python/thread_pool.hpp"
 
 using namespace nanobind::literals;
 
@@ -146,8 +146,8 @@ nb::tuple rollout_arrays(const Program& p, const Array2& q, const Array2& v, con
 void bind_batch(nb::module_& m) {
     m.def("rollout_arrays", &rollout_arrays, "program"_a, "q"_a, "v"_a, "options"_a, "threads"_a, "names"_a, "values"_a,
           nb::sig("def rollout_arrays(program: Program, q: NDArray[numpy.float64], v: NDArray[numpy.float64], "
-                  "options: pin_nonideal.runs.options.RunOptions, threads: int, names: Sequence[tuple[str, int, str]], "
-                  "values: NDArray[numpy.float64]) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], "
+                  "options: pin_nonideal.simulation.options.RunOptions, threads: int, "
+                  "names: Sequence[tuple[str, int, str]], values: NDArray[numpy.float64]) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], "
                   "NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], "
                   "list[tuple[int, BaseException]]]"));
 }

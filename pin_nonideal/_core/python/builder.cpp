@@ -10,7 +10,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "python/callbacks.hpp"
-#include "tree/model_reading.hpp"
+#include "tree/pinocchio_reader.hpp"
 
 using namespace nanobind::literals;
 

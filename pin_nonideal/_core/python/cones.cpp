@@ -4,7 +4,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include "friction/cone_complementarity.hpp"
+#include "complementarity/cone/solver.hpp"
 
 using namespace nanobind::literals;
 

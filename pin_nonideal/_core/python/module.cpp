@@ -4,18 +4,18 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include "friction/cone_program.hpp"
+#include "complementarity/socp_mode_newton.hpp"
 #include "python/batch.hpp"
 #include "python/builder.hpp"
 #include "python/callbacks.hpp"
 #include "python/cones.hpp"
 #include "python/constraints.hpp"
 #include "python/failures.hpp"
-#include "python/followed.hpp"
+#include "python/external_run.hpp"
 #include "python/program.hpp"
 #include "python/runs.hpp"
-#include "python/stepped.hpp"
-#include "run/checkpoint.hpp"
+#include "python/stepped_run.hpp"
+#include "run/output/checkpoint.hpp"
 
 using namespace pn;
 using namespace nanobind::literals;

@@ -8,7 +8,7 @@
 #include "dynamics/power.hpp"
 #include "python/constraints.hpp"
 #include "python/runner.hpp"
-#include "tree/model_reading.hpp"
+#include "tree/pinocchio_reader.hpp"
 
 using namespace nanobind::literals;
 

@@ -5,7 +5,7 @@
 #include <tuple>
 #include <vector>
 
-#include "dynamics/numbers.hpp"
+#include "dynamics/parameters.hpp"
 #include "python/arrays.hpp"
 
 namespace pn {

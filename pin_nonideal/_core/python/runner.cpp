@@ -10,17 +10,17 @@
 #include <nanobind/stl/vector.h>
 
 #include "constraints/row_length.hpp"
-#include "contact/closing.hpp"
+#include "contact/active_set.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
-#include "dynamics/slip.hpp"
+#include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"
-#include "friction/modes.hpp"
+#include "friction/stick_slip.hpp"
 #include "python/buffers.hpp"
-#include "python/cleared.hpp"
+#include "python/reused_workspace.hpp"
 #include "python/options.hpp"
-#include "tree/factor.hpp"
-#include "tree/liegroup.hpp"
+#include "tree/mass_factor.hpp"
+#include "tree/lie_group.hpp"
 
 using namespace nanobind::literals;
 

@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "contact/resting.hpp"
+#include "contact/onset.hpp"
 #include "python/arrays.hpp"
-#include "python/kept_run.hpp"
+#include "python/reused_run.hpp"
 
 namespace pn {
 

@@ -11,11 +11,11 @@
 
 #include "dynamics/projection.hpp"
 #include "python/failures.hpp"
-#include "python/kept_run.hpp"
+#include "python/reused_run.hpp"
 #include "python/options.hpp"
 #include "python/run_programs.hpp"
-#include "python/share_out.hpp"
-#include "run/inside_samples.hpp"
+#include "python/thread_pool.hpp"
+#include "run/output/resampling.hpp"
 
 using namespace nanobind::literals;
 

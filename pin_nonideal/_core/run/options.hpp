@@ -7,8 +7,8 @@
 #include <functional>
 #include <string>
 
-#include "run/method.hpp"
-#include "run/recorder.hpp"
+#include "run/integrators/method.hpp"
+#include "run/output/recorder.hpp"
 
 namespace pn {
 

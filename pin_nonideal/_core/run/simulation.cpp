@@ -6,7 +6,7 @@
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/step_start.hpp"
-#include "run/events.hpp"
+#include "run/events/events.hpp"
 
 namespace pn {
 

@@ -4,12 +4,12 @@
 #include <optional>
 #include <string>
 
-#include "run/event_location.hpp"
-#include "run/growth.hpp"
-#include "run/mode_changes.hpp"
-#include "run/rounding.hpp"
-#include "run/step_control.hpp"
-#include "run/stepper_choice.hpp"
+#include "run/events/event_location.hpp"
+#include "run/integrators/growth.hpp"
+#include "run/events/mode_switch.hpp"
+#include "run/integrators/rounding_floor.hpp"
+#include "run/integrators/step_control.hpp"
+#include "run/integrators/stepper_choice.hpp"
 
 namespace pn {
 

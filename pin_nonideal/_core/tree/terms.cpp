@@ -1,7 +1,7 @@
 #include "tree/terms.hpp"
 
 #include "tree/articulated.hpp"
-#include "tree/liegroup.hpp"
+#include "tree/lie_group.hpp"
 
 namespace pn {
 

@@ -3,7 +3,7 @@
 
 #include <variant>
 
-#include "tree/own_pass.hpp"
+#include "tree/native_pass.hpp"
 #include "tree/pinocchio_pass.hpp"
 
 namespace pn {

@@ -1,0 +1,224 @@
+#include "complementarity/box_lcp.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "math/lanes.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr double met = 1e-9;  // part of the accelerations in play that counts as none
+constexpr double at_limit = 1e-12;  // part of it within which a force is
+constexpr double rounding = 1e-13;  // part of a limit, or of the accelerations in play, that is none
+constexpr double noise_of_others = 1e-14;  // part of the largest accelerations that the others may hold by rounding
+// Least root of a pivot of W, scaled to a unit diagonal, with which Cholesky's factor is as good as an orthogonal one.
+constexpr double regular_pivot = 1e-3;
+constexpr int most_patience = 10;  // rounds of block pivoting that may gain nothing
+
+// Cholesky's factor of A, scaled to a unit diagonal, by rows, with the inverse pivots; whether it keeps clear of singular.
+PN_WIDE bool factor_scaled(int n, const double* A, const double* scale, double* L, double* inverse) {
+    for (int i = 0; i < n; ++i) {
+        double* Li = L + i * n;
+        for (int j = 0; j <= i; ++j) {
+            const double* Lj = L + j * n;
+            const double sum = A[i + j * n] * scale[i] * scale[j] - dot(Li, Lj, j);
+            if (j < i) Li[j] = sum * inverse[j];
+            else if (!(sum > regular_pivot * regular_pivot)) return false;
+            else inverse[i] = 1.0 / std::sqrt(sum);
+        }
+    }
+    return true;
+}
+
+PN_WIDE void substitute_scaled(int n, const double* L, const double* inverse, double* x) {
+    for (int i = 0; i < n; ++i) x[i] = (x[i] - dot(L + i * n, x, i)) * inverse[i];
+    for (int i = n - 1; i >= 0; --i) {
+        x[i] *= inverse[i];
+        for (int j = 0; j < i; ++j) x[j] -= L[i * n + j] * x[i];
+    }
+}
+
+}  // namespace
+
+// rhs of W_FF x = r_F into part, where W, scaled to a unit diagonal, keeps clear of singular; returns whether it does.
+bool BoxProgram::solve_regular(int n) {
+    auto A = A_.matrix(n, n), L = L_.matrix(n, n);
+    auto scale = scale_.vector(n), inverse = inverse_.vector(n), rhs = rhs_.vector(n), x = part_.vector(n),
+         change = change_.vector(n);
+    scale = A.diagonal().cwiseSqrt().cwiseInverse();
+    if (!factor_scaled(n, A.data(), scale.data(), L.data(), inverse.data())) return false;
+    x.setZero();
+    for (int pass = 0; pass < 2; ++pass) {  // the second gives back the digits that the condition costs
+        change = rhs;
+        if (pass > 0) change.noalias() -= A * x;
+        change.array() *= scale.array();
+        substitute_scaled(n, L.data(), inverse.data(), change.data());
+        x.array() += scale.array() * change.array();
+    }
+    return true;
+}
+
+// Least-norm x of W_FF x = r_F on the free elements F; zero on the others, and where nothing responds.
+void BoxProgram::solve_free(const MatX& W) {
+    list_.clear();
+    for (int i = 0; i < r_.size(); ++i)
+        if (is_free_[i] && W(i, i) > 0.0) list_.push_back(i);
+    const int n = static_cast<int>(list_.size());
+    x_.setZero(r_.size());
+    if (n == 0) return;
+    auto A = A_.matrix(n, n);
+    auto rhs = rhs_.vector(n), x = part_.vector(n);
+    for (int j = 0; j < n; ++j) {
+        rhs[j] = r_[list_[j]];
+        for (int i = 0; i < n; ++i) A(i, j) = W(list_[i], list_[j]);
+    }
+    if (!solve_regular(n)) {
+        solver_.factor_orthogonally(A, rank_threshold);
+        solver_.solve(rhs, x);
+    }
+    for (int i = 0; i < n; ++i) x_[list_[i]] = x[i];
+}
+
+// Each element by its own: a light finger's accelerations say nothing of what is none in a leg.
+void BoxProgram::measure(const MatX& W, const VecX& alpha0, const VecX& forces) {
+    size_ = alpha0.cwiseAbs();
+    for (int j = 0; j < forces.size(); ++j) size_ += std::abs(forces[j]) * W.col(j).cwiseAbs();
+    noise_ = noise_of_others * size_.maxCoeff();
+}
+
+// Forces that the limits allow, those near by: each at its limit or free.
+void BoxProgram::start(const VecX& s, const VecX* near) {
+    const int n = static_cast<int>(s.size());
+    f_.setZero(n);
+    is_free_.assign(n, 1);
+    for (int i = 0; i < n; ++i) {
+        is_free_[i] = s[i] > 0.0 && (!near || std::abs((*near)[i]) < s[i] * (1.0 - at_limit));
+        if (near && s[i] > 0.0) f_[i] = is_free_[i] ? (*near)[i] : (*near)[i] > 0.0 ? s[i] : -s[i];
+    }
+}
+
+// Primal active set: from where f is, steps that lower f^T W f / 2 + alpha0^T f and stay in the box. Where redundant
+// elements cannot all stick, since what they would have to hold back is no acceleration that forces cause, the program
+// falls without end along a direction with W d = 0, until one of them is at its limit and slips.
+void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
+    const int n = static_cast<int>(s.size());
+    measure(W, alpha0, s);
+    for (int it = 0; it < 20 * (n + 1) * (n + 1); ++it) {
+        alpha_ = alpha0;
+        alpha_.noalias() += W * f_;
+        r_ = -alpha_;
+        solve_free(W);
+        left_ = alpha_;
+        left_.noalias() += W * x_;
+        bool endless = false;
+        for (int i = 0; i < n; ++i) {
+            if (!is_free_[i]) left_[i] = 0.0;
+            endless |= std::abs(left_[i]) > met * size_[i] + noise_;
+        }
+        if (endless) x_ = -left_;
+        double length = endless ? HUGE_VAL : 1.0;
+        int hit = -1;
+        for (int i = 0; i < n; ++i) {
+            if (x_[i] == 0.0) continue;
+            const double room = ((x_[i] > 0.0 ? s[i] : -s[i]) - f_[i]) / x_[i];
+            if (room < length) { length = room; hit = i; }
+        }
+        f_ += length * x_;
+        if (hit >= 0) {
+            f_[hit] = x_[hit] > 0.0 ? s[hit] : -s[hit];
+            is_free_[hit] = 0;
+            continue;
+        }
+        alpha_ = alpha0;
+        alpha_.noalias() += W * f_;
+        int worst = -1;  // what slips against its force no longer does
+        double most = rounding;
+        for (int i = 0; i < n; ++i) {
+            const double back = alpha_[i] * (f_[i] > 0.0 ? 1.0 : -1.0) - noise_;
+            if (is_free_[i] || !(s[i] > 0.0) || !(back > most * size_[i])) continue;
+            most = back / size_[i];
+            worst = i;
+        }
+        if (worst < 0) return;
+        is_free_[worst] = 1;
+    }
+}
+
+// Block principal pivoting, single (least index) once it fails to make progress; false where what is free cannot all
+// stick, or it does not end.
+bool BoxProgram::pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s) {
+    const int n = static_cast<int>(s.size());
+    int fewest = n + 1, patience = most_patience;
+    for (int it = 0; it < 200 + 50 * n; ++it) {
+        for (int i = 0; i < n; ++i)
+            if (is_free_[i]) f_[i] = 0.0;
+        r_ = -alpha0;
+        r_.noalias() -= W * f_;
+        solve_free(W);
+        f_ += x_;
+        alpha_ = alpha0;
+        alpha_.noalias() += W * f_;
+        measure(W, alpha0, f_);
+        wrong_.clear();
+        for (int i = 0; i < n; ++i) {
+            if (is_free_[i] && std::abs(alpha_[i]) > met * size_[i] + noise_) return false;
+            const bool outside = is_free_[i] && std::abs(f_[i]) > s[i] * (1.0 + rounding);
+            const bool drives = !is_free_[i] && alpha_[i] * f_[i] > (rounding * size_[i] + noise_) * std::abs(f_[i]);
+            if (outside || drives) wrong_.push_back(i);
+        }
+        if (wrong_.empty()) return true;
+        if (static_cast<int>(wrong_.size()) < fewest) {
+            fewest = static_cast<int>(wrong_.size());
+            patience = most_patience;
+        } else if (--patience < 0) {
+            wrong_.assign(1, wrong_.back());
+        }
+        for (int i : wrong_) {
+            if (is_free_[i]) f_[i] = f_[i] > 0.0 ? s[i] : -s[i];
+            is_free_[i] = !is_free_[i];
+        }
+    }
+    return false;
+}
+
+void BoxProgram::solve(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* near, VecX& f) {
+    const int n = static_cast<int>(s.size());
+    if (near) near_ = *near;
+    else near_.setZero(n);
+    alpha_.resize(n);
+    left_.resize(n);
+    f_.setZero(n);
+    is_free_.assign(n, 1);
+    for (int i = 0; near && i < n; ++i) {
+        is_free_[i] = std::abs(near_[i]) < s[i] * (1.0 - at_limit);
+        if (!is_free_[i]) f_[i] = near_[i] > 0.0 ? s[i] : -s[i];
+    }
+    if (!pivot_blocks(W, alpha0, s)) {
+        start(s, near ? &near_ : nullptr);
+        descend(W, alpha0, s);
+    }
+    f = f_;
+}
+
+void BoxProgram::solve_all(const MatX& W, const VecX& r, VecX& x) {
+    is_free_.assign(r.size(), 1);
+    r_ = r;
+    solve_free(W);
+    x = x_;
+}
+
+VecX least_norm_solution(const MatX& W, const VecX& r) {
+    VecX x;
+    BoxProgram().solve_all(W, r, x);
+    return x;
+}
+
+VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* near) {
+    VecX f;
+    BoxProgram().solve(W, alpha0, s, near, f);
+    return f;
+}
+
+}  // namespace pn

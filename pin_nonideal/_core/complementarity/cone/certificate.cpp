@@ -1,0 +1,148 @@
+#include "complementarity/cone/certificate.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "math/decompositions.hpp"
+
+namespace pn {
+
+namespace {
+
+using ConeKind = ConeElement::Kind;
+
+constexpr double clearly = 1e-7;   // part of |y| |w0| that y . w0 must come below zero by
+constexpr double shown = 1e-9;     // rounding that what must vanish may have
+constexpr double near_edges[] = {1e-5, 1e-4, 1e-3, 1e-6, 1e-7};  // parts of the largest force left of what vanishes
+constexpr double dependent = 1e-8;
+constexpr int most_sharpenings = 6;
+
+// How far the rows u of a contact lie outside the dual of its cone.
+double outside_dual(const ConeElement& e, const Eigen::Ref<const VecX>& u) {
+    return std::max(0.0, e.bound * u.tail(e.dim - 1).norm() - u[0]);
+}
+
+// The nearest point to zero of { w_n + p >= 0 of some forces }: a projection, whose optimality is Farkas' alternative.
+bool no_forces(const ConeProblem& p, VecX& y) {
+    std::vector<int> rows;
+    std::vector<ConeElement> elements = p.elements;
+    for (int e = 0; e < p.size(); ++e) {
+        const bool equality = p.elements[e].is(ConeKind::equality);
+        if (p.elements[e].is(ConeKind::box)) continue;
+        for (int k = 0; k < (equality ? p.elements[e].dim : 1); ++k) {
+            rows.push_back(p.at[e] + k);
+            elements.push_back(equality ? ConeElement{ConeKind::equality, 1, 0.0} : ConeElement::contact(1, 0.0));
+        }
+    }
+    const int n = p.n, m = static_cast<int>(rows.size());
+    MatX M = MatX::Identity(n + m, n + m);
+    VecX r = VecX::Zero(n + m), f = r;
+    M.topLeftCorner(n, n).setZero();
+    for (int k = 0; k < m; ++k) {
+        M.row(n + k).head(n) = p.W().row(rows[k]);
+        M.col(n + k).head(n) = -p.W().row(rows[k]).transpose();
+        r[n + k] = p.w0()[rows[k]];
+    }
+    ConeProblem nearest;
+    nearest.associated = true;
+    nearest.pose(M, r, elements);
+    ConePath().follow(nearest, f, ConePath::Slip::stands);
+    f = f.cwiseProduct(nearest.scale());
+    y = VecX::Zero(n);
+    for (int k = 0; k < m; ++k) y[rows[k]] = f[n + k];
+    if (!(y.norm() > 0.0 && y.norm() < HUGE_VAL)) return false;
+    y.normalize();
+    const VecX u = -(p.W().transpose() * y);
+    double margin = -y.dot(p.w0());
+    for (int e = 0; e < p.size(); ++e) {
+        const ConeElement& element = p.elements[e];
+        const auto ue = u.segment(p.at[e], element.dim);
+        if (element.is(ConeKind::contact) && (outside_dual(element, ue) > shown || y[p.at[e]] < 0.0)) return false;
+        if (element.is(ConeKind::equality) && ue.cwiseAbs().maxCoeff() > shown) return false;
+        if (element.is(ConeKind::box)) margin -= element.bound * ue.norm();
+    }
+    return margin > clearly;
+}
+
+// What is nearly y: forces that balance exactly, nothing where y has nothing, on the edge of a cone where y is near it.
+void sharpen(const ConeProblem& p, const MatX& E, double near_edge, VecX& y) {
+    const double none = near_edge * y.cwiseAbs().maxCoeff();
+    const int rank = static_cast<int>(E.cols());
+    MatX J = MatX::Zero(rank + 3 * p.size(), p.n);
+    VecX miss = VecX::Zero(J.rows());
+    J.topRows(rank) = E.transpose();
+    for (int it = 0; it < most_sharpenings; ++it) {
+        miss.head(rank) = E.transpose() * y;
+        for (int e = 0; e < p.size(); ++e) {
+            const ConeElement& element = p.elements[e];
+            const int i = p.at[e], d = element.dim, row = rank + 3 * e;
+            J.middleRows(row, 3).setZero();
+            const double length = element.slides() ? y.segment(i + 1, d - 1).norm() : 0.0;
+            const bool empty = !element.is(ConeKind::contact) || y[i] <= none;
+            if (empty) J.block(row, i, d, d).setIdentity();
+            else if (element.bound == 0.0) J.block(row, i + 1, d - 1, d - 1).setIdentity();
+            else if (element.slides() && length >= element.bound * y[i] - none) {
+                J(row, i) = -element.bound;
+                if (length > 0.0) J.block(row, i + 1, 1, d - 1) = y.segment(i + 1, d - 1).transpose() / length;
+            }
+            miss.segment(row, 3) = J.middleRows(row, 3) * y;
+        }
+        y -= least_squares(J, miss, dependent);
+    }
+}
+
+// Whether y of unit length is in the cones, balances by itself, and w0 works against it.
+bool squeezes(const ConeProblem& p, VecX& y) {
+    if (!(y.norm() > 0.0 && y.norm() < HUGE_VAL)) return false;
+    y.normalize();
+    if ((p.W().transpose() * y).cwiseAbs().maxCoeff() > shown || -y.dot(p.w0()) < clearly) return false;
+    for (int e = 0; e < p.size(); ++e) {
+        const int i = p.at[e], tails = p.elements[e].dim - 1;
+        if (!p.elements[e].is(ConeKind::contact)) continue;
+        if (y[i] < -shown || y.segment(i + 1, tails).norm() > p.elements[e].bound * y[i] + shown) return false;
+    }
+    return true;
+}
+
+// The nearest point to -w0 of the forces in the cones that balance by themselves.
+bool squeezed(const ConeProblem& p, VecX& y) {
+    DenseSolver factors;
+    factors.factor_orthogonally(p.W().transpose());
+    const int n = p.n, rank = factors.rank();
+    MatX E(n, rank);
+    factors.range(E);
+    MatX M = MatX::Identity(rank + n, rank + n);
+    M.topLeftCorner(rank, rank).setZero();
+    M.topRightCorner(rank, n) = -E.transpose();
+    M.bottomLeftCorner(n, rank) = E;
+    VecX r = VecX::Zero(rank + n), f = r;
+    r.tail(n) = p.w0();
+    std::vector<ConeElement> elements(rank, ConeElement{ConeKind::equality, 1, 0.0});
+    for (ConeElement e : p.elements) {
+        if (e.is(ConeKind::box)) e.bound = 0.0;
+        elements.push_back(e);
+    }
+    ConeProblem nearest;
+    nearest.associated = true;
+    nearest.pose(M, r, elements);
+    ConePath().follow(nearest, f, ConePath::Slip::stands);
+    f = f.cwiseProduct(nearest.scale()).eval();
+    for (const double edge : near_edges) {
+        y = f.tail(n);
+        if (!(y.norm() > 0.0 && y.norm() < HUGE_VAL)) return false;
+        sharpen(p, E, edge, y);
+        if (squeezes(p, y)) return true;
+    }
+    return false;
+}
+
+}  // namespace
+
+ConeStatus find_certificate(const ConeProblem& p, VecX& y) {
+    if (no_forces(p, y)) return ConeStatus::infeasible;
+    if (squeezed(p, y)) return ConeStatus::jammed;
+    y = VecX::Zero(0);
+    return ConeStatus::failed;
+}
+
+}  // namespace pn

@@ -1,0 +1,194 @@
+#include "complementarity/cone/interior_point.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pn {
+
+namespace {
+
+using ConeKind = ConeElement::Kind;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr int most_steps = 60;
+constexpr double gap_tolerance = 1e-15, least_step = 1e-7;
+constexpr double to_boundary = 0.99;   // of the way to the cone's boundary that a step takes
+constexpr double smooth_speed = 1e-12;  // below it a slip has no direction
+
+// Units that make a circular cone of the one |f_t| <= mu f_n: forces (root f_n, f_t / root), velocities the other way.
+double root_of(const ConeElement& e) { return e.slides() && e.bound > 0.0 ? std::sqrt(e.bound) : 1.0; }
+bool in_path(const ConeElement& e) { return !e.is(ConeKind::equality); }
+int head_rows(const ConeElement& e) { return e.is(ConeKind::contact) ? 1 : 0; }
+// Tangential rows that may carry a force.
+int tail_rows(const ConeElement& e) {
+    return e.is(ConeKind::box) ? (e.bound > 0.0 ? e.dim : 0) : e.bound > 0.0 ? e.dim - 1 : 0;
+}
+
+}  // namespace
+
+Vector3d ConePath::tail(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& x) const {
+    Vector3d out = Vector3d::Zero();
+    const int rows = tail_rows(p.elements[e]);
+    out.head(rows) = x.segment(p.at[e] + head_rows(p.elements[e]), rows);
+    return out;
+}
+
+// Element e of a force or of a change of it, whose head a box has given.
+Cone ConePath::force(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& f, double head) const {
+    const double root = root_of(p.elements[e]);
+    if (p.elements[e].is(ConeKind::contact)) head = root * f[p.at[e]];
+    return {head, tail(p, e, f) / root};
+}
+
+void ConePath::start(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
+    mode_ = slip;
+    if (static_cast<int>(states_.size()) < p.size()) states_.resize(p.size());
+    auto w = w_.vector(p.n);
+    p.respond(f, w);
+    for (int e = 0; e < p.size(); ++e) {
+        State& s = states_[e];
+        s.speed = p.associated ? 0.0 : tail(p, e, w).norm();
+        s.slip.setZero();
+        s.z = s.y = {1.0, Vector3d::Zero()};
+    }
+    f.setZero();
+    for (int e = 0; e < p.size(); ++e) {
+        if (p.elements[e].is(ConeKind::box)) states_[e].z.head = p.elements[e].bound;
+        if (p.elements[e].is(ConeKind::contact)) f[p.at[e]] = 1.0 / root_of(p.elements[e]);
+    }
+}
+
+// Slip speeds, and what u lacks of w + (mu |w_t|, 0).
+void ConePath::update(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
+    auto w = w_.vector(p.n), miss = miss_.vector(p.n);
+    p.respond(f, w);
+    miss = w;
+    for (int e = 0; e < p.size(); ++e) {
+        const ConeElement& element = p.elements[e];
+        State& s = states_[e];
+        if (!in_path(element)) continue;
+        const int rows = tail_rows(element), first = p.at[e] + head_rows(element);
+        const double root = root_of(element);
+        if (mode_ == Slip::follows && element.slides() && rows > 0 && !p.associated) {
+            const Vector3d slip = tail(p, e, w);
+            s.speed = std::sqrt(slip.squaredNorm() + smooth_speed * smooth_speed);
+            s.slip = slip / s.speed;
+        }
+        miss.segment(first, rows) -= s.y.tail.head(rows) / root;
+        if (element.is(ConeKind::contact)) miss[p.at[e]] += (rows > 0 ? element.bound * s.speed : 0.0) - s.y.head * root;
+        if (rows < element.dim - head_rows(element)) miss.segment(first, element.dim - head_rows(element)).setZero();
+    }
+}
+
+bool ConePath::factorize(const ConeProblem& p) {
+    auto K = K_.matrix(p.n, p.n);
+    K = p.W();
+    for (int e = 0; e < p.size(); ++e) {
+        const ConeElement& element = p.elements[e];
+        if (!in_path(element)) continue;
+        State& s = states_[e];
+        const int i = p.at[e], rows = tail_rows(element), first = i + head_rows(element);
+        const int idle = element.dim - head_rows(element) - rows;
+        if (idle > 0) {  // tangential rows without friction
+            K.middleRows(first, idle).setZero();
+            K.block(first, first, idle, idle).setIdentity();
+            if (element.is(ConeKind::box)) continue;
+        }
+        s.scaling = Scaling(s.z, s.y);
+        const Scaling& T = s.scaling;
+        const double root = root_of(element), inverse = 1.0 / (T.root * T.root);
+        const Matrix3d block = inverse / (root * root) * (2.0 * T.w.tail * T.w.tail.transpose() + Matrix3d::Identity());
+        K.block(first, first, rows, rows) += block.topLeftCorner(rows, rows);
+        if (element.is(ConeKind::box)) continue;
+        K(i, i) += root * root * inverse * (2.0 * T.w.head * T.w.head - 1.0);
+        const Vector3d cross = -2.0 * inverse * T.w.head * T.w.tail;
+        K.block(first, i, rows, 1) += cross.head(rows);
+        K.block(i, first, 1, rows) += cross.head(rows).transpose();
+        if (mode_ == Slip::follows && !p.associated)
+            for (int k = 0; k < rows; ++k) K.row(i) += element.bound * s.slip[k] * p.W().row(first + k);
+    }
+    solver_.factor(K);
+    return true;
+}
+
+// Step to z o y = target with `keep` of the miss left, and the second-order terms of the step before.
+void ConePath::direction(const ConeProblem& p, double target, double keep) {
+    auto rhs = rhs_.vector(p.n), step = step_.vector(p.n);
+    rhs = (keep - 1.0) * miss_.vector(p.n);
+    for (int e = 0; e < p.size(); ++e) {
+        const ConeElement& element = p.elements[e];
+        State& s = states_[e];
+        if (!in_path(element) || (element.is(ConeKind::box) && tail_rows(element) == 0)) continue;
+        Cone d = product(s.scaling.scaled, s.scaling.scaled) * -1.0 - s.second;
+        d.head += target;
+        s.dy = s.scaling.back(quotient(d, s.scaling.scaled));
+        const int rows = tail_rows(element), first = p.at[e] + head_rows(element);
+        const double root = root_of(element);
+        rhs.segment(first, rows) += s.dy.tail.head(rows) / root;
+        if (element.is(ConeKind::contact)) rhs[p.at[e]] += root * s.dy.head;
+    }
+    solver_.solve(rhs, step);
+    for (int e = 0; e < p.size(); ++e) {
+        State& s = states_[e];
+        if (!in_path(p.elements[e]) || (p.elements[e].is(ConeKind::box) && tail_rows(p.elements[e]) == 0)) continue;
+        s.dy = s.dy - s.scaling.back(s.scaling.back(force(p, e, step, 0.0)));
+    }
+}
+
+double ConePath::length(const ConeProblem& p) const {
+    double least = HUGE_VAL;
+    const Eigen::Map<const VecX> step = step_.vector(p.n);
+    for (int e = 0; e < p.size(); ++e) {
+        if (!in_path(p.elements[e]) || (p.elements[e].is(ConeKind::box) && tail_rows(p.elements[e]) == 0)) continue;
+        least = std::min({least, room(states_[e].z, force(p, e, step, 0.0)), room(states_[e].y, states_[e].dy)});
+    }
+    return least;
+}
+
+double ConePath::gap(const ConeProblem& p) const {
+    double sum = 0.0;
+    int count = 0;
+    for (int e = 0; e < p.size(); ++e) {
+        if (!in_path(p.elements[e]) || (p.elements[e].is(ConeKind::box) && tail_rows(p.elements[e]) == 0)) continue;
+        sum += states_[e].z.dot(states_[e].y);
+        ++count;
+    }
+    return count > 0 ? sum / count : 0.0;
+}
+
+void ConePath::follow(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
+    start(p, f, slip);
+    auto step = step_.vector(p.n), kept = kept_.vector(p.n);
+    for (int it = 0; it < most_steps; ++it, ++steps_) {
+        update(p, f);
+        const double now = gap(p);
+        if (now < gap_tolerance && miss_.vector(p.n).cwiseAbs().maxCoeff() < gap_tolerance * 10.0) return;
+        factorize(p);
+        for (int e = 0; e < p.size(); ++e) states_[e].second = Cone();
+        direction(p, 0.0, 0.0);
+        const double left = 1.0 - std::min(1.0, length(p)), sigma = left * left * left;
+        for (int e = 0; e < p.size(); ++e) {
+            State& s = states_[e];
+            s.second = product(s.scaling.back(force(p, e, step, 0.0)), s.scaling.forth(s.dy));
+        }
+        direction(p, sigma * now, sigma);
+        const double a = std::min(1.0, to_boundary * length(p));
+        if (!(a > least_step)) return;
+        kept = f;
+        f += a * step;
+        bool inside = true;
+        for (int e = 0; e < p.size(); ++e) {
+            if (!in_path(p.elements[e]) || (p.elements[e].is(ConeKind::box) && tail_rows(p.elements[e]) == 0)) continue;
+            State& s = states_[e];
+            s.z = force(p, e, f, s.z.head);
+            s.y = s.y + s.dy * a;
+            inside = inside && s.z.determinant() > 0.0 && s.y.determinant() > 0.0;
+        }
+        if (inside) continue;
+        f = kept;  // as near as rounding lets it come
+        return;
+    }
+}
+
+}  // namespace pn

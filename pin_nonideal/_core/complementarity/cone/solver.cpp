@@ -1,0 +1,282 @@
+#include "complementarity/cone/solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+namespace pn {
+
+namespace {
+
+using ConeKind = ConeElement::Kind;
+
+constexpr double solved = 1e-11;     // error that is a solution
+constexpr double no_force = 1e10;    // forces beyond this, in the problem's units, only squeeze
+constexpr double evened = 1e-13;     // the same of even shares
+constexpr int few_steps = 3, first_steps = 20, more_steps = 30;
+constexpr int most_turns = 30, most_rounds = 40, sweeps = 40, most_starts = 100;
+constexpr int few_turns = 10, most_stretches = 60;
+constexpr double relaxation = 0.7;
+// Compliance of contacts and joints beside their own response: it halves from the first to the last.
+constexpr double first_compliance = 1e-2, least_compliance = 1e-9;
+constexpr int most_approaches = 40;
+constexpr double softer = 0.1;  // from one to the next, where the limit is all that is asked for
+// A miss is of what no forces change where it lasts as elements stiffen: what shares a load, such as the corners of a foot
+// that turns, has velocities that contradict each other by that much of those in play. So small a one is not searched
+// further where any is taken.
+constexpr double unchangeable = 1e-9, lasts = 0.9;
+constexpr double first_stretch = 0.1, least_stretch = 1e-5;  // of the way from no friction to all
+
+}  // namespace
+
+ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
+                                      const std::vector<ConeElement>& elements, bool warm, Eigen::Ref<VecX> f,
+                                      bool may_keep_shares) {
+    const int steps = newton_.steps();
+    problem_.pose(W, w0, elements);
+    const int n = problem_.n;
+    auto x = even_.vector(n);
+    if (warm) x = f.cwiseQuotient(problem_.scale()) / problem_.force_unit();
+    else x.setZero();
+    least_miss_ = HUGE_VAL;
+    bool found = search(x, warm);
+    ConeStatus status = found ? ConeStatus::solved : find_certificate(problem_, certificate_);
+    if (status == ConeStatus::jammed) found = grow_friction(x);  // a solution may be there all the same
+    if (status == ConeStatus::failed) found = grow_friction(x) || scatter(x) || take_nearest(x);
+    if (found && shares_alike_) stiffen(x);
+    unique_shares_ = newton_.regular();
+    const bool as_it_was = warm && may_keep_shares && newton_.steps() == steps;
+    if (found && !unique_shares_ && !as_it_was) {
+        auto even = f_.vector(n);
+        even = x;
+        const bool shorter = shares_.even_out(problem_, even);
+        if (shorter && newton_.solve(problem_, even, few_steps) <= std::max(evened, error_)) x = even;
+    }
+    if (found) tidy(x);
+    f = problem_.force_unit() * problem_.scale().cwiseProduct(x);
+    if (found) return ConeStatus::solved;
+    if (certificate_.size() > 0) certificate_ = problem_.scale().cwiseProduct(certificate_).eval();
+    return status;
+}
+
+// Newton's method from where f is; f stays unless that is a solution.
+bool ConeComplementarity::polish(Eigen::Ref<VecX> f, int most_steps) {
+    auto there = f_.vector(problem_.n);
+    there = f;
+    error_ = newton_.solve(problem_, there, most_steps);
+    if (!(error_ <= solved) || there.cwiseAbs().maxCoeff() > no_force) return false;
+    f = there;
+    return true;
+}
+
+bool ConeComplementarity::search(Eigen::Ref<VecX> f, bool warm) {
+    if (problem_.n == 0) return true;
+    if (polish(f, first_steps)) return true;
+    if (warm) {
+        f.setZero();
+        if (polish(f, first_steps)) return true;
+    }
+    path_.follow(problem_, f, ConePath::Slip::follows);
+    return polish(f, more_steps) || approach(f) || take_turns(f) || relax(f);
+}
+
+// Each element gives way by a little of what its force has changed, which makes every problem on the way a regular one,
+// however many elements share a load; forces that change no more give no way (the proximal point algorithm: Rockafellar,
+// SIAM J. Control Optim. 14, 1976).
+bool ConeComplementarity::approach(Eigen::Ref<VecX> f) {
+    grown_ = problem_;
+    auto last = x_.vector(problem_.n), nearest = nearest_.vector(problem_.n);
+    last.setZero();
+    double compliance = first_compliance, before = HUGE_VAL;
+    for (int turn = 0; turn < most_approaches && !(least_miss_ <= unchangeable); ++turn) {
+        grown_.W() = problem_.W();
+        grown_.W().diagonal().array() += compliance;
+        grown_.w0() = problem_.w0() - compliance * last;
+        f = last;
+        double error = newton_.solve(grown_, f, more_steps);
+        if (!(error <= solved)) {
+            f.setZero();
+            error = newton_.solve(grown_, f, more_steps);
+        }
+        if (!(error <= solved)) {
+            path_.follow(grown_, f, ConePath::Slip::follows);
+            if (f.allFinite()) error = newton_.solve(grown_, f, more_steps);
+        }
+        compliance = std::max(least_compliance, 0.5 * compliance);
+        if (!(error <= solved) || f.cwiseAbs().maxCoeff() > no_force) continue;
+        last = f;
+        if (polish(f, few_steps)) return true;
+        error = newton_.error(problem_, f);
+        if (error > lasts * before && error < least_miss_) {
+            nearest = f;
+            least_miss_ = error;
+        }
+        before = error;
+    }
+    return least_miss_ <= unchangeable && take_nearest(f);
+}
+
+// To elements that give way by ever less of their whole force; f stays where that leads to no solution.
+bool ConeComplementarity::stiffen(Eigen::Ref<VecX> f) {
+    grown_ = problem_;
+    auto there = x_.vector(problem_.n);
+    there.setZero();
+    for (double compliance = first_compliance; compliance >= least_compliance; compliance *= softer) {
+        grown_.W() = problem_.W();
+        grown_.W().diagonal().array() += compliance;
+        if (newton_.solve(grown_, there, more_steps) <= solved) continue;
+        path_.follow(grown_, there, ConePath::Slip::follows);
+        if (!there.allFinite() || !(newton_.solve(grown_, there, more_steps) <= solved)) return false;
+    }
+    const double error = error_;
+    f_.vector(problem_.n) = there;
+    there = f;
+    f = f_.vector(problem_.n);
+    if (polish(f, few_steps)) return true;
+    f = there;
+    error_ = error;
+    return false;
+}
+
+// Of the forces that were approached those that miss least, where they may miss as much.
+bool ConeComplementarity::take_nearest(Eigen::Ref<VecX> f) {
+    if (!(least_miss_ <= most_miss_)) return false;
+    f = nearest_.vector(problem_.n);
+    error_ = least_miss_;
+    return true;
+}
+
+// No force pulls, and none leaves its cone, by rounding either.
+void ConeComplementarity::tidy(Eigen::Ref<VecX> f) const {
+    for (int e = 0; e < problem_.size(); ++e) {
+        const ConeElement& element = problem_.elements[e];
+        const int i = problem_.at[e], head = element.is(ConeKind::contact);
+        if (element.is(ConeKind::equality)) continue;
+        if (head && !(f[i] > 0.0)) f[i] = 0.0;
+        auto tail = f.segment(i + head, element.dim - head);
+        const double limit = element.bound * (head ? f[i] : 1.0), length = tail.norm();
+        if (length > limit) tail *= limit / length;
+    }
+}
+
+// Slip speeds held and forces found for them, in turn (Cadoux, "Méthodes d'optimisation pour la dynamique non
+// régulière", 2009).
+bool ConeComplementarity::take_turns(Eigen::Ref<VecX> f) {
+    f.setZero();
+    for (int turn = 0; turn < most_turns; ++turn) {
+        path_.follow(problem_, f, ConePath::Slip::stands);
+        if (!f.allFinite()) f.setZero();
+        if (polish(f, more_steps)) return true;
+    }
+    return false;
+}
+
+// One element after the other goes to the nearest force that its cone allows.
+bool ConeComplementarity::relax(Eigen::Ref<VecX> f) {
+    auto w = w_.vector(problem_.n), x = x_.vector(problem_.n);
+    f.setZero();
+    problem_.respond(f, w);
+    for (int round = 0; round < most_rounds; ++round) {
+        for (int sweep = 0; sweep < sweeps; ++sweep)
+            for (int e = 0; e < problem_.size(); ++e) {
+                const ConeElement& element = problem_.elements[e];
+                const int i = problem_.at[e], d = element.dim, head = element.is(ConeKind::contact);
+                auto fe = f.segment(i, d);
+                auto before = x.head(d);
+                before = fe;
+                fe -= relaxation * problem_.stiffness(e) * w.segment(i, d);
+                if (head) fe[0] = std::max(fe[0], 0.0);
+                const double length = fe.tail(d - head).norm(), limit = element.bound * (head ? fe[0] : 1.0);
+                if (!element.is(ConeKind::equality) && length > limit) fe.tail(d - head) *= limit / length;
+                before -= fe;
+                for (int k = 0; k < d; ++k) w -= before[k] * problem_.W().col(i + k);
+            }
+        if (!f.allFinite()) return false;
+        if (polish(f, more_steps)) return true;
+    }
+    return false;
+}
+
+// From no friction, where the problem is convex, to all of it.
+bool ConeComplementarity::grow_friction(Eigen::Ref<VecX> f) {
+    grown_ = problem_;
+    double reached = 0.0, stretch = first_stretch;
+    auto there = x_.vector(problem_.n);
+    f.setZero();
+    for (int tried = 0; tried < most_stretches && stretch > least_stretch; ++tried) {
+        const double next = std::min(1.0, reached + stretch);
+        for (int e = 0; e < problem_.size(); ++e) grown_.elements[e].bound = next * problem_.elements[e].bound;
+        there = f;
+        double error = newton_.solve(grown_, there, more_steps);
+        for (int turn = 0; turn < few_turns && !(error <= solved); ++turn) {
+            path_.follow(grown_, there, turn == 0 ? ConePath::Slip::follows : ConePath::Slip::stands);
+            if (!there.allFinite()) break;
+            auto end = f_.vector(problem_.n);
+            end = there;
+            error = newton_.solve(grown_, end, more_steps);
+            if (error <= solved) there = end;
+        }
+        if (!(error <= solved)) {
+            stretch *= 0.3;
+            continue;
+        }
+        f = there;
+        reached = next;
+        stretch *= 2.0;
+        if (reached == 1.0) return polish(f, more_steps);
+    }
+    return false;
+}
+
+// Starts drawn by lot, always the same ones.
+bool ConeComplementarity::scatter(Eigen::Ref<VecX> f) {
+    std::minstd_rand lot(1);
+    for (int start = 0; start < most_starts; ++start) {
+        for (int i = 0; i < problem_.n; ++i) f[i] = 4.0 * (lot() / double(std::minstd_rand::max()) - 0.5);
+        for (int e = 0; e < problem_.size(); ++e)
+            if (problem_.elements[e].is(ConeKind::contact)) f[problem_.at[e]] = 2.0 * std::abs(f[problem_.at[e]]);
+        if (polish(f, more_steps)) return true;
+        path_.follow(problem_, f, ConePath::Slip::stands);
+        if (f.allFinite() && polish(f, more_steps)) return true;
+    }
+    return false;
+}
+
+ConeResiduals ConeComplementarity::residuals(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
+                                             const std::vector<ConeElement>& elements,
+                                             const Eigen::Ref<const VecX>& f) {
+    constexpr double least = std::numeric_limits<double>::min();
+    ConeResiduals out;
+    if (w0.size() == 0) return out;
+    const double force = std::max(f.cwiseAbs().maxCoeff(), least);
+    int i = 0;
+    for (const ConeElement& e : elements) {
+        const int head = e.is(ConeKind::contact), d = e.dim;
+        Eigen::Vector3d w = Eigen::Vector3d::Zero(), ft = w, wt = w;
+        double speed = std::max(w0.cwiseAbs().maxCoeff(), least), limit = e.bound;
+        for (int k = 0; k < d; ++k) {
+            w[k] = w0[i + k] + W.row(i + k).dot(f);
+            speed = std::max(speed, W.row(i + k).cwiseAbs().dot(f.cwiseAbs()));
+        }
+        if (head) {
+            limit *= std::max(f[i], 0.0);
+            const double product = std::abs(f[i] * w[0]) / (force * speed);
+            out.signorini = std::max({out.signorini, -w[0] / speed, -f[i] / force, product});
+        }
+        for (int k = head; k < d; ++k) {
+            ft[k] = f[i + k];
+            wt[k] = w[k];
+        }
+        if (e.is(ConeKind::equality)) {
+            out.signorini = std::max(out.signorini, wt.norm() / speed);
+        } else {
+            out.coulomb = std::max(out.coulomb, (ft.norm() - limit) / force);
+            out.dissipation = std::max(out.dissipation, std::abs(ft.dot(wt) + limit * wt.norm()) / (force * speed));
+        }
+        i += d;
+    }
+    return out;
+}
+
+}  // namespace pn

@@ -1,0 +1,105 @@
+#include "complementarity/fixed_point/equation.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pn {
+
+constexpr int newton_passes = 30;
+constexpr double newton_rounding = 1e-15;  // of the residual, over the solution
+constexpr double stalled = 1e-12;          // the same where rounding is worse: it no longer falls
+constexpr int growth_passes = 200;
+constexpr double safe_growth = 0.5;      // nobody asks by how much it lies below this
+constexpr double growth_settled = 1e-4;  // part of the bound by which a pass improves it in the end
+constexpr double kept_weight = 1e-2;     // of the weights before, so that none becomes zero and none alternates
+
+void ReactionEquation::resize(int size, int vectors) {
+    constant.resize(size);
+    element.resize(vectors);
+    directed.assign(vectors, 0);
+    offset.resize(3, vectors);
+    columns.resize(3 * vectors, size);
+}
+
+Eigen::Vector3d ReactionEquation::vector(int k, const VecX& y, double s) const {
+    return s * offset.col(k) + columns.middleRows<3>(3 * k) * y;
+}
+
+bool ReactionEquation::finite() const { return constant.allFinite() && offset.allFinite() && columns.allFinite(); }
+
+void ReactionEquation::image(const VecX& y, double s, VecX& g) const {
+    g = s * constant;
+    for (int k = 0; k < vectors(); ++k) {
+        const Eigen::Vector3d load = vector(k, y, s);
+        g[element[k]] += directed[k] ? load[0] : load.norm();
+    }
+}
+
+void ReactionEquation::slope(const VecX& y, double s, MatX& J) const {
+    J.setZero(size(), size());
+    for (int k = 0; k < vectors(); ++k) {
+        if (directed[k]) {
+            J.row(element[k]) += columns.row(3 * k);
+            continue;
+        }
+        const Eigen::Vector3d load = vector(k, y, s);
+        const double length = load.norm();
+        if (length == 0.0) continue;
+        J.row(element[k]).noalias() += (load / length).transpose() * columns.middleRows<3>(3 * k);
+    }
+}
+
+void ReactionEquation::steepest(MatX& L) const {
+    L.setZero(size(), size());
+    for (int k = 0; k < vectors(); ++k)
+        for (int j = 0; j < size(); ++j) L(element[k], j) += columns.block<3, 1>(3 * k, j).norm();
+}
+
+VecX ReactionEquation::steepest_in_s() const {
+    VecX least = constant;
+    for (int k = 0; k < vectors(); ++k) least[element[k]] += offset.col(k).norm();
+    return least;
+}
+
+double ReactionNewton::factorize(const ReactionEquation& equation, const VecX& y) {
+    equation.slope(y, 1.0, matrix);
+    matrix = -matrix;
+    matrix.diagonal().array() += 1.0;
+    factor.compute(matrix);
+    return factor.determinant();
+}
+
+bool ReactionNewton::solve(const ReactionEquation& equation, VecX& y) {
+    double last = HUGE_VAL;
+    for (int pass = 0; pass < newton_passes; ++pass) {
+        equation.image(y, 1.0, image);
+        residual = image - y;
+        const double error = residual.cwiseAbs().maxCoeff(), size = y.cwiseAbs().maxCoeff();
+        if (!std::isfinite(error)) return false;
+        if (error <= newton_rounding * size || (error >= last && error <= stalled * size)) return true;
+        last = error;
+        factorize(equation, y);
+        factor.solve(residual, step);
+        if (!step.allFinite()) return false;
+        y += step;
+    }
+    return false;
+}
+
+// max (L u)_i / u_i over any positive u is such a bound (Collatz and Wielandt).
+double growth(const MatX& L) {
+    double best = L.rowwise().sum().maxCoeff();
+    if (best <= safe_growth) return best;
+    VecX u = VecX::Ones(L.rows());
+    for (int pass = 0; pass < growth_passes; ++pass) {
+        const VecX next = L * u;
+        const double before = best;
+        best = std::min(best, next.cwiseQuotient(u).maxCoeff());
+        if (best <= safe_growth || (pass > 0 && before - best <= growth_settled * best)) break;
+        u = next + kept_weight * best * u;
+        u /= u.maxCoeff();
+    }
+    return best;
+}
+
+}  // namespace pn

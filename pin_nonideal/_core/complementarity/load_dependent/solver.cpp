@@ -1,0 +1,225 @@
+#include "complementarity/load_dependent/solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "complementarity/socp_mode_newton.hpp"
+#include "math/decompositions.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr double solved = 1e-13;          // largest error of the equation, as part of each element's forces
+constexpr double rounding = 1e-10;        // the same where no step makes it smaller any more
+constexpr double good_contraction = 0.5;  // of limits and forces in turn; slower ones go to Newton's method
+constexpr double within = 1e-13;          // part of the largest force by which one that holds may pass its limit
+constexpr double least_gain = 1e-3;       // of a step towards forces that hold, part of what they lack
+constexpr int most_turns = 40, most_newton = 40, most_halvings = 12;
+constexpr double enough = 1e-4;           // part of the decrease that a Newton step promises
+constexpr double first_stretch = 0.25, least_stretch = 1e-4;  // of the path
+
+// Limits and forces in turn: for given limits the forces are a convex program.
+struct Turns {
+    const RestEquation& equation;
+    std::vector<int> dims, rows;
+    MatX W;
+    VecX alpha;
+    FrictionLimits limits;
+
+    explicit Turns(const RestEquation& e) : equation(e) {
+        for (const RestElement& element : e.elements) {
+            if (!element.may_stick) continue;
+            dims.push_back(element.dim);
+            for (int k = 0; k < element.dim; ++k) rows.push_back(element.row + k);
+        }
+        const int count = static_cast<int>(rows.size());
+        W.resize(count, count);
+        for (int i = 0; i < count; ++i)
+            for (int j = 0; j < count; ++j) W(i, j) = e.W(rows[i], rows[j]);
+    }
+
+    // Under x: forces of those that slip in any case, limits of those that may stick, and what the others leave for them.
+    void ask(const VecX& x, VecX& out, FrictionLimits& held, VecX& own) {
+        equation.respond(x, alpha, limits);
+        out = x;
+        held.size.resize(dims.size());
+        held.middle = limits.middle(rows);
+        int free = 0;
+        for (size_t i = 0; i < equation.elements.size(); ++i) {
+            const RestElement& e = equation.elements[i];
+            if (e.may_stick) held.size[free++] = limits[i];
+            else out.segment(e.row, e.dim) = limits.middle.segment(e.row, e.dim) - limits[i] * e.direction;
+        }
+        VecX before = out;
+        for (int r : rows) before[r] = 0.0;
+        own = (alpha + equation.W * (before - x))(rows);
+    }
+
+    // The forces that the limits under x allow.
+    VecX next(const VecX& x) {
+        VecX out, own;
+        FrictionLimits held;
+        ask(x, out, held, own);
+        out(rows) = friction_program(W, own, dims, held);
+        return out;
+    }
+
+    bool iterate(VecX& x) {
+        double last = HUGE_VAL;
+        for (int it = 0; it < most_turns; ++it) {
+            x = next(x);
+            const double error = equation.error(x);
+            if (error <= solved) return true;
+            if (!(error < HUGE_VAL) || (it > 2 && error > good_contraction * last)) return false;
+            last = error;
+        }
+        return false;
+    }
+};
+
+VecX newton_step(const RestEquation& equation, const VecX& x, const VecX& lack) {
+    const MatX J = equation.jacobian(x);
+    LU lu;
+    lu.compute(J);
+    if (!(lu.reciprocal_condition() > rank_threshold)) return least_squares(J, lack, rank_threshold);
+    VecX step;
+    lu.solve(lack, step);
+    return step;
+}
+
+bool follow_path(const RestEquation& equation, VecX& x) {
+    RestEquation partly = equation;
+    VecX alpha;
+    equation.respond(x, alpha, partly.fixed);
+    partly.frozen = 1.0;
+    if (!Turns(partly).iterate(x)) return false;
+    double stretch = first_stretch;
+    while (partly.frozen > 0.0) {
+        VecX ahead = x;
+        const double before = partly.frozen;
+        partly.frozen = std::max(0.0, before - stretch);
+        if (refine_rest(partly, ahead)) {
+            x = ahead;
+            stretch *= 2.0;
+            continue;
+        }
+        partly.frozen = before;
+        stretch *= 0.25;
+        if (stretch < least_stretch) return false;
+    }
+    return true;
+}
+
+double largest_force_in_play(const RestEquation& equation, const VecX& x, const FrictionLimits& limits) {
+    double size = 0.0;
+    for (size_t i = 0; i < equation.elements.size(); ++i) size = std::max(size, equation.force_in_play(i, x, limits));
+    return size;
+}
+
+// What forces x lack to hold all that rests: accelerations that are left, as the forces they ask for, and what is beyond
+// a limit; and the derivative.
+void lack_of_rest(const RestEquation& equation, const VecX& x, VecX& lack, MatX& J) {
+    VecX alpha;
+    FrictionLimits limits;
+    MatX dalpha, dlimits, dmiddle;
+    equation.respond(x, alpha, limits);
+    equation.differentiate(x, dalpha, dlimits, dmiddle);
+    const VecX from_middle = x - limits.middle;
+    const MatX slope = MatX::Identity(equation.n, equation.n) - dmiddle;
+    const int n = equation.n, count = static_cast<int>(equation.elements.size());
+    const double no_limit = solved * largest_force_in_play(equation, x, limits);
+    lack.setZero(2 * n);
+    J.setZero(2 * n, n);
+    for (int i = 0; i < count; ++i) {
+        const RestElement& e = equation.elements[i];
+        const auto force = from_middle.segment(e.row, e.dim);
+        if (!e.may_stick) {
+            lack.segment(e.row, e.dim) = force + limits[i] * e.direction;
+            J.middleRows(e.row, e.dim) = slope.middleRows(e.row, e.dim) + e.direction * dlimits.row(i);
+            continue;
+        }
+        lack.segment(e.row, e.dim) = e.rho * alpha.segment(e.row, e.dim);
+        J.middleRows(e.row, e.dim) = e.rho * dalpha.middleRows(e.row, e.dim);
+        const double size = force.norm();
+        if (limits[i] <= no_limit) {  // |x| has a kink there, x has none
+            lack.segment(n + e.row, e.dim) = force;
+            J.middleRows(n + e.row, e.dim) = slope.middleRows(e.row, e.dim);
+        } else if (size > limits[i]) {
+            lack[n + e.row] = size - limits[i];
+            J.row(n + e.row) = force.transpose() / size * slope.middleRows(e.row, e.dim) - dlimits.row(i);
+        }
+    }
+}
+
+}  // namespace
+
+// Gauss and Newton's method; where limits are linear in the forces, as those of contacts, the lack is convex.
+bool hold_at_rest(const RestEquation& equation, VecX& x) {
+    VecX lack, there, ahead;
+    MatX J, J_there;
+    lack_of_rest(equation, x, lack, J);
+    for (int it = 0; it < most_newton; ++it) {
+        VecX alpha;
+        FrictionLimits limits;
+        equation.respond(x, alpha, limits);
+        if (lack.cwiseAbs().maxCoeff() <= within * largest_force_in_play(equation, x, limits)) return true;
+        const VecX step = least_squares(J, lack, rank_threshold);
+        const double now = lack.norm();
+        double length = 1.0;
+        bool gains = false;
+        for (int halving = 0; halving < most_halvings && !gains; ++halving, length *= 0.5) {
+            ahead = x - length * step;
+            lack_of_rest(equation, ahead, there, J_there);
+            gains = there.norm() < (1.0 - least_gain * length) * now;
+        }
+        if (!gains) return false;
+        x = ahead;
+        lack = there;
+        J = J_there;
+    }
+    return false;
+}
+
+bool refine_rest(const RestEquation& equation, VecX& x) {
+    double error = equation.error(x);
+    for (int it = 0; it < most_newton && error > solved; ++it) {
+        const VecX step = newton_step(equation, x, equation.residual(x));
+        double length = 1.0, there = HUGE_VAL;
+        VecX ahead;
+        for (int halving = 0; halving < most_halvings; ++halving, length *= 0.5) {
+            ahead = x - length * step;
+            there = equation.error(ahead);
+            if (there < (1.0 - enough * length) * error) break;
+        }
+        if (!(there < error)) break;
+        x = ahead;
+        error = there;
+    }
+    return error <= rounding;
+}
+
+VecX onset_accelerations(const RestEquation& equation, const VecX& x) {
+    Turns turns(equation);
+    VecX out, own;
+    FrictionLimits held;
+    turns.ask(x, out, held, own);
+    VecX accelerations = turns.alpha;
+    accelerations(turns.rows) = onset_accelerations(turns.W, own, turns.dims, held);
+    return accelerations;
+}
+
+bool solve_rest(const RestEquation& equation, VecX& x) {
+    if (equation.n == 0) return true;
+    const VecX guess = x;
+    if (Turns(equation).iterate(x)) return true;
+    bool found = refine_rest(equation, x);
+    if (!found) found = refine_rest(equation, x = guess);
+    if (!found) found = follow_path(equation, x = guess);
+    if (!found) return false;
+    const VecX at_limits = Turns(equation).next(x);  // what slips has its limit, to the last bit
+    if (equation.error(at_limits) <= solved + equation.error(x)) x = at_limits;
+    return true;
+}
+
+}  // namespace pn

@@ -1,0 +1,259 @@
+#include "complementarity/socp_mode_newton.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "complementarity/second_order_cone.hpp"
+#include "math/decompositions.hpp"
+
+namespace pn {
+
+namespace {
+
+// With f = s x and slip accelerations alpha, the pairs z_e = (1, x_e) and y_e = (u_e, alpha_e) lie in the cone
+// |tail| <= head, and are complementary at the solution: x_e = -alpha_e / |alpha_e| or alpha_e = 0. A primal-dual
+// interior-point method in Nesterov and Todd's scaling (Vandenberghe, "The CVXOPT linear and quadratic cone program
+// solvers", 2010) needs some fifteen steps however singular W is, and ends at the most even shares of a load that
+// nothing tells apart. Newton's method then solves the equations of the modes that it found to rounding.
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr int most_steps = 60, most_newton = 12;
+constexpr double gap_tolerance = 1e-17;  // of z . y, part of the accelerations in play; rounding may end it before
+constexpr double to_boundary = 0.99;     // of the way to the cone's boundary that a step takes
+constexpr double newton_tolerance = 4e-16, condition = 1e-12;
+
+struct ConeProgram {
+    const MatX& W;
+    const VecX& alpha0;
+    const std::vector<int>& dims;
+    const VecX& s;
+    int n, elements;
+    std::vector<int> at;
+    VecX scale;            // s of each row
+    double size = 0.0;     // of the accelerations in play
+    MatX V, K;             // W s / size, and the matrix of a step
+    VecX r0, x;
+    std::vector<Cone> y;
+    std::vector<Scaling> scalings;
+    Cholesky factor;
+
+    ConeProgram(const MatX& W_, const VecX& alpha0_, const std::vector<int>& dims_, const VecX& s_)
+        : W(W_), alpha0(alpha0_), dims(dims_), s(s_), n(static_cast<int>(alpha0_.size())),
+          elements(static_cast<int>(dims_.size())), scale(n), y(dims_.size()) {
+        for (int e = 0, row = 0; e < elements; row += dims[e], ++e) {
+            at.push_back(row);
+            scale.segment(row, dims[e]).setConstant(s[e]);
+        }
+        size = alpha0.cwiseAbs().maxCoeff() + (W.cwiseAbs() * scale).maxCoeff();
+        V = W * scale.asDiagonal() / size;
+        r0 = alpha0 / size;
+        x = VecX::Zero(n);
+    }
+
+    Vector3d tail(const VecX& rows, int e) const {
+        Vector3d out = Vector3d::Zero();
+        out.head(dims[e]) = rows.segment(at[e], dims[e]);
+        return out;
+    }
+    Cone z(int e) const { return {1.0, tail(x, e)}; }
+
+    double gap() const {
+        double sum = 0.0;
+        for (int e = 0; e < elements; ++e) sum += s[e] * z(e).dot(y[e]);
+        return sum / s.sum();
+    }
+
+    bool inside() const {
+        for (int e = 0; e < elements; ++e)
+            if (!(z(e).determinant() > 0.0) || !(y[e].determinant() > 0.0)) return false;
+        return true;
+    }
+
+    bool factorize() {
+        K = scale.asDiagonal() * V;
+        scalings.clear();
+        for (int e = 0; e < elements; ++e) {
+            scalings.emplace_back(z(e), y[e]);
+            const Scaling& T = scalings.back();
+            const Matrix3d block =
+                s[e] / (T.root * T.root) * (2.0 * T.w.tail * T.w.tail.transpose() + Matrix3d::Identity());
+            K.block(at[e], at[e], dims[e], dims[e]) += block.topLeftCorner(dims[e], dims[e]);
+        }
+        return factor.compute(K);
+    }
+
+    // Step to z o y = target, with the second-order terms of the step before.
+    void direction(double target, const std::vector<Cone>& second, VecX& dx, std::vector<Cone>& dy) const {
+        VecX rhs(n);
+        for (int e = 0; e < elements; ++e) {
+            const Scaling& T = scalings[e];
+            Cone d = product(T.scaled, T.scaled) * -1.0 - second[e];
+            d.head += target;
+            dy[e] = T.back(quotient(d, T.scaled));
+            rhs.segment(at[e], dims[e]) = s[e] * dy[e].tail.head(dims[e]);
+        }
+        factor.solve(rhs, dx);
+        for (int e = 0; e < elements; ++e) dy[e] = dy[e] - scalings[e].back(scalings[e].back({0.0, tail(dx, e)}));
+    }
+
+    double length(const VecX& dx, const std::vector<Cone>& dy) const {
+        double least = HUGE_VAL;
+        for (int e = 0; e < elements; ++e)
+            least = std::min({least, room(z(e), {0.0, tail(dx, e)}), room(y[e], dy[e])});
+        return least;
+    }
+
+    // y's tails are the accelerations of x; its heads keep what the step left them beyond the tails.
+    void advance(double step, const VecX& dx, const std::vector<Cone>& dy) {
+        x += step * dx;
+        const VecX alpha = V * x + r0;
+        for (int e = 0; e < elements; ++e) {
+            const Cone next = y[e] + dy[e] * step;
+            y[e].tail = tail(alpha, e);
+            y[e].head = y[e].tail.norm() + (next.head - next.tail.norm());
+        }
+    }
+
+    void follow_central_path() {
+        for (int e = 0; e < elements; ++e) {
+            y[e].tail = tail(r0, e);
+            y[e].head = y[e].tail.norm() + 1.0;
+        }
+        VecX dx(n);
+        std::vector<Cone> dy(elements), second(elements);
+        for (int it = 0; it < most_steps && gap() > gap_tolerance; ++it) {
+            if (!factorize()) return;
+            std::fill(second.begin(), second.end(), Cone());
+            direction(0.0, second, dx, dy);
+            const double left = 1.0 - std::min(1.0, length(dx, dy));
+            for (int e = 0; e < elements; ++e)
+                second[e] = product(scalings[e].back({0.0, tail(dx, e)}), scalings[e].forth(dy[e]));
+            direction(left * left * left * gap(), second, dx, dy);
+            const VecX x_before = x;
+            const std::vector<Cone> y_before = y;
+            advance(std::min(1.0, to_boundary * length(dx, dy)), dx, dy);
+            if (inside()) continue;
+            x = x_before;  // as near as rounding lets it come
+            y = y_before;
+            return;
+        }
+    }
+
+    // Newton's method for modes as equations: alpha = 0 for what sticks, alpha + m x = 0 and |x| = 1 for what slides.
+    bool solve_modes(const std::vector<char>& slides, VecX& there, VecX& m) const {
+        there = x;
+        m.setZero();
+        for (int e = 0; e < elements; ++e)
+            if (slides[e]) m[e] = y[e].tail.norm();
+        double last = HUGE_VAL;
+        for (int it = 0; it < most_newton; ++it) {
+            MatX J = MatX::Zero(n + elements, n + elements);
+            VecX residual = VecX::Zero(n + elements);
+            J.topLeftCorner(n, n) = V;
+            residual.head(n) = V * there + r0;
+            for (int e = 0; e < elements; ++e) {
+                const auto xe = there.segment(at[e], dims[e]);
+                if (!slides[e]) continue;
+                J.block(at[e], at[e], dims[e], dims[e]).diagonal().array() += m[e];
+                J.block(at[e], n + e, dims[e], 1) = xe;
+                J.block(n + e, at[e], 1, dims[e]) = xe.transpose();
+                residual.segment(at[e], dims[e]) += m[e] * xe;
+                residual[n + e] = 0.5 * (xe.squaredNorm() - 1.0);
+            }
+            const double error = residual.cwiseAbs().maxCoeff();
+            const bool done = error <= newton_tolerance || (error < condition && error >= last);
+            last = error;
+            if (done) break;
+            const VecX step = least_squares(J, residual, rank_threshold);
+            there -= step.head(n);
+            m -= step.tail(elements);
+        }
+        return last < condition;
+    }
+
+    // The modes that the path leads to: what has more acceleration than room slides. Where both are small only the
+    // solution tells: modes that it contradicts are changed until none is. False if they do not come to rest.
+    bool find_modes() {
+        std::vector<char> slides(elements);
+        for (int e = 0; e < elements; ++e) slides[e] = y[e].head > 1.0 - tail(x, e).norm();
+        VecX there(n), m(elements);
+        for (int round = 0; round < 2 * elements + 4; ++round) {
+            int changed = 0, nearest = -1;
+            if (solve_modes(slides, there, m)) {
+                for (int e = 0; e < elements; ++e) {
+                    const bool wrong = slides[e] ? m[e] < -condition : tail(there, e).norm() > 1.0 + condition;
+                    if (!wrong) continue;
+                    slides[e] = !slides[e];
+                    ++changed;
+                }
+                if (changed == 0) {
+                    x = there;
+                    return true;
+                }
+                continue;
+            }
+            for (int e = 0; e < elements; ++e)  // what sticks cannot: the one with the least room slides
+                if (!slides[e] && (nearest < 0 || tail(x, e).norm() > tail(x, nearest).norm())) nearest = e;
+            if (nearest < 0) return false;
+            slides[nearest] = 1;
+        }
+        return false;
+    }
+
+    VecX solve() {
+        follow_central_path();
+        const bool found = find_modes();
+        for (int e = 0; e < elements; ++e) {  // what slides is at its limit, to the last bit
+            const double length = tail(x, e).norm();
+            if (found ? length > 1.0 - condition : y[e].head > 1.0 - length) x.segment(at[e], dims[e]) /= length;
+        }
+        return scale.cwiseProduct(x);
+    }
+};
+
+}  // namespace
+
+VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s) {
+    std::vector<int> rows, own_dims;
+    std::vector<double> limits;
+    for (int e = 0, row = 0; e < static_cast<int>(dims.size()); row += dims[e], ++e) {
+        if (!(s[e] > 0.0)) continue;
+        own_dims.push_back(dims[e]);
+        limits.push_back(s[e]);
+        for (int k = 0; k < dims[e]; ++k) rows.push_back(row + k);
+    }
+    const int n = static_cast<int>(rows.size());
+    MatX own_W(n, n);
+    VecX own_alpha(n), f = VecX::Zero(alpha0.size());
+    for (int i = 0; i < n; ++i) {
+        own_alpha[i] = alpha0[rows[i]];
+        for (int j = 0; j < n; ++j) own_W(i, j) = W(rows[i], rows[j]);
+    }
+    if (n == 0 || own_alpha.isZero(0.0)) return f;
+    const VecX own_f =
+        ConeProgram(own_W, own_alpha, own_dims, Eigen::Map<const VecX>(limits.data(), limits.size())).solve();
+    for (int i = 0; i < n; ++i) f[rows[i]] = own_f[i];
+    return f;
+}
+
+VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s,
+                      const VecX* near) {
+    if (alpha0.size() == 0) return VecX::Zero(0);
+    if (std::all_of(dims.begin(), dims.end(), [](int d) { return d == 1; })) return box_program(W, alpha0, s, near);
+    return ball_program(W, alpha0, dims, s);
+}
+
+VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits) {
+    if (limits.middle.isZero(0.0)) return friction_program(W, alpha0, dims, limits.size);
+    return limits.middle + friction_program(W, alpha0 + W * limits.middle, dims, limits.size);
+}
+
+VecX onset_accelerations(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits) {
+    constexpr double beyond = 1e-6;  // part of the load by which it is raised
+    const VecX more = (1.0 + beyond) * alpha0;
+    return more + W * friction_program(W, more, dims, limits);
+}
+
+}  // namespace pn

@@ -1,0 +1,42 @@
+// Directions of friction: sliding of a sphere or capsule along another one, at the place where they touch.
+#pragma once
+
+#include <tuple>
+
+#include "constraints/geometry.hpp"
+#include "constraints/row_traits.hpp"
+#include "constraints/gaps/segments.hpp"
+
+namespace pn {
+
+struct CapsulesSlipRows : SlipDirections {
+    static constexpr const char* name = "capsules_slip";
+
+    Frame frame1, frame2;
+    double half1, half2, radius1;
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame1", &CapsulesSlipRows::frame1}, Datum{"frame2", &CapsulesSlipRows::frame2},
+                          Datum{"half1", &CapsulesSlipRows::half1}, Datum{"half2", &CapsulesSlipRows::half2},
+                          Datum{"radius1", &CapsulesSlipRows::radius1});
+    }
+    int size() const { return 2; }
+
+    template <class Sides, class Out>
+    PN_INLINE void rows(const Sides& s, Out& out) const {
+        const NearestPoints<Sides> p(s, half1, half2);
+        const TurningTangents<Sides> along(s, p.n, typename Sides::Vec());
+        const auto contact = p.c1 - radius1 * p.n;
+        for (int k = 0; k < 2; ++k) out.wrench[k] = force_at(contact, along.t[k]);
+    }
+    template <class Sides, class Out>
+    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+        const NearestPoints<Sides> p(s, half1, half2);
+        const NearestMotion<Sides> m(s, p);
+        const TurningTangents<Sides> along(s, p.n, m.dn);
+        const auto contact = p.c1 - radius1 * p.n;
+        slide(s, out, along, contact, s.a.velocity(p.c1) + m.along1 - radius1 * m.dn);
+    }
+};
+
+}  // namespace pn

@@ -1,0 +1,51 @@
+// The gap between a segment with a radius, a capsule or a rounded edge, and a cylinder or cone.
+#pragma once
+
+#include <tuple>
+
+#include "constraints/geometry.hpp"
+#include "constraints/row_traits.hpp"
+#include "constraints/gaps/nearest_along_line.hpp"
+
+namespace pn {
+
+struct LineRow {
+    static constexpr const char* name = "line";
+    static constexpr Role role = Role::contact;
+    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
+    static constexpr int pressing = 0;
+    static constexpr Shown shown = Shown::contact;
+
+    Frame frame1, frame2;
+    Revolved solid;
+    double half1, radius;  // half the segment; the sum of both radii
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame1", &LineRow::frame1}, Datum{"frame2", &LineRow::frame2},
+                          Datum{"solid", &LineRow::solid}, Datum{"half1", &LineRow::half1},
+                          Datum{"radius", &LineRow::radius});
+    }
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return true; }
+    bool moves_in_time() const { return false; }
+
+    template <class Sides, class Out>
+    PN_INLINE void residual(const Sides& s, Out& out) const {
+        out.residual[0] = NearestAlongLine<Sides>(s, solid, half1).at.distance - radius;  // Eq. (2)
+    }
+    template <class Sides, class Out>
+    PN_INLINE void place(const Sides& s, Out& out) const {
+        const NearestAlongLine<Sides> p(s, solid, half1);
+        out.residual[0] = p.at.distance - radius;
+        out.wrench[0] = force_at(p.place(), p.at.n);
+    }
+    template <class Sides, class Out>
+    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+        const NearestAlongLine<Sides> p(s, solid, half1);
+        const AlongLineMotion<Sides> m(s, p);
+        out.rate[0] = p.at.n.dot(m.u);
+        out.drift[0] = m.drift;
+    }
+};
+
+}  // namespace pn

@@ -1,0 +1,44 @@
+// Directions of friction: sliding of a capsule or a rounded edge along a cylinder or cone.
+#pragma once
+
+#include <tuple>
+
+#include "constraints/geometry.hpp"
+#include "constraints/row_traits.hpp"
+#include "constraints/gaps/nearest_along_line.hpp"
+#include "constraints/gaps/segments.hpp"
+
+namespace pn {
+
+struct LineSlipRows : SlipDirections {
+    static constexpr const char* name = "line_slip";
+
+    Frame frame1, frame2;
+    Revolved solid;
+    double half1, radius1;
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame1", &LineSlipRows::frame1}, Datum{"frame2", &LineSlipRows::frame2},
+                          Datum{"solid", &LineSlipRows::solid}, Datum{"half1", &LineSlipRows::half1},
+                          Datum{"radius1", &LineSlipRows::radius1});
+    }
+    int size() const { return 2; }
+
+    template <class Sides, class Out>
+    PN_INLINE void rows(const Sides& s, Out& out) const {
+        const NearestAlongLine<Sides> p(s, solid, half1);
+        const TurningTangents<Sides> along(s, p.at.n, typename Sides::Vec());
+        const auto contact = p.place() - radius1 * p.at.n;
+        for (int k = 0; k < 2; ++k) out.wrench[k] = force_at(contact, along.t[k]);
+    }
+    template <class Sides, class Out>
+    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+        const NearestAlongLine<Sides> p(s, solid, half1);
+        const AlongLineMotion<Sides> m(s, p);
+        const TurningTangents<Sides> along(s, p.at.n, m.dn);
+        const auto c = p.place();
+        slide(s, out, along, c - radius1 * p.at.n, s.a.velocity(c) + m.slides * p.e - radius1 * m.dn);
+    }
+};
+
+}  // namespace pn

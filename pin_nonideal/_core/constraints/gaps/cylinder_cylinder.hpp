@@ -1,0 +1,52 @@
+// The gap between two cylinders, cones or disks, each with a radius around it.
+#pragma once
+
+#include <tuple>
+
+#include "constraints/geometry.hpp"
+#include "constraints/row_traits.hpp"
+#include "constraints/gaps/nearest_of_rims.hpp"
+
+namespace pn {
+
+struct RimsRow {
+    static constexpr const char* name = "rims";
+    static constexpr Role role = Role::contact;
+    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
+    static constexpr int pressing = 0;
+    static constexpr Shown shown = Shown::nothing;
+
+    Frame frame1, frame2;
+    Revolved first, second;
+    double radius;  // the sum of both
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame1", &RimsRow::frame1}, Datum{"frame2", &RimsRow::frame2},
+                          Datum{"first", &RimsRow::first}, Datum{"second", &RimsRow::second},
+                          Datum{"radius", &RimsRow::radius});
+    }
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return true; }
+    bool moves_in_time() const { return false; }
+
+    template <class Sides, class Out>
+    PN_INLINE void residual(const Sides& s, Out& out) const {
+        out.residual[0] = NearestOfRims<Sides>(s, first, second).distance - radius;  // Eq. (2)
+    }
+    // The force at the place that slides: the other lies on its line.
+    template <class Sides, class Out>
+    PN_INLINE void place(const Sides& s, Out& out) const {
+        const NearestOfRims<Sides> p(s, first, second);
+        out.residual[0] = p.distance - radius;
+        out.wrench[0] = force_at(p.found.place, p.n);
+    }
+    template <class Sides, class Out>
+    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+        const NearestOfRims<Sides> p(s, first, second);
+        const RimsMotion<Sides> m(p.mover(s), p.found);
+        out.rate[0] = p.found.at.n.dot(m.u);
+        out.drift[0] = m.drift;
+    }
+};
+
+}  // namespace pn

@@ -1,0 +1,52 @@
+// Directions of friction: sliding of a cylinder, cone or disk along another one.
+#pragma once
+
+#include <tuple>
+
+#include "constraints/geometry.hpp"
+#include "constraints/row_traits.hpp"
+#include "constraints/gaps/nearest_of_rims.hpp"
+#include "constraints/gaps/segments.hpp"
+
+namespace pn {
+
+struct RimsSlipRows : SlipDirections {
+    static constexpr const char* name = "rims_slip";
+
+    Frame frame1, frame2;
+    Revolved first, second;
+    double radius1, radius2;
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame1", &RimsSlipRows::frame1}, Datum{"frame2", &RimsSlipRows::frame2},
+                          Datum{"first", &RimsSlipRows::first}, Datum{"second", &RimsSlipRows::second},
+                          Datum{"radius1", &RimsSlipRows::radius1}, Datum{"radius2", &RimsSlipRows::radius2});
+    }
+    int size() const { return 2; }
+
+    template <class Sides, class Out>
+    PN_INLINE void rows(const Sides& s, Out& out) const {
+        const NearestOfRims<Sides> p(s, first, second);
+        const TurningTangents<Sides> along(s, p.n, typename Sides::Vec());
+        for (int k = 0; k < 2; ++k) out.wrench[k] = force_at(contact(p), along.t[k]);
+    }
+    template <class Sides, class Out>
+    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+        const NearestOfRims<Sides> p(s, first, second);
+        const Sides mover = p.mover(s);
+        const RimsMotion<Sides> m(mover, p.found);
+        const TurningTangents<Sides> along(s, p.n, p.turned ? typename Sides::Vec(-m.dn) : m.dn);
+        slide(s, out, along, contact(p), mover.a.velocity(p.found.place) + m.slides - around(p) * m.dn);
+    }
+
+private:
+    // The radius around the body on which the place slides.
+    template <class Nearest>
+    PN_INLINE double around(const Nearest& p) const { return p.turned ? radius2 : radius1; }
+    template <class Sides>
+    PN_INLINE typename Sides::Vec contact(const NearestOfRims<Sides>& p) const {
+        return p.found.place - around(p) * p.found.at.n;
+    }
+};
+
+}  // namespace pn

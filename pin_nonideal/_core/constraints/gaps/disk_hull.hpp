@@ -1,0 +1,56 @@
+// The gap between a disk, the rim of a cylinder or cone, and a convex hull with a radius.
+#pragma once
+
+#include <tuple>
+
+#include "constraints/geometry.hpp"
+#include "constraints/row_traits.hpp"
+#include "constraints/gaps/nearest_of_rim.hpp"
+
+namespace pn {
+
+struct RimRow {
+    static constexpr const char* name = "rim";
+    static constexpr Role role = Role::contact;
+    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
+    static constexpr int pressing = 0;
+    static constexpr Shown shown = Shown::contact;
+
+    Frame frame1, frame2;
+    Hull solid;
+    double rim, radius;  // of the disk, and around the hull
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame1", &RimRow::frame1}, Datum{"frame2", &RimRow::frame2},
+                          Datum{"solid", &RimRow::solid}, Datum{"rim", &RimRow::rim},
+                          Datum{"radius", &RimRow::radius});
+    }
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return true; }
+    bool moves_in_time() const { return false; }
+
+    template <class Sides, class Out>
+    PN_INLINE void residual(const Sides& s, Out& out) const {
+        out.residual[0] = NearestOfRim<Sides>(s, solid, rim).distance - radius;  // Eq. (2)
+    }
+    template <class Sides, class Out>
+    PN_INLINE void place(const Sides& s, Out& out) const {
+        const NearestOfRim<Sides> p(s, solid, rim);
+        out.residual[0] = p.distance - radius;
+        out.wrench[0] = force_at(p.place, p.n);
+    }
+    // Over a face as over a plane; beside an edge as that edge over the disk.
+    template <class Sides, class Out>
+    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+        const NearestOfRim<Sides> p(s, solid, rim);
+        if (p.lowest) {
+            sliding_row(s, out, 0, p.n, p.place, p.lowest->velocity(s, {rim, rim, 0.0}));
+            return;
+        }
+        const AlongLineMotion<Sides> m(p.from_hull(s), *p.line);
+        out.rate[0] = p.line->at.n.dot(m.u);
+        out.drift[0] = m.drift;
+    }
+};
+
+}  // namespace pn

@@ -1,0 +1,45 @@
+// A joint goes no further than its stop: sign (q - bound) stays positive.
+#pragma once
+
+#include <tuple>
+#include <vector>
+
+#include "constraints/coordinates.hpp"
+#include "constraints/row_traits.hpp"
+
+namespace pn {
+
+struct LimitRow {
+    static constexpr const char* name = "limit";
+    static constexpr Role role = Role::contact;
+    static constexpr bool constant_A = true, affine_rate = true, comparable_rows = false;
+    static constexpr int pressing = 0;
+    static constexpr Shown shown = Shown::nothing;
+
+    int joint;
+    double bound, sign;  // sign: +1 of a lower stop, -1 of an upper one
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"joint", &LimitRow::joint}, Datum{"bound", &LimitRow::bound},
+                          Datum{"sign", &LimitRow::sign});
+    }
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return true; }
+    bool moves_in_time() const { return false; }
+    std::vector<int> dofs(const Mechanism& m) const { return {m.joints[joint].iv}; }
+
+    template <class State, class Out>
+    PN_INLINE void residual(const State& s, Out& out) const {
+        out.residual[0] = sign * (joint_angle(s.mechanism.joints[joint], s.q) - bound);  // Eq. (2)
+    }
+    template <class State, class Out>
+    PN_INLINE void rows(const State& s, Out& out) const {
+        out.A(0, s.mechanism.joints[joint].iv) = sign;
+    }
+    template <class State, class Out>
+    PN_INLINE void rate_and_drift(const State& s, Out& out) const {
+        out.rate[0] = sign * s.v[s.mechanism.joints[joint].iv];
+    }
+};
+
+}  // namespace pn

@@ -1,0 +1,116 @@
+// The point of a segment of body 1 that is nearest to a cylinder or cone in frame 2, and how it moves.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "constraints/geometry.hpp"
+#include "constraints/gaps/nearest_on_revolved.hpp"
+#include "constraints/gaps/segments.hpp"
+
+namespace pn {
+
+// Slope of the distance along the segment that rounding leaves where it is least.
+constexpr double level_line = 1e-15;
+// Its curvature, in parts of the inverse of the segment's length, below which all places along it are as near.
+constexpr double straight_line = 1e-12;
+// Slope beyond which the nearest place is a kink of the distance, inside the solid.
+constexpr double kink = 1e-9;
+// A search that only halves ends after so many looks; one of Newton's takes three to eight.
+constexpr int most_line_looks = 100;
+
+template <class Sides>
+struct NearestAlongLine {
+    using Vec = typename Sides::Vec;
+    using Scalar = typename Sides::Scalar;
+    using OnSolid = NearestOnRevolved<Sides>;
+    Vec middle, e;        // of the segment, and along it
+    Scalar part;          // where on it, from its middle
+    OnSolid at;           // the nearest point there
+    Scalar bend;          // curvature of the distance along the segment
+    bool free = false;    // inside the segment, and nearest by a curvature
+
+    // The distance of a place from a convex solid is convex along the segment: its slope, the normal along the segment,
+    // only grows. Newton's steps find where it is none, between ends that close in.
+    PN_INLINE NearestAlongLine(const Sides& s, const Revolved& solid, const Vec& x, const Vec& along, double half)
+        : middle(x), e(along), part(first(s, solid, half)), at(there(s), solid), bend(0.0) {
+        if (half == 0.0) return;
+        Scalar low = -half, high = half, steepest = HUGE_VAL;
+        bool low_seen = false, high_seen = false;
+        for (int look = 0; look < most_line_looks; ++look) {
+            if (look > 0) at = OnSolid(there(s), solid);
+            const Scalar slope = e.dot(at.n), steep = slope < 0.0 ? -slope : slope;
+            bend = e.dot(at.turning(e));
+            if (!(steep > level_line)) break;
+            const bool fast = steep < 0.5 * steepest && bend > 0.0;
+            steepest = steep;
+            (slope > 0.0 ? high : low) = part;
+            (slope > 0.0 ? high_seen : low_seen) = true;
+            if (!(high > low)) break;
+            const Scalar newton = fast ? Scalar(part - slope / bend) : Scalar(slope > 0.0 ? low : high);
+            // An end may be the nearest place; between two that were seen it lies inside.
+            Scalar next = newton;
+            if (!(newton < high)) next = high_seen ? Scalar(0.5 * (low + high)) : high;
+            if (!(newton > low)) next = low_seen ? Scalar(0.5 * (low + high)) : low;
+            if (!(next > part) && !(next < part)) break;
+            part = next;
+        }
+        const Scalar slope = e.dot(at.n);
+        free = part > -half && part < half && bend * half > straight_line && slope * slope < kink * kink;
+        if (!free) return;
+        part = part - slope / bend;
+        at = OnSolid(there(s), solid);
+        bend = e.dot(at.turning(e));
+    }
+    // Along z of frame 1, about its origin.
+    PN_INLINE NearestAlongLine(const Sides& s, const Revolved& solid, double half)
+        : NearestAlongLine(s, solid, s.a.x, s.a.R * Vec3::UnitZ(), half) {}
+    PN_INLINE Vec place() const { return middle + part * e; }
+
+private:
+    PN_INLINE Sides there(const Sides& s) const {
+        Sides out = s;
+        out.a.x = place();
+        return out;
+    }
+    // The place that is nearest to the solid's axis; where they are parallel, the middle of what lies beside the solid.
+    PN_INLINE Scalar first(const Sides& s, const Revolved& solid, double half) const {
+        const Vec axis = s.b.R * Vec3::UnitZ(), apart = middle - s.b.x;
+        const Scalar cosine = e.dot(axis), square = 1.0 - cosine * cosine, up = apart.dot(axis);
+        Scalar nearest;
+        if (square > parallel_segments) {
+            nearest = (up * cosine - e.dot(apart)) / square;
+        } else {
+            const Scalar least = up - half > -solid.half ? Scalar(up - half) : Scalar(-solid.half);
+            const Scalar most = up + half < solid.half ? Scalar(up + half) : Scalar(solid.half);
+            nearest = cosine * (0.5 * (least + most) - up);
+        }
+        return nearest > half ? Scalar(half) : nearest < -half ? Scalar(-half) : nearest;
+    }
+};
+
+// How it moves: it slides along the segment so that the normal stays at a right angle to that.
+template <class Sides>
+struct AlongLineMotion {
+    using Vec = typename Sides::Vec;
+    using Scalar = typename Sides::Scalar;
+    Vec u;       // velocity of body 1 against body 2 at the nearest place of the segment
+    Scalar slides;  // that place along it
+    Vec dn;      // rate of the normal
+    Scalar drift;   // of the distance: its second rate at zero acceleration
+
+    PN_INLINE AlongLineMotion(const Sides& s, const NearestAlongLine<Sides>& p)
+        : u(), slides(0.0), dn(), drift(0.0) {
+        const Vec c = p.place();
+        u = s.a.velocity(c) - s.b.velocity(c);
+        const Vec turning = p.at.turning(u);
+        // Of the slope of the distance along the segment, at a place that stays on it.
+        const Scalar rate = turning.dot(p.e) + p.at.n.dot((s.a.omega() - s.b.omega()).cross(p.e));
+        if (p.free) slides = -rate / p.bend;
+        dn = s.b.omega().cross(p.at.n) + turning + slides * p.at.turning(p.e);
+        const Vec du = s.a.acceleration(c) - s.b.acceleration(c) - 2.0 * s.b.omega().cross(u);
+        drift = p.at.n.dot(du) + turning.dot(u) + slides * rate;
+    }
+};
+
+}  // namespace pn

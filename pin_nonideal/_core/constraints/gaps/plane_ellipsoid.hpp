@@ -1,0 +1,50 @@
+// The gap between an ellipsoid, or a disk, and the plane of frame 2.
+#pragma once
+
+#include <algorithm>
+#include <tuple>
+
+#include "constraints/geometry.hpp"
+#include "constraints/row_traits.hpp"
+#include "constraints/gaps/lowest_on_ellipsoid.hpp"
+
+namespace pn {
+
+struct EllipsoidRow {
+    static constexpr const char* name = "ellipsoid";
+    static constexpr Role role = Role::contact;
+    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
+    static constexpr int pressing = 0;
+    static constexpr Shown shown = Shown::contact;
+
+    Frame frame1, frame2;
+    Vec3 normal, semiaxes;
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame", &EllipsoidRow::frame1}, Datum{"plane", &EllipsoidRow::frame2},
+                          Datum{"normal", &EllipsoidRow::normal}, Datum{"semiaxes", &EllipsoidRow::semiaxes});
+    }
+    double reach() const { return std::max({semiaxes[0], semiaxes[1], semiaxes[2]}); }
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return true; }
+    bool moves_in_time() const { return false; }
+
+    template <class Sides, class Out>
+    PN_INLINE void residual(const Sides& s, Out& out) const {
+        const LowestOnEllipsoid<Sides> lowest(s, normal, semiaxes);
+        out.residual[0] = lowest.n.dot(s.a.x - s.b.x) - lowest.depth;  // Eq. (2)
+    }
+    template <class Sides, class Out>
+    PN_INLINE void place(const Sides& s, Out& out) const {
+        const LowestOnEllipsoid<Sides> lowest(s, normal, semiaxes);
+        out.residual[0] = lowest.n.dot(s.a.x - s.b.x) - lowest.depth;
+        out.wrench[0] = force_at(lowest.place, lowest.n);
+    }
+    template <class Sides, class Out>
+    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+        const LowestOnEllipsoid<Sides> lowest(s, normal, semiaxes);
+        sliding_row(s, out, 0, lowest.n, lowest.place, lowest.velocity(s, semiaxes));
+    }
+};
+
+}  // namespace pn

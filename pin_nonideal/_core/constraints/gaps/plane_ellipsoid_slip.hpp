@@ -1,0 +1,42 @@
+// Directions of friction: sliding of an ellipsoid's lowest point along the plane of frame 2.
+#pragma once
+
+#include <tuple>
+
+#include "constraints/geometry.hpp"
+#include "constraints/row_traits.hpp"
+#include "constraints/gaps/lowest_on_ellipsoid.hpp"
+
+namespace pn {
+
+struct EllipsoidSlipRows : SlipDirections {
+    static constexpr const char* name = "ellipsoid_slip";
+
+    Frame frame1, frame2;
+    Vec3 semiaxes, tangent1, tangent2, normal;
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame", &EllipsoidSlipRows::frame1}, Datum{"plane", &EllipsoidSlipRows::frame2},
+                          Datum{"semiaxes", &EllipsoidSlipRows::semiaxes},
+                          Datum{"tangent1", &EllipsoidSlipRows::tangent1},
+                          Datum{"tangent2", &EllipsoidSlipRows::tangent2},
+                          Datum{"normal", &EllipsoidSlipRows::normal});
+    }
+    int size() const { return 2; }
+
+    template <class Sides, class Out>
+    PN_INLINE void rows(const Sides& s, Out& out) const {
+        const LowestOnEllipsoid<Sides> lowest(s, normal, semiaxes);
+        out.wrench[0] = force_at(lowest.place, s.b.R * tangent1);
+        out.wrench[1] = force_at(lowest.place, s.b.R * tangent2);
+    }
+    template <class Sides, class Out>
+    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+        const LowestOnEllipsoid<Sides> lowest(s, normal, semiaxes);
+        const auto rate = lowest.velocity(s, semiaxes);
+        sliding_row(s, out, 0, s.b.R * tangent1, lowest.place, rate);
+        sliding_row(s, out, 1, s.b.R * tangent2, lowest.place, rate);
+    }
+};
+
+}  // namespace pn

@@ -1,0 +1,58 @@
+// The gap between a sphere and a convex solid, both with a radius.
+#pragma once
+
+#include <tuple>
+
+#include "constraints/geometry.hpp"
+#include "constraints/row_traits.hpp"
+#include "constraints/gaps/nearest_on_hull.hpp"
+#include "constraints/gaps/nearest_on_revolved.hpp"
+
+namespace pn {
+
+// Solid: a shape in the axes of frame 2 that knows its nearest point, how far it reaches, and its supporting planes.
+template <class Solid>
+struct SolidRow {
+    static constexpr const char* name = Solid::gap;
+    static constexpr Role role = Role::contact;
+    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
+    static constexpr int pressing = 0;
+    static constexpr Shown shown = Shown::contact;
+
+    Frame frame1, frame2;
+    Solid solid;
+    double radius;  // the sum of both
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame1", &SolidRow::frame1}, Datum{"frame2", &SolidRow::frame2},
+                          Datum{"solid", &SolidRow::solid}, Datum{"radius", &SolidRow::radius});
+    }
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return true; }
+    bool moves_in_time() const { return false; }
+
+    template <class Sides>
+    PN_INLINE auto nearest(const Sides& s) const { return typename Solid::template Nearest<Sides>(s, solid); }
+    template <class Sides, class Out>
+    PN_INLINE void residual(const Sides& s, Out& out) const {
+        out.residual[0] = nearest(s).distance - radius;  // Eq. (2)
+    }
+    template <class Sides, class Out>
+    PN_INLINE void place(const Sides& s, Out& out) const {
+        const auto p = nearest(s);
+        out.residual[0] = p.distance - radius;
+        out.wrench[0] = force_at(s.a.x, p.n);
+    }
+    template <class Sides, class Out>
+    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+        const auto p = nearest(s);
+        const PointMotion<typename Sides::Pose> motion(s);
+        out.rate[0] = p.n.dot(motion.u);
+        out.drift[0] = p.n.dot(motion.du) + p.turning(motion.u).dot(motion.u);
+    }
+};
+
+using HullRow = SolidRow<Hull>;
+using RevolvedRow = SolidRow<Revolved>;
+
+}  // namespace pn

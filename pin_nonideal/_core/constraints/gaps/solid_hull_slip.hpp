@@ -1,0 +1,50 @@
+// Directions of friction: sliding of a sphere along a convex solid.
+#pragma once
+
+#include <tuple>
+
+#include "constraints/geometry.hpp"
+#include "constraints/row_traits.hpp"
+#include "constraints/gaps/nearest_on_hull.hpp"
+#include "constraints/gaps/nearest_on_revolved.hpp"
+#include "constraints/gaps/segments.hpp"
+
+namespace pn {
+
+template <class Solid>
+struct SolidSlipRows : SlipDirections {
+    static constexpr const char* name = Solid::slip;
+
+    Frame frame1, frame2;
+    Solid solid;
+    double radius1;
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame1", &SolidSlipRows::frame1}, Datum{"frame2", &SolidSlipRows::frame2},
+                          Datum{"solid", &SolidSlipRows::solid}, Datum{"radius1", &SolidSlipRows::radius1});
+    }
+    int size() const { return 2; }
+
+    template <class Sides>
+    PN_INLINE auto nearest(const Sides& s) const { return typename Solid::template Nearest<Sides>(s, solid); }
+    template <class Sides, class Out>
+    PN_INLINE void rows(const Sides& s, Out& out) const {
+        const auto p = nearest(s);
+        const TurningTangents<Sides> along(s, p.n, typename Sides::Vec());
+        const auto contact = s.a.x - radius1 * p.n;
+        for (int k = 0; k < 2; ++k) out.wrench[k] = force_at(contact, along.t[k]);
+    }
+    template <class Sides, class Out>
+    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+        const auto p = nearest(s);
+        const auto dn = s.b.omega().cross(p.n) + p.turning(s.a.velocity(s.a.x) - s.b.velocity(s.a.x));
+        const TurningTangents<Sides> along(s, p.n, dn);
+        const auto contact = s.a.x - radius1 * p.n;
+        slide(s, out, along, contact, s.a.velocity(s.a.x) - radius1 * dn);
+    }
+};
+
+using HullSlipRows = SolidSlipRows<Hull>;
+using RevolvedSlipRows = SolidSlipRows<Revolved>;
+
+}  // namespace pn

@@ -1,0 +1,46 @@
+// A gap as the user's functions give it.
+#pragma once
+
+#include "constraints/rows/user.hpp"
+
+namespace pn {
+
+struct UserGapRow {
+    static constexpr const char* name = "user_gap";
+    static constexpr Role role = Role::contact;
+    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
+    static constexpr int pressing = 0;
+    static constexpr Shown shown = Shown::nothing;
+
+    decltype(UserRows::function) function;
+    decltype(UserRows::residual_function) gap;
+    decltype(UserRows::rate_function) gap_rate;
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"rows", &UserGapRow::function}, Datum{"gap", &UserGapRow::gap},
+                          Datum{"rate", &UserGapRow::gap_rate});
+    }
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return true; }
+    bool moves_in_time() const { return true; }
+    std::vector<int> dofs(const Mechanism& m) const { return all_dofs(m); }
+
+    template <class State, class Out>
+    PN_INLINE void residual(const State& s, Out& out) const {
+        gap(s.t, s.q, out.scratch);
+        out.residual[0] = out.scratch[0];  // Eq. (2)
+    }
+    // A and b come together.
+    template <class State, class Out>
+    PN_INLINE void rows(const State& s, Out& out) const {
+        function(s.t, s.q, s.v, out.A, out.b);
+        out.drift[0] = -out.b[0];
+    }
+    template <class State, class Out>
+    PN_INLINE void rate_and_drift(const State& s, Out& out) const {
+        gap_rate(s.t, s.q, s.v, out.scratch);
+        out.rate[0] = out.scratch[0];
+    }
+};
+
+}  // namespace pn

@@ -1,0 +1,96 @@
+#include "constraints/pull_feasibility.hpp"
+
+#include <algorithm>
+
+#include "math/decompositions.hpp"
+#include "math/nnls.hpp"
+
+namespace pn {
+
+namespace {
+
+// Part of a unit vector of multipliers that exert no force below which a row takes no part in it.
+constexpr double takes_part = 1e-9;
+constexpr double binding = 1e-6;     // part of the weights below which a row does not bind
+constexpr double rounding = 1e-12;   // part of the loads that a margin may be off
+
+// Multipliers of all described rows that exert no force together: the rows of Z are theirs, and its columns are
+// orthonormal. With the first described row of each row in use as what the others depend on, A_others = C A_first, they
+// are y_first = -C^T z, y_others = z.
+MatX free_described(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
+                    const DescribedRows& all, RowSystem& s) {
+    const std::vector<int> dependent = dependent_rows(s);
+    const MatX W = dependence(layout, blocks, B, s, dependent);
+    std::vector<int> first(layout.rows, -1), place(layout.rows, -1), others;
+    for (size_t k = 0; k < dependent.size(); ++k) place[dependent[k]] = static_cast<int>(k);
+    for (int i = 0; i < static_cast<int>(all.rows.size()); ++i) {
+        const int kept = all.rows[i].kept;
+        if (kept < 0 || !s.required[kept]) continue;
+        if (s.active[kept] && first[kept] < 0 && all.rows[i].factor == 1.0) first[kept] = i;
+        else others.push_back(i);
+    }
+    const int n = static_cast<int>(others.size());
+    MatX C = MatX::Zero(n, layout.rows);
+    for (int k = 0; k < n; ++k) {
+        const DescribedRows::Row& row = all.rows[others[k]];
+        if (place[row.kept] >= 0) C.row(k) = row.factor * W.row(place[row.kept]);
+        else C(k, row.kept) = row.factor;
+    }
+    MatX Z = MatX::Zero(static_cast<Eigen::Index>(all.rows.size()), n);
+    for (int r = 0; r < layout.rows; ++r)
+        if (first[r] >= 0) Z.row(first[r]) = -C.col(r).transpose();
+    for (int k = 0; k < n; ++k) Z(others[k], k) = 1.0;
+    const MatX S = MatX::Identity(n, n) + C * C.transpose();
+    Cholesky factor;
+    factor.compute(S);
+    return factor.solve_lower(Z.transpose()).transpose();
+}
+
+// What the pressing rows have of these multipliers.
+MatX of_pressing(const std::vector<int>& pressing, const MatX& Z) {
+    MatX part(static_cast<Eigen::Index>(pressing.size()), Z.cols());
+    for (size_t k = 0; k < pressing.size(); ++k) {
+        part.row(k) = Z.row(pressing[k]);
+        if (!(part.row(k).norm() > takes_part)) part.row(k).setZero();
+    }
+    return part;
+}
+
+// All that one shares a load with, directly or not, itself first.
+std::vector<int> sharing_with(int index, const MatX& Z) {
+    const MatX coupling = Z * Z.transpose();
+    std::vector<int> found{index};
+    for (size_t k = 0; k < found.size(); ++k)
+        for (int j = 0; j < static_cast<int>(Z.rows()); ++j)
+            if (std::abs(coupling(found[k], j)) > takes_part * takes_part &&
+                std::find(found.begin(), found.end(), j) == found.end())
+                found.push_back(j);
+    return found;
+}
+
+}  // namespace
+
+Press press(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
+            const DescribedRows& all, const std::vector<int>& pressing, RowSystem& s, const VecX& shared, int index) {
+    const double own = all.share(pressing[index], shared);
+    const Press alone{own, {index}, {index}, own < 0.0};
+    if (!s.redundant && !all.copied) return alone;
+    const MatX of_all = of_pressing(pressing, free_described(layout, blocks, B, all, s));
+    if (of_all.row(index).isZero(0.0)) return alone;
+    Press found{own, sharing_with(index, of_all), {}, false};
+    const int n = static_cast<int>(found.sharing.size());
+    MatX Z(n, of_all.cols());
+    VecX N(n);
+    for (int k = 0; k < n; ++k) {
+        Z.row(k) = of_all.row(found.sharing[k]);
+        N[k] = all.share(pressing[found.sharing[k]], shared);
+    }
+    const LargestLeast least = largest_least(Z, N);
+    found.margin = least.value;
+    found.must_pull = least.value < -rounding * N.cwiseAbs().maxCoeff();
+    for (int k = 0; k < least.weight.size(); ++k)
+        if (least.weight[k] > binding * least.weight.maxCoeff()) found.pulling.push_back(found.sharing[k]);
+    return found;
+}
+
+}  // namespace pn

@@ -1,0 +1,101 @@
+#include "constraints/qr_factor.hpp"
+
+#include <algorithm>
+
+namespace pn {
+
+namespace {
+
+// Columns whose squared lengths differ by less than this part are of one length, and the earlier goes first: rounding
+// does not choose among rows of equal worth.
+constexpr double tie = 1e-12;
+
+// Rows of unit length in use as columns of Q.
+void dense_columns(const std::vector<Block>& blocks, const std::vector<double>& B,
+                   const std::vector<char>& use, RowSystem& s) {
+    if (s.Q.cols() == 0) s.Q.resize(s.Q.rows(), s.scale.size());
+    s.columns.clear();
+    for (int index : s.blocks) {
+        const Block& block = blocks[index];
+        const int r = static_cast<int>(block.kept.size());
+        for (int k = 0; k < r; ++k) {
+            if (!use[block.row + k]) continue;
+            const int c = static_cast<int>(s.columns.size());
+            s.columns.push_back(block.row + k);
+            auto column = s.Q.col(c);
+            column.setZero();
+            for (size_t l = 0; l < block.support.size(); ++l)
+                column[block.support[l]] = B[block.offset + l * r + k] * s.scale[block.row + k];
+        }
+    }
+}
+
+// Householder factorization of the first n columns of Q in place, with column pivoting when asked. Returns the rank.
+int householder(RowSystem& s, int n, bool pivot, double tolerance) {
+    const int m = static_cast<int>(s.Q.rows());
+    for (int k = 0; k < n; ++k) {
+        if (k >= m) return k;
+        if (pivot) {
+            int best = k;
+            double best_norm = -1.0;
+            for (int c = k; c < n; ++c) {
+                const double norm = s.Q.col(c).tail(m - k).squaredNorm();
+                if (norm > best_norm * (1.0 + tie)) { best_norm = norm; best = c; }
+            }
+            if (best != k) {
+                s.Q.col(k).swap(s.Q.col(best));
+                std::swap(s.columns[k], s.columns[best]);
+            }
+        }
+        auto x = s.Q.col(k).tail(m - k);
+        const double norm = x.norm();
+        if (pivot && norm <= tolerance) return k;
+        if (norm == 0.0) { s.tau[k] = 0.0; continue; }
+        const double beta = x[0] > 0.0 ? -norm : norm;
+        s.tau[k] = (beta - x[0]) / beta;
+        const double inverse = 1.0 / (x[0] - beta);
+        x.tail(m - k - 1) *= inverse;
+        x[0] = beta;
+        for (int c = k + 1; c < n; ++c) {
+            auto y = s.Q.col(c).tail(m - k);
+            const double w = s.tau[k] * (y[0] + x.tail(m - k - 1).dot(y.tail(m - k - 1)));
+            y[0] -= w;
+            y.tail(m - k - 1) -= w * x.tail(m - k - 1);
+        }
+    }
+    return n;
+}
+
+}  // namespace
+
+void find_independent(const std::vector<Block>& blocks, const std::vector<double>& B, double tolerance, int most,
+                      RowSystem& s) {
+    dense_columns(blocks, B, s.required, s);
+    s.rank = std::min(most, householder(s, static_cast<int>(s.columns.size()), true, tolerance));
+    std::fill(s.active.begin(), s.active.end(), char(0));
+    for (int k = 0; k < s.rank; ++k) s.active[s.columns[k]] = 1;
+    s.redundant = s.rank < static_cast<int>(s.columns.size());
+}
+
+void factor_orthogonally(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s) {
+    dense_columns(blocks, B, s.active, s);
+    householder(s, static_cast<int>(s.columns.size()), false, 0.0);
+}
+
+void solve_orthogonally(RowSystem& s, const VecX& r, VecX& lam) {
+    const int k = static_cast<int>(s.columns.size());
+    auto y = s.work.head(k);
+    for (int i = 0; i < k; ++i) {
+        double sum = r[s.columns[i]] * s.scale[s.columns[i]];
+        for (int j = 0; j < i; ++j) sum -= s.Q(j, i) * y[j];
+        y[i] = s.Q(i, i) != 0.0 ? sum / s.Q(i, i) : 0.0;
+    }
+    for (int i = k - 1; i >= 0; --i) {
+        double sum = y[i];
+        for (int j = i + 1; j < k; ++j) sum -= s.Q(i, j) * y[j];
+        y[i] = s.Q(i, i) != 0.0 ? sum / s.Q(i, i) : 0.0;
+        lam[s.columns[i]] = y[i] * s.scale[s.columns[i]];
+    }
+}
+
+}  // namespace pn

@@ -1,0 +1,73 @@
+// Members that a struct needs to be a kind of constraint, checked at compile time.
+#pragma once
+
+#include <string>
+#include <type_traits>
+
+#include "constraints/geometry.hpp"
+#include "constraints/row_traits.hpp"
+
+namespace pn {
+
+struct RowValues;
+struct State;
+
+template <class K, class = void>
+constexpr bool is_geometric = false;
+template <class K>
+constexpr bool is_geometric<K, std::void_t<decltype(&K::frame1), decltype(&K::frame2)>> = true;
+
+// Whether K answers a question: a lambda that asks it.
+template <class K, class Question>
+constexpr bool answers(Question) { return std::is_invocable_v<Question, const K&>; }
+// Its constants as types, so that a question can ask for them.
+template <class K> using ConstantA = std::bool_constant<std::decay_t<K>::constant_A>;
+template <class K> using AffineRate = std::bool_constant<std::decay_t<K>::affine_rate>;
+template <class K> using ComparableRows = std::bool_constant<std::decay_t<K>::comparable_rows>;
+template <class K> using ShownAs = std::integral_constant<Shown, std::decay_t<K>::shown>;
+template <class K> using Called = decltype(std::string(std::decay_t<K>::name));
+template <class K> using RoleOf = std::integral_constant<Role, std::decay_t<K>::role>;
+// Something of a type, in questions that nobody asks.
+template <class T> T given();
+
+// Whether K gives residual and rows at once, from nearest points found once.
+template <class K, class At, class Out = RowValues>
+constexpr bool places = answers<K>([](const auto& k) -> decltype(k.place(given<At>(), given<Out&>())) {});
+
+// A struct is a kind when it says all this of itself.
+template <class K>
+constexpr bool is_complete() {
+    using At = std::conditional_t<is_geometric<K>, const Sides<Pose>&, const State&>;
+    static_assert(answers<K>([](const auto& k) -> Called<decltype(k)> { return {}; }),
+                  "a kind needs `static constexpr const char* name`: by which Python adds it");
+    static_assert(answers<K>([](const auto& k) -> RoleOf<decltype(k)> { return {}; }),
+                  "a kind needs `static constexpr Role role`: a constraint, a contact or a direction of friction");
+    static_assert(answers<K>([](const auto& k) -> decltype(k.data(), void()) {}),
+                  "a kind needs `static constexpr auto data()`: what it is made of, by name");
+    static_assert(answers<K>([](const auto& k) -> decltype(int(k.size())) { return 0; }),
+                  "a kind needs `int size() const`: its number of rows");
+    static_assert(answers<K>([](const auto& k) -> decltype(bool(k.is_holonomic(0))) { return true; }),
+                  "a kind needs `bool is_holonomic(int row) const`: whether a position stands behind the row");
+    static_assert(answers<K>([](const auto& k) -> decltype(bool(k.moves_in_time())) { return true; }),
+                  "a kind needs `bool moves_in_time() const`: whether its rate may differ from zero at rest");
+    static_assert(is_geometric<K> ||
+                      answers<K>([](const auto& k) -> decltype(k.dofs(given<const Mechanism&>())) { return {}; }),
+                  "a kind needs `Frame frame1, frame2`, or `std::vector<int> dofs(const Mechanism&) const`");
+    static_assert(answers<K>([](const auto& k) -> ConstantA<decltype(k)> { return {}; }),
+                  "a kind needs `static constexpr bool constant_A`: whether A never changes");
+    static_assert(answers<K>([](const auto& k) -> AffineRate<decltype(k)> { return {}; }),
+                  "a kind needs `static constexpr bool affine_rate`: whether its rate is A(q, t) v + phi_t");
+    static_assert(answers<K>([](const auto& k) -> ComparableRows<decltype(k)> { return {}; }),
+                  "a kind needs `static constexpr bool comparable_rows`: components of one vector");
+    static_assert(answers<K>([](const auto& k) -> ShownAs<decltype(k)> { return {}; }),
+                  "a kind needs `static constexpr Shown shown`: what a replay shows of it");
+    static_assert(answers<K>([](const auto& k) -> decltype(k.residual(given<At>(), given<RowValues&>())) {}),
+                  "a kind needs `residual`: phi(q, t) of each row, with phi_t and phi_tt where it moves");
+    static_assert(places<K, At> || answers<K>([](const auto& k) -> decltype(k.rows(given<At>(), given<RowValues&>())) {}),
+                  "a kind needs `rows`: unit wrenches, or A itself; or `place`: residual and rows at once");
+    static_assert(answers<K>([](const auto& k) -> decltype(k.rate_and_drift(given<At>(), given<RowValues&>())) {}),
+                  "a kind needs `rate_and_drift`: A v + phi_t, and its rate at zero acceleration");
+    return true;
+}
+
+}  // namespace pn

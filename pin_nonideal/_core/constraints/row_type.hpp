@@ -1,0 +1,98 @@
+// The kinds of constraints, and of directions along which friction acts.
+//
+// A kind is one struct in one header that knows everything about itself; constraints/kinds/complete.hpp lists what. Most
+// kinds act between two bodies: a row is then the power of a unit wrench w on the motion of body 1 relative to body 2, so
+// that A_j = w . J_j, and the multiplier is the size of that wrench. The others act on dofs directly and write A.
+#pragma once
+
+#include <utility>
+#include <variant>
+
+#include "constraints/gaps/point_box.hpp"
+#include "constraints/gaps/point_box_slip.hpp"
+#include "constraints/gaps/capsule_capsule.hpp"
+#include "constraints/gaps/capsule_capsule_slip.hpp"
+#include "constraints/gaps/plane_point.hpp"
+#include "constraints/gaps/plane_point_slip.hpp"
+#include "constraints/rows/coupling.hpp"
+#include "constraints/rows/coupling_slip.hpp"
+#include "constraints/rows/distance.hpp"
+#include "constraints/rows/dof_slip.hpp"
+#include "constraints/gaps/plane_ellipsoid.hpp"
+#include "constraints/gaps/plane_ellipsoid_slip.hpp"
+#include "constraints/rows/frame.hpp"
+#include "constraints/rows/hinge.hpp"
+#include "constraints/rows/hinge_slip.hpp"
+#include "constraints/rows/knife_edge.hpp"
+#include "constraints/gaps/limit.hpp"
+#include "constraints/gaps/capsule_cylinder.hpp"
+#include "constraints/gaps/capsule_cylinder_slip.hpp"
+#include "constraints/rows/motion.hpp"
+#include "constraints/rows/point.hpp"
+#include "constraints/gaps/disk_hull.hpp"
+#include "constraints/gaps/disk_hull_slip.hpp"
+#include "constraints/gaps/cylinder_cylinder.hpp"
+#include "constraints/gaps/cylinder_cylinder_slip.hpp"
+#include "constraints/rows/rolling.hpp"
+#include "constraints/gaps/solid_hull.hpp"
+#include "constraints/gaps/solid_hull_slip.hpp"
+#include "constraints/rows/spin_slip.hpp"
+#include "constraints/rows/user.hpp"
+#include "constraints/gaps/user_gap.hpp"
+#include "constraints/rows/user_slip.hpp"
+
+namespace pn {
+
+using Kind = std::variant<PointRows, ContactRow, CapsulesRow, BoxRow, FrameRows, HingeRows, DistanceRows, KnifeRows,
+                          RollingRows, CouplingRows, MotionRows, LimitRow, UserRows, UserGapRow, DofRows,
+                          HingeSlipRows, TurnSlipRows, ContactSlipRows, CapsulesSlipRows, BoxSlipRows, CouplingSlipRow,
+                          UserSlipRows, EllipsoidRow, EllipsoidSlipRows, HullRow, HullSlipRows, RevolvedRow,
+                          RevolvedSlipRows, LineRow, LineSlipRows, RimRow, RimSlipRows, RimsRow,
+                          RimsSlipRows>;
+
+// Rows of one constraint before any is left out.
+struct RowValues {
+    int rows = 0;
+    bool geometric = false;  // rows are wrenches between two bodies
+    std::vector<Wrench> wrench;
+    std::vector<double> drift, residual, rate;
+    std::vector<double> phi_t, phi_tt;  // explicit rates in time of the residual
+    MatX A;  // rows x nv, when not geometric
+    bool constant_A = false, has_A = false;  // A that never changes is written once
+    VecX b, scratch;
+
+    void resize(const Kind& kind, int nv);
+};
+
+// What an evaluation of a kind may read.
+struct State {
+    const Mechanism& mechanism;
+    const Terms& terms;
+    double t;
+    const VecX &q, &v;
+};
+
+// What a kind knows of itself, whichever it is.
+int size(const Kind& kind);
+bool is_holonomic(const Kind& kind, int row);
+bool moves_in_time(const Kind& kind);
+bool has_constant_A(const Kind& kind);
+bool has_affine_rate(const Kind& kind);
+bool has_comparable_rows(const Kind& kind);
+// The row whose multiplier should press, or -1.
+int pressing_row(const Kind& kind);
+Role role(const Kind& kind);
+Shown shown(const Kind& kind);
+// Its two frames, where it acts between bodies; else none.
+std::pair<const Frame*, const Frame*> frames(const Kind& kind);
+// The functions of time that move it.
+std::vector<const TimeFunction*> time_functions(const Kind& kind);
+// Dofs on which A may differ from zero.
+std::vector<int> dofs(const Kind& kind, const Mechanism& m);
+
+// What of all rows of the kind is evaluated: the residuals alone; residuals and wrenches or A, which bodies in their
+// places give; or rates and drifts, which need bodies in motion, and the place part before.
+enum class Part { residual, place, motion };
+void evaluate(const Kind& kind, const State& s, Part part, RowValues& out);
+
+}  // namespace pn

@@ -1,0 +1,49 @@
+// q1 = ratio q2 + offset: gears, belts.
+#pragma once
+
+#include <tuple>
+#include <vector>
+
+#include "constraints/coordinates.hpp"
+#include "constraints/row_traits.hpp"
+
+namespace pn {
+
+struct CouplingRows {
+    static constexpr const char* name = "coupling";
+    static constexpr Role role = Role::constraint;
+    static constexpr bool constant_A = true, affine_rate = true, comparable_rows = false;
+    static constexpr Shown shown = Shown::gear;
+
+    int joint1, joint2;
+    double ratio, offset, period;  // period of the residual for joints that turn without end; 0: none
+    bool position;                 // false: no angle tells the residual, and only the rate is bound
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"joint1", &CouplingRows::joint1}, Datum{"joint2", &CouplingRows::joint2},
+                          Datum{"ratio", &CouplingRows::ratio}, Datum{"offset", &CouplingRows::offset},
+                          Datum{"period", &CouplingRows::period}, Datum{"position", &CouplingRows::position});
+    }
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return true; }
+    bool moves_in_time() const { return false; }
+    std::vector<int> dofs(const Mechanism& m) const { return {m.joints[joint1].iv, m.joints[joint2].iv}; }
+
+    template <class State, class Out>
+    PN_INLINE void residual(const State& s, Out& out) const {
+        const Joint &j1 = s.mechanism.joints[joint1], &j2 = s.mechanism.joints[joint2];
+        const auto gap = joint_angle(j1, s.q) - ratio * joint_angle(j2, s.q) - offset;  // Eq. (2)
+        if (position) out.residual[0] = wrap(gap, period);
+    }
+    template <class State, class Out>
+    PN_INLINE void rows(const State& s, Out& out) const {
+        out.A(0, s.mechanism.joints[joint1].iv) = 1.0;
+        out.A(0, s.mechanism.joints[joint2].iv) = -ratio;
+    }
+    template <class State, class Out>
+    PN_INLINE void rate_and_drift(const State& s, Out& out) const {
+        out.rate[0] = s.v[s.mechanism.joints[joint1].iv] - ratio * s.v[s.mechanism.joints[joint2].iv];
+    }
+};
+
+}  // namespace pn

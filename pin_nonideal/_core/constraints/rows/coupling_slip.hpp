@@ -1,0 +1,43 @@
+// Direction of friction: sliding of the teeth or threads of a coupling, as weights of the velocities of its joints.
+#pragma once
+
+#include <tuple>
+#include <vector>
+
+#include "constraints/coordinates.hpp"
+#include "constraints/row_traits.hpp"
+
+namespace pn {
+
+struct CouplingSlipRow {
+    static constexpr const char* name = "coupling_slip";
+    static constexpr Role role = Role::direction;
+    static constexpr bool constant_A = true, affine_rate = true, comparable_rows = false;
+    static constexpr Shown shown = Shown::nothing;
+
+    int joint1, joint2;
+    double weight1, weight2;
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"joint1", &CouplingSlipRow::joint1}, Datum{"joint2", &CouplingSlipRow::joint2},
+                          Datum{"weight1", &CouplingSlipRow::weight1}, Datum{"weight2", &CouplingSlipRow::weight2});
+    }
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return false; }
+    bool moves_in_time() const { return false; }
+    std::vector<int> dofs(const Mechanism& m) const { return {m.joints[joint1].iv, m.joints[joint2].iv}; }
+
+    template <class State, class Out>
+    PN_INLINE void residual(const State&, Out&) const {}
+    template <class State, class Out>
+    PN_INLINE void rows(const State& s, Out& out) const {
+        out.A(0, s.mechanism.joints[joint1].iv) = weight1;
+        out.A(0, s.mechanism.joints[joint2].iv) = weight2;
+    }
+    template <class State, class Out>
+    PN_INLINE void rate_and_drift(const State& s, Out& out) const {
+        out.rate[0] = weight1 * s.v[s.mechanism.joints[joint1].iv] + weight2 * s.v[s.mechanism.joints[joint2].iv];
+    }
+};
+
+}  // namespace pn

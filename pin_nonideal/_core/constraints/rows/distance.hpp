@@ -1,0 +1,60 @@
+// |x1 - x2| = length(t): a rod.
+#pragma once
+
+#include <tuple>
+
+#include "constraints/geometry.hpp"
+#include "constraints/row_traits.hpp"
+#include "math/time_function.hpp"
+
+namespace pn {
+
+struct DistanceRows {
+    static constexpr const char* name = "distance";
+    static constexpr Role role = Role::constraint;
+    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
+    static constexpr Shown shown = Shown::rod;
+
+    Frame frame1, frame2;
+    TimeFunction length;
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame1", &DistanceRows::frame1}, Datum{"frame2", &DistanceRows::frame2},
+                          Datum{"length", &DistanceRows::length});
+    }
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return true; }
+    bool moves_in_time() const { return !is_constant(length); }
+
+    template <class Sides, class Out>
+    PN_INLINE void residual(const Sides& s, Out& out) const {
+        const Jet l = evaluate(length, s.t);
+        out.residual[0] = (s.a.x - s.b.x).norm() - l[0];  // Eq. (2)
+        out.phi_t[0] = -l[1];
+        out.phi_tt[0] = -l[2];
+    }
+    template <class Sides, class Out>
+    PN_INLINE void rows(const Sides& s, Out& out) const {
+        const auto d = s.a.x - s.b.x;
+        out.wrench[0] = force_at(s.a.x, direction(d, d.norm()));
+    }
+    template <class Sides, class Out>
+    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+        using Scalar = typename Sides::Scalar;
+        const auto d = s.a.x - s.b.x, u = s.a.velocity(s.a.x) - s.b.velocity(s.b.x);
+        const Scalar distance = d.norm();
+        const auto n = direction(d, distance);
+        const Scalar along = n.dot(u);
+        out.rate[0] = along + out.phi_t[0];
+        out.drift[0] = n.dot(s.a.acceleration(s.a.x) - s.b.acceleration(s.b.x)) + out.phi_tt[0];
+        if (distance > 0.0) out.drift[0] += (u.squaredNorm() - along * along) / distance;
+    }
+
+private:
+    template <class Vec, class Scalar>
+    static PN_INLINE Vec direction(const Vec& d, const Scalar& distance) {
+        return distance > 0.0 ? Vec(d / distance) : Vec(Vec3::UnitX());
+    }
+};
+
+}  // namespace pn

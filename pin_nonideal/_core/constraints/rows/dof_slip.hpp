@@ -1,0 +1,42 @@
+// Direction of friction: velocity of one dof, or of the three of a ball joint.
+#pragma once
+
+#include <tuple>
+#include <vector>
+
+#include "constraints/coordinates.hpp"
+#include "constraints/row_traits.hpp"
+
+namespace pn {
+
+struct DofRows {
+    static constexpr const char* name = "dof_slip";
+    static constexpr Role role = Role::direction;
+    static constexpr bool constant_A = true, affine_rate = true, comparable_rows = false;
+    static constexpr Shown shown = Shown::nothing;
+
+    int dof, count;
+
+    static constexpr auto data() { return std::tuple(Datum{"dof", &DofRows::dof}, Datum{"count", &DofRows::count}); }
+    int size() const { return count; }
+    bool is_holonomic(int) const { return false; }
+    bool moves_in_time() const { return false; }
+    std::vector<int> dofs(const Mechanism&) const {
+        std::vector<int> own;
+        for (int k = 0; k < count; ++k) own.push_back(dof + k);
+        return own;
+    }
+
+    template <class State, class Out>
+    PN_INLINE void residual(const State&, Out&) const {}
+    template <class State, class Out>
+    PN_INLINE void rows(const State&, Out& out) const {
+        for (int k = 0; k < count; ++k) out.A(k, dof + k) = 1.0;
+    }
+    template <class State, class Out>
+    PN_INLINE void rate_and_drift(const State& s, Out& out) const {
+        for (int k = 0; k < count; ++k) out.rate[k] = s.v[dof + k];
+    }
+};
+
+}  // namespace pn

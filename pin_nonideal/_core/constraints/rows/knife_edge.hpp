@@ -1,0 +1,41 @@
+// No velocity of a frame's origin along the frame's axis: a skate.
+#pragma once
+
+#include <tuple>
+
+#include "constraints/geometry.hpp"
+#include "constraints/row_traits.hpp"
+
+namespace pn {
+
+struct KnifeRows {
+    static constexpr const char* name = "knife";
+    static constexpr Role role = Role::constraint;
+    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
+    static constexpr Shown shown = Shown::edge;
+
+    Frame frame1, frame2;  // the latter is the world's
+    Vec3 axis;
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame", &KnifeRows::frame1}, Datum{"axis", &KnifeRows::axis});
+    }
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return false; }
+    bool moves_in_time() const { return false; }
+
+    template <class Sides, class Out>
+    PN_INLINE void residual(const Sides&, Out&) const {}
+    template <class Sides, class Out>
+    PN_INLINE void rows(const Sides& s, Out& out) const {
+        out.wrench[0] = force_at(s.a.x, s.a.R * axis);
+    }
+    template <class Sides, class Out>
+    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+        const auto e = s.a.R * axis, u = s.a.velocity(s.a.x);
+        out.rate[0] = e.dot(u);  // Eq. (2)
+        out.drift[0] = e.dot(s.a.acceleration(s.a.x)) + s.a.omega().cross(e).dot(u);
+    }
+};
+
+}  // namespace pn

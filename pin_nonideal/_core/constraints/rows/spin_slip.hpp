@@ -1,0 +1,39 @@
+// Directions of friction: turning of body 1 against body 2 about axes of frame 2, all three of a ball joint or some of a
+// contact.
+#pragma once
+
+#include <tuple>
+#include <vector>
+
+#include "constraints/geometry.hpp"
+#include "constraints/row_traits.hpp"
+
+namespace pn {
+
+struct TurnSlipRows : SlipDirections {
+    static constexpr const char* name = "turn_slip";
+
+    Frame frame1, frame2;
+    std::vector<int> axes;
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"frame1", &TurnSlipRows::frame1}, Datum{"frame2", &TurnSlipRows::frame2},
+                          Datum{"axes", &TurnSlipRows::axes});
+    }
+    int size() const { return static_cast<int>(axes.size()); }
+
+    template <class Sides, class Out>
+    PN_INLINE void rows(const Sides& s, Out& out) const {
+        for (size_t k = 0; k < axes.size(); ++k) out.wrench[k] = couple_at(s.a.x, s.b.R.col(axes[k]));
+    }
+    template <class Sides, class Out>
+    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+        const auto omega = s.a.omega() - s.b.omega(), alpha = s.a.alpha() - s.b.alpha() - s.b.omega().cross(omega);
+        for (size_t k = 0; k < axes.size(); ++k) {
+            out.rate[k] = s.b.R.col(axes[k]).dot(omega);
+            out.drift[k] = s.b.R.col(axes[k]).dot(alpha);
+        }
+    }
+};
+
+}  // namespace pn

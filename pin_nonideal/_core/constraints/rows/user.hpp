@@ -1,0 +1,54 @@
+// A a = b as the user's functions give it.
+#pragma once
+
+#include <functional>
+#include <tuple>
+#include <vector>
+
+#include "constraints/coordinates.hpp"
+#include "constraints/row_traits.hpp"
+
+namespace pn {
+
+struct UserRows {
+    static constexpr const char* name = "user";
+    static constexpr Role role = Role::constraint;
+    // A may depend on v, and then the rate is not A v + phi_t.
+    static constexpr bool constant_A = false, affine_rate = false, comparable_rows = false;
+    static constexpr Shown shown = Shown::nothing;
+
+    int count = 0;
+    std::function<void(double t, const VecX& q, const VecX& v, MatX& A, VecX& b)> function;
+    std::function<void(double t, const VecX& q, VecX& phi)> residual_function;                // may be empty
+    std::function<void(double t, const VecX& q, const VecX& v, VecX& rate)> rate_function;    // may be empty
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"size", &UserRows::count}, Datum{"rows", &UserRows::function},
+                          Datum{"residual", &UserRows::residual_function}, Datum{"rate", &UserRows::rate_function});
+    }
+    int size() const { return count; }
+    bool is_holonomic(int) const { return static_cast<bool>(residual_function); }
+    bool moves_in_time() const { return true; }
+    std::vector<int> dofs(const Mechanism& m) const { return all_dofs(m); }
+
+    template <class State, class Out>
+    PN_INLINE void residual(const State& s, Out& out) const {
+        if (!residual_function) return;
+        residual_function(s.t, s.q, out.scratch);
+        for (int k = 0; k < count; ++k) out.residual[k] = out.scratch[k];
+    }
+    // A and b come together.
+    template <class State, class Out>
+    PN_INLINE void rows(const State& s, Out& out) const {
+        function(s.t, s.q, s.v, out.A, out.b);
+        for (int k = 0; k < count; ++k) out.drift[k] = -out.b[k];
+    }
+    template <class State, class Out>
+    PN_INLINE void rate_and_drift(const State& s, Out& out) const {
+        if (!rate_function) return;
+        rate_function(s.t, s.q, s.v, out.scratch);
+        for (int k = 0; k < count; ++k) out.rate[k] = out.scratch[k];
+    }
+};
+
+}  // namespace pn

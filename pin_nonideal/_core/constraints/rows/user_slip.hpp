@@ -1,0 +1,59 @@
+// Directions of friction as the user's function gives them.
+#pragma once
+
+#include <functional>
+#include <tuple>
+#include <vector>
+
+#include "constraints/coordinates.hpp"
+#include "constraints/row_traits.hpp"
+#include "tree/lie_group.hpp"
+
+namespace pn {
+
+// Difference in time by which the directions' own rates are taken: rounding and the second derivative share the error.
+constexpr double direction_step = 1e-6;
+
+struct UserSlipRows {
+    static constexpr const char* name = "user_slip";
+    static constexpr Role role = Role::direction;
+    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
+    static constexpr Shown shown = Shown::nothing;
+
+    int count = 1;
+    std::function<void(double t, const VecX& q, VecX& rows)> directions;  // one after the other
+
+    static constexpr auto data() {
+        return std::tuple(Datum{"size", &UserSlipRows::count}, Datum{"directions", &UserSlipRows::directions});
+    }
+    int size() const { return count; }
+    bool is_holonomic(int) const { return false; }
+    bool moves_in_time() const { return true; }
+    std::vector<int> dofs(const Mechanism& m) const { return all_dofs(m); }
+
+    template <class State, class Out>
+    PN_INLINE void residual(const State&, Out&) const {}
+    template <class State, class Out>
+    PN_INLINE void rows(const State& s, Out& out) const {
+        directions(s.t, s.q, out.scratch);
+        for (int k = 0; k < count; ++k) out.A.row(k) = out.scratch.segment(k * s.v.size(), s.v.size()).transpose();
+    }
+    // The drift is d(n(t, q))/dt . v, by a difference along the motion.
+    template <class State, class Out>
+    PN_INLINE void rate_and_drift(const State& s, Out& out) const {
+        const double h = direction_step;
+        const auto nv = s.v.size();
+        VecX ahead(s.q.size()), before(count * nv), after(count * nv);
+        const VecX step = h * s.v, back = -step;
+        retract(s.mechanism, s.q.data(), step.data(), ahead.data());
+        directions(s.t + h, ahead, after);
+        retract(s.mechanism, s.q.data(), back.data(), ahead.data());
+        directions(s.t - h, ahead, before);
+        for (int k = 0; k < count; ++k) {
+            out.rate[k] = out.A.row(k).dot(s.v);
+            out.drift[k] = (after.segment(k * nv, nv).dot(s.v) - before.segment(k * nv, nv).dot(s.v)) / (2.0 * h);
+        }
+    }
+};
+
+}  // namespace pn

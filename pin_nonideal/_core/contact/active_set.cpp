@@ -1,0 +1,236 @@
+#include "contact/active_set.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "contact/queries.hpp"
+#include "contact/impact.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/projection.hpp"
+#include "dynamics/friction_limit.hpp"
+#include "friction/stick_slip.hpp"
+
+namespace pn {
+
+namespace {
+
+using Choice = std::vector<char>;  // of closed gaps
+
+// All choices of so many contacts are looked through where steps from one to the next do not lead to the right one.
+constexpr int most_enumerated = 12;
+// The same of those in which what begins to slip goes its way: without, there is a motion to go on by.
+constexpr int most_aligned = 8;
+// What would close a wider gap [m or rad] within `touching_time` outruns light.
+constexpr double sure_gap = 1e-3;
+// Contacts of which some may share a load in several ways.
+constexpr int may_share = 3;
+
+// Part of the accelerations in play below which slip begins so slowly that they do not tell its way, and by how much
+// another way differs.
+constexpr double slow = 1e-4, astray = 1e-6;
+
+}  // namespace
+
+bool goes_its_way(const Program& p, Workspace& w, const VecX& v) {
+    const double least = slow * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
+        if (!slips(w.state.mode[e])) continue;
+        const Friction& f = p.frictions[e];
+        if (f.dim == 1 || f.gap < 0 || is_open(p, w, e) || !at_rest(p, w, e, v)) continue;
+        const Block& block = p.blocks[f.block];
+        multiply(block, w.now.A, w.now.a, w.scratch.r);
+        double size = 0.0, along = 0.0;
+        for (int k = 0; k < f.dim; ++k) {
+            const double begins = w.scratch.r[block.row + k] - w.now.b[block.row + k];
+            size += begins * begins;
+            along += begins * w.state.slip_direction[e][k];
+        }
+        size = std::sqrt(size);
+        if (size > least && along < (1.0 - astray) * size) return false;
+    }
+    return true;
+}
+
+namespace {
+
+// The choices tried at one state, as the right one is sought.
+struct Search {
+    const Program& p;
+    Workspace& w;
+    double t;
+    const VecX& v;
+    const Choice& rest;
+    const std::function<void(const RestingMotion*)>& find_modes;
+    const RestingMotion* together = nullptr;
+    bool aligned = false;  // what begins to slip is asked to go its way
+    std::vector<Choice> tried;
+    std::optional<Failure> failure;  // of the first choice that had no motion
+
+    // The next choice: this one where its motion keeps all conditions, else with one contact more or less; nothing
+    // where it has no motion.
+    std::optional<Choice> better(const Choice& choice) {
+        tried.push_back(choice);
+        set_closed(p, w, choice);
+        try {
+            find_modes(together && (together->is_near || together->closed == choice) ? together : nullptr);
+        } catch (const Failure& thrown) {
+            if (thrown.kind == Failure::Kind::interrupted || thrown.kind == Failure::Kind::not_finite) throw;
+            if (!failure) failure = thrown;
+            return std::nullopt;
+        }
+        if (aligned && !goes_its_way(p, w, v)) return std::nullopt;
+        Choice next = choice;
+        int change = pulling_contact(p, w);
+        if (change < 0) change = approaching(choice);
+        if (change >= 0) next[change] = !next[change];
+        return next;
+    }
+
+    // Of the contacts left open the one that would go through its plane fastest, or -1.
+    int approaching(const Choice& choice) {
+        int found = -1;
+        double most = 1.0;
+        for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
+            if (!rest[i] || choice[i]) continue;
+            evaluate_gap(p, w, t, v, i);
+            const double beyond = -gap_acceleration(p, w, i) / acceleration_rounding(p, w, i);
+            if (beyond <= most) continue;
+            most = beyond;
+            found = i;
+        }
+        return found;
+    }
+
+    bool is_new(const Choice& choice) const { return std::find(tried.begin(), tried.end(), choice) == tried.end(); }
+
+    // From one choice to the next until one keeps all conditions.
+    bool walk(Choice choice) {
+        while (is_new(choice)) {
+            const std::optional<Choice> next = better(choice);
+            if (!next) return false;
+            if (*next == choice) return true;
+            choice = *next;
+        }
+        return false;
+    }
+
+    // All choices, those with the most closed first.
+    bool enumerate() {
+        std::vector<int> list;
+        for (int i = 0; i < static_cast<int>(rest.size()); ++i)
+            if (rest[i]) list.push_back(i);
+        if (static_cast<int>(list.size()) > (aligned ? most_aligned : most_enumerated)) return false;
+        std::vector<unsigned> order(1u << list.size());
+        for (unsigned k = 0; k < order.size(); ++k) order[k] = k;
+        const auto count = [](unsigned bits) { return __builtin_popcount(bits); };
+        std::stable_sort(order.begin(), order.end(), [&](unsigned a, unsigned b) { return count(a) > count(b); });
+        for (unsigned bits : order) {
+            Choice choice(rest.size(), 0);
+            for (size_t k = 0; k < list.size(); ++k) choice[list[k]] = bits >> k & 1u;
+            if (is_new(choice) && better(choice) == choice) return true;
+        }
+        return false;
+    }
+};
+
+}  // namespace
+
+Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts) {
+    Touching out{Choice(p.gaps.size(), 0), Choice(p.gaps.size(), 0)};
+    update_kinematics(p, w, t, q, v);
+    const double width = starts ? starting_width * scene_size(p, w) : touching_width;
+    std::vector<int> list;
+    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
+        if (is_bare(p, i)) continue;
+        if (!w.state.closed[i] && !p.is_users(i)) {
+            measure_gap(p, w, t, v, i);
+            if (gap_width(p, w, i) > sure_gap) continue;
+        }
+        evaluate_gap(p, w, t, v, i);
+        const bool touches = gap_width(p, w, i) <= std::max(width, -gap_rate(p, w, i) * touching_time);
+        if (w.state.closed[i] || touches) list.push_back(i);
+    }
+    if (list.size() > 1) {
+        for (int i : list)
+            if (p.gaps[i].sliding >= 0) evaluate_block(p, w, t, v, p.frictions[p.gaps[i].sliding].block);
+        leave_one_of_each_place(p, w, w.state.closed, list);
+    }
+    const double still = rest_rate(v);
+    for (int i : list) {
+        const double rate = gap_rate(p, w, i);
+        out.touch[i] = 1;
+        out.rest[i] = rate <= still;
+        out.strikes |= rate < -still;
+        out.lands |= rate < -still && !w.state.closed[i];
+    }
+    return out;
+}
+
+const Touching& TouchingKnown::at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts) {
+    const bool same = known_ && t == t_ && starts == starts_ && q == q_ && v == v_ && same_bytes(closed_, w.state.closed);
+    if (same) return found_;
+    known_ = true;
+    t_ = t;
+    starts_ = starts;
+    q_ = q;
+    v_ = v;
+    closed_ = w.state.closed;
+    found_ = touching_contacts(p, w, t, q, v, starts);
+    return found_;
+}
+
+// Contacts that share their load are decided together; else one by one, which tells whether the motion is the only one,
+// and together where that does not end.
+void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                    const ClosingQuestion& question, const std::function<void(const RestingMotion*)>& find_modes) {
+    const RunState before = w.state;
+    const auto together = [&] {
+        set_closed(p, w, before.closed);
+        set_modes(p, w, before.mode);
+        w.state = before;
+        return resting_motion(p, w, t, q, v, question);
+    };
+    const auto close = [&](const Choice& start, const RestingMotion* answer) {
+        Choice first = start;
+        if (question.opening >= 0) first[question.opening] = 0;
+        Search search{p, w, t, v, question.rest, find_modes, answer, true, {}, {}};
+        if (search.walk(first) || search.enumerate()) return;
+        search.aligned = false;
+        search.tried.clear();
+        if (search.walk(first) || search.enumerate()) return;
+        if (search.failure) throw *search.failure;
+        throw Failure(Failure::Kind::not_converged, t);
+    };
+    // What slides, or begins to, rubs by the shares of loads that friction follows, and which cones do not.
+    const auto decides_alone = [&](RestingMotion near) {
+        near.is_near = true;
+        try {
+            close(near.closed, &near);
+            return true;
+        } catch (const Failure& failure) {
+            if (failure.kind != Failure::Kind::not_converged && failure.kind != Failure::Kind::paradox) throw;
+        }
+        set_closed(p, w, before.closed);
+        set_modes(p, w, before.mode);
+        w.state = before;
+        return false;
+    };
+    const bool many = std::count(question.rest.begin(), question.rest.end(), char(1)) >= may_share;
+    if (many && question.breaking.empty()) {
+        const std::optional<RestingMotion> answer = together();
+        if (answer && answer->shared && answer->slides() && decides_alone(*answer)) return;
+        if (answer && answer->shared) return close(answer->closed, &*answer);
+    }
+    try {
+        close(question.rest, nullptr);
+    } catch (const Failure& failure) {
+        const bool undecided = failure.kind == Failure::Kind::not_converged;
+        if (!undecided && !(many && failure.kind == Failure::Kind::paradox)) throw;
+        const std::optional<RestingMotion> answer = together();
+        if (!answer || !(undecided || answer->shared)) throw;
+        close(answer->closed, &*answer);
+    }
+}
+
+}  // namespace pn

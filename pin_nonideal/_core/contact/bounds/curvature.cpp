@@ -1,0 +1,216 @@
+#include "contact/bounds/curvature.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pn {
+
+Reach::Reach(const Program& program) : p(program), bodies_(program.mechanism.joints.size()) {
+    std::vector<char> needed(bodies_.size(), 0);
+    for (const Gap& gap : p.gaps)
+        for (int joint : {p.blocks[gap.block].joint1, p.blocks[gap.block].joint2})
+            for (; joint != 0; joint = p.mechanism.joints[joint].parent) needed[joint] = 1;
+    for (size_t joint = 1; joint < needed.size(); ++joint)
+        if (needed[joint]) joints_.push_back(static_cast<int>(joint));
+}
+
+// Motion of a joint's body against its parent, in the parent's axes.
+Reach::Bound Reach::joint_bound(const Joint& joint) const {
+    const auto v = speed_.segment(joint.iv, joint.nv), a = acceleration_.segment(joint.iv, joint.nv);
+    const double speed = v.norm(), rate = a.norm();
+    switch (joint.kind) {
+        case JointKind::revolute:
+        case JointKind::spherical: return {0.0, 0.0, speed, rate};
+        case JointKind::prismatic:
+        case JointKind::translation: return {speed, rate, 0.0, 0.0};
+        case JointKind::helical: return {std::abs(joint.pitch) * speed, std::abs(joint.pitch) * rate, speed, rate};
+        default: break;
+    }
+    const int slides = joint.kind == JointKind::free_flyer ? 3 : joint.kind == JointKind::planar ? 2 : joint.nv;
+    const bool other = slides == joint.nv;  // a joint of which nothing else is known: all its dofs may do both
+    const double spin = other ? speed : v.tail(joint.nv - slides).norm();
+    const double slide = v.head(slides).norm();
+    // Velocities of a floating base stand in its own axes, which turn.
+    const double spin_rate = other ? rate + speed * speed : a.tail(joint.nv - slides).norm();
+    return {slide, a.head(slides).norm() + spin * slide, spin, spin_rate};
+}
+
+void Reach::bound_bodies(const Workspace& w, const VecX& speed, const VecX& acceleration, double h) {
+    speed_ = speed;
+    acceleration_ = acceleration;
+    h_ = h;
+    for (int i : joints_) {
+        const Joint& joint = p.mechanism.joints[i];
+        const Body &own = w.now.terms.body[i], &parent = w.now.terms.body[joint.parent];
+        const Bound base = bodies_[joint.parent], move = joint_bound(joint);
+        const Vec3 from = joint.parent == 0 ? own.ref + own.p : own.ref + own.p - parent.ref - parent.p;
+        const double apart = joint.parent == 0 ? 0.0 : from.norm() + h * move.velocity;
+        bodies_[i] = {base.velocity + base.spin * apart + move.velocity,
+                      base.acceleration + (base.spin_rate + base.spin * base.spin) * apart +
+                          2.0 * base.spin * move.velocity + move.acceleration,
+                      base.spin + move.spin, base.spin_rate + move.spin_rate + base.spin * move.spin};
+    }
+}
+
+Reach::Bound Reach::frame_bound(const Frame& frame) const {
+    if (frame.joint == 0) return {};
+    const Bound& body = bodies_[frame.joint];
+    const double apart = frame.p.norm();
+    return {body.velocity + body.spin * apart,
+            body.acceleration + (body.spin_rate + body.spin * body.spin) * apart, body.spin, body.spin_rate};
+}
+
+// g = n . (x1 - x2) - r, with n fixed in body 2, of a point of body 1 that far from its frame.
+double Reach::over_plane(const Workspace& w, const Frame& frame, const Frame& plane, double reach) const {
+    const Bound a = frame_bound(frame), b = frame_bound(plane);
+    const double velocity = a.velocity + reach * a.spin + b.velocity;
+    double turning = 0.0;
+    if (b.spin > 0.0 || b.spin_rate > 0.0) {
+        const Pose one(p.mechanism, w.now.terms, frame), two(p.mechanism, w.now.terms, plane);
+        const double apart = (one.x - two.x).norm() + reach + h_ * velocity;
+        turning = 2.0 * b.spin * velocity + (b.spin_rate + b.spin * b.spin) * apart;
+    }
+    return a.acceleration + reach * (a.spin_rate + a.spin * a.spin) + b.acceleration + turning;
+}
+
+double Reach::of(const Workspace& w, const ContactRow& kind) const {
+    return over_plane(w, kind.frame1, kind.frame2, 0.0);
+}
+
+// Of each of its points, whichever is the lowest.
+double Reach::of(const Workspace& w, const EllipsoidRow& kind) const {
+    return over_plane(w, kind.frame1, kind.frame2, kind.reach());
+}
+
+// g = |c1 - c2| - r, least over both segments: points that stay on their bodies come near no faster than this.
+double Reach::of(const Workspace&, const CapsulesRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.acceleration + b.acceleration + kind.half1 * (a.spin_rate + a.spin * a.spin) +
+           kind.half2 * (b.spin_rate + b.spin * b.spin);
+}
+
+double Reach::of(const Workspace&, const LineRow& kind) const {
+    return of_points(kind.frame1, kind.half1, kind.frame2, kind.solid.reach);
+}
+
+double Reach::of(const Workspace&, const RimRow& kind) const {
+    return of_points(kind.frame1, kind.rim, kind.frame2, kind.solid.reach);
+}
+
+double Reach::of(const Workspace&, const RimsRow& kind) const {
+    return of_points(kind.frame1, kind.first.reach, kind.frame2, kind.second.reach);
+}
+
+// Of any two points that far from their frames.
+double Reach::of_points(const Frame& frame1, double reach1, const Frame& frame2, double reach2) const {
+    const Bound a = frame_bound(frame1), b = frame_bound(frame2);
+    return a.acceleration + b.acceleration + reach1 * (a.spin_rate + a.spin * a.spin) +
+           reach2 * (b.spin_rate + b.spin * b.spin);
+}
+
+double Reach::of(const Workspace&, const BoxRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.acceleration + b.acceleration + kind.half.norm() * (b.spin_rate + b.spin * b.spin);
+}
+
+template <class Solid>
+double Reach::of(const Workspace&, const SolidRow<Solid>& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.acceleration + b.acceleration + kind.solid.reach * (b.spin_rate + b.spin * b.spin);
+}
+
+double Reach::of(const Workspace&, const LimitRow& kind) const {
+    return acceleration_[p.mechanism.joints[kind.joint].iv];
+}
+
+double Reach::bound(const Workspace& w, int gap) const {
+    const Kind& kind = p.blocks[p.gaps[gap].block].kind;
+    if (const auto* contact = std::get_if<ContactRow>(&kind)) return of(w, *contact);
+    if (const auto* capsules = std::get_if<CapsulesRow>(&kind)) return of(w, *capsules);
+    if (const auto* box = std::get_if<BoxRow>(&kind)) return of(w, *box);
+    if (const auto* ellipsoid = std::get_if<EllipsoidRow>(&kind)) return of(w, *ellipsoid);
+    if (const auto* hull = std::get_if<HullRow>(&kind)) return of(w, *hull);
+    if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return of(w, *revolved);
+    if (const auto* line = std::get_if<LineRow>(&kind)) return of(w, *line);
+    if (const auto* rim = std::get_if<RimRow>(&kind)) return of(w, *rim);
+    if (const auto* rims = std::get_if<RimsRow>(&kind)) return of(w, *rims);
+    return of(w, std::get<LimitRow>(kind));
+}
+
+// Points at the ends of what belongs to a contact move no faster than this; a plane that turns reaches everywhere.
+double Reach::speed(const ContactRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return b.spin > 0.0 ? HUGE_VAL : a.velocity + b.velocity;
+}
+
+double Reach::speed(const EllipsoidRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return b.spin > 0.0 ? HUGE_VAL : a.velocity + kind.reach() * a.spin + b.velocity;
+}
+
+double Reach::speed(const CapsulesRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.velocity + kind.half1 * a.spin + b.velocity + kind.half2 * b.spin;
+}
+
+double Reach::speed(const LineRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.velocity + kind.half1 * a.spin + b.velocity + kind.solid.reach * b.spin;
+}
+
+double Reach::speed(const RimRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.velocity + kind.rim * a.spin + b.velocity + kind.solid.reach * b.spin;
+}
+
+double Reach::speed(const RimsRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.velocity + kind.first.reach * a.spin + b.velocity + kind.second.reach * b.spin;
+}
+
+double Reach::speed(const BoxRow& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.velocity + b.velocity + kind.half.norm() * b.spin;
+}
+
+template <class Solid>
+double Reach::speed(const SolidRow<Solid>& kind) const {
+    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
+    return a.velocity + b.velocity + kind.solid.reach * b.spin;
+}
+
+double Reach::speed(int gap) const {
+    return std::visit([&](const auto& kind) { return speed(kind); }, p.blocks[p.gaps[gap].block].kind);
+}
+
+bool Reach::knows(const Program& p, int gap) { return !p.is_users(gap); }
+
+// Points that pass by each other at a distance d with the speed u move apart with u^2 / d; that others become the nearest
+// takes off some. What belongs to the contact reaches so far from its frames.
+double Reach::rise(double reach1, double reach2, const Frame& frame1, const Frame& frame2, double radius) const {
+    const Bound a = frame_bound(frame1), b = frame_bound(frame2);
+    const double velocity = a.velocity + b.velocity + reach1 * a.spin + reach2 * b.spin;
+    return velocity * velocity / radius;
+}
+
+double Reach::rise(const Workspace& w, int gap) const {
+    const Kind& kind = p.blocks[p.gaps[gap].block].kind;
+    double passing = 0.0;
+    if (const auto* c = std::get_if<CapsulesRow>(&kind))
+        passing = rise(c->half1, c->half2, c->frame1, c->frame2, c->radius);
+    else if (const auto* box = std::get_if<BoxRow>(&kind))
+        passing = rise(0.0, box->half.norm(), box->frame1, box->frame2, box->radius);
+    else if (const auto* hull = std::get_if<HullRow>(&kind))
+        passing = rise(0.0, hull->solid.reach, hull->frame1, hull->frame2, hull->radius);
+    else if (const auto* revolved = std::get_if<RevolvedRow>(&kind))
+        passing = rise(0.0, revolved->solid.reach, revolved->frame1, revolved->frame2, revolved->radius);
+    else if (const auto* line = std::get_if<LineRow>(&kind))
+        passing = rise(line->half1, line->solid.reach, line->frame1, line->frame2, line->radius);
+    else if (const auto* rim = std::get_if<RimRow>(&kind))
+        passing = rise(rim->rim, rim->solid.reach, rim->frame1, rim->frame2, rim->radius);
+    else if (const auto* rims = std::get_if<RimsRow>(&kind))
+        passing = rise(rims->first.reach, rims->second.reach, rims->frame1, rims->frame2, rims->radius);
+    return bound(w, gap) + passing;
+}
+
+}  // namespace pn

@@ -1,0 +1,193 @@
+#include "contact/bounds/travel.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pn {
+
+namespace {
+
+// Bodies are allowed this many times their way, for what projections add.
+constexpr double way_factor = 2.0;
+// What slides is given this part of its distance ahead, and so many of its steps, before distances are taken again.
+constexpr double room_ahead = 0.5, steps_ahead = 4.0;
+// A sum times this is no smaller than in exact numbers.
+constexpr double rounded_up = 1.0 + 0x1p-51;
+// The same of a sum over all joints.
+constexpr double joints_rounded_up = 1.0 + 1e-12;
+// A unit of what a stop limits counts as a meter of its body at the least.
+constexpr double lever_of_stop = 1.0;
+
+// How far what belongs to a contact reaches from its frames; a plane is told apart.
+struct Extents { double first = 0.0, second = 0.0; };
+
+Extents extents(const Kind& kind) {
+    if (const auto* capsules = std::get_if<CapsulesRow>(&kind)) return {capsules->half1, capsules->half2};
+    if (const auto* box = std::get_if<BoxRow>(&kind)) return {0.0, box->half.norm()};
+    if (const auto* ellipsoid = std::get_if<EllipsoidRow>(&kind)) return {ellipsoid->reach(), 0.0};
+    if (const auto* hull = std::get_if<HullRow>(&kind)) return {0.0, hull->solid.reach};
+    if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return {0.0, revolved->solid.reach};
+    if (const auto* line = std::get_if<LineRow>(&kind)) return {line->half1, line->solid.reach};
+    if (const auto* rim = std::get_if<RimRow>(&kind)) return {rim->rim, rim->solid.reach};
+    if (const auto* rims = std::get_if<RimsRow>(&kind)) return {rims->first.reach, rims->second.reach};
+    return {};
+}
+
+bool has_plane(const Kind& kind) {
+    return std::holds_alternative<ContactRow>(kind) || std::holds_alternative<EllipsoidRow>(kind);
+}
+
+bool turns(JointKind kind) { return kind != JointKind::prismatic && kind != JointKind::translation; }
+bool slides(JointKind kind) { return kind != JointKind::revolute && kind != JointKind::spherical; }
+
+}  // namespace
+
+static void add(const std::vector<double>& parts, std::vector<double>& sums) {
+    for (size_t i = 0; i < sums.size(); ++i) sums[i] = (sums[i] + parts[i]) * rounded_up;
+}
+
+void Ways::add_bodies() {
+    add(body_step, body);
+    add(joint_step, joint);
+    add(turn_step, turn);
+    most = scene = (scene + scene_step) * rounded_up;
+}
+
+void Ways::go_on() {
+    if (summed) return add_bodies();
+    add(slid_step, slid);
+    add(turned_step, turned);
+    most = (most + most_step) * rounded_up;
+}
+
+WayBound::WayBound(const Program& program)
+    : p(program), extent_(program.mechanism.joints.size(), 0.0), pairs_(program.gaps.size()) {
+    const std::vector<Joint>& joints = p.mechanism.joints;
+    std::vector<char> needed(joints.size(), 0), may_turn(joints.size(), 0);
+    for (size_t i = 1; i < joints.size(); ++i) may_turn[i] = may_turn[joints[i].parent] || turns(joints[i].kind);
+    for (size_t gap = 0; gap < p.gaps.size(); ++gap) {
+        const Block& block = p.blocks[p.gaps[gap].block];
+        Pair& pair = pairs_[gap];
+        int ends[] = {0, 0};
+        if (const auto* limit = std::get_if<LimitRow>(&block.kind)) {
+            pair.joint = ends[0] = limit->joint;
+            extent_[limit->joint] = std::max(extent_[limit->joint], lever_of_stop);
+        } else if (const auto [first, second] = frames(block.kind); first && !p.is_users(static_cast<int>(gap))) {
+            pair.first = ends[0] = first->joint;
+            pair.second = ends[1] = second->joint;
+            pair.turns = has_plane(block.kind) && may_turn[pair.second];
+            const Extents reach = extents(block.kind);
+            pair.reach = reach.first;
+            extent_[pair.first] = std::max(extent_[pair.first], first->p.norm() + reach.first);
+            extent_[pair.second] = std::max(extent_[pair.second], second->p.norm() + reach.second);
+        } else {
+            pair.unknown = true;
+        }
+        for (int joint : ends) needed[joint] = 1;
+    }
+    for (size_t i = joints.size() - 1; i > 0; --i)
+        if (needed[i]) needed[joints[i].parent] = 1;
+    for (size_t i = 1; i < joints.size(); ++i) {
+        if (!needed[i]) continue;
+        const Joint& joint = joints[i];
+        const double slide = joint.kind == JointKind::revolute ? 0.0
+                             : joint.kind == JointKind::helical ? std::abs(joint.pitch) : 1.0;
+        const double turn = joint.kind == JointKind::prismatic ? 0.0 : 1.0;
+        const bool drifts = slides(joint.kind) && may_turn[joint.parent];
+        moved_.push_back({static_cast<int>(i), joint.parent, joint.iv, joint.nv, joint.kind, slide, turn, drifts});
+        drift_ |= drifts;
+    }
+}
+
+void WayBound::size(Ways& ways) const {
+    for (auto* each : {&ways.body, &ways.joint, &ways.turn, &ways.lever, &ways.slid, &ways.turned, &ways.body_step,
+                       &ways.joint_step, &ways.turn_step, &ways.slid_step, &ways.turned_step})
+        each->assign(extent_.size(), 0.0);
+    ways.slid_until.assign(extent_.size(), -1.0);
+}
+
+// Motion of a joint's body against the one before.
+WayBound::Speeds WayBound::speeds(const Moved& moved, const VecX& speed) {
+    if (moved.nv == 1) return {moved.slide * speed[moved.iv], moved.turn * speed[moved.iv]};
+    const auto all = speed.segment(moved.iv, moved.nv);
+    switch (moved.kind) {
+        case JointKind::spherical: return {0.0, all.norm()};
+        case JointKind::translation: return {all.norm(), 0.0};
+        case JointKind::free_flyer: return {all.head(3).norm(), all.tail(3).norm()};
+        case JointKind::planar: return {all.head(2).norm(), all[2]};
+        default: return {all.norm(), all.norm()};  // of which nothing else is known
+    }
+}
+
+// Along the tree, from the farthest point of a body to the joint that moves it, and on to the next. Origins of joints that
+// turn stay where they are on the body before; others are given room.
+void WayBound::set_levers(const Terms& terms, Ways& ways) const {
+    for (const Moved& moved : moved_) ways.lever[moved.joint] = extent_[moved.joint];
+    for (auto moved = moved_.rbegin(); moved != moved_.rend(); ++moved) {
+        const int i = moved->joint, parent = moved->parent;
+        if (parent == 0) continue;
+        const Body &own = terms.body[i], &before = terms.body[parent];
+        double apart = (own.ref + own.p - before.ref - before.p).norm();
+        if (slides(moved->kind)) {
+            const double room = room_ahead * apart + steps_ahead * (ways.slid_step[i] + ways.turned_step[i]);
+            ways.slid_until[i] = ways.joint[i] + room;
+            apart += room;
+        }
+        ways.lever[parent] = std::max(ways.lever[parent], apart + ways.lever[i]);
+    }
+    ways.placed = true;
+}
+
+// What was not summed up as yet goes with the levers so far.
+void WayBound::step(const Terms& terms, const VecX& speed, double h, Ways& ways) const {
+    const double time = way_factor * h;
+    bool far = !ways.placed;
+    for (const Moved& moved : moved_) {
+        const int i = moved.joint;
+        const Speeds of = speeds(moved, speed);
+        ways.slid_step[i] = time * of.slide;
+        ways.turned_step[i] = time * of.turn;
+        if (!moved.drifts) continue;
+        const double come = ways.joint[i] + ways.slid[i] + ways.turned[i];
+        far |= !(come + ways.slid_step[i] + ways.turned_step[i] <= ways.slid_until[i]);
+    }
+    if (far) {
+        sum_up(ways);
+        set_levers(terms, ways);
+    }
+    ways.summed = false;
+    ways.most_step = 0.0;
+    for (const Moved& moved : moved_)
+        ways.most_step += ways.slid_step[moved.joint] + ways.turned_step[moved.joint] * ways.lever[moved.joint];
+    ways.most_step *= joints_rounded_up;
+}
+
+// Along the tree: a body comes as far as the one before it, and by what its joint does.
+void WayBound::spread(const std::vector<double>& slid, const std::vector<double>& turned, Ways& ways) const {
+    ways.scene_step = 0.0;
+    for (const Moved& moved : moved_) {
+        const int i = moved.joint, parent = moved.parent;
+        ways.joint_step[i] = slid[i] + turned[i];
+        ways.turn_step[i] = ways.turn_step[parent] + turned[i];
+        ways.body_step[i] = ways.body_step[parent] + slid[i] + turned[i] * ways.lever[i];
+        ways.scene_step = std::max(ways.scene_step, ways.body_step[i]);
+    }
+}
+
+void WayBound::sum_up(Ways& ways) const {
+    if (ways.summed) return;
+    spread(ways.slid, ways.turned, ways);
+    ways.add_bodies();
+    std::fill(ways.slid.begin(), ways.slid.end(), 0.0);
+    std::fill(ways.turned.begin(), ways.turned.end(), 0.0);
+    spread(ways.slid_step, ways.turned_step, ways);
+    ways.summed = true;
+}
+
+double WayBound::apart(const Terms& terms, int gap) const {
+    const auto& [first, second] = frames(p.blocks[p.gaps[gap].block].kind);
+    const Pose one(p.mechanism, terms, *first), other(p.mechanism, terms, *second);
+    return (one.x - other.x).norm() + pairs_[gap].reach;
+}
+
+}  // namespace pn

@@ -1,0 +1,245 @@
+#include "contact/onset.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/contact_rows.hpp"
+#include "dynamics/friction_limit.hpp"
+#include "dynamics/step_start.hpp"
+#include "complementarity/cone/solver.hpp"
+#include "friction/stick_slip.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr double none = 1e-12;      // part of the accelerations in play that is none
+constexpr double at_limit = 1e-9;   // part of its limit by which a force may miss it
+constexpr double breaking_by = 1e-6;  // part of a limit by which what has just come to it is past it
+constexpr int most_releases = 4;    // rounds in which what slips gets its kinetic limit
+constexpr int most_turns = 100;     // of loads and the friction that they cause
+constexpr double settled = 1e-13;   // change of the loads, as part of the largest, that is rounding
+
+// Friction that is not the sliding of contacts, or does not grow from zero with their loads, is no matter of cones.
+bool fits(const Program& p) {
+    bool only_cones = true;
+    each_law<UserLaw>(p.laws, [&](const UserLaw& law) { only_cones &= law.reaction == Reaction::none; });
+    for (size_t e = 0; e < p.frictions.size(); ++e) {
+        const Friction& f = p.frictions[e];
+        only_cones &= f.gap >= 0 && p.gaps[f.gap].sliding == static_cast<int>(e) && f.constant == 0.0 &&
+                      static_cast<int>(p.blocks[f.block].kept.size()) == f.dim;
+    }
+    return only_cones;
+}
+
+struct RestingProblem {
+    const Program& p;
+    Workspace& w;
+    const VecX& v;
+    const ClosingQuestion& question;
+    const RunState& before;
+    ContactRows rows;
+    std::vector<char> slides;            // contacts whose slip is known
+    std::vector<ConeElement> cones;      // their cones, those that slide with a row for the normal alone
+    std::vector<int> first;              // row of each in the problem
+    MatX drag;                           // friction along all rows by unknown, of contacts that slide
+    MatX W, dragging;                    // accelerations of the problem's rows to a unit of each unknown, and to its drag
+    VecX w0, f;
+
+    RestingProblem(const Program& program, Workspace& workspace, const VecX& velocity, const std::vector<int>& gaps,
+                   const ClosingQuestion& asked, const RunState& state)
+        : p(program), w(workspace), v(velocity), question(asked), before(state), rows(program, workspace, gaps) {
+        const int all = static_cast<int>(rows.W.rows());
+        int n = 0;
+        MatX share = MatX::Zero(all, all);
+        drag = share;
+        for (size_t i = 0; i < gaps.size(); ++i) {
+            const int e = p.gaps[gaps[i]].sliding, at = rows.first[i], dim = rows.cones[i].dim;
+            const bool slips = e >= 0 && dim > 1 && !rests(e);
+            slides.push_back(slips);
+            first.push_back(n);
+            share(at, n) = 1.0;
+            if (slips) {
+                const Vec3 u = slip_velocity(w.now, p.frictions[e]);
+                const double mu = p.frictions[e].kinetic_limit(p.frictions[e].mu, u.norm());
+                for (int k = 1; k < dim; ++k) drag(at + k, n) = -mu * u[k - 1] / u.norm();
+                cones.push_back(ConeElement::contact(1, 0.0));
+            } else {
+                for (int k = 1; k < dim; ++k) share(at + k, n + k) = 1.0;
+                cones.push_back(ConeElement::contact(dim, e < 0 ? 0.0 : limit(e)));
+            }
+            n += cones.back().dim;
+        }
+        const VecX free = accelerations();
+        W = chosen(rows.W * share.leftCols(n));
+        dragging = chosen(rows.W * drag.leftCols(n));
+        w0 = chosen(free);
+        f.setZero(n);
+    }
+
+    // Of all rows those of the problem.
+    MatX chosen(const MatX& of_all) const {
+        const int n = cones.empty() ? 0 : first.back() + cones.back().dim;
+        MatX out(n, of_all.cols());
+        for (size_t i = 0; i < cones.size(); ++i)
+            out.middleRows(first[i], cones[i].dim) = of_all.middleRows(rows.first[i], cones[i].dim);
+        return out;
+    }
+
+    bool rests(int e) const {
+        const bool known = before.mode[e] == sticking || before.lingers[e];
+        return e == question.arrived || (known && !question.struck) ||
+               slip_velocity(w.now, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
+    }
+
+    double limit(int e) const {
+        const Friction& friction = p.frictions[e];
+        const std::vector<int>& list = question.breaking;
+        const bool breaks = std::find(list.begin(), list.end(), e) != list.end();
+        return friction.holding_limit(friction.mu) * (breaks ? 1.0 - breaking_by : 1.0);
+    }
+
+    // Of the rows, without forces.
+    VecX accelerations() {
+        VecX out = VecX::Zero(rows.W.rows());
+        rows.each_row([&](int at, int block, int k) {
+            multiply(p.blocks[block], w.now.A, w.now.a, w.scratch.r);
+            out[at] = w.scratch.r[p.blocks[block].row + k] + w.now.values[block].drift[p.blocks[block].kept[k]];
+        });
+        return out;
+    }
+
+    double in_play() const { return w0.cwiseAbs().maxCoeff() + (W.cwiseAbs() * f.cwiseAbs()).maxCoeff(); }
+
+    // Of contacts that share a load one may carry none but rounding.
+    bool at_its_limit(size_t i) const {
+        const double most = cones[i].bound * f[first[i]], rounding = none * f.cwiseAbs().maxCoeff();
+        return f.segment(first[i] + 1, cones[i].dim - 1).norm() >= most * (1.0 - at_limit) - rounding;
+    }
+
+    // What slips from rest has its kinetic limit from then on. Returns whether something just did.
+    bool release() {
+        const VecX a = w0 + W * f;
+        bool any = false;
+        for (size_t i = 0; i < cones.size(); ++i) {
+            const int e = p.gaps[rows.gaps[i]].sliding;
+            if (cones[i].dim == 1 || e < 0 || !at_its_limit(i)) continue;
+            const double kinetic = p.frictions[e].kinetic_limit(p.frictions[e].mu, 0.0);
+            if (!(a.segment(first[i] + 1, cones[i].dim - 1).norm() > none * in_play()) || !(kinetic < cones[i].bound))
+                continue;
+            cones[i].bound = kinetic;
+            any = true;
+        }
+        return any;
+    }
+
+    bool solve(bool& shared) {
+        const MatX plain = W;
+        const VecX free = w0;
+        W += dragging;
+        if (!solve_cones(false, shared)) return false;
+        if (!shared || dragging.isZero(0.0)) return true;
+        const MatX coupled = W;
+        const VecX found = f;
+        W = plain;
+        if (take_turns(free)) return true;
+        W = coupled;
+        w0 = free;
+        f = found;
+        return true;
+    }
+
+    bool solve_cones(bool warm, bool& shared) {
+        ConeComplementarity solver;
+        for (int round = 0; round < most_releases; ++round) {
+            if (solver.solve(W, w0, cones, warm || round > 0, f) != ConeStatus::solved) return false;
+            if (!release()) break;
+        }
+        shared = !solver.unique_shares();
+        return true;
+    }
+
+    // Loads are shared as if friction were given: the one that they cause. False where that does not come to rest.
+    bool take_turns(const VecX& free) {
+        bool shared = false;
+        for (int turn = 0; turn < most_turns; ++turn) {
+            const VecX before = f;
+            w0 = free + dragging * before;
+            if (!solve_cones(true, shared)) return false;
+            if ((dragging * (f - before)).cwiseAbs().maxCoeff() <= settled * in_play()) return true;
+        }
+        return false;
+    }
+
+    void read(RestingMotion& out) const {
+        const VecX a = w0 + W * f;
+        const double least = none * in_play();
+        for (size_t i = 0; i < cones.size(); ++i) {
+            const int gap = rows.gaps[i], e = p.gaps[gap].sliding;
+            out.closed[gap] = a[first[i]] <= least;
+            if (e < 0 || !out.closed[gap]) continue;
+            if (slides[i]) {
+                const Vec3 u = slip_velocity(w.now, p.frictions[e]);
+                out.modes[e] = p.frictions[e].dim > 1 || u[0] > 0.0 ? slip_plus : slip_minus;
+                out.direction[e] = (1.0 / u.norm()) * u;
+                continue;
+            }
+            out.modes[e] = sticking;
+            for (int k = 1; k < cones[i].dim; ++k) out.friction[e][k - 1] = f[first[i] + k];
+            const auto slip = a.segment(first[i] + 1, cones[i].dim - 1);
+            if (cones[i].dim == 1 || !at_its_limit(i) || !(slip.norm() > least)) continue;
+            // Where slip begins slowly its force tells the way better than what is left of an acceleration.
+            const VecX friction = f.segment(first[i] + 1, slip.size());
+            const bool tells = friction.norm() > none * f.cwiseAbs().maxCoeff();
+            const VecX way = tells ? VecX(-friction.normalized()) : VecX(slip.normalized());
+            for (int k = 0; k < slip.size(); ++k) out.direction[e][k] = way[k];
+            out.modes[e] = p.frictions[e].dim > 1 || way[0] > 0.0 ? slip_plus : slip_minus;
+        }
+    }
+};
+
+}  // namespace
+
+bool RestingMotion::slides() const {
+    return std::any_of(modes.begin(), modes.end(), [](Mode mode) { return slips(mode); });
+}
+
+void RestingMotion::answer(const Program& p, Workspace& w, ModeQuestion& question) const {
+    if (is_near) {
+        question.near = friction;
+        return;
+    }
+    for (int e : question.at_rest) {
+        question.modes[e] = modes[e];
+        if (p.frictions[e].dim > 1 && slips(modes[e])) w.state.slip_direction[e] = w.state.last_direction[e] = direction[e];
+    }
+    question.answered = true;
+}
+
+std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                                            const ClosingQuestion& question) {
+    std::vector<int> gaps;
+    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i)
+        if (question.rest[i]) gaps.push_back(i);
+    if (gaps.empty() || !fits(p)) return std::nullopt;
+    const RunState before = w.state;
+    RestingMotion out{std::vector<char>(p.gaps.size(), 0), std::vector<Mode>(p.frictions.size(), unloaded),
+                      std::vector<Vec3>(p.frictions.size(), Vec3::Zero()), {}};
+    out.friction = out.direction;
+    bool found = false;
+    try {
+        release_contacts(p, w, t, q, v, question.rest);
+        RestingProblem problem(p, w, v, gaps, question, before);
+        found = problem.solve(out.shared);
+        if (found) problem.read(out);
+    } catch (const Failure& failure) {  // what other rows say is found again, and told, by those who ask for the motion
+        if (failure.kind == Failure::Kind::interrupted) throw;
+    }
+    set_closed(p, w, before.closed);
+    set_modes(p, w, before.mode);
+    w.state = before;
+    if (!found) return std::nullopt;
+    return out;
+}
+
+}  // namespace pn

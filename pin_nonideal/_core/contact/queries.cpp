@@ -1,0 +1,122 @@
+#include "contact/queries.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "constraints/redundancy.hpp"
+#include "dynamics/reactions.hpp"
+
+namespace pn {
+
+// Part of the terms of a sum that rounding may leave of it.
+constexpr double sum_rounding = 1e-12;
+// By which lines and points of one place differ: a part of the distance from the origin, or the sine of an angle.
+constexpr double one_place = 1e-12;
+
+// The rate's own rate, and the size of its terms.
+static std::pair<double, double> rate_of_rate(const Program& p, const Workspace& w, int gap) {
+    const Block& block = p.blocks[p.gaps[gap].block];
+    const double drift = w.now.values[p.gaps[gap].block].drift[block.kept[0]];
+    double sum = drift, size = std::abs(drift);
+    const double* A = w.now.A.data() + block.offset;
+    for (size_t l = 0; l < block.support.size(); ++l) {
+        const double term = A[l] * w.now.a[block.support[l]];
+        sum += term;
+        size += std::abs(term);
+    }
+    return {sum, size};
+}
+
+double gap_acceleration(const Program& p, const Workspace& w, int gap) { return rate_of_rate(p, w, gap).first; }
+
+double acceleration_rounding(const Program& p, const Workspace& w, int gap) {
+    return sum_rounding * (rate_of_rate(p, w, gap).second + p.mechanism.gravity.norm());
+}
+
+namespace {
+
+struct Line { Vec3 point, along; };
+
+// Of a geometric row as a force on the body with the higher number.
+Line line_of(const Program& p, const Workspace& w, int block, int row) {
+    const Wrench& unit = w.now.values[block].wrench[row];
+    return {unit.point, p.blocks[block].joint1 > p.blocks[block].joint2 ? unit.force : -unit.force};
+}
+
+std::pair<int, int> bodies(const Block& block) { return std::minmax({block.joint1, block.joint2}); }
+
+bool rubs_the_same(const Friction& a, const Friction& b) {
+    return a.mu == b.mu && a.constant == b.constant && a.radius == b.radius && a.axial_radius == b.axial_radius &&
+           a.inverse_span == b.inverse_span && a.static_ratio == b.static_ratio &&
+           a.stribeck_velocity == b.stribeck_velocity && a.dim == b.dim && !a.user_limit && !b.user_limit;
+}
+
+// The numbers of a program may differ by run.
+bool rub_and_bounce_the_same(const Program& p, const Gap& a, const Gap& b) {
+    return a.restitution == b.restitution && (a.sliding < 0) == (b.sliding < 0) &&
+           std::equal(a.elements.begin(), a.elements.end(), b.elements.begin(), b.elements.end(), [&](int e, int other) {
+               return rubs_the_same(p.frictions[e], p.frictions[other]);
+           });
+}
+
+}  // namespace
+
+bool are_copies(const Program& p, int gap, int other) {
+    const Gap &a = p.gaps[gap], &b = p.gaps[other];
+    return a.alike == b.alike && (gap == other || rub_and_bounce_the_same(p, a, b));
+}
+
+bool coincide(const Program& p, const Workspace& w, int gap, int other) {
+    const Gap &a = p.gaps[gap], &b = p.gaps[other];
+    if (are_copies(p, gap, other)) return true;
+    if (!w.now.values[a.block].geometric || !w.now.values[b.block].geometric) return false;
+    if (bodies(p.blocks[a.block]) != bodies(p.blocks[b.block]) || !rub_and_bounce_the_same(p, a, b)) return false;
+    const Line one = line_of(p, w, a.block, 0), two = line_of(p, w, b.block, 0);
+    const double size = 1.0 + one.point.norm();
+    if ((one.along - two.along).norm() > one_place) return false;
+    if ((one.point - two.point).cross(one.along).norm() > one_place * size) return false;
+    if (a.sliding < 0) return true;
+    const Friction &rubs = p.frictions[a.sliding], &rubs_too = p.frictions[b.sliding];
+    const Vec3 apart = w.now.values[rubs.block].wrench[0].point - w.now.values[rubs_too.block].wrench[0].point;
+    return apart.norm() <= one_place * size;
+}
+
+void leave_one_of_each_place(const Program& p, const Workspace& w, const std::vector<char>& closed, std::vector<int>& list) {
+    size_t left = 0;
+    for (int gap : list) {
+        const auto end = list.begin() + static_cast<std::ptrdiff_t>(left);
+        const auto same = std::find_if(list.begin(), end, [&](int other) { return coincide(p, w, gap, other); });
+        if (same == end) list[left++] = gap;
+        else if (closed[gap] && !closed[*same]) *same = gap;
+    }
+    list.resize(left);
+    std::sort(list.begin(), list.end());
+}
+
+double load(const Program& p, Workspace& w, int gap) {
+    return reactions(p, w).lam[p.blocks[p.gaps[gap].block].row];
+}
+
+double load_rounding(const Program& p, const Workspace& w, int gap) {
+    const double scale = w.now.rows.scale[p.blocks[p.gaps[gap].block].row];  // square: mass that the row moves
+    return sum_rounding * scale * scale * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+}
+
+int pulling_contact(const Program& p, Workspace& w) {
+    const Reactions& r = reactions(p, w);
+    if (r.presses && w.now.rows.redundant) return -1;
+    VecX lam = r.lam;
+    if (w.now.rows.redundant) share_multipliers(p.layout, p.blocks, w.now.B, p.described, w.now.rows, w.now.lam, lam);
+    int found = -1;
+    double most = 0.0;
+    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
+        if (!w.state.closed[i] || is_bare(p, i)) continue;
+        const double pull = -lam[p.blocks[p.gaps[i].block].row] / load_rounding(p, w, i);
+        if (!(pull > 1.0) || pull <= most) continue;
+        most = pull;
+        found = i;
+    }
+    return found;
+}
+
+}  // namespace pn

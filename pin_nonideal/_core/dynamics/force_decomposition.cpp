@@ -1,0 +1,73 @@
+#include "dynamics/force_decomposition.hpp"
+
+#include "constraints/redundancy.hpp"
+#include "dynamics/reactions.hpp"
+#include "dynamics/acceleration.hpp"
+#include "tree/mass_factor.hpp"
+
+namespace pn {
+
+IdealMotion::IdealMotion(const Program& program, Workspace& workspace) : p(program), w(workspace) {
+    for (Mode mode : w.state.mode) sticks |= mode == sticking;
+    if (sticks) {
+        w.now.terms.locked.swap(w.scratch.ideal_locked);
+        factorize(p.mechanism, w.now.terms);
+        std::swap(w.now.rows, w.now.ideal_rows);
+        const RowSystem& own = w.now.ideal_rows;
+        w.now.rows.refine = own.refine;
+        if (!w.state.ideal_decided) {
+            for (int r = 0; r < p.layout.rows; ++r) w.now.rows.required[r] = own.required[r] && r < p.constraint_rows();
+            w.now.rows.use_required(p.blocks);
+        }
+        if (!w.now.rows.blocks.empty()) {
+            scale_rows(p, w);
+            if (w.state.ideal_decided) factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+            else choose_rows(p, w);
+        }
+        w.state.ideal_decided = true;
+    }
+    solve_motion(p, w, false);
+    w.now.ideal = true;
+}
+
+IdealMotion::~IdealMotion() {
+    w.now.ideal = false;
+    w.now.renew();
+    if (!sticks) return;
+    w.now.terms.locked.swap(w.scratch.ideal_locked);
+    factorize(p.mechanism, w.now.terms);
+    std::swap(w.now.rows, w.now.ideal_rows);
+    scale_rows(p, w);
+}
+
+void split_forces(const Program& p, Workspace& w, Split& out) {
+    const int nv = p.mechanism.nv;
+    const VecX a = w.now.a, lam = w.now.lam;
+    VecX shared = reactions(p, w).lam;
+    out.lam = p.user_multipliers(shared);
+    out.C = p.has_laws() ? w.now.C : VecX(VecX::Zero(nv));
+    VecX total = VecX::Zero(nv);
+    for (size_t i = 0; i < p.blocks.size(); ++i) {
+        if (!w.now.rows.block_used[i]) continue;
+        const bool constraint = static_cast<int>(i) < p.constraints;
+        add_transpose(p.blocks[i], w.now.A, shared, constraint ? total : out.C);  // C holds what sticks as well
+    }
+    VecX left_over = VecX::Zero(nv);  // of the multipliers, by the shares; what locks a dof carries that as well
+    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.A, lam - shared, left_over);
+    for (int dof = 0; dof < nv; ++dof)
+        if (w.now.terms.locked[dof]) out.C[dof] += holding_forces(p, w)[dof] + left_over[dof];
+    {
+        const IdealMotion ideal(p, w);
+        share_multipliers(p.layout, p.blocks, w.now.B, p.described, w.now.rows, w.now.lam, shared);
+        out.F_ideal = VecX::Zero(nv);
+        for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.A, shared, out.F_ideal);
+        if (w.now.rows.blocks.empty()) shared.setZero();
+        out.lam_ideal = p.user_multipliers(shared);
+    }
+    out.F_nonideal = total - out.F_ideal + out.C;  // Eq. (39)
+    w.now.a = a;
+    w.now.lam = lam;
+    w.now.renew();
+}
+
+}  // namespace pn

@@ -1,0 +1,171 @@
+#include "dynamics/friction_limit.hpp"
+
+#include <algorithm>
+
+#include "dynamics/reactions.hpp"
+#include "dynamics/acceleration.hpp"
+
+namespace pn {
+
+Vec3 slip_velocity(const Evaluation& now, const Friction& f) {
+    const RowValues& values = now.values[f.block];
+    Vec3 u = Vec3::Zero();
+    for (int k = 0; k < f.dim; ++k) u[k] = values.rate[k];
+    return u;
+}
+
+static PN_INLINE LoadVectors vectors_of_load(const Program& p, Workspace& w, const Friction& f) {
+    using Load = Friction::Load;
+    const Vec3 none = Vec3::Zero();
+    if (f.load == Load::none || f.load == Load::user) return {none, none, none};
+    if (f.load == Load::multiplier) {
+        const double share = p.described.share(f.row, reactions(p, w).lam);
+        return {f.mu * share * Vec3::UnitX(), none, none};
+    }
+    Force r;
+    Vec3 axis;
+    if (f.joint > 0) {
+        r = joint_wrench(p, w, f.joint);
+        axis = f.axis_dof >= 0 ? w.now.terms.J[f.axis_dof].ang : w.now.terms.body[f.joint].R * f.axis;
+    } else {
+        r = anchor_wrench(p, w, f.anchor);
+        const Frame& frame = *frames(p.blocks[f.anchor].kind).first;
+        axis = w.now.terms.body[frame.joint].R * (frame.R * f.axis);
+    }
+    const double rub = f.mu * f.radius;
+    if (f.load == Load::spherical) return {rub * r.lin, none, none};
+    const Vec3 axial = r.lin.dot(axis) * axis, radial = r.lin - axial;
+    if (f.load == Load::prismatic) return {f.mu * radial, f.mu * f.inverse_span * r.ang, none};
+    const Vec3 bending = r.ang - r.ang.dot(axis) * axis;
+    if (f.load == Load::planar) return {f.mu * axial, f.mu * f.inverse_span * bending, none};
+    return {rub * radial, rub * f.inverse_span * bending, f.mu * f.axial_radius * axial};
+}
+
+LoadVectors load_vectors(const Program& p, Workspace& w, const Friction& f) { return vectors_of_load(p, w, f); }
+
+SlipLimits load_limits(const Program& p, Workspace& w, const Friction& f, double t, const VecX& q, const VecX& v) {
+    if (f.load == Friction::Load::user) return f.user_limit(p, t, q, v, w);
+    double limit = f.constant;
+    if (f.load == Friction::Load::none) return limit;
+    // Stages beyond the instant at which a contact opens see a force that pulls: friction goes through zero with it.
+    if (f.gap >= 0) return limit + f.mu * p.described.share(f.row, reactions(p, w).lam);
+    for (const Vec3& vector : vectors_of_load(p, w, f)) limit += vector.norm();
+    return limit;
+}
+
+double slip_along_mode(const Program& p, const Workspace& w, int e) {
+    const Friction& f = p.frictions[e];
+    const Vec3 u = slip_velocity(w.now, f);
+    return f.dim == 1 ? w.state.mode[e] * u[0] : u.dot(w.state.slip_direction[e]);
+}
+
+// Rates of the slip velocities in the motion at hand.
+static Vec3 slip_acceleration(const Program& p, Workspace& w, const Friction& f) {
+    const Block& block = p.blocks[f.block];
+    Vec3 rate = Vec3::Zero();
+    if (block.dof >= 0) {
+        for (int k = 0; k < f.dim; ++k) rate[k] = w.now.a[block.dof + k];
+        return rate;
+    }
+    multiply(block, w.now.A, w.now.a, w.scratch.r);
+    for (int k = 0; k < f.dim; ++k) rate[k] = w.scratch.r[block.row + k] - w.now.b[block.row + k];
+    return rate;
+}
+
+double slip_rate_along_mode(const Program& p, Workspace& w, int e) {
+    const Friction& f = p.frictions[e];
+    const Vec3 rate = slip_acceleration(p, w, f);
+    return f.dim == 1 ? w.state.mode[e] * rate[0] : rate.dot(w.state.slip_direction[e]);
+}
+
+std::pair<double, double> slip_toward_rest(const Program& p, Workspace& w, int e) {
+    const Friction& f = p.frictions[e];
+    const double along = slip_along_mode(p, w, e);
+    if (f.dim == 1) return {along, slip_rate_along_mode(p, w, e)};
+    const Vec3 u = slip_velocity(w.now, f);
+    const double size = u.norm();
+    // What is too slow to tell a direction goes along the one that is remembered.
+    const bool slow = size <= directed_speed * (1.0 + w.now.speed);
+    if (slow || 2.0 * along * along > size * size) return {along, slip_rate_along_mode(p, w, e)};
+    return {size, slip_acceleration(p, w, f).dot(u) / size};
+}
+
+double limit_under(const Program& p, const Workspace& w, int e, double load) {
+    const Friction& f = p.frictions[e];
+    const bool slips = f.varies_with_speed() && w.state.mode[e] != sticking;
+    return f.kinetic_limit(load, slips ? slip_velocity(w.now, f).norm() : 0.0);
+}
+
+void update_limit(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
+    w.now.load[e] = load_limits(p, w, p.frictions[e], t, q, v);
+    w.now.limit[e] = limit_under(p, w, e, w.now.load[e].against(w.state.mode[e]));
+}
+
+SlipLimits static_limits(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
+    const Friction& f = p.frictions[e];
+    if (f.reaction == Reaction::total) w.now.load[e] = load_limits(p, w, f, t, q, v);
+    return w.now.load[e] * f.static_ratio;
+}
+
+Vec3 friction_force(const Program& p, Workspace& w, int e) {
+    const Friction& f = p.frictions[e];
+    if (w.state.mode[e] != sticking) return w.now.slip_force[e];
+    Vec3 force = Vec3::Zero();
+    const Block& block = p.blocks[f.block];
+    if (block.dof >= 0)
+        for (int k = 0; k < f.dim; ++k) force[k] = holding_forces(p, w)[block.dof + k];
+    else
+        for (int k = 0; k < f.dim; ++k) force[k] = w.now.lam[block.row + k];
+    return force;
+}
+
+HoldingForce holding_force(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
+    const SlipLimits limits = static_limits(p, w, e, t, q, v);
+    HoldingForce out{friction_force(p, w, e), limits.reach()};
+    if (p.frictions[e].dim == 1) out.force[0] -= limits.middle();
+    return out;
+}
+
+double limit_at_hand(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
+    if (w.state.mode[e] == unloaded) return 0.0;
+    if (w.state.mode[e] != sticking) return w.now.limit[e];
+    const SlipLimits limits = static_limits(p, w, e, t, q, v);
+    return limits.bounding(p.frictions[e].dim == 1 ? friction_force(p, w, e)[0] : 0.0);
+}
+
+void forget_slip_directions(Workspace& w) {
+    std::fill(w.state.slip_direction.begin(), w.state.slip_direction.end(), Vec3::Zero());
+}
+
+// Unit direction of the friction force of a slipping element.
+static Vec3 force_direction(const Program& p, Workspace& w, int e) {
+    const Friction& f = p.frictions[e];
+    if (f.dim == 1) return Vec3(-w.state.mode[e], 0.0, 0.0);
+    if (w.state.seeks_directions) return -w.state.last_direction[e];
+    const Vec3 u = slip_velocity(w.now, f);
+    const double speed = u.norm();
+    if (speed > directed_speed * (1.0 + w.now.speed))
+        // Past a reversal inside a step the direction goes on as it was, so that the step sees a smooth law.
+        w.state.last_direction[e] = u.dot(w.state.slip_direction[e]) >= 0.0 ? Vec3(u / speed) : Vec3(-u / speed);
+    return -w.state.last_direction[e];
+}
+
+static PN_INLINE void add_force_of_slip(const Program& p, Workspace& w, int e, VecX& C) {
+    if (!slips(w.state.mode[e])) return;
+    const Block& block = p.blocks[p.frictions[e].block];
+    w.now.slip_force[e] = w.now.limit[e] * force_direction(p, w, e);
+    w.now.reactions.current = false;
+    if (block.dof >= 0)
+        for (int k = 0; k < block.total; ++k) C[block.dof + k] += w.now.slip_force[e][k];
+    else
+        add_along(block, w.now.A, w.now.slip_force[e], C);
+}
+
+void add_slip_force(const Program& p, Workspace& w, int e, VecX& C) { add_force_of_slip(p, w, e, C); }
+
+void add_slip_forces(const Program& p, Workspace& w, bool loaded, VecX& C) {
+    for (int e : w.now.slipping)
+        if ((p.frictions[e].reaction != Reaction::none) == loaded) add_force_of_slip(p, w, e, C);
+}
+
+}  // namespace pn

@@ -1,0 +1,255 @@
+#include "dynamics/implicit_friction.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "dynamics/reactions.hpp"
+#include "dynamics/acceleration.hpp"
+#include "dynamics/force_decomposition.hpp"
+#include "dynamics/uniqueness.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr double reaction_tolerance = 4e-15;  // relative change of y that counts as rounding
+constexpr double newton_tolerance = 3.2e-14;  // the same behind a linear solve
+constexpr double stalled = 1e-12;             // Newton's error that no longer falls is rounding where it is below this
+constexpr double slow_change = 1e-13;         // a change that contracts slowly is followed where it is above this
+constexpr double good_contraction = 0.25;     // slower fixed points go to Newton's method
+constexpr int fixed_point_limit = 30, newton_limit = 30;
+// The growth of the equation below which a proof of uniqueness is kept for as many steps as there are unknowns, and these
+// at least: it costs about one motion a step then. Over so short a time no growth comes from here to one.
+constexpr double safe_growth = 0.5;
+constexpr int kept_steps = 4;
+constexpr int most_pieces = 30;  // of the loads that contacts share, one solution each
+constexpr double least_part = 0x1p-10;  // of the way to a solution of another piece
+constexpr double least_gain = 0.1;      // of the error that a step to the solution takes away if all is one piece
+
+struct Implicit : Unknowns {
+    using Unknowns::Unknowns;
+
+    bool is_due() const {
+        const RunState& state = w.state;
+        if (state.unique == Uniqueness::not_shown) return state.steps_since == never_decided;  // it was tried in vain
+        return state.steps_since >= (state.growth < safe_growth ? std::max(n, kept_steps) : 1);
+    }
+
+    // Whether the equation contracts, with y its solution; the motion is then again that of y.
+    bool contracts(const VecX& y) {
+        ReactionEquation& arrays = w.scratch.equation;
+        const HeldPiece piece(p, w);
+        equation(y, arrays);
+        if (!arrays.finite()) throw Failure(Failure::Kind::not_finite, t);
+        arrays.steepest(w.scratch.jacobian);
+        const double bound = growth(w.scratch.jacobian);
+        if (!(bound < 1.0 - least_determinant_told)) return false;
+        w.state.growth = bound;
+        w.state.steps_since = 0;
+        w.state.unique = shares_pressing(p, w) ? Uniqueness::not_shown : Uniqueness::shown;
+        set(y);
+        motion();
+        return true;
+    }
+
+    // Piece after piece of the loads, until a solution lies in its own. One that lies in another piece is gone to as far as
+    // that makes the equation better met: else two pieces might send to one another for ever.
+    void solve_pieces(VecX& y) {
+        VecX g(n);
+        const VecX start = y;
+        try {
+            image(y, g);
+            double error = (g - y).norm();
+            for (int turn = 0; turn < most_pieces; ++turn) {
+                const VecX from = y;
+                {
+                    const HeldPiece piece(p, w);
+                    solve_bearings(y);
+                }
+                if (is_motion(y)) return;
+                if (!approach(from, error, y, g)) break;
+            }
+        } catch (const Failure& failure) {
+            if (failure.kind != Failure::Kind::paradox || failure.solutions == Failure::Solutions::several) throw;
+            decide_over_pieces(*this, start, y, failure);
+            image(y, g);
+            return;
+        }
+        decide_over_pieces(*this, start, y, Failure(Failure::Kind::not_converged, t, elements()));
+        image(y, g);
+    }
+
+    // Back from y towards `from` until the error there is less than before; false where it nowhere is.
+    bool approach(const VecX& from, double& error, VecX& y, VecX& g) {
+        const VecX way = y - from;
+        for (double part = 1.0; part >= least_part; part *= 0.5) {
+            y = from + part * way;
+            image(y, g);
+            const double there = (g - y).norm();
+            if (!(there < (1.0 - least_gain * part) * error)) continue;
+            error = there;
+            return true;
+        }
+        return false;
+    }
+
+    // The equation as arrays, its solution near y, and whether that is the only one.
+    void solve_bearings(VecX& y) {
+        ReactionEquation& arrays = w.scratch.equation;
+        ReactionNewton& newton = w.scratch.newton;
+        equation(y, arrays);
+        if (!arrays.finite()) throw Failure(Failure::Kind::not_finite, t);
+        VecX& before = w.scratch.before;
+        before = y;
+        const bool solved = newton.solve(arrays, y);
+        const bool regular = solved && newton.factorize(arrays, y) > least_determinant_told;
+        if (!regular || is_due()) decide(*this, arrays, before, y, solved);
+        w.now.determinant = newton.factorize(arrays, y);
+        double last = std::numeric_limits<double>::infinity();
+        for (int it = 0; it < newton_limit; ++it) {  // what rounding left in the arrays
+            image(y, newton.image);
+            newton.residual = newton.image - y;
+            const double error = newton.residual.cwiseAbs().maxCoeff();
+            if (error <= reaction_tolerance * y.cwiseAbs().maxCoeff() || error >= last) return;
+            last = error;
+            newton.factor.solve(newton.residual, newton.step);
+            y += newton.step;
+        }
+    }
+
+    // With functions of the user's among the unknowns.
+    void solve_laws(VecX& y) {
+        VecX g(n);
+        double size = 0.0, last = std::numeric_limits<double>::infinity();
+        MatX& J = w.scratch.jacobian;
+        for (int it = 0; it < newton_limit; ++it) {
+            image(y, g);
+            const VecX residual = g - y;
+            size = std::max({size, y.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});
+            const double error = residual.cwiseAbs().maxCoeff();
+            if (!g.allFinite()) throw Failure(Failure::Kind::not_finite, t);
+            differentiate(*this, y, g, size, J);
+            if (error <= newton_tolerance * size || (it > 3 && error <= stalled * size && error >= last)) {
+                look_for_others(*this, y, J, size);
+                image(y, g);
+                return;
+            }
+            last = error;
+            const VecX step = pn::solve(MatX::Identity(n, n) - J, residual);
+            if (!step.allFinite()) throw Failure(Failure::Kind::paradox, t, elements(), 0.0);  // between one and none
+            y += step;
+        }
+        w.now.determinant = least_determinant(*this, J);
+        throw Failure(Failure::Kind::paradox, t, elements(), w.now.determinant);
+    }
+
+    // Fixed-point steps from the solution before; false where they contract slowly.
+    bool iterate() {
+        VecX &y = w.scratch.unknown, &g = w.scratch.image;
+        auto yn = y.head(n);
+        double last = 0.0;
+        for (int it = 0; it < fixed_point_limit; ++it) {
+            image(y, g);
+            double size = 0.0, change = 0.0;
+            for (int k = 0; k < n; ++k) {
+                size = std::max(size, std::abs(g[k]));
+                change = std::max(change, std::abs(g[k] - y[k]));
+            }
+            if (!g.head(n).allFinite()) throw Failure(Failure::Kind::not_finite, t);
+            yn = g.head(n);
+            if (change <= reaction_tolerance * size) return true;
+            if (it > 1 && change > good_contraction * last && change > slow_change * size + rounding()) return false;
+            if (it > 1 && change >= last) return true;  // rounding
+            // The next change would be below rounding: the motion just found needs one more pass and no check.
+            if (it > 0 && change * (change / last) <= reaction_tolerance * size) {
+                set(g);
+                motion();
+                return true;
+            }
+            last = change;
+        }
+        return false;
+    }
+
+    // Places of the unknowns among those of all elements and laws, which a warm start keeps.
+    template <class Exchange>
+    void exchange(const Exchange& swap) const {
+        const int elements = static_cast<int>(p.frictions.size()), nv = p.mechanism.nv;
+        int k = 0;
+        each([&](size_t e) { swap(k++, static_cast<int>(e), 1); },
+             [&](const UserLaw& law) { swap(k, elements + law.index * nv, nv); k += nv; });
+    }
+
+    void solve() {
+        VecX &kept = w.state.unknown, &y = w.scratch.unknown;
+        y.setZero();
+        if (w.state.warm) exchange([&](int k, int place, int count) { y.segment(k, count) = kept.segment(place, count); });
+        w.state.warm = false;  // what a failure leaves is no start for the next evaluation
+        if (!iterate() || (bearings && is_due() && !contracts(y))) {
+            VecX& solution = w.scratch.solution;
+            solution = y.head(n);
+            if (bearings && shares_pressing(p, w)) solve_pieces(solution);
+            else if (bearings) solve_bearings(solution);
+            else solve_laws(solution);
+            y.head(n) = solution;
+        } else if (!bearings) {
+            w.state.unique = Uniqueness::not_shown;
+        }
+        exchange([&](int k, int place, int count) { kept.segment(place, count) = y.segment(k, count); });
+    }
+};
+
+}  // namespace
+
+// Loads that the ideal motion gives, as the paper's Example (c) takes them; their laws are then known.
+static void ideal_loads(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    bool asked = false;
+    for (const Friction& f : p.frictions) asked |= f.reaction == Reaction::ideal;
+    each_law<UserLaw>(p.laws, [&](const UserLaw& law) { asked |= law.reaction == Reaction::ideal; });
+    if (!asked) return;
+    const IdealMotion motion(p, w);
+    for (size_t e = 0; e < p.frictions.size(); ++e)
+        if (p.frictions[e].reaction == Reaction::ideal) update_limit(p, w, e, t, q, v);
+    each_law<UserLaw>(p.laws, [&](const UserLaw& law) {
+        if (law.reaction == Reaction::ideal) w.now.base_C += ask(p, law, w, t, q, v);
+    });
+}
+
+void find_known_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    w.now.C_smooth.setZero();
+    add_smooth_forces(p, w, t, q, v, w.now.C_smooth);
+    for (size_t e = 0; e < p.frictions.size(); ++e)
+        if (p.frictions[e].reaction == Reaction::none) update_limit(p, w, e, t, q, v);
+    add_slip_forces(p, w, false, w.now.C_smooth);
+}
+
+void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const VecX& known) {
+    w.now.determinant = 1.0;
+    const bool act = laws_act(p, w);
+    if (!p.needs_reactions || !act) {
+        w.now.C = known;
+        solve_motion(p, w, true);
+        if (!act) w.state.unique = Uniqueness::shown;
+        return;
+    }
+    w.now.base_C = known;  // C that does not change while the reactions are sought
+    ideal_loads(p, w, t, q, v);
+    Implicit implicit{p, w, t, q, v};
+    if (implicit.n == 0) implicit.motion();
+    else implicit.solve();
+    if (implicit.n == 0) w.state.unique = Uniqueness::shown;
+    w.state.warm = true;
+}
+
+void solve_with_step_friction(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    Unknowns unknowns{p, w, t, q, v};
+    for (int e : unknowns.elements()) {
+        const Block& block = p.blocks[p.frictions[e].block];
+        w.now.limit[e] = w.state.percussion.segment(block.row, static_cast<Eigen::Index>(block.kept.size())).norm();
+    }
+    unknowns.motion();
+    w.state.unique = Uniqueness::not_shown;
+}
+
+}  // namespace pn

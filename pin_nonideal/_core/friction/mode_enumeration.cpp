@@ -1,0 +1,116 @@
+#include "friction/mode_enumeration.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/reactions.hpp"
+#include "dynamics/friction_limit.hpp"
+#include "dynamics/step_start.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr int most_elements = 5;  // 243 choices, of one implicit equation each
+
+bool may_be_tried(const Program& p, const std::vector<int>& list) {
+    return list.size() <= most_elements &&
+           std::all_of(list.begin(), list.end(), [&](int e) { return p.frictions[e].dim == 1; });
+}
+
+struct EachChoice {
+    const Program& p;
+    Workspace& w;
+    double t;
+    const VecX &q, &v;
+    const ModeQuestion& question;
+    std::vector<std::vector<Mode>> motions;  // choices whose motions keep the conditions that their modes stand for
+    bool shown = true;                       // that the others have none
+    double determinant = 0.0;                // the least of those that have none
+
+    // All elements stick or slip one way or the other; false where one sticks that has just begun to slip.
+    bool choose(int number, std::vector<Mode>& modes) const {
+        for (int e : question.at_rest) {
+            modes[e] = number % 3 == 0 ? sticking : number % 3 == 1 ? slip_plus : slip_minus;
+            number /= 3;
+            const auto& breaking = question.breaking;
+            if (modes[e] == sticking && std::find(breaking.begin(), breaking.end(), e) != breaking.end()) return false;
+        }
+        return true;
+    }
+
+    void move(const std::vector<Mode>& modes) {
+        set_modes(p, w, modes);
+        w.state.warm = false;
+        w.state.steps_since = never_decided;
+        begin_step(p, w, t, q, v);
+    }
+
+    // Whether the motion at hand does, but for rounding.
+    bool keeps_conditions() {
+        const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
+        return std::all_of(question.at_rest.begin(), question.at_rest.end(), [&](int e) {
+            if (w.state.mode[e] != sticking) return slip_rate_along_mode(p, w, e) >= -limit_slack * size;
+            return holding_force(p, w, e, t, q, v).is_within(limit_slack);
+        });
+    }
+
+    void try_all() {
+        std::vector<Mode> modes = question.modes;
+        const int choices = static_cast<int>(std::lround(std::pow(3.0, question.at_rest.size())));
+        for (int number = 0; number < choices; ++number) {
+            if (!choose(number, modes)) continue;
+            try {
+                move(modes);
+            } catch (const Failure& failure) {
+                shown &= failure.solutions == Failure::Solutions::none;
+                if (failure.kind == Failure::Kind::paradox) determinant = std::min(determinant, failure.value);
+                continue;
+            }
+            if (keeps_conditions()) motions.push_back(modes);
+            else shown &= w.state.unique == Uniqueness::shown;
+        }
+    }
+
+    const std::vector<Mode>* stickiest() const {
+        const auto holds_all_of = [&](const std::vector<Mode>& one, const std::vector<Mode>& other) {
+            return std::all_of(question.at_rest.begin(), question.at_rest.end(),
+                               [&](int e) { return one[e] == sticking || other[e] != sticking; });
+        };
+        for (const std::vector<Mode>& one : motions)
+            if (std::all_of(motions.begin(), motions.end(), [&](const auto& other) { return holds_all_of(one, other); }))
+                return &one;
+        return nullptr;
+    }
+
+    [[noreturn]] void paradox() {
+        Failure failure(Failure::Kind::paradox, t, question.at_rest, determinant);
+        failure.solutions = motions.empty() ? Failure::Solutions::none : Failure::Solutions::several;
+        for (size_t i = 0; i < std::min<size_t>(2, motions.size()); ++i) {
+            move(motions[i]);
+            VecX limits(question.at_rest.size());
+            for (int k = 0; k < limits.size(); ++k)
+                limits[k] = static_limits(p, w, question.at_rest[k], t, q, v).reach();
+            failure.limits.push_back(limits);
+            failure.accelerations.push_back(w.now.a);
+        }
+        throw failure;
+    }
+};
+
+}  // namespace
+
+bool take_only_choice(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ModeQuestion& question) {
+    if (!may_be_tried(p, question.at_rest)) return false;
+    EachChoice each{p, w, t, q, v, question, {}};
+    each.try_all();
+    if (each.motions.empty() && !each.shown) return false;
+    const std::vector<Mode>* modes = each.stickiest();
+    if (!modes) each.paradox();
+    each.move(*modes);
+    w.now.several = each.motions.size() > 1;
+    w.now.several_element = question.at_rest.front();
+    return true;
+}
+
+}  // namespace pn

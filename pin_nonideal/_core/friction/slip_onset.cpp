@@ -1,0 +1,98 @@
+#include "friction/slip_onset.hpp"
+
+#include <algorithm>
+
+#include "complementarity/socp_mode_newton.hpp"
+#include "complementarity/load_dependent/solver.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr double unsolved = 10.0;  // what the equation lacks leaves so much in the accelerations
+constexpr double slow = 1e-6;      // part of the accelerations that begin at a limit alone
+
+struct Beginning {
+    VecX force, slip;   // along its directions, the force from the middle of its limits; slip tells the way that it begins
+                        // to go
+    bool slides, told;  // its acceleration is more than rounding; its way is known
+    bool breaks;        // it stuck until now, and is at its limit
+};
+
+bool breaks(const ModeQuestion& question, int e, const VecX& force, double limit) {
+    const std::vector<int>& list = question.breaking;
+    return force.norm() >= limit * (1.0 - limit_slack) && std::find(list.begin(), list.end(), e) != list.end();
+}
+
+std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const std::vector<Beginning>& all) {
+    std::vector<Mode> modes = question.modes;
+    const bool any_told = std::any_of(all.begin(), all.end(), [](const Beginning& one) { return one.told; });
+    for (size_t i = 0; i < all.size(); ++i) {
+        const int e = question.at_rest[i];
+        const Beginning& one = all[i];
+        modes[e] = sticking;
+        // Of those that reached their limits together some may hold on.
+        if (!one.slides && !(one.breaks && (one.told || !any_told))) continue;
+        const VecX direction = one.told ? VecX(one.slip.normalized()) : VecX(-one.force.normalized());
+        Vec3 along;
+        for (int k = 0; k < direction.size(); ++k) along[k] = direction[k];
+        if (direction.size() > 1) w.state.slip_direction[e] = w.state.last_direction[e] = along;
+        modes[e] = direction.size() > 1 || along[0] > 0.0 ? slip_plus : slip_minus;
+    }
+    return modes;
+}
+
+}  // namespace
+
+// Of the friction of what slips and its acceleration, which are opposite, the one that is larger beside its rounding tells
+// the way.
+std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const FrictionProblem& problem, const VecX& f,
+                           const FrictionLimits& limits) {
+    const VecX alpha = problem.alpha0 + problem.W * f, from_middle = f - limits.middle;
+    const double noise = no_acceleration * problem.alpha0.cwiseAbs().maxCoeff();
+    const double slowest = slow * problem.alpha0.cwiseAbs().maxCoeff();
+    std::vector<Beginning> all;
+    VecX onset;
+    for (size_t i = 0, at = 0; i < question.at_rest.size(); at += problem.dims[i], ++i) {
+        const int dim = problem.dims[i];
+        const VecX force = from_middle.segment(at, dim), slip = alpha.segment(at, dim);
+        const bool broken = breaks(question, question.at_rest[i], force, limits[i]);
+        const bool slides = force.norm() >= limits[i] * (1.0 - at_limit) && slip.norm() > noise;
+        const bool slowly = dim > 1 ? force.norm() >= limits[i] * (1.0 - limit_slack) && slip.norm() < slowest
+                                    : broken && !slides;
+        if (slowly && onset.size() == 0)
+            onset = onset_accelerations(problem.W, problem.alpha0, problem.dims, limits);
+        const double response = problem.W.diagonal().segment(at, dim).sum() / dim;
+        const bool by_force = slides && force.norm() * response > slip.norm();
+        const VecX begins = slowly ? VecX(onset.segment(at, dim)) : by_force ? VecX(-force) : slip;
+        all.push_back({force, begins, slides, (slides || slowly) && begins.norm() > noise, broken});
+    }
+    return modes_of(w, question, all);
+}
+
+std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const RestEquation& equation, const VecX& x) {
+    VecX alpha, onset;
+    FrictionLimits limits;
+    equation.respond(x, alpha, limits);
+    const VecX from_middle = x - limits.middle;
+    const double noise = no_acceleration + unsolved * equation.error(x);
+    std::vector<Beginning> all;
+    for (size_t i = 0; i < question.at_rest.size(); ++i) {
+        const RestElement& e = equation.elements[i];
+        const VecX force = from_middle.segment(e.row, e.dim), slip = alpha.segment(e.row, e.dim);
+        const bool broken = breaks(question, question.at_rest[i], force, limits[i]);
+        const bool at_its_limit = force.norm() >= limits[i] * (1.0 - at_limit) ||
+                                  (force - e.rho * slip).norm() > limits[i] * (1.0 + at_limit);
+        const double in_play = equation.force_in_play(i, x, limits);
+        const bool slides = !e.may_stick || (at_its_limit && e.rho * slip.norm() > noise * in_play);
+        const bool slowly = broken && !slides;
+        if (slowly && onset.size() == 0) onset = onset_accelerations(equation, x);
+        const bool by_force = slides && e.may_stick && force.norm() > e.rho * slip.norm();
+        const VecX begins = slowly ? VecX(onset.segment(e.row, e.dim)) : by_force ? VecX(-force) : slip;
+        const bool told = slides || (slowly && e.rho * begins.norm() > no_acceleration * in_play);
+        all.push_back({force, begins, slides, told, broken});
+    }
+    return modes_of(w, question, all);
+}
+
+}  // namespace pn

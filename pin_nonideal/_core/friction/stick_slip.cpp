@@ -1,0 +1,396 @@
+#include "friction/stick_slip.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/evaluation.hpp"
+#include "dynamics/implicit_friction.hpp"
+#include "dynamics/reactions.hpp"
+#include "dynamics/friction_limit.hpp"
+#include "dynamics/acceleration.hpp"
+#include "dynamics/step_start.hpp"
+#include "complementarity/socp_mode_newton.hpp"
+#include "friction/mode_enumeration.hpp"
+#include "complementarity/load_dependent/enumeration.hpp"
+#include "friction/load_dependent_problem.hpp"
+#include "complementarity/load_dependent/solver.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr double limit_tolerance = 1e-12; // relative change of the limits at which the turns end
+constexpr double least_limit = 1e-300;    // a limit of zero divides by this
+constexpr int most_turns = 100;           // of forces and limits
+constexpr int most_pieces = 30;           // of the loads that contacts share
+
+bool contains(const std::vector<int>& list, int e) { return std::find(list.begin(), list.end(), e) != list.end(); }
+
+// The modes of elements at rest at one state, as they are sought.
+struct Search {
+    const Program& p;
+    Workspace& w;
+    double t;
+    const VecX &q, &v;
+    const ModeQuestion& question;
+    const std::vector<int>& list;  // of the elements at rest
+    std::vector<int> slipping;     // those whose limits follow their load
+
+    Search(const Program& program, Workspace& workspace, double time, const VecX& q_, const VecX& v_,
+           const ModeQuestion& asked)
+        : p(program), w(workspace), t(time), q(q_), v(v_), question(asked), list(asked.at_rest) {
+        for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
+            if (!contains(list, e) && slips(asked.modes[e]) && p.frictions[e].reaction == Reaction::total)
+                slipping.push_back(e);
+    }
+
+    void apply(const std::vector<Mode>& modes, bool limits_known) {
+        set_modes(p, w, modes);
+        w.state.warm = limits_known;
+        if (limits_known) {  // among all that these modes allow: the others are no motions from rest
+            w.state.unique = Uniqueness::shown;
+            w.state.growth = 1.0;
+            w.state.steps_since = -1;
+        }
+        begin_step(p, w, t, q, v);
+    }
+
+    // Whether the motion under the modes that the question suggests keeps the conditions that they stand for, where
+    // that makes it the only one: no limit depends on the load. The workspace ends evaluated there.
+    bool keeps_suggestion() {
+        if (p.needs_reactions || !question.breaking.empty()) return false;
+        try {
+            apply(question.modes, false);
+        } catch (const Failure& failure) {  // what is driven does not stick
+            if (failure.kind != Failure::Kind::inconsistent) throw;
+            return false;
+        }
+        const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
+        return std::all_of(list.begin(), list.end(), [&](int e) {
+            if (w.state.mode[e] == sticking)
+                return holding_force(p, w, e, t, q, v).is_within(at_limit);
+            return p.frictions[e].dim == 1 && slip_rate_along_mode(p, w, e) >= -limit_slack * size;
+        });
+    }
+
+    // Forces of all elements for the factors of their limits at hand, among all motions of a few elements; of more the
+    // one in which all stick, or else any.
+    bool find(RestProblem& problem, VecX& x) {
+        const RestEquation& equation = problem.equation;
+        const AllMotions all = all_motions(equation);
+        if (all.complete && !problem.has_pieces()) {
+            std::vector<VecX> motions;
+            for (const VecX& forces : all.forces)
+                if (problem.is_motion(forces)) motions.push_back(forces);
+            // Where a contact pulls in all of them, it is about to open.
+            return choose(problem, motions.empty() ? all.forces : motions, x);
+        }
+        VecX held = equation.holding_forces();
+        if (!refine_rest(equation, held) || !all_stick(equation, held)) return solve_rest(equation, x);
+        x = held;
+        return true;
+    }
+
+    // The same in piece after piece of the loads that contacts share, until the motion lies in its own; where that leads to
+    // none, in all of them.
+    bool find_in_pieces(RestProblem& problem, VecX& x) {
+        for (int turn = 0; turn < most_pieces && find(problem, x); ++turn) {
+            if (!problem.has_pieces() || problem.is_motion(x)) return true;
+            problem.enter_piece(x);
+        }
+        if (!problem.has_pieces()) return false;
+        for (const std::vector<char>& unloaded : load_pieces(p, w)) {
+            problem.enter_piece(unloaded);
+            x.setZero();
+            if (find(problem, x) && problem.is_motion(x)) return true;
+        }
+        return false;
+    }
+
+    // Newton's method alone, near a solution.
+    bool refine_in_pieces(RestProblem& problem, VecX& x) {
+        for (int turn = 0; turn < most_pieces; ++turn) {
+            if (problem.has_pieces()) problem.enter_piece(x);
+            if (!refine_rest(problem.equation, x)) return false;
+            if (!problem.has_pieces() || problem.is_motion(x)) return true;
+        }
+        return false;
+    }
+
+    // Whether forces within their limits hold all that rests, where those of the turns let it slip, in any piece of the
+    // loads that contacts share.
+    bool rests(RestProblem& problem, VecX& x) {
+        const auto begin = problem.equation.elements.begin();
+        const auto may_stick = [](const RestElement& e) { return e.may_stick; };  // the constraints drive the others
+        if (!std::all_of(begin, begin + list.size(), may_stick)) return false;
+        x = problem.equation.holding_forces();
+        for (int turn = 0; turn < most_pieces; ++turn) {
+            const bool holds = hold_at_rest(problem.equation, x);
+            if (!problem.has_pieces() || problem.is_motion(x)) return holds;
+            problem.enter_piece(x);
+        }
+        return false;
+    }
+
+    // What rested goes on resting: of several motions the one in which all that sticks in any other sticks, and more.
+    bool choose(const RestProblem& problem, const std::vector<VecX>& motions, VecX& x) {
+        const RestEquation& equation = problem.equation;
+        proven = true;
+        if (motions.empty()) return false;
+        for (const VecX& one : motions) {
+            const bool stickiest = std::all_of(motions.begin(), motions.end(), [&](const VecX& other) {
+                return &other == &one || sticks_more(equation.sticks(one), equation.sticks(other));
+            });
+            if (!stickiest) continue;
+            w.now.several = motions.size() > 1;
+            w.now.several_element = list.front();
+            x = one;
+            return true;
+        }
+        double determinant = HUGE_VAL;
+        for (const VecX& one : motions) determinant = std::min(determinant, equation.determinant(one));
+        paradox(problem, determinant, motions);
+    }
+
+    // `motions`: forces of some that are possible, of which two are shown.
+    [[noreturn]] void paradox(const RestProblem& problem, double determinant, const std::vector<VecX>& motions) const {
+        Failure failure(Failure::Kind::paradox, t, list, determinant);
+        failure.solutions = motions.empty() ? Failure::Solutions::none : Failure::Solutions::several;
+        for (size_t i = 0; i < std::min<size_t>(2, motions.size()); ++i) {
+            VecX alpha;
+            FrictionLimits limits;
+            problem.equation.respond(motions[i], alpha, limits);
+            failure.limits.push_back(limits.size.head(list.size()));
+            failure.accelerations.push_back(problem.acceleration(motions[i]));
+        }
+        throw failure;
+    }
+
+    bool all_stick(const RestEquation& equation, const VecX& x) const {
+        const std::vector<bool> sticks = equation.sticks(x);
+        return std::all_of(sticks.begin(), sticks.begin() + list.size(), [](bool one) { return one; });
+    }
+
+    static bool sticks_more(const std::vector<bool>& one, const std::vector<bool>& other) {
+        for (size_t i = 0; i < one.size(); ++i)
+            if (other[i] && !one[i]) return false;
+        return one != other;
+    }
+
+    // What begins to slip has its kinetic limit from then on. Returns whether something just did.
+    bool release(const RestProblem& problem, RestEquation& equation, const std::vector<Mode>& modes) {
+        bool any = false;
+        for (size_t i = 0; i < list.size(); ++i) {
+            RestElement& e = equation.elements[i];
+            if (!e.may_stick || !slips(modes[list[i]]) || e.factor == problem.sliding_factor(i)) continue;
+            e.factor = problem.sliding_factor(i);
+            any = true;
+        }
+        return any;
+    }
+
+    // The motion of these modes, which have just been found together with the limits.
+    void settle(const RestEquation& equation, const VecX& x, const std::vector<Mode>& modes) {
+        VecX alpha;
+        FrictionLimits limits;
+        equation.respond(x, alpha, limits);
+        for (size_t i = 0; i < equation.elements.size(); ++i) {
+            const int e = i < list.size() ? list[i] : slipping[i - list.size()];
+            const double middle = limits.middle[equation.elements[i].row];
+            w.state.unknown[e] = limits[i] - (slips(modes[e]) ? modes[e] * middle : 0.0);
+        }
+        apply(modes, proven);
+    }
+
+    // The motion under the forces f of the elements at rest, and the limits that its loads give: the kinetic one for what
+    // slips. Returns their largest relative change.
+    double follow(FrictionProblem& problem, const VecX& f, const std::vector<Mode>& modes, FrictionLimits& limits) {
+        VecX C = VecX::Zero(p.mechanism.nv);
+        problem.add_forces(p, w, f, C);
+        C = w.now.C_smooth + C;
+        solve_with_laws(p, w, t, q, v, C);
+        const VecX driven = problem.alpha0;
+        problem.alpha0 = problem.slip_accelerations(p, w) - problem.W * f;
+        for (int i = 0; i < problem.rows; ++i)
+            if (problem.W(i, i) == 0.0) problem.alpha0[i] = driven[i];
+        double change = 0.0;
+        for (size_t i = 0, at = 0; i < list.size(); at += problem.dims[i], ++i) {
+            const Friction& friction = p.frictions[list[i]];
+            SlipLimits now = static_limits(p, w, list[i], t, q, v);
+            if (modes[list[i]] != sticking) now = w.now.load[list[i]] * friction.speed_factor(0.0);
+            const double missed = std::max(std::abs(now.reach() - limits[i]), std::abs(now.middle() - limits.middle[at]));
+            change = std::max(change, missed / std::max(now.reach(), least_limit));
+            limits.size[i] = now.reach();
+            limits.middle[at] = now.middle();
+        }
+        return change;
+    }
+
+    // Limits and forces in turn, each motion with the loads that it has; false where they do not come to rest soon.
+    bool take_turns(std::vector<Mode>& modes) {
+        FrictionProblem problem(p, w, list);
+        problem.clean(p, w);
+        problem.alpha0 = problem.slip_accelerations(p, w);
+        const double noise = no_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+        for (int i = 0; i < problem.rows; ++i)  // what the constraints hold still has no slip acceleration
+            if (problem.W(i, i) == 0.0 && std::abs(problem.alpha0[i]) <= noise) problem.alpha0[i] = 0.0;
+        FrictionLimits limits(static_cast<int>(list.size()), problem.rows);
+        for (size_t i = 0, at = 0; i < list.size(); at += problem.dims[i], ++i) {
+            const SlipLimits now = static_limits(p, w, list[i], t, q, v);
+            limits.size[i] = now.reach();
+            limits.middle[at] = now.middle();
+        }
+        double change = 0.0;
+        for (int turn = 0; turn < most_turns; ++turn) {
+            const VecX f = friction_program(problem.W, problem.alpha0, problem.dims, limits);
+            const std::vector<Mode> next = modes_of(w, question, problem, f, limits);
+            if (next == modes && change <= limit_tolerance) return true;
+            modes = next;
+            change = follow(problem, f, modes, limits);
+        }
+        return false;
+    }
+
+    // Forces of the elements at rest in the motion that is near.
+    VecX near(const RestEquation& equation) const {
+        VecX x = VecX::Zero(equation.n);
+        for (size_t i = 0; i < list.size(); ++i)
+            for (int k = 0; k < equation.elements[i].dim; ++k) x[equation.elements[i].row + k] = question.near[list[i]][k];
+        return x;
+    }
+
+    // Elements at rest without friction; `all`: those that slip under a load of their own as well.
+    void unload(bool all) {
+        std::vector<Mode> modes = question.modes;
+        for (int e : list) modes[e] = unloaded;
+        if (all)
+            for (int e : slipping) modes[e] = unloaded;
+        for (int e : list) w.now.slip_force[e] = Vec3::Zero();
+        apply(modes, false);
+    }
+
+    void run() {
+        if (question.answered) return apply(question.modes, false);
+        if (keeps_suggestion()) return;
+        std::vector<Mode> modes = question.modes;
+        for (int e : list) modes[e] = unloaded;
+        bool found = false;
+        try {
+            unload(false);
+            found = take_turns(modes);
+            presses = !found || reactions(p, w).presses;
+        } catch (const Failure& failure) {  // loads of what slips, while what rests has no force yet or not its own
+            if (failure.kind != Failure::Kind::paradox) throw;
+        }
+        if (p.needs_reactions && look_further(found, modes)) return;
+        if (found) return apply(modes, false);
+        if (!take_only_choice(p, w, t, q, v, question)) throw Failure(Failure::Kind::not_converged, t, list);
+    }
+
+    // Turns give what slips in one of them its kinetic limit: what holds in the end may have slipped on the way.
+    bool released_early(const std::vector<Mode>& modes) const {
+        return std::any_of(list.begin(), list.end(), [&](int e) {
+            const Friction& friction = p.frictions[e];
+            return slips(modes[e]) && friction.holding_limit(1.0) > friction.kinetic_limit(1.0, 0.0);
+        });
+    }
+
+    // Where loads may leave several motions or none, or where turns found none to be trusted. Returns whether it knows
+    // better.
+    bool look_further(bool found, const std::vector<Mode>& turned) {
+        const bool trusted = found && presses && !released_early(turned);
+        const bool slid = !found || std::any_of(list.begin(), list.end(), [&](int e) { return turned[e] != sticking; });
+        unload(true);
+        RestProblem problem(p, w, t, q, v, list, slipping);
+        RestEquation& equation = problem.equation;
+        if (trusted && contraction(equation) < 1.0) return false;
+        VecX x;
+        // A search of all would have it; where all hold, that is the motion in which most sticks.
+        const bool all_known = is_searched(equation) && !problem.has_pieces();
+        if (slid && !all_known && equation.loaded()) {
+            if (rests(problem, x)) {
+                w.now.several = trusted;
+                w.now.several_element = list.front();
+                std::vector<Mode> modes = question.modes;
+                for (int e : list) modes[e] = sticking;
+                settle(equation, x, modes);
+                return true;
+            }
+            if (problem.has_pieces()) problem.enter_piece(VecX::Zero(equation.n));
+        }
+        if (trusted && !is_searched(equation)) return false;
+        x = VecX::Zero(equation.n);
+        bool solved = find_in_pieces(problem, x), one_limit = true;
+        if (!solved && !question.near.empty()) {
+            x = near(equation);
+            solved = refine_in_pieces(problem, x);
+        }
+        if (!solved && release(problem, equation, std::vector<Mode>(p.frictions.size(), slip_plus))) {
+            one_limit = false;  // some stick by one limit and slip by another: the search had not all of these motions
+            solved = find_in_pieces(problem, x);
+        }
+        while (solved && release(problem, equation, modes_of(w, question, equation, x))) solved = find_in_pieces(problem, x);
+        if (trusted && !(proven && solved)) return false;
+        if (!solved && proven && one_limit && !found)
+            paradox(problem, std::min(0.0, equation.determinant_far_away()), {});
+        if (solved) settle(equation, x, modes_of(w, question, equation, x));
+        return solved;
+    }
+
+    bool presses = true;  // the loads of the turns' motion: it is one
+    bool proven = false;  // that there is no motion, or which there are
+};
+
+}  // namespace
+
+static bool hardly_slips(const Program& p, const Workspace& w, int e, const VecX& v) {
+    return slip_velocity(w.now, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
+}
+
+bool at_rest(const Program& p, const Workspace& w, int e, const VecX& v) {
+    return w.state.mode[e] == sticking || hardly_slips(p, w, e, v);
+}
+
+void follow_velocity(const Program& p, Workspace& w, int e, ModeQuestion& question) {
+    const Vec3 u = slip_velocity(w.now, p.frictions[e]);
+    question.modes[e] = p.frictions[e].dim > 1 || u[0] > 0.0 ? slip_plus : slip_minus;
+    if (p.frictions[e].dim > 1) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
+}
+
+ModeQuestion question(const Program& p, Workspace& w, const VecX& v, int also) {
+    ModeQuestion asked{w.state.mode, {}, {}};
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
+        if (is_open(p, w, e)) continue;
+        if (e != also && !at_rest(p, w, e, v) && !w.state.lingers[e]) {
+            follow_velocity(p, w, e, asked);
+            continue;
+        }
+        asked.at_rest.push_back(e);
+        if (e == also) asked.modes[e] = sticking;
+    }
+    return asked;
+}
+
+ModeQuestion first_question(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    ModeQuestion asked{w.state.mode, {}, {}};
+    if (p.frictions.empty()) return asked;
+    w.state.warm = false;
+    update_kinematics(p, w, t, q, v);
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
+        if (is_open(p, w, e)) continue;
+        asked.modes[e] = sticking;
+        if (hardly_slips(p, w, e, v)) asked.at_rest.push_back(e);
+        else follow_velocity(p, w, e, asked);
+    }
+    return asked;
+}
+
+void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                   const ModeQuestion& question) {
+    w.now.several = false;
+    if (!question.at_rest.empty()) return Search(p, w, t, q, v, question).run();
+    set_modes(p, w, question.modes);
+    begin_step(p, w, t, q, v);
+}
+
+}  // namespace pn

@@ -1,0 +1,86 @@
+#include "python/external_run.hpp"
+
+#include <memory>
+
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include "python/options.hpp"
+#include "python/runner.hpp"
+#include "run/external_run.hpp"
+
+using namespace nanobind::literals;
+
+namespace pn {
+
+namespace {
+
+using Tick = Function<void(double)>;                       // with the time
+using Interpolant = nb::typed<nb::callable, Numbers(double)>;  // the state at a time inside a step
+
+Options with_events(Options options, const std::vector<UserEventTuple>& events) {
+    options.events = user_events(events);
+    return options;
+}
+
+// A run with all that it works in.
+struct Followed {
+    std::shared_ptr<const Program> p;
+    Options options;
+    Workspace w;
+    Recording out;
+    FollowedRun run;
+
+    Followed(std::shared_ptr<const Program> program, const Options& asked, const Tick& tick,
+             const std::vector<UserEventTuple>& events)
+        : p(std::move(program)), options(with_events(asked, events)), w(*p), run(*p, w, options, out) {
+        if (tick) options.tick = [tick](double t) { (*tick)(t); };
+    }
+
+    Numbers derivative(double t, const Array& y) {
+        VecX rate;
+        run.derivative(t, map(y), rate);
+        return to_numpy(rate);
+    }
+    Table jacobian(double t, const Array& y) {
+        const MatX by_columns = run.jacobian(t, map(y));
+        auto* kept = new RowMajor(by_columns);
+        nb::capsule owner(kept, [](void* x) noexcept { delete static_cast<RowMajor*>(x); });
+        const size_t n = y.shape(0);
+        return Table(kept->data(), {n, n}, owner);
+    }
+    bool follow(double t, const Interpolant& interpolant) {
+        return run.follow(t, [&](double at, VecX& y) {
+            const Array inside = nb::cast<Array>(interpolant(at));
+            y.head(inside.shape(0)) = map(inside);
+        });
+    }
+};
+
+}  // namespace
+
+void bind_followed(nb::module_& m) {
+    constexpr auto own = nb::rv_policy::automatic;
+    nb::class_<Followed>(m, "FollowedRun")
+        .def(nb::init<std::shared_ptr<const Program>, const Options&, const Tick&, const std::vector<UserEventTuple>&>(),
+             "program"_a, "options"_a, "tick"_a = nb::none(), "events"_a = std::vector<UserEventTuple>())
+        .def("start", [](Followed& f, const Array& q, const Array& v) { f.run.start(map(q), map(v)); }, "q"_a, "v"_a)
+        .def("derivative", &Followed::derivative, "t"_a, "y"_a)
+        .def("jacobian", &Followed::jacobian, "t"_a, "y"_a)
+        .def("follow", &Followed::follow, "t"_a, "interpolant"_a)
+        .def("stop_before", [](Followed& f, double end) { return f.run.stop_before(end); }, "end"_a)
+        .def_prop_ro("t", [](const Followed& f) { return f.run.time(); })
+        .def_prop_ro("done", [](const Followed& f) { return f.run.done(); })
+        .def_prop_ro("y", [](const Followed& f) { return to_numpy(f.run.state()); }, own)
+        .def_prop_ro("rate", [](const Followed& f) { return to_numpy(f.run.state_rate()); }, own)
+        .def_prop_ro("singular_onset", [](Followed& f) -> std::optional<std::string> {
+            const auto e = f.run.singular_onset();
+            return e ? std::optional(f.p->frictions[*e].name) : std::nullopt;
+        })
+        .def("outcome", [](Followed& f) { return Outcome{f.w.counters, std::move(f.out)}; });
+}
+
+}  // namespace pn

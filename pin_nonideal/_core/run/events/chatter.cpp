@@ -1,0 +1,70 @@
+#include "run/events/chatter.hpp"
+
+#include <algorithm>
+
+namespace pn {
+
+namespace {
+
+// This many events within the chatter's time make the run go on by time stepping for a while, in so many steps. Where
+// it goes on right after, the while is made longer by this factor, up to the longest [s].
+constexpr int chatter_events = 60;
+// Changes at so many instants in that time, of which the last leads nowhere, dwindle to rest.
+constexpr size_t dwindling_events = 6;
+constexpr int chatter_steps = 50;
+constexpr double chatter_growth = 2.0, longest_chatter = 1e-2;
+
+}  // namespace
+
+Clusters::Clusters(System& system, Progress& progress, const Options& options, StiffnessGuard& stiffness,
+                   TimeStepping& time_stepping, Recording& out)
+    : w(system.w), now_(progress), options_(options), stiffness_(stiffness), time_stepping_(time_stepping),
+      out_(out) {}
+
+bool Clusters::bridge(int element, double t_end) {
+    std::vector<double>& recent = now_.recent_events;
+    if (recent.size() > chatter_events) recent.erase(recent.begin());
+    if (recent.size() < chatter_events || now_.t - recent.front() > chatter_time) return false;
+    if (!options_.method.outside()) {
+        stiffness_.require_time_steps(next_stretch() / chatter_steps);
+        step_over(element, t_end);
+        return true;
+    }
+    recent.clear();  // steps of SciPy's methods go on without a look at events
+    out_.events.push_back({now_.t, Event::Kind::chatter, element});
+    return false;
+}
+
+void Clusters::remember() {
+    std::vector<double>& last = now_.last_changes;
+    if (!last.empty() && last.back() == now_.t) return;
+    if (last.size() == dwindling_events) last.erase(last.begin());
+    last.push_back(now_.t);
+}
+
+bool Clusters::dwindles() const {
+    const std::vector<double>& last = now_.last_changes;
+    return last.size() == dwindling_events && now_.t - last.front() <= chatter_time;
+}
+
+// Twice the last one where events went on crowding right after it.
+double Clusters::next_stretch() const {
+    const std::vector<double>& recent = now_.recent_events;
+    const double first = recent.empty() ? now_.t : recent.front();
+    const bool again = now_.bridged_time > 0.0 && first - now_.bridged_end < now_.bridged_time;
+    return again ? std::min(chatter_growth * now_.bridged_time, longest_chatter) : chatter_time;
+}
+
+void Clusters::step_over(int element, double t_end) {
+    now_.bridged_time = next_stretch();
+    now_.recent_events.clear();
+    now_.last_changes.clear();
+    const double dt = now_.bridged_time / chatter_steps;
+    out_.events.push_back({now_.t, Event::Kind::chatter, element});
+    const double stop = std::min(t_end, now_.t + now_.bridged_time);
+    w.state.seeks_directions = false;
+    while (now_.t < stop) time_stepping_.step(dt, stop, t_end);
+    now_.bridged_end = now_.t;
+}
+
+}  // namespace pn

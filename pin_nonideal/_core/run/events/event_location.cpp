@@ -1,0 +1,320 @@
+#include "run/events/event_location.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "contact/queries.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/projection.hpp"
+#include "dynamics/friction_limit.hpp"
+#include "dynamics/step_start.hpp"
+#include "friction/stick_slip.hpp"
+
+namespace pn {
+
+namespace {
+
+using EventKind = FoundEvent::Kind;
+
+// Slip of several directions below this has come to rest in fixed steps, which do not locate it.
+constexpr double arrived_speed = 1e-7;
+// Slip that has more than this part left of what its step began with, and more than this speed, passes by rest.
+constexpr double rest_part = 0.05, passing_speed = 1e-6;
+// A fixed step covers this part of the time to rest, and this part of its own length at least.
+constexpr double part_toward_rest = 0.5, least_shortened = 1e-3;
+// A step that misses a rest ends before it, by this part of the time to it. A step that begins with slip of fewer
+// tolerances than this may end at rest in any case.
+constexpr double part_before_rest = 0.1, negligible_slip = 10.0;
+
+// --- The step taken again
+constexpr int correction_passes = 12;
+// Gaps that close almost together change places so often, where the step taken again is not quite its interpolant.
+constexpr int most_closed_before = 4;
+constexpr double time_rounding = 2e-16, corrected_width = 1e-13;
+// Part of the step as it ends by which its end moves along the rate there, instead of the step being taken again: what
+// that leaves out is half the square of it, of the step's own change of the rate. A flight may be a millionth of the step
+// that was tried, and moving by all of it would leave out its fall.
+constexpr double moved_part = 1e-6;
+// The instant of a release is found to this part of the step or of the time. A secant of the rates beyond it is believed
+// where they have fallen to this part, and keeps off its root by this part of the way.
+constexpr double release_width = 1e-12, least_fall = 0.7, short_of_root = 1e-2;
+// Where the step does not show yet what its interpolant does, it goes on by this part of it, then by so many times that.
+constexpr double least_later = 1e-11, further_part = 10.0;
+
+// A step at rest is divided into so many parts, at whose ends it is asked whether what sticks holds.
+constexpr int places_inside = 8;
+
+}  // namespace
+
+EventLocator::EventLocator(System& system, Stepper& stepper, ErrorNorm& norm, const std::vector<double>& slip_at_start,
+                           const std::vector<char>& pulls, GapWatch& watch)
+    : system_(system), stepper_(stepper), norm_(norm), p(system.p), w(system.w), slip_at_start_(slip_at_start),
+      search_(system, stepper, pulls, watch) {}
+
+double EventLocator::shorten_toward_rest(const VecX& rate, double size) {
+    const double least = least_shortened * size;
+    for (int e : w.now.slipping) {
+        const Friction& f = p.frictions[e];
+        if (f.dim == 1) continue;
+        const Block& block = p.blocks[f.block];
+        system_.v = system_.velocity(rate);
+        multiply(block, w.now.A, system_.v, w.scratch.r);
+        const double slip = slip_velocity(w.now, f).squaredNorm();
+        double change = 0.0;
+        for (int k = 0; k < f.dim; ++k) {
+            const double along = w.scratch.r[block.row + k] - w.now.b[block.row + k];
+            change += along * along;
+        }
+        if (slip < change * size * size)
+            size = std::min(size, std::max(part_toward_rest * std::sqrt(slip / change), least));
+    }
+    return size;
+}
+
+double EventLocator::margin_at_end(const Watch& watch) {
+    return search_.margin(watch, stepper_.t0 + stepper_.h, stepper_.y1);
+}
+
+// Slip of several directions that has come to rest at the end of a fixed step.
+bool EventLocator::has_arrived(int e) const {
+    if (p.frictions[e].dim == 1 || stepper_.method.adaptive()) return false;
+    const double speed = system_.velocity(stepper_.y1).cwiseAbs().maxCoeff();
+    const double slip = slip_velocity(w.now, p.frictions[e]).norm();
+    return slip < slip_at_start_[e] && slip <= arrived_speed * (1.0 + speed);
+}
+
+void EventLocator::end_step_at(double size) {
+    stepper_.take_again(size);
+    system_.project_and_evaluate(stepper_.t0 + size, stepper_.y1, stepper_.end_rate());
+}
+
+// The step's end moves a little, or the step is taken again.
+void EventLocator::correct_end_to(double size) {
+    if (std::abs(size - stepper_.h) > moved_part * stepper_.h) return end_step_at(size);
+    stepper_.move_end(size - stepper_.h);
+    system_.project_and_evaluate(stepper_.t0 + stepper_.h, stepper_.y1, stepper_.end_rate());
+}
+
+// Slip of several directions turns as it comes to rest. The component across the final direction vanishes as a power
+// 1 + k of the component along it, with any k > 0, which no polynomial follows to the end. At the instant at which the
+// component along has vanished, the slip that is left is an error of the step. So is what its own estimate says: the step
+// was taken again, with stages at other times than those of the step that was accepted.
+bool EventLocator::misses_rest(const Watch& watch) const {
+    if (watch.kind != Watch::Kind::slip || p.frictions[watch.index].dim == 1) return false;
+    if (!stepper_.method.adaptive() || stepper_.method.outside()) return false;
+    const bool accurate = stepper_.error() <= 1.0;
+    norm_.set_tolerances(stepper_.y0, stepper_.y1, stepper_.h);
+    const bool rests = norm_.of_speed(slip_velocity(w.now, p.frictions[watch.index]).norm()) <= 1.0;
+    return !(accurate && rests) && norm_.of_speed(system_.slip(stepper_.start_rate(), watch.index)) > negligible_slip;
+}
+
+// Ends the step before the rest. The steps that follow begin with less slip, and their errors are smaller in proportion.
+void EventLocator::end_before_rest() {
+    const double to_rest = stepper_.h;
+    end_step_at((1.0 - part_before_rest) * to_rest);
+    if (!(stepper_.error() <= 1.0)) throw Failure(Failure::Kind::not_converged, stepper_.t0);
+    time_to_rest_ = part_before_rest * to_rest;
+}
+
+// Takes the step again up to the event, or to an earlier time if it misses a rest.
+void EventLocator::step_onto(const Crossing& crossing) {
+    const double full = stepper_.h;
+    time_to_rest_.reset();
+    end_step_at(std::clamp(crossing.part, 0.0, 1.0) * full);
+    if (!crossing.leaps) correct_instant(crossing, full);
+    if (misses_rest(crossing.watch)) end_before_rest();
+}
+
+// Corrects the instant by the margin that is left there. Its rate is known for slip along one direction; in other cases it
+// is that of the interpolant, then a secant's.
+void EventLocator::correct_instant(const Crossing& crossing, double full) {
+    const Watch& watch = crossing.watch;
+    const bool of_gap = watch.kind == Watch::Kind::gap;
+    const bool known_rate = of_gap || (watch.kind == Watch::Kind::slip && p.frictions[watch.index].dim == 1);
+    const double resolution = time_rounding * std::max(std::abs(stepper_.t0), full);
+    double rate = crossing.slope / full;
+    // Between an instant before it and one behind it: where the motion is not that of the interpolant, or where what others
+    // hold on its plane has no rate but rounding, Newton's method would lead on to the step's end, past other events.
+    double size = stepper_.h, here = margin_at_end(watch), low = 0.0, high = full;
+    const double still = of_gap ? rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff()) : 0.0;
+    for (int it = 0; it < correction_passes; ++it) {
+        if (of_gap) rate = gap_rate(p, w, watch.index);
+        else if (known_rate) rate = slip_rate_along_mode(p, w, watch.index);
+        if (!(rate < -still)) return;  // it hardly dipped: from here on it moves away again, and no root lies ahead
+        (here > 0.0 ? low : high) = size;
+        double next = size - here / rate;
+        if (!(next >= low && next <= high)) next = 0.5 * (low + high);
+        const double change = next - size, before = here;
+        if (std::abs(change) <= resolution || (it > 0 && std::abs(change) < corrected_width * full)) return;
+        correct_end_to(next);
+        size = next;
+        here = margin_at_end(watch);
+        if (const double secant = (here - before) / change; secant < 0.0) rate = secant;
+    }
+}
+
+// Slip of several directions may turn far without coming to rest. It has come to rest when hardly anything is left of
+// the slip that the step began with.
+bool EventLocator::passes_by_rest(int e) const {
+    if (p.frictions[e].dim == 1) return false;
+    const double speed = system_.velocity(stepper_.y1).cwiseAbs().maxCoeff();
+    const double slip = slip_velocity(w.now, p.frictions[e]).norm();
+    return slip > rest_part * slip_at_start_[e] && slip > passing_speed * (1.0 + speed);
+}
+
+std::optional<FoundEvent> EventLocator::locate() {
+    const auto found = [&](EventKind kind, int index) {
+        return FoundEvent{kind, index, stepper_.t0 + stepper_.h};
+    };
+    for (auto e = w.now.slipping.rbegin(); e != w.now.slipping.rend(); ++e)
+        if (has_arrived(*e)) return found(EventKind::rest_or_limit, *e);
+    time_to_rest_.reset();
+    std::optional<Crossing> crossing = search_.first();
+    if (crossing) step_onto(*crossing);
+    for (int k = 0; k < most_closed_before && crossing; ++k) {
+        const std::optional<Crossing> before = search_.entered(crossing->watch);
+        if (!before) break;
+        crossing = before;
+        step_onto(*crossing);
+    }
+    if (const auto lifted = lift_together()) return lifted;  // which may come earlier
+    if (!crossing || time_to_rest_) return release_together();
+    const Watch& watch = crossing->watch;
+    const bool reverses = watch.kind == Watch::Kind::slip && passes_by_rest(watch.index);
+    if (const auto released = release_together()) return released;  // which may come earlier
+    if (watch.kind == Watch::Kind::gap) return found(EventKind::touch, watch.index);
+    if (watch.kind == Watch::Kind::load) return found(EventKind::lift, watch.index);
+    if (watch.kind == Watch::Kind::contact) return found(EventKind::pull, watch.index);
+    return found(reverses ? EventKind::reversal : EventKind::rest_or_limit, watch.index);
+}
+
+// How fast what stuck before begins to slip at a state of the step, where forces within all limits do not hold it any
+// more; nothing where they do.
+std::optional<double> EventLocator::release_rate(double t, const VecX& y, const std::vector<Mode>& modes,
+                                                 ModeQuestion& asked) {
+    system_.read(y);
+    // What has just come to rest may be found to slip the other way: the step has its own directions, taken again or not.
+    const std::vector<Vec3> directions = w.state.slip_direction, last_directions = w.state.last_direction;
+    asked = {modes, {}, {}};
+    for (int e = 0; e < system_.ne; ++e)
+        if (!is_open(p, w, e) && at_rest(p, w, e, system_.v)) asked.at_rest.push_back(e);
+    double rate = 0.0;
+    try {
+        resolve_modes(p, w, t, system_.q, system_.v, asked);
+        for (int e : asked.at_rest)
+            if (modes[e] == sticking && w.state.mode[e] != sticking)
+                rate = std::max(rate, std::abs(slip_rate_along_mode(p, w, e)));
+    } catch (const Failure& failure) {  // they do not stick; the contacts that may open decide with them what they do
+        if (p.gaps.empty() || failure.kind != Failure::Kind::not_converged) throw;
+        rate = HUGE_VAL;
+    }
+    const double noise = no_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+    set_modes(p, w, modes);
+    w.state.slip_direction = directions;
+    w.state.last_direction = last_directions;
+    begin_step(p, w, t, system_.q, system_.v);
+    if (rate <= noise) return std::nullopt;  // what the others hold does not move, whatever its force
+    return rate;
+}
+
+std::optional<double> EventLocator::release_rate_at_end(const std::vector<Mode>& modes, ModeQuestion& asked) {
+    return release_rate(stepper_.t0 + stepper_.h, stepper_.y1, modes, asked);
+}
+
+// Whether all loads that redundant contacts share can press, at the step's end and at its stages.
+bool EventLocator::all_press() {
+    for (const Stepper::Look& look : stepper_.looks())
+        for (int i : w.now.touching)
+            if (system_.load(*look.rate, i) < 0.0) return false;
+    return true;
+}
+
+// Redundant contacts stay closed as long as some loads do that press all of them, whatever their least-norm split says.
+// Halves the step down to the instant from which on none do.
+std::optional<FoundEvent> EventLocator::lift_together() {
+    if (p.gaps.empty() || !w.now.rows.redundant || all_press()) return std::nullopt;
+    double low = 0.0, high = stepper_.h;
+    while (high - low > release_width * std::max(std::abs(stepper_.t0), stepper_.h)) {
+        const double mid = 0.5 * (low + high);
+        end_step_at(mid);
+        (all_press() ? low : high) = mid;
+    }
+    if (low > 0.0) {
+        end_step_at(low);
+        if (const auto released = release_together()) return released;  // before
+    }
+    end_step_at(high);
+    return FoundEvent{EventKind::lift, -1, stepper_.t0 + stepper_.h};
+}
+
+// The part of the step at which, by its interpolant, nothing holds any more what begins to slip at its end at this rate.
+// Closes in from beyond by the rates at which slip begins there, which fall to zero toward it where limits do not jump,
+// and by halves else.
+double EventLocator::release_part(double rate, const std::vector<Mode>& modes, ModeQuestion& asked) {
+    const double full = stepper_.h, width = release_width * std::max(std::abs(stepper_.t0) / full, 1.0);
+    double low = 0.0, high = 1.0, beyond = 0.0, rate_beyond = 0.0;
+    bool falls = false;  // the rate, as the instant comes near
+    VecX y(system_.ny);
+    stepper_.make_interpolant();
+    while (high - low > width) {
+        double next = 0.5 * (low + high);
+        if (falls) {
+            const double vanishes = high - rate * (beyond - high) / (rate_beyond - rate);
+            if (high - vanishes <= width) break;
+            if (vanishes > low) next = vanishes + short_of_root * (high - vanishes);
+        }
+        const double t = stepper_.t0 + next * full;
+        stepper_.interpolate(next, y);
+        system_.read(y);
+        update_kinematics(p, w, t, system_.q, system_.v);
+        const std::optional<double> there = release_rate(t, y, modes, asked);
+        falls = there && rate < HUGE_VAL && *there < least_fall * rate;
+        if (there) {
+            beyond = std::exchange(high, next);
+            rate_beyond = std::exchange(rate, *there);
+        } else {
+            low = next;
+        }
+    }
+    return high;
+}
+
+// While nothing moves, steps are long beside what functions of time may do: whether what sticks holds is asked inside
+// as well. The step ends at the first place where it does not.
+std::optional<double> EventLocator::release_rate_inside(const std::vector<Mode>& modes, ModeQuestion& asked) {
+    if (!p.asks_functions || (system_.velocity(stepper_.y1).array() != 0.0).any()) return std::nullopt;
+    const double whole = stepper_.h;
+    for (int k = 1; k < places_inside; ++k) {
+        const double t = stepper_.t0 + whole * k / places_inside;
+        system_.read(stepper_.y1);
+        update_kinematics(p, w, t, system_.q, system_.v);
+        if (!release_rate(t, stepper_.y1, modes, asked)) continue;
+        end_step_at(t - stepper_.t0);
+        return release_rate_at_end(modes, asked);
+    }
+    system_.read(stepper_.y1);
+    begin_step(p, w, stepper_.t0 + whole, system_.q, system_.v);
+    return std::nullopt;
+}
+
+// Where redundant elements stick together, the multiplier of one says little: they hold as long as some forces within
+// all limits do, those of elements included that slip but do not move. The step is taken again up to where its
+// interpolant shows that none do, and a little further where the step itself does not show it yet.
+std::optional<FoundEvent> EventLocator::release_together() {
+    if (!w.state.indeterminate) return std::nullopt;
+    const std::vector<Mode> modes = w.state.mode;
+    ModeQuestion asked;
+    std::optional<double> rate = release_rate_at_end(modes, asked);
+    if (!rate) rate = release_rate_inside(modes, asked);
+    if (!rate) return std::nullopt;
+    const double full = stepper_.h;
+    const double part = release_part(*rate, modes, asked);
+    for (double later = 0.0;; later = std::max(further_part * later, least_later)) {
+        end_step_at(std::min(part + later, 1.0) * full);
+        if (release_rate_at_end(modes, asked) || part + later >= 1.0) break;
+    }
+    return FoundEvent{EventKind::released_together, asked.at_rest.front(), stepper_.t0 + stepper_.h};
+}
+
+}  // namespace pn

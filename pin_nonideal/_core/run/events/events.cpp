@@ -1,0 +1,261 @@
+#include "run/events/events.hpp"
+
+#include <algorithm>
+
+#include "contact/active_set.hpp"
+#include "contact/impact.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/projection.hpp"
+#include "dynamics/friction_limit.hpp"
+#include "dynamics/step_start.hpp"
+#include "friction/mode_update.hpp"
+
+namespace pn {
+
+namespace {
+
+// Slip below this [rad/s or m/s] has no direction worth keeping.
+constexpr double directed_slip = 1e-12;
+// Part of its limit by which a sticking element may pass it by rounding.
+constexpr double limit_rounding = 1e-9;
+
+bool hardly_moves(const System& system, int e) {
+    const double slip = slip_velocity(system.w.now, system.p.frictions[e]).norm();
+    return slip <= raised_rest * (1.0 + system.v.cwiseAbs().maxCoeff());
+}
+
+// Modes of the elements at rest together, and the state that goes with them; those that turn out to move are taken off
+// the list.
+void resolve_together(System& system, double t, ModeQuestion& asked, bool strikes) {
+    const Program& p = system.p;
+    Workspace& w = system.w;
+    std::vector<int>& resting = asked.at_rest;
+    for (;;) {
+        resolve_modes(p, w, t, system.q, system.v, asked);
+        if (!strikes) keep_moving(p, w, t, system.v);
+        // What sticks from now on has no slip velocity at all, not one of rounding.
+        project(p, w, t, system.q, system.v);
+        begin_step(p, w, t, system.q, system.v);
+        // Nearly redundant elements that stuck together leave one that slips a velocity, which may oppose its mode.
+        const auto moving = std::stable_partition(resting.begin(), resting.end(), [&](int e) {
+            return hardly_moves(system, e) || slip_along_mode(p, w, e) >= 0.0;
+        });
+        if (moving == resting.end()) return;
+        std::for_each(moving, resting.end(), [&](int e) { follow_velocity(p, w, e, asked); });
+        resting.erase(moving, resting.end());
+    }
+}
+
+// Whether the elements that stick share their load in several ways: one of them is beyond its limit, or the one that
+// reached it sticks on.
+bool shares_load(System& system, double t, const std::vector<int>& resting, int held) {
+    const Program& p = system.p;
+    Workspace& w = system.w;
+    bool shares = false;
+    if (!p.needs_reactions && !w.now.rows.redundant) return shares;
+    for (int e : resting)
+        shares |= w.state.mode[e] == sticking &&
+                  (e == held || !holding_force(p, w, e, t, system.q, system.v).is_within(limit_rounding));
+    return shares;
+}
+
+// Slip of several directions that begins from rest has no velocity to tell its direction: steps seek it.
+void seek_directions(System& system, const std::vector<int>& resting, bool sought) {
+    const auto begins = [&](int e) { return system.p.frictions[e].dim > 1 && slips(system.w.state.mode[e]); };
+    bool& seeks = system.w.state.seeks_directions;
+    seeks = system.seeks_directions &&
+            ((seeks && sought && turning(system)) || std::any_of(resting.begin(), resting.end(), begins));
+}
+
+// What came to rest in vain lingers there, until its mode changes or it moves.
+void linger(RunState& state, const std::vector<Mode>& before, const FoundEvent& event) {
+    for (size_t e = 0; e < before.size(); ++e)
+        if (before[e] != state.mode[e]) state.lingers[e] = 0;
+    const int e = event.index;
+    if (event.kind == FoundEvent::Kind::rest_or_limit && slips(before[e]) && before[e] == state.mode[e])
+        state.lingers[e] = 1;
+}
+
+}  // namespace
+
+bool turning(const System& system) {
+    const std::vector<int>& slipping = system.w.now.slipping;
+    return std::any_of(slipping.begin(), slipping.end(), [&](int e) { return system.p.frictions[e].dim > 1; });
+}
+
+Event::Kind kind_of_change(Mode before, Mode after) {
+    return after == sticking ? Event::Kind::stick : before == sticking ? Event::Kind::slip : Event::Kind::reverse;
+}
+
+namespace {
+
+// Modes of stick and slip for the contacts that are closed, and the state on the constraints that goes with them.
+struct FrictionSwitch {
+    System& system;
+    double t;
+    const std::optional<FoundEvent>& event;  // of friction, if it is one
+    const std::vector<Mode>& before;
+    ModeQuestion asked;
+    int held = -1;  // what has just reached its limit
+
+    // `together`: of all contacts, where that is known.
+    void find(const RestingMotion* together) {
+        const Program& p = system.p;
+        Workspace& w = system.w;
+        if (p.frictions.empty()) {
+            begin_step(p, w, t, system.q, system.v);
+            return keep_on_planes();
+        }
+        const bool known = event && !event->of_gap();
+        const bool strikes = event && event->kind == FoundEvent::Kind::touch;  // what stuck may move
+        asked = event && !strikes ? question(p, w, system.v, known ? event->index : -1)
+                                  : first_question(p, w, t, system.q, system.v);
+        held = known && before[event->index] == sticking && !is_open(p, w, event->index) ? event->index : -1;
+        if (known && event->kind == FoundEvent::Kind::released_together) asked.breaking = asked.at_rest;
+        else if (held >= 0) asked.breaking = {held};
+        if (together) together->answer(p, w, asked);
+        if (asked.answered || !known || !go_on(p, w, t, system.q, system.v, asked, event->index))
+            resolve_together(system, t, asked, strikes);
+    }
+
+    // What sticks until it has just come to its limit: it gives way.
+    std::vector<int> breaking() const {
+        std::vector<int> list;
+        if (!event || event->of_gap()) return list;
+        for (int e = 0; e < system.ne; ++e)
+            if (before[e] == sticking && (event->kind == FoundEvent::Kind::released_together || e == event->index))
+                list.push_back(e);
+        return list;
+    }
+
+    // What touches lies on its plane, and moves along it.
+    void keep_on_planes() {
+        const std::vector<char>& closed = system.w.state.closed;
+        if (std::find(closed.begin(), closed.end(), char(1)) == closed.end()) return;
+        project(system.p, system.w, t, system.q, system.v);
+        begin_step(system.p, system.w, t, system.q, system.v);
+    }
+};
+
+// What has come to rest but for rounding.
+void rest(System& system, double t) {
+    system.v.setZero();
+    begin_step(system.p, system.w, t, system.q, system.v);
+}
+
+// Contacts among those that rest on each other are closed, and the rest of the modes with them.
+void close_and_find(System& system, double t, bool starts, FrictionSwitch& friction) {
+    const Program& p = system.p;
+    const auto& event = friction.event;
+    const bool landing = starts || event->kind == FoundEvent::Kind::touch;
+    ClosingQuestion question;
+    question.rest = system.touching.at(p, system.w, t, system.q, system.v, starts).rest;
+    if (event && event->kind == FoundEvent::Kind::lift) question.opening = event->index;
+    if (event && !event->of_gap()) question.arrived = event->index;
+    question.breaking = friction.breaking();
+    question.struck = landing;
+    const VecX q = system.q, v = system.v;
+    close_contacts(p, system.w, t, q, v, question, [&](const RestingMotion* together) {
+        system.q = q;
+        system.v = v;
+        update_kinematics(p, system.w, t, q, v);
+        friction.find(together);
+        if (landing && !p.moves_in_time && system.v.cwiseAbs().maxCoeff() <= rest_speed) rest(system, t);
+    });
+}
+
+}  // namespace
+
+std::vector<Event> changes_since(const System& system, double t, const std::vector<char>& closed,
+                                 const std::vector<Mode>& before, int turned) {
+    const Program& p = system.p;
+    const RunState& now = system.w.state;
+    std::vector<Event> changes;
+    if (turned < 0 && same_bytes(closed, now.closed) && same_bytes<Mode>(before, now.mode)) return changes;
+    for (size_t i = 0; i < closed.size(); ++i)
+        if (closed[i] != now.closed[i])
+            changes.push_back({t, closed[i] ? Event::Kind::lift_off : Event::Kind::touch_down, p.gaps[i].block});
+    for (int e = 0; e < system.ne; ++e) {
+        const bool begins = before[e] == unloaded && slips(now.mode[e]);  // a contact that slides from the first
+        if (e == turned || (before[e] != now.mode[e] && now.mode[e] != unloaded && !begins))
+            changes.push_back({t, kind_of_change(before[e], now.mode[e]), e});
+    }
+    return changes;
+}
+
+std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event) {
+    const Program& p = system.p;
+    Workspace& w = system.w;
+    system.read(y);
+    system.read_law_states(y);
+    const std::vector<Mode> before = w.state.mode;
+    const std::vector<char> closed = w.state.closed;
+    const std::vector<Vec3> directions = w.state.slip_direction;
+    FrictionSwitch friction{system, t, event, before, {}};
+    if (p.gaps.empty()) friction.find(nullptr);
+    else close_and_find(system, t, !event, friction);
+    if (!p.frictions.empty() || !p.gaps.empty()) {
+        seek_directions(system, friction.asked.at_rest, event.has_value());
+        system.write(y);
+        w.state.indeterminate = shares_load(system, t, friction.asked.at_rest, friction.held);
+    }
+    system.rate_of_evaluation(t, y, dy);
+    if (!event) return {};
+    linger(w.state, before, *event);
+    const int e = event->of_gap() ? -1 : event->index;
+    const bool turned = e >= 0 && before[e] == 1 && w.state.mode[e] == 1 && p.frictions[e].dim > 1 &&
+                        directions[e].dot(w.state.slip_direction[e]) < 0.0;
+    return changes_since(system, t, closed, before, turned ? e : -1);
+}
+
+bool contacts_strike(System& system, double t, const VecX& y, bool starts) {
+    system.read(y);
+    return system.touching.at(system.p, system.w, t, system.q, system.v, starts).strikes;
+}
+
+bool contacts_land(System& system, double t, const VecX& y) {
+    if (system.p.gaps.empty()) return false;
+    system.read(y);
+    return system.touching.at(system.p, system.w, t, system.q, system.v, false).lands;
+}
+
+Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool bounces) {
+    const Program& p = system.p;
+    const std::vector<char> closed = system.w.state.closed;
+    const std::vector<Mode> modes = system.w.state.mode;
+    system.read(y);
+    const std::vector<char>& touch = system.touching.at(p, system.w, t, system.q, system.v, starts).touch;
+    const Impact impact = strike(p, system.w, t, system.q, system.v, touch, bounces);
+    system.write(y);
+    set_closed(p, system.w, closed);  // what changes by it is still to be found
+    set_modes(p, system.w, modes);
+    Strike out;
+    double largest = 0.0;
+    for (const Vec3& impulse : impact.impulse) largest = std::max(largest, impulse.norm());
+    for (size_t i = 0; i < impact.gaps.size(); ++i) {
+        out.work += impact.work[i];
+        if (!(impact.impulse[i].norm() > impulse_rounding * largest)) continue;
+        out.events.push_back({t, Event::Kind::impact, p.gaps[impact.gaps[i]].block, impact.impulse[i], impact.work[i],
+                              impact.v_minus, impact.v_plus});
+    }
+    out.work_of_constraints = impact.energy_change - out.work;
+    return out;
+}
+
+void remember_directions(System& system, std::vector<double>& slip, int arrived) {
+    Workspace& w = system.w;
+    const auto velocity = [&](int e) { return slip_velocity(w.now, system.p.frictions[e]); };
+    const double least = arrived < 0 ? directed_slip : std::max(directed_slip, velocity(arrived).norm());
+    for (int e : w.now.loaded) {
+        const Friction& f = system.p.frictions[e];
+        if (w.state.lingers[e] && !hardly_moves(system, e)) w.state.lingers[e] = 0;
+        if (!slips(w.state.mode[e]) || f.dim == 1) continue;
+        const Vec3 u = velocity(e);
+        slip[e] = u.norm();
+        const Vec3& n = w.state.last_direction[e];
+        if (w.state.seeks_directions) w.state.slip_direction[e] = n;
+        else if (slip[e] > least) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
+    }
+}
+
+}  // namespace pn

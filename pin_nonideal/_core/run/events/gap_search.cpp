@@ -1,0 +1,201 @@
+#include "run/events/gap_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/queries.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/projection.hpp"
+#include "math/roots.hpp"
+
+namespace pn {
+
+namespace {
+
+// Accelerations between the stages of an accepted step stay below so many times the largest at the stages.
+constexpr double between_stages = 2.0;
+// A gap that hovers about its plane is not followed further than so many looks: it has closed.
+constexpr int most_looks = 4000;
+// Bodies are allowed this many times their travel, for what projections add.
+constexpr double travel_factor = 2.0;
+constexpr double rate_rounding = 1e-12;  // part of the rates of a gap that moves evenly
+
+}  // namespace
+
+GapSearch::GapSearch(System& system, Stepper& stepper, GapWatch& watch)
+    : system_(system), stepper_(stepper), p(system.p), w(system.w), watch_(watch), start_(watch.gaps), reach_(system.p),
+      speed_(VecX::Zero(system.nv)), acceleration_(speed_), probe_(VecX::Zero(system.ny)) {}
+
+// Largest |v| and |a| of each dof over the step, from the rates at the stages.
+void GapSearch::bound_rates() {
+    const int nq = system_.nq, nv = system_.nv;
+    acceleration_.setZero();
+    for (const Stepper::Look& look : stepper_.looks())
+        acceleration_ = acceleration_.cwiseMax(look.rate->segment(nq, nv).cwiseAbs());
+    const double *v0 = stepper_.y0.data() + nq, *v1 = stepper_.y1.data() + nq;
+    for (int k = 0; k < nv; ++k) {
+        acceleration_[k] *= between_stages;
+        // Never farther from both ends than their mean and what half a step of acceleration adds.
+        speed_[k] = 0.5 * (std::abs(v0[k]) + std::abs(v1[k])) + 0.5 * stepper_.h * acceleration_[k];
+    }
+}
+
+// Bounds of a gap between the step's ends; of one of the user's, so many times what its cubic between them and its
+// motion at the end show.
+GapSearch::Bends GapSearch::bends(int gap, const Look& end) const {
+    if (Reach::knows(p, gap)) return {reach_.bound(w, gap), reach_.rise(w, gap)};
+    const double h = stepper_.h, change = (end.width - start_.width[gap]) / h;
+    const double r0 = start_.rate[gap], r1 = end.rate;
+    const double most = between_stages * std::max({std::abs(6.0 * change - 4.0 * r0 - 2.0 * r1) / h,
+                                                   std::abs(6.0 * change - 2.0 * r0 - 4.0 * r1) / h,
+                                                   std::abs(gap_acceleration(p, w, gap))});
+    return {most, most};
+}
+
+// Of gaps that were not looked at in the steps before.
+void GapSearch::look_at_starts(const std::vector<int>& gaps) {
+    system_.read(stepper_.y0);
+    kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
+    for (int gap : gaps) {
+        follow_gap(p, w, stepper_.t0, system_.v, gap);
+        start_.keep(gap, Look::here(p, w, gap, 0.0));
+    }
+    system_.read(stepper_.y1);
+    kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
+}
+
+const std::vector<GapSearch::Doubt>& GapSearch::doubtful() {
+    doubtful_.clear();
+    bound_rates();
+    const std::vector<int>& unseen = watch_.follow(speed_, stepper_.h);
+    system_.read(stepper_.y1);
+    if (!unseen.empty()) look_at_starts(unseen);
+    if (start_.near_gaps.empty()) return doubtful_;
+    rounding_ = gap_rounding * scene_size(p, w);
+    reach_.bound_bodies(w, speed_, acceleration_, stepper_.h);
+    held_.clear();
+    for (int i : w.now.touching)
+        if (Separation::has(p, i)) held_.push_back(i);
+    for (int i : start_.near_gaps) {
+        follow_gap(p, w, stepper_.t0 + stepper_.h, system_.v, i);
+        watch_.end.push_back(Look::here(p, w, i, 1.0));
+        if (start_.near[i] == GapState::from_the_end || travel_factor * reach_.travel(i) < start_.width[i]) continue;
+        if (has_held_copy(i)) continue;
+        const Look end = above(watch_.end.back(), level_here(i, 1.0));
+        const Bends bent = bends(i, end);
+        if (!stays_open(i, look_at_start(i), end, bent.below)) doubtful_.push_back({i, end, bent});
+    }
+    return doubtful_;
+}
+
+// The two parabolas of the bound through both ends lie below the gap; where the higher of them is least it stands.
+bool GapSearch::stays_open(int gap, const Look& a, const Look& b, double bound) const {
+    const double length = (b.part - a.part) * stepper_.h, least = -rounding_;
+    if (!(a.width > least) || !(b.width > least)) return false;
+    if (a.separation) {
+        const Kind& kind = p.blocks[p.gaps[gap].block].kind;
+        return stays_apart(kind, *a.separation, *b.separation, bound, reach_.speed(gap), length, least);
+    }
+    if (has_lowest_point(p, gap)) return stays_above(a.width, b.width, 0.5 * bound * length * length, least);
+    const double change = b.rate - a.rate + bound * length;  // negative: no bound at all
+    if (change <= 0.0) return change >= -rate_rounding * (std::abs(a.rate) + std::abs(b.rate));
+    const double meet = (a.width - b.width + b.rate * length + 0.5 * bound * length * length) / change;
+    if (!(meet > 0.0 && meet < length)) return true;
+    return a.width + meet * (a.rate - 0.5 * bound * meet) > least;
+}
+
+bool GapSearch::same_bodies(int gap, int other) const {
+    const Block &a = p.blocks[p.gaps[gap].block], &b = p.blocks[p.gaps[other].block];
+    return (a.joint1 == b.joint1 && a.joint2 == b.joint2) || (a.joint1 == b.joint2 && a.joint2 == b.joint1);
+}
+
+// A copy of it is closed: this one goes with that.
+bool GapSearch::has_held_copy(int gap) const {
+    const std::vector<int>& touching = w.now.touching;
+    return std::any_of(touching.begin(), touching.end(), [&](int held) { return are_copies(p, held, gap); });
+}
+
+bool GapSearch::slides_on(int gap) const {
+    return std::any_of(held_.begin(), held_.end(), [&](int held) { return same_bodies(gap, held); });
+}
+
+GapSearch::Look GapSearch::above(Look look, double level) const {
+    look.width -= level;
+    if (look.separation) look.separation->radius += level;
+    return look;
+}
+
+double GapSearch::level_here(int gap, double part) const {
+    double level = plane(gap);
+    if (!Separation::has(p, gap)) return level;
+    for (int held : held_) {
+        if (!same_bodies(gap, held)) continue;
+        measure_gap(p, w, stepper_.t0 + part * stepper_.h, system_.v, held);
+        level = std::min(level, gap_width(p, w, held));
+    }
+    return level;
+}
+
+GapSearch::Look GapSearch::look_at_start(int gap) const {
+    const Look out{0.0, start_.width[gap], start_.rate[gap], std::nullopt};
+    if (!Separation::has(p, gap)) return above(out, plane(gap));
+    double level = plane(gap);
+    for (int held : held_)
+        if (same_bodies(gap, held)) level = std::min(level, start_.width[held]);
+    return above({0.0, start_.width[gap], start_.rate[gap], start_.separation[gap]}, level);
+}
+
+GapSearch::Look GapSearch::look(int gap, double part) {
+    ++looks_;
+    if (part == 0.0) return look_at_start(gap);
+    stepper_.interpolate(part, probe_);
+    system_.read(probe_);
+    kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
+    follow_gap(p, w, stepper_.t0 + part * stepper_.h, system_.v, gap);
+    const Look out = Look::here(p, w, gap, part);
+    return above(out, level_here(gap, part));
+}
+
+// The root between an instant at which the gap is open, or where it has just closed, and one at which it is through.
+GapSearch::Touch GapSearch::between(int gap, const Look& a, const Look& b) {
+    const double part =
+        root_between(a.part, a.width, b.part, b.width, [&](double at) { return look(gap, at).width; });
+    return {part, look(gap, part).rate * stepper_.h};
+}
+
+std::optional<GapSearch::Touch> GapSearch::search(int gap, const Look& a, const Look& b, const Bends& bends) {
+    const double bound = bends.below;
+    if (stays_open(gap, a, b, bound)) return std::nullopt;
+    const double length = (b.part - a.part) * stepper_.h;
+    // It goes on closing all the way.
+    if (b.width < -rounding_ && a.rate + bends.above * length < 0.0) return between(gap, a, b);
+    if (bends.above * length * length < rounding_ || looks_ > most_looks) {
+        // Bodies that slide from one place to the next, a corner from a face on to an edge, bring the gap of the next down
+        // to zero there, where it stays: nothing touches before it goes below.
+        const bool rests = stepper_.t0 < start_.rests_until[gap];
+        const bool has_closed = looks_ > most_looks && !rests && !(a.separation && slides_on(gap));
+        if (a.width > 0.0 && b.width < -rounding_) return between(gap, a, b);
+        if (b.width < -rounding_ || has_closed) return Touch{b.part, b.rate * stepper_.h};
+        return std::nullopt;
+    }
+    // What leaves its plane is sure to be above it for half the time that the bound gives it.
+    if (a.width <= rounding_ && a.rate > 0.0 && !a.separation && !has_lowest_point(p, gap)) {
+        const double sure = a.part + a.rate / (bound * stepper_.h);
+        if (sure < 0.5 * (a.part + b.part) && sure > a.part) {
+            const Look up = look(gap, sure);
+            if (up.width > 0.0) return search(gap, up, b, bends);
+        }
+    }
+    const Look middle = look(gap, 0.5 * (a.part + b.part));
+    if (const auto touch = search(gap, a, middle, bends)) return touch;
+    return search(gap, middle, b, bends);
+}
+
+std::optional<GapSearch::Touch> GapSearch::first_touch(int gap) {
+    looks_ = 0;
+    stepper_.make_interpolant();
+    const auto doubt = std::find_if(doubtful_.begin(), doubtful_.end(), [&](const Doubt& d) { return d.gap == gap; });
+    return search(gap, look_at_start(gap), doubt->end, doubt->bends);
+}
+
+}  // namespace pn

@@ -1,0 +1,142 @@
+#include "run/events/mode_switch.hpp"
+
+#include <algorithm>
+
+#include "dynamics/evaluation.hpp"
+#include "dynamics/friction_limit.hpp"
+#include "dynamics/step_start.hpp"
+
+namespace pn {
+
+// So many tiny steps lie at the least between two places at which modes are left that go no further.
+static constexpr double leaving_apart = 1e3;
+// Slip below this speed [m/s or rad/s] rests soon, or is about to begin.
+static constexpr double creeping = 1e-8;
+
+static bool of_modes(const Failure& failure) {
+    return failure.kind == Failure::Kind::not_converged || failure.kind == Failure::Kind::paradox;
+}
+
+ModeChanges::ModeChanges(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
+                         Landing& landing, Clusters& clusters, Recording& out)
+    : p(system.p), w(system.w), system_(system), now_(progress), options_(options), torques_(torques), output_(output),
+      landing_(landing), clusters_(clusters), out_(out) {}
+
+void ModeChanges::change(FoundEvent event) {
+    const RunState before = w.state;
+    bool struck = false;
+    try {
+        if (contacts_land(system_, now_.t, now_.y)) event = {FoundEvent::Kind::touch, -1, now_.t};
+        struck = event.kind == FoundEvent::Kind::touch && landing_.strike(false);
+        for (const Event& found : switch_modes(system_, now_.t, now_.y, now_.rate, event)) {
+            out_.events.push_back(found);
+            if (!struck) clusters_.count();
+        }
+    } catch (const Failure& failure) {
+        keep_last(before, struck);
+        if (!leads_on(failure) || !step_over(failure)) throw;
+        return;
+    }
+    clusters_.remember();
+    const bool in_vain = event.kind == FoundEvent::Kind::touch && event.index >= 0 && !struck;
+    const bool same_modes = std::equal(before.mode.begin(), before.mode.end(), w.state.mode.begin());
+    if (!same_modes || before.closed != w.state.closed) now_.gaps.ask_anew();
+    else if (in_vain && !w.state.closed[event.index]) now_.gaps.ask_in_vain(event.index, now_.t);
+    landing_.remember_gaps();
+    if (struck) return end_bouncing();
+    if (same_modes) clusters_.count();
+    output_.configured_now();
+    bridge(event.of_gap() ? 0 : event.index);
+}
+
+// Among ever lower flights as well some motion may not be found.
+void ModeChanges::end_bouncing() {
+    try {
+        landing_.end_bouncing(torques_.next_stop(options_.end()));
+    } catch (const Failure& failure) {
+        if (!leads_on(failure) || !step_over(failure)) throw;
+    }
+}
+
+// What was shown to have no motion, or several, is what the user is told.
+bool ModeChanges::leads_on(const Failure& failure) {
+    const bool shown = failure.solutions != Failure::Solutions::not_told;
+    return failure.kind == Failure::Kind::step_size || (of_modes(failure) && !shown);
+}
+
+bool ModeChanges::may_end(const Failure& failure) const {
+    return of_modes(failure) && options_.method.adaptive() && system_.ng > 0 &&
+           now_.t >= now_.left + leaving_apart * tiny_step_at(now_.t);
+}
+
+bool ModeChanges::leave() {
+    const double t = now_.t, ahead = tiny_step_at(t);
+    const VecX y = now_.y;
+    try {
+        now_.y.noalias() += ahead * now_.rate;
+        now_.t += ahead;
+        change(FoundEvent{FoundEvent::Kind::lift, -1, now_.t});
+    } catch (const Failure&) {
+        now_.t = t;
+        now_.y = y;
+        return false;
+    }
+    now_.left = now_.t;
+    output_.now();
+    return true;
+}
+
+void ModeChanges::bridge(int element) {
+    if (clusters_.bridge(element, options_.end())) go_on_with_new_modes();
+}
+
+// What contacts that may open do, and was not found: of which nothing is shown.
+bool ModeChanges::undecided(const Failure& failure) const {
+    return failure.kind == Failure::Kind::not_converged && system_.ng > 0;
+}
+
+bool ModeChanges::step_over(const Failure& failure) {
+    if (options_.method.outside() || system_.ne == 0) return false;
+    if (!(undecided(failure) || clusters_.dwindles() || creeps())) return false;
+    for (;;) {
+        clusters_.step_over(failure.elements.empty() ? 0 : failure.elements.front(), options_.end());
+        try {
+            go_on_with_new_modes();
+            return true;
+        } catch (const Failure& again) {  // a little later it is as it was
+            if (!undecided(again)) throw;
+        }
+        if (now_.t >= options_.end()) return true;
+    }
+}
+
+// Whether all that slips is about to rest.
+bool ModeChanges::creeps() const {
+    const double least = creeping * (1.0 + system_.velocity(now_.y).cwiseAbs().maxCoeff());
+    const std::vector<int>& slipping = w.now.slipping;
+    return !slipping.empty() && std::all_of(slipping.begin(), slipping.end(), [&](int e) {
+        return slip_velocity(w.now, p.frictions[e]).norm() <= least;
+    });
+}
+
+void ModeChanges::go_on_with_new_modes() {
+    switch_modes(system_, now_.t, now_.y, now_.rate, std::nullopt);
+    landing_.remember_gaps();
+    output_.configured_now();
+}
+
+// What the motion was until no modes were found for what follows.
+void ModeChanges::keep_last(const RunState& before, bool struck) {
+    set_contacts(p, w, before.closed, before.mode);
+    w.state = before;
+    if (struck) return;
+    system_.read(now_.y);
+    try {
+        begin_step(p, w, now_.t, system_.q, system_.v);
+        evaluate(p, w, now_.t, system_.q, system_.v);
+        output_.now();
+    } catch (const Failure&) {  // the sample before is the last: what failed first is what the user is told
+    }
+}
+
+}  // namespace pn

@@ -1,0 +1,120 @@
+#include "run/events/rebound.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "contact/active_set.hpp"
+#include "contact/queries.hpp"
+#include "contact/impact.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/projection.hpp"
+#include "dynamics/friction_limit.hpp"
+#include "tree/lie_group.hpp"
+
+namespace pn {
+
+namespace {
+
+// Flights lower than this part of the scene's size [m] are too low to be integrated.
+constexpr double low_flight = 4e-12;
+// Of so many flights the second half takes less than this part of the time of the first where they die out; else, with
+// restitution of 1, they would go on without end, and what lands next comes to rest.
+constexpr int most_bounces = 10000;
+constexpr double hardly_shorter = 0.9;
+constexpr double never = std::numeric_limits<double>::infinity();
+
+struct Bouncing {
+    System& system;
+    double lowest;
+
+    // Times until the first gap in low flight is back, until the first of the others lands, and until a slip comes to
+    // rest; infinite where nothing does. And until the last of those that leave is no longer low.
+    struct Next {
+        double low = never, high = never, rest = never, leaves = 0.0;
+        int element = -1;  // that comes to rest
+        double time() const { return std::min(low, rest); }
+        bool stays_low() const { return (low < never || rest < leaves) && high > time(); }
+    };
+    Next next(double t) const {
+        const Program& p = system.p;
+        Workspace& w = system.w;
+        const double still = rest_rate(system.v);
+        Next out;
+        for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
+            if (w.state.closed[i] || is_bare(p, i)) continue;
+            evaluate_gap(p, w, t, system.v, i);
+            const double width = gap_width(p, w, i), rate = gap_rate(p, w, i);
+            const double fall = -gap_acceleration(p, w, i), rise = std::max(0.0, rate);
+            const bool touches = width <= touching_width;
+            if (touches && std::abs(rate) <= still && fall <= acceleration_rounding(p, w, i)) continue;
+            const double height = touches ? 0.0 : width;  // what touches lies on its plane, but for rounding
+            const double back = landing(height, rate, fall);
+            const double most = height + (rise > 0.0 ? 0.5 * rise * rise / fall : 0.0);
+            const bool is_low = back < never && most <= lowest;
+            double& first = is_low ? out.low : out.high;
+            first = std::min(first, back);
+            if (!is_low && height <= lowest) out.leaves = std::max(out.leaves, landing(lowest - height, -rate, -fall));
+        }
+        for (int e = 0; e < system.ne; ++e) {
+            if (!slips(w.state.mode[e]) || w.state.lingers[e]) continue;
+            const auto [slip, rate] = slip_toward_rest(p, w, e);
+            if (!(rate < 0.0) || slip > -rate * out.rest) continue;
+            out.rest = std::max(0.0, -slip / rate);
+            out.element = e;
+        }
+        return out;
+    }
+
+    // Of a gap that is so wide, changes at this rate and falls back.
+    static double landing(double width, double rate, double fall) {
+        const double square = rate * rate + 2.0 * fall * width;
+        if (!(square >= 0.0)) return never;
+        const double root = std::sqrt(square);
+        if (rate < 0.0) return 2.0 * width / (root - rate);
+        return fall > 0.0 ? (rate + root) / fall : never;
+    }
+};
+
+double energy(const System& system) {
+    Terms& terms = system.w.now.terms;
+    return kinetic_energy(system.p.mechanism, terms, system.v) + potential_energy(system.p.mechanism, terms);
+}
+
+}  // namespace
+
+std::optional<Rest> bounce_to_rest(System& system, double t, double stop, VecX& y, VecX& dy) {
+    const Program& p = system.p;
+    Workspace& w = system.w;
+    system.read(y);
+    const RunState before = w.state;
+    const Bouncing bouncing{system, low_flight * scene_size(p, w)};
+    const double before_energy = energy(system), before_work = system.work(y).sum();
+    VecX move;
+    Rest out{t, {}, 0.0};
+    int bounce = 0;
+    double halves[2] = {0.0, 0.0};
+    bool dies_out = true;
+    for (; bounce < (dies_out ? 1 : 2) * most_bounces; ++bounce) {
+        const Bouncing::Next next = bouncing.next(out.time);
+        const double time = next.time();
+        if (!next.stays_low() || out.time + time >= stop) break;
+        move = time * (system.v + 0.5 * time * w.now.a);
+        y += time * dy;
+        retract(p.mechanism, system.q.data(), move.data(), y.data());
+        out.time += time;
+        halves[2 * bounce >= most_bounces] += time;
+        if (bounce + 1 == most_bounces) dies_out = halves[1] < hardly_shorter * halves[0];
+        FoundEvent event{FoundEvent::Kind::touch, 0, out.time};
+        if (next.rest < next.low && !contacts_land(system, out.time, y))
+            event = {FoundEvent::Kind::rest_or_limit, next.element, out.time};
+        else if (contacts_strike(system, out.time, y, false)) strike_contacts(system, out.time, y, false, dies_out);
+        switch_modes(system, out.time, y, dy, event);
+        system.read(y);
+    }
+    if (bounce == 0) return std::nullopt;
+    out.events = changes_since(system, out.time, before.closed, before.mode);
+    out.work = energy(system) - before_energy - (system.work(y).sum() - before_work);
+    return out;
+}
+
+}  // namespace pn

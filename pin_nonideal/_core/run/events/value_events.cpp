@@ -1,0 +1,181 @@
+#include "run/events/value_events.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/evaluation.hpp"
+#include "dynamics/given_forces.hpp"
+#include "math/roots.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr int looks = 5;      // into each step
+constexpr double beyond = 2.0;
+constexpr int corrections = 12;
+// Parts of the step: in which its end is found, and in which the slope of a value is taken.
+constexpr double corrected_width = 1e-14, slope_part = 1e-4;
+// Of the step: an event of friction and one of the user this near to each other are at one time.
+constexpr double same_part = 1e-12;
+// An event this near to the step's start, in spacings of the time, has happened there.
+constexpr double start_spacings = 8.0;
+
+double sign(double x) { return (x > 0.0) - (x < 0.0); }
+
+// Those whose drives may be asked for more than they have.
+std::vector<int> bounded_drives(const Program& p) {
+    std::vector<int> dofs;
+    for (int dof = 0; p.limits_effort() && dof < p.mechanism.nv; ++dof)
+        if (p.least_effort[dof] > -HUGE_VAL || p.most_effort[dof] < HUGE_VAL) dofs.push_back(dof);
+    return dofs;
+}
+
+}  // namespace
+
+ValueEvents::ValueEvents(const std::vector<UserEvent>& asked, System& system, Stepper& stepper, Progress& progress)
+    : asked_(asked), system_(system), stepper_(stepper), drives_(bounded_drives(system.p)), side_(progress.sides),
+      count_(asked.size() + drives_.size(), 0), asked_y_(VecX::Zero(system.ns)), asked_torque_(VecX::Zero(system.nv)),
+      probe_(VecX::Zero(system.ny)) {
+    side_.assign(count_.size(), 0.0);
+}
+
+double ValueEvents::value(int k, double t, const VecX& y) {
+    if (k >= users()) return effort_left(drives_[k - users()], t, y);
+    system_.read(y);
+    return asked_[k].function(t, system_.q, system_.v);
+}
+
+// Negative where more is asked than the drive has. All drives are asked at once.
+double ValueEvents::effort_left(int dof, double t, const VecX& y) {
+    if (!asked_before_ || t != asked_time_ || asked_y_ != y.head(system_.ns)) {
+        asked_before_ = true;
+        asked_time_ = t;
+        asked_y_ = y.head(system_.ns);
+        system_.read(y);
+        asked_torque(system_.p, system_.w, t, system_.q, system_.v, asked_torque_);
+    }
+    return std::min(system_.p.most_effort[dof] - asked_torque_[dof], asked_torque_[dof] - system_.p.least_effort[dof]);
+}
+
+double ValueEvents::value_inside(int k, double part) {
+    if (part >= 1.0) return value(k, stepper_.t0 + stepper_.h, stepper_.y1);
+    stepper_.interpolate(part, probe_);
+    return value(k, stepper_.t0 + part * stepper_.h, probe_);
+}
+
+void ValueEvents::start(double t, const VecX& y) {
+    asked_before_ = false;
+    for (int k = 0; k < size(); ++k) side_[k] = sign(value(k, t, y));
+}
+
+// Where a value is zero at the start of a run it has no sign before it takes one, which is no event.
+double ValueEvents::first_crossing(int k) {
+    double before = 0.0;
+    for (int i = 1; i <= looks; ++i) {
+        const double part = static_cast<double>(i) / looks, here = value_inside(k, part);
+        if (side_[k] != 0 && sign(here) == -side_[k]) {
+            if (counts(k)) {
+                const auto margin = [&](double x) { return side_[k] * value_inside(k, x) / std::abs(here); };
+                const double at_start = margin(before);
+                if (before == 0.0 && at_start <= 0.0) return root_after_start(part, -1.0, 0.0, margin);
+                return root_between(before, at_start, part, -1.0, margin);
+            }
+            side_[k] = sign(here);
+        } else if (side_[k] == 0) {
+            side_[k] = sign(here);
+        }
+        before = part;
+    }
+    return beyond;
+}
+
+void ValueEvents::end_step_at(double size) {
+    stepper_.take_again(size);
+    system_.project_and_evaluate(stepper_.t0 + size, stepper_.y1, stepper_.end_rate());
+}
+
+// Secants on the length of the step, from the slope that the interpolant has at the crossing.
+void ValueEvents::step_onto(int k, double part) {
+    const double full = stepper_.h, t0 = stepper_.t0;
+    const double least = start_spacings * (std::nextafter(std::abs(t0), HUGE_VAL) - std::abs(t0));
+    const double low = std::max(0.0, part - slope_part), high = std::min(1.0, part + slope_part);
+    double slope = (value_inside(k, high) - value_inside(k, low)) / ((high - low) * full);
+    double size = std::max(part * full, least);
+    end_step_at(size);
+    double here = value(k, t0 + size, stepper_.y1);
+    for (int i = 0; i < corrections && here != 0.0 && slope != 0.0; ++i) {
+        const double next = std::clamp(size - here / slope, least, full), change = next - size, before = here;
+        if (std::abs(change) <= corrected_width * full || t0 + next == t0 + size) break;
+        end_step_at(size = next);
+        here = value(k, t0 + size, stepper_.y1);
+        slope = (here - before) / change;
+    }
+}
+
+void ValueEvents::tell(double t, std::vector<Event>& events) const {
+    for (int k : found_) {
+        const Event::Kind drives = side_[k] < 0.0 ? Event::Kind::saturate : Event::Kind::desaturate;
+        if (k < users()) events.push_back({t, Event::Kind::user, k});
+        else events.push_back({t, drives, drives_[k - users()]});
+    }
+}
+
+void ValueEvents::count(int k) {
+    const int after = direction(k);
+    side_[k] = after != 0 ? after : -side_[k];
+    found_.push_back(k);
+    ++count_[k];
+    ends_run_ |= k < users() && asked_[k].terminal > 0 && count_[k] >= asked_[k].terminal;
+}
+
+// Events that happen together with the one that the step ends at, and signs of all others.
+void ValueEvents::take_signs() {
+    for (int k = 0; k < size(); ++k) {
+        const double here = sign(value(k, stepper_.t0 + stepper_.h, stepper_.y1));
+        if (here == 0 || here == side_[k] || std::count(found_.begin(), found_.end(), k) > 0) continue;
+        if (side_[k] != 0 && counts(k)) count(k);
+        else side_[k] = here;
+    }
+}
+
+bool ValueEvents::locate(bool ends_at_event) {
+    found_.clear();
+    stepper_.make_interpolant();
+    const std::vector<double> side = side_;
+    asked_before_ = false;
+    int first = -1;
+    double part = beyond;
+    for (int k = 0; k < size(); ++k) {
+        const double crossing = first_crossing(k);
+        if (crossing >= part) continue;
+        part = crossing;
+        first = k;
+    }
+    side_ = side;
+    const bool at_end = ends_at_event && part > 1.0 - same_part;
+    if (first >= 0) count(first);
+    if (first >= 0 && !at_end) {
+        step_onto(first, part);
+    } else {
+        stepper_.end_directions();
+        system_.read(stepper_.y1);
+        system_.read_law_states(stepper_.y1);
+        evaluate(system_.p, system_.w, stepper_.t0 + stepper_.h, system_.q, system_.v);
+    }
+    take_signs();
+    return first >= 0 && !at_end;
+}
+
+void ValueEvents::look_at_end(double t, const VecX& y) {
+    found_.clear();
+    asked_before_ = false;
+    for (int k = 0; k < size(); ++k) {
+        const double here = sign(value(k, t, y));
+        if (here == 0 || here == side_[k]) continue;
+        if (side_[k] != 0 && counts(k)) count(k);
+        else side_[k] = here;
+    }
+}
+
+}  // namespace pn

@@ -1,0 +1,77 @@
+#include "run/external_run.hpp"
+
+#include <algorithm>
+
+#include "dynamics/projection.hpp"
+#include "dynamics/friction_limit.hpp"
+#include "friction/stick_slip.hpp"
+#include "friction/problem.hpp"
+
+namespace pn {
+
+// Relative step of central differences: the cube root of the rounding, where rounding and curvature cost the same.
+constexpr double difference = 6e-6;
+// Acceleration of an onset beside that of its friction alone, whose inverse is the rate at which the direction relaxes over
+// the time since the onset: implicit steps follow it to about thirty.
+constexpr double least_onset = 1.0 / 30.0;
+
+void FollowedRun::derivative(double at, const VecX& y_outside, VecX& rate_outside) {
+    inside_ = inside_rate_ = VecX::Zero(system.ny);
+    inside_.head(system.ns) = y_outside;
+    system.derivative(at, inside_, inside_rate_);
+    rate_outside = inside_rate_.head(system.ns);
+}
+
+// The steps of positions stay bounded when a joint has turned many times.
+MatX FollowedRun::jacobian(double at, const VecX& y_outside) {
+    const int n = system.ns;
+    MatX out = MatX::Zero(n, n);
+    VecX ahead = y_outside, back = y_outside, rate_ahead(n), rate_back(n);
+    for (int k = 0; k < n - system.nw; ++k) {
+        const double step = difference * (k < system.nq ? 1.0 : std::max(1.0, std::abs(y_outside[k])));
+        ahead[k] += step;
+        back[k] -= step;
+        derivative(at, ahead, rate_ahead);
+        derivative(at, back, rate_back);
+        out.col(k) = (rate_ahead - rate_back) / (ahead[k] - back[k]);
+        ahead[k] = back[k] = y_outside[k];
+    }
+    return out;
+}
+
+std::optional<int> FollowedRun::singular_onset() {
+    for (int e : w.now.slipping) {
+        const Friction& friction = p.frictions[e];
+        if (friction.dim == 1 || !at_rest(p, w, e, system.v)) continue;
+        const FrictionProblem problem(p, w, {e});
+        const double by_friction = w.now.limit[e] * problem.W.trace() / friction.dim;
+        if (slip_rate_along_mode(p, w, e) < least_onset * by_friction) return e;
+    }
+    return std::nullopt;
+}
+
+// Events came too thick a moment ago: implicit steps go over them with the modes as they are.
+bool FollowedRun::bridges_cluster() const {
+    return !out.events.empty() && out.events.back().kind == Event::Kind::chatter &&
+           t < out.events.back().time + chatter_time;
+}
+
+bool FollowedRun::follow(double end, const OutsideStep::Interpolant& interpolant) {
+    between_steps();
+    moved_energy = moved_before_;
+    stepper.y0 = y;
+    stepper.start_rate() = rate;
+    stepper.follow(t, end - t, interpolant);
+    system.project_and_evaluate(end, stepper.y1, stepper.end_rate());
+    event.reset();
+    if (!bridges_cluster()) find_event();
+    accept({stepper.h, end, true}, event);
+    record(event);
+    system.on_constraints = w.now.rows.distance < near_singular && !w.now.rows.blocks.empty();
+    const bool breaks_here = breaks.reached() && !done();
+    if (breaks_here) pass_break();
+    if (event || breaks_here || options.method.one_step) moved_before_ = moved_energy;
+    return event.has_value() || breaks_here;
+}
+
+}  // namespace pn

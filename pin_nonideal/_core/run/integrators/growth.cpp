@@ -1,0 +1,87 @@
+#include "run/integrators/growth.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pn {
+
+namespace {
+
+// Speeds below this [rad/s or m/s] are any motion's; from there on every decade is kept in mind.
+constexpr double least_speed = 1.0, decade = 10.0;
+// Decades of a growth, in two halves. Exponential growth takes as long for both. Under a constant force, or a polynomial of
+// time, the second half takes much longer; near a singular position, or under a force that grows with a power of the speed,
+// much less, and the steps end by themselves.
+constexpr size_t half = 3;
+constexpr double as_fast = 0.8, much_faster = 100.0;
+// A chaotic motion with a source of energy grows by a power of time. Its last decade takes so many steps, and each decade
+// takes longer than the one before, on the mean less than so many times as long; under a constant force it takes ten times
+// as long, and near a singular position it is shorter.
+constexpr long many_steps = 1000;
+constexpr double longer = 5.0;
+// Growth by more than this in one fixed step is the method's: the step is too long, and the motion overflows.
+constexpr double growth_in_step = 0.1;
+
+}  // namespace
+
+GrowthGuard::GrowthGuard(System& system, Progress& progress, const Options& options, const Recording& out)
+    : system_(system), progress_(progress), options_(options), out_(out) {}
+
+void GrowthGuard::look() {
+    const double speed = progress_.y.segment(system_.nq, system_.nv).cwiseAbs().maxCoeff();
+    std::vector<double>& speeds = progress_.growth_speeds;
+    const double next = speeds.empty() ? least_speed : decade * speeds.back();
+    if (!(speed >= next)) return;
+    speeds.push_back(speed);
+    progress_.growth_times.push_back(progress_.t);
+    progress_.growth_steps.push_back(out_.steps);
+    if (options_.max_steps == 0) judge();
+}
+
+double GrowthGuard::growth(size_t k) const {
+    const std::vector<double>&speeds = progress_.growth_speeds, &times = progress_.growth_times;
+    return std::log(speeds[k] / speeds[k - half]) / (times[k] - times[k - half]);
+}
+
+bool GrowthGuard::is_exponential() const {
+    const size_t last = progress_.growth_speeds.size() - 1;
+    if (last < 2 * half) return false;
+    const double before = growth(last - half), now = growth(last);
+    return now > as_fast * before && now < much_faster * before;
+}
+
+bool GrowthGuard::is_costly() const {
+    const std::vector<double>& times = progress_.growth_times;
+    const std::vector<long>& steps = progress_.growth_steps;
+    const size_t last = times.size() - 1;
+    if (last < half + 2 || steps[last] - steps[last - 1] < many_steps) return false;
+    const double before = times[last - 2] - times[last - 3], now = times[last] - times[last - 1];
+    return before < now && now < longer * longer * before;
+}
+
+void GrowthGuard::judge() {
+    if (!is_exponential() && !is_costly()) return;
+    const double rate = growth(progress_.growth_speeds.size() - 1);
+    if (!options_.method.adaptive() && rate * options_.dt > growth_in_step) return;
+    int dof = 0;
+    progress_.y.segment(system_.nq, system_.nv).cwiseAbs().maxCoeff(&dof);
+    throw Failure(Failure::Kind::growing, progress_.t, {dof, largest_source()}, rate);
+}
+
+// 0 of the actuation, 1 of the given forces, 2 of the laws.
+int GrowthGuard::largest_source() const {
+    const Evaluation& now = system_.w.now;
+    const VecX speed = progress_.y.segment(system_.nq, system_.nv).cwiseAbs();
+    int largest = 0;
+    double most = 0.0;
+    for (int source = 0; source < 3; ++source) {
+        const VecX& force = source == 0 ? now.tau : source == 1 ? now.external : now.C;
+        const double power = force.cwiseAbs().dot(speed);
+        if (!(power > most)) continue;
+        largest = source;
+        most = power;
+    }
+    return largest;
+}
+
+}  // namespace pn

@@ -1,0 +1,81 @@
+#include "run/integrators/rounding_floor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "dynamics/evaluation.hpp"
+#include "run/integrators/step_control.hpp"
+
+namespace pn {
+
+namespace {
+
+// Only runs that take so many steps, as noise that asks for ever shorter ones makes them, are held to their rounding: what
+// is measured is a bound that most runs are far better than. It is measured so many steps apart: seven evaluations among
+// hundreds.
+constexpr long many_steps = 20000, apart = 64;
+// A measurement is a sample: the rounding of another step may be so many times it, and is taken for half of what it was
+// before at least.
+constexpr double sample_factor = 3.0, lasting_part = 0.5;
+// Changes of the last digits are a fixed sequence, so that runs repeat; each of so many spacings of the numbers at most.
+constexpr unsigned long long multiplier = 6364136223846793005ULL, increment = 1442695040888963407ULL;
+constexpr double most_spacings = 16.0;
+constexpr int samples = 3;
+const double second_difference = std::sqrt(6.0);  // deviation of its rounding, over that of a rate
+
+}  // namespace
+
+RoundingFloor::RoundingFloor(System& system, Stepper& stepper, ErrorNorm& norm, Progress& progress, Recording& out)
+    : system_(system), stepper_(stepper), norm_(norm), progress_(progress), out_(out) {
+    const Method& method = stepper.method;
+    progress.rounding = VecX::Zero(2 * system.nv + system.nz);
+    if (!method.E) return;
+    double sum = 0.0;
+    for (int i = 0; i < method.stages + method.first_same_as_last; ++i) sum += method.E[i] * method.E[i];
+    raised_ = sample_factor * std::sqrt(sum) / StepControl::aim(method);
+}
+
+// What changes of the last digits of the state make of its rates: every rounding on the way is another then. Opposite
+// changes make opposite differences but for rounding, whose second difference has the variance 1 + 1 + 4.
+void RoundingFloor::measure() {
+    const double at = stepper_.t0 + stepper_.h, epsilon = std::numeric_limits<double>::epsilon();
+    const RunState kept = system_.w.state;
+    const int n = system_.nq + system_.nv;
+    const double size = system_.velocity(stepper_.end_rate()).cwiseAbs().maxCoeff();
+    unsigned long long draw = 1;
+    change_.resize(n), rate_.resize(stepper_.y1.size());
+    progress_.rounding *= lasting_part;
+    for (int sample = 0; sample < samples; ++sample) {
+        for (int k = 0; k < n; ++k) {
+            draw = multiplier * draw + increment;
+            const double part = static_cast<double>(static_cast<long long>(draw)) * 0x1p-63;
+            change_[k] = most_spacings * epsilon * part * stepper_.y1[k];  // what rests goes on resting
+        }
+        noise_ = -2.0 * stepper_.end_rate();
+        for (const double side : {1.0, -1.0}) {
+            probe_ = stepper_.y1;
+            probe_.head(n) += side * change_;
+            system_.normalize(probe_);
+            system_.derivative(at, probe_, rate_);
+            system_.w.state = kept;
+            noise_ += rate_;
+        }
+        noise_ /= second_difference;
+        norm_.raise(progress_.rounding, raised_ * noise_, stepper_.y1);
+        if (size > 0.0)
+            out_.rounding = std::max(out_.rounding, system_.velocity(noise_).cwiseAbs().maxCoeff() / size);
+    }
+    system_.read(stepper_.y1);
+    system_.read_law_states(stepper_.y1);
+    evaluate(system_.p, system_.w, at, system_.q, system_.v);
+    system_.w.state = kept;
+}
+
+void RoundingFloor::look() {
+    if (raised_ == 0.0 || stepper_.collocates() || out_.steps < std::max(many_steps, progress_.next_look)) return;
+    progress_.next_look = out_.steps + apart;
+    measure();
+}
+
+}  // namespace pn

@@ -1,0 +1,115 @@
+#include "run/integrators/stepper.hpp"
+
+#include <algorithm>
+
+namespace pn {
+
+Stepper::Stepper(const Method& chosen, System& system, ErrorNorm& norm)
+    : Step(chosen.stages, chosen.rates(), system.ns, system.ny), method(chosen), system_(system), norm_(norm),
+      collocation_(*this, system, norm) {
+    if (method.scheme == Method::Scheme::runge_kutta) scheme_.emplace<RungeKutta>(method, *this);
+    if (method.scheme == Method::Scheme::semi_implicit_euler) scheme_.emplace<SemiImplicitEuler>(*this);
+    if (method.outside()) scheme_.emplace<OutsideStep>(method, *this);
+    system.seeks_directions = !method.outside();
+    for (int i = 0; i < stages; ++i)
+        if (i == 0 || (method.C && method.C[i] < 1.0)) looks_.push_back({i == 0 ? 0.0 : method.C[i], &rates[i]});
+    std::stable_sort(looks_.begin(), looks_.end(), [](const Look& a, const Look& b) { return a.part < b.part; });
+    // Of stages at one instant the last is the best.
+    const auto same = [](const Look& a, const Look& b) { return a.part == b.part; };
+    looks_.erase(looks_.begin(), std::unique(looks_.rbegin(), looks_.rend(), same).base());
+    collocation_looks_.push_back({0.0, &rates[0]});
+    for (int i = 0; i + 1 < Collocation::stages; ++i)
+        collocation_looks_.push_back({Collocation::part(i), &collocation_.rate(i)});
+    for (auto* list : {&looks_, &collocation_looks_}) list->push_back({1.0, &end_rate()});
+}
+
+// Calls `use` with the stepper that the method has; time stepping is no business of these.
+template <class Scheme, class Use>
+static void with_scheme(Scheme& scheme, const Use& use) {
+    if (auto* runge_kutta = std::get_if<RungeKutta>(&scheme)) use(*runge_kutta);
+    else if (auto* euler = std::get_if<SemiImplicitEuler>(&scheme)) use(*euler);
+    else if (auto* outside = std::get_if<OutsideStep>(&scheme)) use(*outside);
+}
+
+void Stepper::take(double t, double size) {
+    t0 = t;
+    h = size;
+    has_interpolant_ = false;
+    collocates_ = system_.w.state.seeks_directions;
+    active = system_.active();
+    if (collocates_) {
+        collocation_.advance();
+        if (collocation_.is_solved() || method.adaptive()) return;
+        RunState& state = system_.w.state;  // the next trial of a fixed step is no shorter
+        collocates_ = state.seeks_directions = false;
+        state.last_direction = state.slip_direction;
+    }
+    with_scheme(scheme_, [&](auto& scheme) { scheme.advance(system_); });
+}
+
+void Stepper::take_again(double size) {
+    take(t0, size);
+    if (collocates_ && !collocation_.is_solved()) throw Failure(Failure::Kind::not_converged, t0);
+}
+
+void Stepper::move_end(double dt) {
+    h += dt;
+    y1 += dt * end_rate();
+    system_.normalize(y1);
+    has_interpolant_ = false;
+}
+
+void Stepper::follow(double t, double size, OutsideStep::Interpolant interpolant) {
+    auto& outside = std::get<OutsideStep>(scheme_);
+    outside.set_interpolant(std::move(interpolant));
+    take(t, size);
+    if (system_.ne > 0) outside.look_inside(system_);
+}
+
+double Stepper::error() {
+    if (!method.adaptive()) return 0.0;
+    if (collocates_) return collocation_.error();
+    norm_.set_tolerances(y0, y1, h);
+    return std::get<RungeKutta>(scheme_).error(norm_);
+}
+
+double Stepper::stiffness() const {
+    if (collocates_) return collocation_.stiffness();
+    const double apart = (system_.velocity(y1) - system_.velocity(last_stage())).norm();
+    if (!(apart > 0.0)) return 0.0;
+    return h * (system_.velocity(rates[stages]) - system_.velocity(rates[stages - 1])).norm() / apart;
+}
+
+void Stepper::learn() {
+    if (collocates_) return;
+    if (const auto* euler = std::get_if<SemiImplicitEuler>(&scheme_)) euler->learn(system_);
+}
+
+void Stepper::make_interpolant() {
+    if (has_interpolant_) return;
+    has_interpolant_ = true;
+    if (collocates_) return;
+    with_scheme(scheme_, [&](auto& scheme) { scheme.make_interpolant(system_); });
+}
+
+void Stepper::interpolate(double part, VecX& y) const {
+    if (collocates_) collocation_.interpolate(part, y);
+    else with_scheme(scheme_, [&](const auto& scheme) { scheme.interpolate(part, y); });
+    system_.normalize(y);
+}
+
+double Stepper::interpolated(double part, int index) const {
+    double value = 0.0;
+    if (collocates_) return collocation_.interpolated(part, index);
+    with_scheme(scheme_, [&](const auto& scheme) { value = scheme.interpolated(part, index).first; });
+    return value;
+}
+
+double Stepper::interpolated_rate(double part, int index) const {
+    double rate = 0.0;
+    if (collocates_) return collocation_.interpolated_rate(part, index);
+    with_scheme(scheme_, [&](const auto& scheme) { rate = scheme.interpolated(part, index).second / h; });
+    return rate;
+}
+
+}  // namespace pn

@@ -1,0 +1,167 @@
+#include "run/integrators/stiffness.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+
+#include "dynamics/evaluation.hpp"
+
+namespace pn {
+
+namespace {
+
+// A stiff run takes this many steps unless it may take more: some seconds.
+constexpr double usual_steps = 1e5;
+// Steps near the border of stability until the motion is asked whether it is stiff; these many in a row away from it
+// begin the count anew. [Hairer, Wanner, Solving ODEs II, IV.2, asks after 15]
+constexpr long suspicious_steps = 1000, quiet_steps = 6;
+// Part of the border beyond which a step counts: the control of the error keeps a stiff run there on an average.
+constexpr double near_border = 0.5;
+// Time stepping takes what decays by Euler's rule.
+constexpr double euler_border = 2.0;
+// A mode that decays by less than this part of its frequency swings, and must be followed by any method.
+constexpr double least_damping = 0.1;
+// Relative step of differences; passes of the power iteration.
+constexpr double difference_step = 1e-8;
+constexpr int power_passes = 20;
+// Over shorter differences a rate stays what it is to this part; that of a leap, as of a load whose place changes, grows
+// as they shrink, or falls to none where they do not reach it any more.
+constexpr double shorter_step = 1e-9, same_rate = 0.5;
+
+// A run is looked ahead after so many steps first, and twice as many each time. It takes long where so many seconds are
+// left, and vibrates where so many periods are, by steps longer than this part of one (in radians).
+constexpr long first_look_ahead = 500, never = 1L << 62;
+constexpr double long_time = 3.0, many_radians = 2e4, part_of_period = 0.1;
+
+}  // namespace
+
+StiffnessGuard::StiffnessGuard(System& system, Stepper& stepper, Progress& progress, const Options& options)
+    : system_(system), stepper_(stepper), progress_(progress), options_(options),
+      most_steps_(options.max_steps > 0 ? static_cast<double>(options.max_steps) : usual_steps) {
+    forget();
+}
+
+void StiffnessGuard::forget() {
+    begun_ = Clock::now();
+    steps_ = 0;
+    next_look_ahead_ = options_.hint && options_.max_steps == 0 ? first_look_ahead : never;
+}
+
+double StiffnessGuard::FastestMode::rate() const { return std::hypot(decay, frequency); }
+
+bool StiffnessGuard::FastestMode::decays() const { return decay > least_damping * rate(); }
+
+// Two evaluations at the step's end, of the last stage and of the result, tell how fast the rate changes with the state.
+double StiffnessGuard::stage_rate() const {
+    const int n = system_.nq + system_.nv + system_.nz;
+    const double apart = (stepper_.y1 - stepper_.last_stage()).head(n).norm();
+    const double change = (stepper_.end_rate() - stepper_.rates[stepper_.stages - 1]).head(n).norm();
+    return apart > 0.0 ? change / apart : 0.0;
+}
+
+// Derivative of the rate along a unit direction, and what the forces on the way change.
+VecX StiffnessGuard::difference(double relative, const VecX& direction, VecX& force) {
+    const double at = stepper_.t0 + stepper_.h;
+    const int n = static_cast<int>(direction.size());
+    const double step = relative * (1.0 + stepper_.y1.head(n).cwiseAbs().maxCoeff());
+    VecX there[2], forces[2];
+    for (int side = 0; side < 2; ++side) {
+        probe_ = stepper_.y1;
+        probe_.head(n) += (side == 0 ? step : -step) * direction;
+        probe_rate_ = VecX::Zero(system_.ny);
+        system_.derivative(at, probe_, probe_rate_);
+        there[side] = probe_rate_.head(n);
+        forces[side] = system_.w.now.F;
+        if (system_.p.has_laws()) forces[side] += system_.w.now.C;
+    }
+    force = (forces[0] - forces[1]) / (2.0 * step);
+    return (there[0] - there[1]) / (2.0 * step);
+}
+
+StiffnessGuard::FastestMode StiffnessGuard::fastest_mode(double relative) {
+    const int n = system_.nq + system_.nv + system_.nz;
+    VecX x = VecX::Ones(n).normalized(), force, other_force;
+    for (int pass = 0; pass < power_passes; ++pass) x = difference(relative, x, force).normalized();
+    // The largest eigenvalue in the plane of x and where it goes.
+    const VecX image = difference(relative, x, force);
+    VecX other = image - x.dot(image) * x;
+    const double a = x.dot(image), c = other.norm();
+    std::complex<double> eigenvalue = a;
+    if (c > 1e-9 * image.norm()) {
+        other /= c;
+        const VecX other_image = difference(relative, other, other_force);
+        const double b = x.dot(other_image), d = other.dot(other_image);
+        const std::complex<double> root = std::sqrt(std::complex<double>(0.25 * (a - d) * (a - d) + b * c));
+        const std::complex<double> one = 0.5 * (a + d) + root, two = 0.5 * (a + d) - root;
+        eigenvalue = std::abs(one) > std::abs(two) ? one : two;
+        if (force.norm() < other_force.norm()) {
+            x = other;
+            force = other_force;
+        }
+    }
+    int dof = 0;
+    const VecX power = force.cwiseAbs().cwiseProduct(x.segment(system_.nq, system_.nv).cwiseAbs());
+    (power.maxCoeff() > 0.0 ? power : force.cwiseAbs()).eval().maxCoeff(&dof);
+    return {-eigenvalue.real(), std::abs(eigenvalue.imag()), dof};
+}
+
+StiffnessGuard::FastestMode StiffnessGuard::mode_here() {
+    const RunState kept = system_.w.state;
+    const FastestMode mode = fastest_mode(difference_step);
+    system_.w.state = kept;
+    system_.read(stepper_.y1);
+    system_.read_law_states(stepper_.y1);
+    evaluate(system_.p, system_.w, stepper_.t0 + stepper_.h, system_.q, system_.v);
+    system_.w.state = kept;
+    return mode;
+}
+
+void StiffnessGuard::look() {
+    if (stepper_.method.stability == 0.0 || stepper_.collocates()) return;
+    look_for_border();
+    if (++steps_ == next_look_ahead_) look_ahead();
+}
+
+void StiffnessGuard::look_for_border() {
+    const double border = stepper_.method.stability, size = stepper_.h, at = stepper_.t0 + size;
+    if (!(options_.end() - at > most_steps_ * size)) return;
+    if (size * stage_rate() < near_border * border) {
+        if (++progress_.quiet_steps == quiet_steps) progress_.stiff_steps = 0;
+        return;
+    }
+    progress_.quiet_steps = 0;
+    if (++progress_.stiff_steps < suspicious_steps) return;
+    progress_.stiff_steps = 0;
+    const FastestMode mode = mode_here();
+    if (size * mode.rate() > near_border * border && mode.decays())
+        throw Failure(Failure::Kind::stiff, at, {mode.dof}, mode.rate());
+}
+
+void StiffnessGuard::look_ahead() {
+    next_look_ahead_ = 2 * steps_;
+    const double size = stepper_.h, at = stepper_.t0 + size, left = options_.end() - at;
+    const double so_far = std::chrono::duration<double>(Clock::now() - begun_).count();
+    if (so_far / static_cast<double>(steps_) * (left / size) < long_time) return;
+    const Counters kept = system_.w.counters;  // when this comes depends on the clock
+    const FastestMode mode = mode_here();
+    system_.w.counters = kept;
+    const double radians = size * mode.rate();
+    const bool follows =
+        mode.decays() ? radians > near_border * stepper_.method.stability && left < most_steps_ * size
+                      : radians > part_of_period && mode.rate() * left > many_radians;
+    if (!follows) return;
+    next_look_ahead_ = never;
+    options_.hint(at, mode.dof, mode.rate(), mode.decays());
+}
+
+void StiffnessGuard::require_time_steps(double size) {
+    // Time stepping finds which way slip goes together with its forces: slow slip turns as fast as it likes.
+    system_.w.state.seeks_directions = true;
+    const FastestMode mode = fastest_mode(difference_step);
+    if (!(size * mode.rate() > euler_border && mode.decays())) return;
+    const double shorter = fastest_mode(shorter_step).rate();
+    if (shorter < same_rate * mode.rate() || mode.rate() < same_rate * shorter) return;
+    throw Failure(Failure::Kind::stiff, stepper_.t0 + stepper_.h, {mode.dof}, mode.rate());
+}
+
+}  // namespace pn

@@ -1,0 +1,168 @@
+#include "run/integrators/system.hpp"
+
+#include <algorithm>
+
+#include "contact/depenetration.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/implicit_friction.hpp"
+#include "dynamics/power.hpp"
+#include "dynamics/projection.hpp"
+#include "dynamics/reactions.hpp"
+#include "dynamics/friction_limit.hpp"
+#include "dynamics/step_start.hpp"
+#include "tree/lie_group.hpp"
+
+namespace pn {
+
+// Below any limit of friction [N or N m]: what carries none at all still has a share.
+constexpr double least_limit = 1e-300;
+// What a contact holds of its limit is not told beyond this: where its load jumps to none it has opened.
+constexpr double most_share = 10.0;
+
+System::System(const Program& program, Workspace& workspace, bool with_energy)
+    : p(program), w(workspace), energy(with_energy), nq(p.mechanism.nq), nv(p.mechanism.nv), nz(p.states),
+      nw(with_energy ? power_count(p) : 0), ne(static_cast<int>(p.frictions.size())),
+      ng(static_cast<int>(p.gaps.size())), ns(nq + nv + nz + nw), ny(ns + 2 * ne + ng),
+      q(VecX::Zero(nq)), v(VecX::Zero(nv)), q_before_(q) {}
+
+void System::read(const VecX& y) {
+    std::copy_n(y.data(), nq, q.data());
+    std::copy_n(y.data() + nq, nv, v.data());
+}
+
+void System::write(VecX& y) const {
+    std::copy_n(q.data(), nq, y.data());
+    std::copy_n(v.data(), nv, y.data() + nq);
+}
+
+void System::read_law_states(const VecX& y) {
+    if (nz > 0) w.state.z = y.segment(nq + nv, nz);
+}
+
+void System::derivative(double t, const VecX& y, VecX& dy) {
+    read(y);
+    read_law_states(y);
+    if (on_constraints) pn::project_and_evaluate(p, w, t, q, v);
+    else evaluate(p, w, t, q, v);
+    if (!w.now.rows.blocks.empty()) smallest_pivot = std::min(smallest_pivot, w.now.rows.distance);
+    write_rate(t, dy);
+}
+
+void System::rate_of_evaluation(double t, const VecX& y, VecX& dy) {
+    read(y);
+    write_rate(t, dy);
+}
+
+void System::write_rate(double t, VecX& dy) {
+    configuration_rate(p.mechanism, q.data(), v.data(), dy.data());
+    std::copy_n(w.now.a.data(), nv, dy.data() + nq);
+    if (nz > 0) dy.segment(nq + nv, nz) = w.now.dz;
+    if (energy) powers(p, w, v, dy.data() + nq + nv + nz);
+    if (!w.now.loaded.empty()) watch(t, dy);
+    if (!w.now.touching.empty()) watch_loads(dy);
+}
+
+void System::watch(double t, VecX& dy) {
+    std::fill_n(dy.data() + ns, std::min(active() - ns, 2 * ne), 0.0);
+    for (int e : w.now.loaded) {
+        double *of_element = dy.data() + ns + 2 * e, &share = of_element[0], &rate = of_element[1];
+        if (slips(w.state.mode[e])) {
+            const auto [speed, change] = slip_toward_rest(p, w, e);
+            share = speed;
+            rate = change;
+        } else if (w.state.mode[e] == sticking && !w.state.indeterminate) {
+            const auto [force, limit] = holding_force(p, w, e, t, q, v);
+            // The force along one direction keeps its sign: it is smooth through zero.
+            share = (p.frictions[e].dim == 1 ? force[0] : force.norm()) / std::max(limit, least_limit);
+            if (p.frictions[e].gap >= 0) share = std::clamp(share, -most_share, most_share);
+        }
+    }
+}
+
+void System::watch_loads(VecX& dy) {
+    double* loads = dy.data() + ns + 2 * ne;
+    std::fill_n(loads, ng, 0.0);
+    for (int i : w.now.touching) {
+        if (p.blocks[p.gaps[i].block].kept.empty()) continue;
+        if (!w.now.rows.redundant) loads[i] = w.now.lam[p.blocks[p.gaps[i].block].row];
+        else loads[i] = reactions(p, w).presses ? 1.0 : -1.0;
+    }
+}
+
+double System::energy_at(const VecX& y) {
+    read(y);
+    place_bodies(p.mechanism, w.now.terms, q);
+    mass_matrix(p.mechanism, w.now.terms);
+    return kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms);
+}
+
+void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
+    const double before = energy && !w.now.rows.blocks.empty() ? energy_at(y) : 0.0;
+    read(y);
+    read_law_states(y);
+    bool moved = project_position(p, w, t, q, v);
+    moved |= project_onto_dependent(p, w, t, q, v);
+    moved |= project_past_sticking(p, w, t, q, v);
+    require_closed(p, w, t);
+    moved |= begin_step_on_rates(p, w, t, v);
+    write(y);
+    write_rate(t, dy);
+    moved_energy = 0.0;
+    if (!moved || !energy) return;
+    moved_energy =
+        kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms) - before;
+}
+
+bool System::settle_velocity(double t, bool chosen, bool evaluates, bool goes_through) {
+    try {
+        return begin_step_on_rates(p, w, t, v, chosen, evaluates);
+    } catch (const Failure& failure) {
+        const bool of_modes = failure.kind == Failure::Kind::paradox || failure.kind == Failure::Kind::not_converged;
+        if (!goes_through || !of_modes) throw;
+        w.now.no_motion = true;
+        w.now.several_element = failure.elements.empty() ? 0 : failure.elements.front();
+        solve_with_step_friction(p, w, t, q, v);
+        return true;
+    }
+}
+
+void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_through) {
+    read(y);
+    read_law_states(y);
+    moved_energy = 0.0;
+    w.now.no_motion = false;
+    if (!evaluates && keeps_to_rows(p, w, t, q, v)) return write(y);
+    const auto total = [&] {
+        return kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms);
+    };
+    // Factors of the new modes: what sticks must not move as the rest is projected.
+    bool chosen = begin_rows(p, w, t, q, v);
+    const double before = energy && !w.now.rows.blocks.empty() ? total() : 0.0;
+    const double longest_single = longest_single_move(p, w);
+    if (longest_single > 0.0) q_before_ = q;
+    bool moved = project_position(p, w, t, q, v, true, !evaluates);
+    if (longest_single > 0.0 && strays_from_planes(p, w, longest_single)) {
+        q = q_before_;
+        chosen = move_out(p, w, t, q, v);
+        project_position(p, w, t, q, v, true, !evaluates);
+        moved = true;
+    }
+    moved |= project_onto_dependent(p, w, t, q, v);
+    const bool past_sticking = project_past_sticking(p, w, t, q, v);
+    require_closed(p, w, t);
+    if (past_sticking || (moved && evaluates)) chosen = configure_step(p, w);
+    moved |= past_sticking;
+    moved |= settle_velocity(t, chosen, evaluates, goes_through);
+    write(y);
+    if (evaluates) write_rate(t, dy);
+    if (moved && energy) moved_energy = total() - before;
+}
+
+bool System::is_on_constraints(double t, const VecX& y) {
+    read(y);
+    return pn::is_on_constraints(p, w, t, q, v);
+}
+
+void System::normalize(VecX& y) const { pn::normalize(p.mechanism, y.data()); }
+
+}  // namespace pn

@@ -1,0 +1,151 @@
+// The bindings below name every member of their type, so that one added there does not compile until it is added here.
+#include "run/output/checkpoint.hpp"
+
+#include <algorithm>
+
+#include "dynamics/evaluation.hpp"
+#include "dynamics/step_start.hpp"
+#include "run/output/archive.hpp"
+
+namespace pn {
+
+static void fields(Archive& a, Counters& x) {
+    auto& [evaluations, factorizations, projections, iterations, signorini, coulomb, dissipation] = x;
+    a(evaluations, factorizations, projections, iterations, signorini, coulomb, dissipation);
+}
+
+void fields(Archive& a, Modes& x) {
+    a(x.values_);
+    for (Mode mode : x) a.require(slips(mode) || mode == sticking || mode == unloaded);
+}
+
+static void fields(Archive& a, RunState& x) {
+    auto& [mode, closed, slip_direction, last_direction, lingers, seeks_directions, indeterminate,
+           rank_tolerance, z, held_torque, has_held, unknown, warm, percussion, third_order_lam, ideal_decided, unique,
+           growth, steps_since] = x;
+    a(mode, closed, slip_direction, last_direction, lingers, seeks_directions, indeterminate,
+      rank_tolerance, z, held_torque, has_held, unknown, warm, percussion, third_order_lam, ideal_decided, unique,
+      growth, steps_since);
+}
+
+static void fields(Archive& a, Ways& x) {
+    auto& [body, joint, turn, scene, lever, slid_until, placed, slid, turned, body_step, joint_step, turn_step, slid_step,
+           turned_step, scene_step, most, most_step, summed] = x;
+    a(body, joint, turn, scene, lever, slid_until, placed, slid, turned, body_step, joint_step, turn_step, slid_step,
+      turned_step, scene_step, most, most_step, summed);
+}
+
+static void fields(Archive& a, GapState& x) {
+    auto& [width, rate, separation, near, far, way, turn, apart, ways, ask, current, near_gaps, vain_since,
+           rests_until] = x;
+    a(width, rate, separation, near, far, way, turn, apart, ask, current, vain_since, rests_until);
+    fields(a, ways);
+    x.find_near();
+}
+
+static void fields(Archive& a, Progress& x) {
+    auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, found_break, recent_events,
+           last_changes, sides, bridged_time, bridged_end, slip_at_start, pulls, gaps, left, impact_energy, several,
+           stiff_steps, quiet_steps, rounding, next_look, growth_times, growth_speeds, growth_steps, turning_steps] = x;
+    a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, found_break, sides, bridged_time,
+      bridged_end, slip_at_start, pulls, left, impact_energy, several, stiff_steps, quiet_steps, rounding, next_look,
+      turning_steps);
+    fields(a, gaps);
+    a.list(recent_events);
+    a.list(growth_times);
+    a.list(growth_speeds);
+    a.list(growth_steps);
+    a.list(last_changes);
+}
+
+static void fields(Archive& a, Event& x) {
+    auto& [time, kind, element, impulse, energy_change, v_minus, v_plus] = x;
+    a(time, kind, element, impulse, energy_change);
+    a.sized(v_minus);
+    a.sized(v_plus);
+}
+
+static void fields(Archive& a, DenseOutput& x) {
+    auto& [times, states, step_modes, directions, sought, torque, moved] = x;
+    for (auto* numbers : {&times, &states, &directions, &torque, &moved}) a.list(*numbers);
+    a.list(step_modes);
+    a.list(sought);
+}
+
+static void fields(Archive& a, Recording& x) {
+    // A run that failed or raised has no next step.
+    auto& [t, q, v, violation, violation_rate, acceleration, tau, F_ideal, F_nonideal, lam, lam_ideal, energy, power, z,
+           law_forces, limits, reactions, contact_forces, modes, closed, events, dense, steps, rejected, limited, rounding,
+           failure, error] = x;
+    for (auto* samples : {&t, &q, &v, &violation, &violation_rate, &acceleration, &tau, &F_ideal, &F_nonideal, &lam,
+                          &lam_ideal, &energy, &power, &z, &law_forces, &limits, &reactions,
+                          &contact_forces})
+        a.list(*samples);
+    a.list(modes);
+    a.list(closed);
+    a.list(events);
+    fields(a, dense);
+    a(steps, rejected, limited, rounding);
+}
+
+// One thing of an evaluation outlives it: which rows are independent, decided at the start of a step and kept until that
+// shows to be wrong, and what that is judged by.
+static void archive(Archive& a, Workspace& w, Progress& progress, Recording& out) {
+    RowSystem& rows = w.now.rows;
+    a(w.state, w.counters, rows.active, rows.longest, rows.longest_chosen, rows.chosen_pivot, progress, out);
+}
+
+std::string to_bytes(Workspace& w, Progress& progress, Recording& out) {
+    Archive a;
+    archive(a, w, progress, out);
+    return a.bytes;
+}
+
+// The factors and rows that the next step starts from, as the last one left them: all that it reads of an evaluation
+// before it makes its own.
+static void evaluate_anew(System& system, const Progress& progress) {
+    const Program& p = system.p;
+    Workspace& w = system.w;
+    const RunState state = w.state;
+    const RowChoice choice = w.now.rows;
+    const Counters counters = w.counters;
+    select_rows(p, w);
+    static_cast<RowChoice&>(w.now.rows) = choice;
+    w.now.rows.redundant = choice.active != w.now.rows.required;
+    system.read(progress.y);
+    configure(p, w, progress.t, system.q, system.v);
+    if (state.ideal_decided) {
+        const IdealMotion decided(p, w);
+    }
+    system.read(progress.configured_y);
+    configure(p, w, progress.configured_t, system.q, system.v);
+    update_kinematics(p, w, progress.configured_t, system.q, system.v);
+    w.state = state;
+    w.counters = counters;
+}
+
+void from_bytes(const std::string& bytes, System& system, Progress& progress, Recording& out) {
+    Archive a(bytes);
+    archive(a, system.w, progress, out);
+    a.end();
+    const int elements = static_cast<int>(std::max(system.p.frictions.size(), system.p.blocks.size()));
+    for (const Event& e : out.events) {
+        const int known = Event::of_drive(e.kind) ? system.nv : elements;
+        a.require(static_cast<size_t>(e.kind) < std::size(event_kinds) && e.element >= 0 && e.element < known);
+    }
+    a.require(progress.samples >= 0 && progress.next_period >= 0);
+    try {
+        evaluate_anew(system, progress);
+    } catch (const Failure&) {
+        a.require(false);  // no run has been in such a state
+    }
+}
+
+std::string state_layout() {
+    const size_t sizes[] = {sizeof(RunState), sizeof(Progress), sizeof(Recording), sizeof(long)};
+    std::string layout;
+    for (size_t size : sizes) layout += std::to_string(size) + ".";
+    return layout;
+}
+
+}  // namespace pn

@@ -1,0 +1,136 @@
+#include "run/output/output.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/evaluation.hpp"
+#include "dynamics/projection.hpp"
+#include "dynamics/friction_limit.hpp"
+
+namespace pn {
+
+// Room for samples is taken at once up to this number; longer runs may stop before they fill it.
+constexpr double most_reserved = 1e5;
+
+Output::Output(System& system, Stepper& stepper, Progress& progress, const Options& options, Recording& out)
+    : p(system.p), w(system.w), system_(system), stepper_(stepper), progress_(progress), options_(options), out_(out),
+      recorder_(system, options.record, out),
+      dense_(system, stepper, options.callback || std::holds_alternative<SampledTorque>(p.actuation), out.dense),
+      sample_(VecX::Zero(system.ny)) {}
+
+void Output::begin() {
+    progress_.samples = 1;
+    // The steps of adaptive methods are not known before.
+    const double apart = options_.output_dt > 0.0 ? options_.output_dt : options_.dt;
+    if (apart > 0.0) recorder_.reserve(static_cast<size_t>(std::min(options_.duration / apart + 2.0, most_reserved)));
+}
+
+void Output::emit(double at, const VecX& state, bool evaluated) {
+    if (!out_.t.empty() && (jumps_ ? at < out_.t.back() : at <= out_.t.back())) return;
+    jumps_ = false;
+    const GapState& gaps = progress_.gaps;
+    recorder_.sample(at, state, {progress_.impact_energy, progress_.moved_energy}, evaluated,
+                     gaps.current ? &gaps.far : nullptr);
+}
+
+void Output::before_jump() {
+    emit(progress_.t, progress_.y, false);
+    jumps_ = true;
+}
+
+void Output::now() { emit(progress_.t, progress_.y, true); }
+
+void Output::configured_now() {
+    if (!options_.save) return;
+    progress_.configured_t = progress_.t;
+    progress_.configured_y.head(system_.ns) = progress_.y.head(system_.ns);
+}
+
+void Output::end_step(bool asked) {
+    const double t = progress_.t;
+    const bool on_grid = options_.output_dt > 0.0 && std::abs(next() - t) <= same_time(t);
+    if (!asked && options_.output_dt != 0.0 && !on_grid && t < options_.end()) return;
+    progress_.samples += on_grid;
+    if (stepper_.has_interpolant() && !system_.has_events()) {  // the workspace may be inside the step
+        system_.read(progress_.y);
+        evaluate(p, w, t, system_.q, system_.v);
+        configured_now();
+    }
+    now();
+}
+
+void Output::end_time_step() {
+    const double t = progress_.t;
+    const bool on_grid = options_.output_dt > 0.0 && next() <= t + same_time(t);
+    progress_.samples += on_grid;
+    if (options_.output_dt == 0.0 || on_grid || t >= options_.end()) now();
+}
+
+template <class Look>
+void Output::look_inside(const Look& look) {
+    kept_ = w.state;
+    look();
+    w.state = kept_;
+    system_.read(progress_.y);
+    evaluate(p, w, progress_.t, system_.q, system_.v);
+    w.state = kept_;
+}
+
+void Output::keep_step() {
+    if (options_.record.dense) look_inside([&] { dense_.step(progress_.moved_energy); });
+}
+
+void Output::keep_time_step(double from, const VecX& y_from) {
+    if (options_.record.dense) dense_.straight(from, y_from, progress_.t, progress_.y, progress_.moved_energy);
+}
+
+void Output::emit_between(double at) {
+    stepper_.make_interpolant();
+    stepper_.interpolate((at - stepper_.t0) / stepper_.h, sample_);
+    const bool redundant = w.now.rows.redundant;
+    if (redundant) choice_ = w.now.rows;
+    if (!w.now.rows.blocks.empty()) {
+        system_.read(sample_);
+        project(p, w, at, system_.q, system_.v);
+        system_.write(sample_);
+    }
+    if (!w.now.rows.blocks.empty() || options_.record.evaluates() || p.constraints > 0) {
+        progress_.configured_t = at;
+        progress_.configured_y.head(system_.ns) = sample_.head(system_.ns);
+    }
+    forget_slip_directions(w);
+    emit(at, sample_, false);
+    if (redundant) choose_as_before(at);
+}
+
+// A sample chooses rows that are long at its place; the run goes on with its own.
+void Output::choose_as_before(double at) {
+    const bool same = choice_.active == w.now.rows.active;
+    static_cast<RowChoice&>(w.now.rows) = choice_;
+    if (same) return;
+    system_.read(sample_);
+    configure(p, w, at, system_.q, system_.v);
+}
+
+void Output::inside_step(std::optional<double> between) {
+    const double end = progress_.t - same_time(progress_.t);
+    const auto due = [&] { return options_.output_dt > 0.0 && next() < end; };
+    if (between && !(*between < end)) between.reset();
+    if (!between && !due()) return;
+    const auto emit_samples = [&] {
+        while (due()) {
+            if (between && *between < next()) {
+                emit_between(*between);
+                between.reset();
+            }
+            emit_between(next());
+            ++progress_.samples;
+        }
+        if (between) emit_between(*between);
+    };
+    if (!system_.has_events()) return emit_samples();
+    look_inside(emit_samples);  // modes and directions of slip follow from the evaluation at the step's end
+    configured_now();
+}
+
+}  // namespace pn

@@ -1,0 +1,113 @@
+// What a run leaves behind: samples, events, counters.
+#pragma once
+
+#include <cstdint>
+#include <exception>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dynamics/law_forces.hpp"
+#include "dynamics/force_decomposition.hpp"
+#include "run/output/dense_output.hpp"
+#include "run/integrators/system.hpp"
+
+namespace pn {
+
+struct Event {
+    enum class Kind {
+        stick, slip, reverse, pull, chatter, several, paradox, user, saturate, desaturate, jump, impact, touch_down, lift_off
+    };
+    double time;
+    Kind kind;
+    int element;  // of friction; of a contact or prescribed motion its block; of the user his function; of a drive its dof
+    // An impact has components along the normal and the directions of slip; a prescribed motion has the first alone.
+    Vec3 impulse = Vec3::Zero();
+    double energy_change = 0.0;
+    VecX v_minus = {}, v_plus = {};
+    static bool of_drive(Kind kind) { return kind == Kind::saturate || kind == Kind::desaturate; }
+    static bool of_contact(Kind kind) { return kind == Kind::pull || kind >= Kind::impact; }
+};
+
+// All kinds in order, as Python names them.
+struct EventKind {
+    Event::Kind kind;
+    const char *name, *meaning;
+};
+constexpr EventKind event_kinds[] = {
+    {Event::Kind::stick, "stick", "an element comes to rest"},
+    {Event::Kind::slip, "slip", "what stuck gives way"},
+    {Event::Kind::reverse, "reverse", "slip turns round"},
+    {Event::Kind::pull, "pull", "the normal force of a contact turns negative"},
+    {Event::Kind::chatter, "chatter", "a cluster of events is bridged by time stepping"},
+    {Event::Kind::several, "several", "from here on the laws allow other motions too"},
+    {Event::Kind::paradox, "paradox", "from here on time stepping goes through modes that allow no motion"},
+    {Event::Kind::user, "user", "a function of the user crosses zero"},
+    {Event::Kind::saturate, "saturate", "a drive reaches the effort that it has"},
+    {Event::Kind::desaturate, "desaturate", "a drive gives again what is asked of it"},
+    {Event::Kind::jump, "jump", "the rate of a prescribed motion jumps, with an impulse"},
+    {Event::Kind::impact, "impact", "a contact strikes, with an impulse"},
+    {Event::Kind::touch_down, "touch_down", "a contact closes without an impulse, or its bouncing ends"},
+    {Event::Kind::lift_off, "lift_off", "a contact opens"},
+};
+
+struct Recording {
+    std::vector<double> t, q, v, violation, violation_rate;
+    std::vector<double> a, tau, F_ideal, F_nonideal, lam, lam_ideal, energy, power, z;
+    // Of each law on the dofs that it acts on, law by law; of each element; of each joint, then of each block that
+    // reaction_blocks tells, [force; moment] in its own axes and in world axes.
+    std::vector<double> law_forces, limits, reactions;
+    std::vector<double> contact_forces;  // on the body of each contact's frame, in world axes
+    std::vector<std::int8_t> modes, closed;
+    std::vector<Event> events;
+    DenseOutput dense;
+    long steps = 0, rejected = 0;
+    long limited = 0;       // steps whose error was rounding, beyond the tolerances
+    double rounding = 0.0;  // largest in an acceleration, as part of the largest one, where it was measured
+    std::optional<Failure> failure;
+    std::exception_ptr error;  // what a user function raised
+};
+
+struct RecordOptions {
+    bool a = false, forces = false, energy = false, power = false, laws = false, reactions = false, tau = false;
+    bool dense = false;
+    bool evaluates() const { return a || forces || energy || power || laws || reactions || tau; }
+};
+
+class Recorder {
+public:
+    Recorder(System& system, const RecordOptions& options, Recording& out)
+        : p(system.p), w(system.w), system(system), options(options), out(out) {
+        if (options.laws) supports_ = law_supports(p);
+    }
+    // Room for so many samples.
+    void reserve(size_t samples);
+    // What has changed the energy so far beside the works that are integrated.
+    struct Jumps { double impacts, projection; };
+    // The state at t. The workspace is evaluated there when `evaluated`, and
+    // left so where anything of that is recorded. Gaps that are known to be open are not measured (`sure`).
+    void sample(double t, const VecX& y, const Jumps& jumps, bool evaluated, const std::vector<char>* sure = nullptr);
+
+private:
+    void record_laws(double t);
+    void record_reactions();
+    void record_contacts();
+
+    const Program& p;
+    Workspace& w;
+    System& system;
+    RecordOptions options;
+    Recording& out;
+    VecX power_;
+    Split split_;
+    std::vector<std::vector<int>> supports_;  // of the laws
+};
+
+// Whether each contact is closed, in the order of their descriptions.
+void append_closed(const Program& p, const Workspace& w, std::vector<std::int8_t>& to);
+// Contacts between two frames, in the order of their descriptions.
+std::vector<int> framed_contacts(const Program& p);
+// Constraints and contacts that act between two frames, and so carry a wrench.
+std::vector<int> reaction_blocks(const Program& p);
+
+}  // namespace pn

@@ -1,0 +1,38 @@
+// Samples inside the steps of a run that has ended, from its dense output.
+#pragma once
+
+#include <vector>
+
+#include "run/output/recorder.hpp"
+
+namespace pn {
+
+// The polynomials of steps: `points` states of `size` numbers a step.
+class StepPolynomials {
+public:
+    StepPolynomials(const double* states, int points, int size);
+
+    // The state at this part of a step. [Berrut, Trefethen, "Barycentric Lagrange interpolation", SIAM Review 46 (2004),
+    // eq. 4.2, 5.4]
+    void at(size_t step, double part, double* out) const;
+
+private:
+    const double* states_;
+    const int points_, size_;
+    std::vector<double> places_, weights_;  // of the points
+};
+
+// States inside steps, each with what its step held, and for each element the direction of its slip and whether the step
+// sought it. Without elements of several directions the vectors of directions are empty.
+struct InsideStates {
+    std::vector<double> t, moved;
+    std::vector<VecX> y, torque, directions;
+    std::vector<std::vector<char>> sought;
+    std::vector<std::vector<Mode>> modes;
+    double end = HUGE_VAL;  // of the run
+};
+// Puts them on the constraints and samples them.
+void sample_inside(const Program& p, Workspace& w, const InsideStates& inside, const RecordOptions& options,
+                   Recording& out);
+
+}  // namespace pn

@@ -1,0 +1,137 @@
+#include "run/time_stepping/bridge.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/acceleration.hpp"
+#include "dynamics/step_start.hpp"
+#include "run/events/events.hpp"
+
+namespace pn {
+
+namespace {
+
+// Part of a step that is not worth one of its own.
+constexpr double least_part = 1e-9;
+// Of a step at the least, where edges come at each other.
+constexpr double least_cut = 1e-3;
+
+// Whether another step from the same state may go elsewhere: by time, by the user, or where steps of another method lie
+// between those of time stepping.
+bool may_differ(const Program& p, const Options& options) {
+    return options.method.scheme != Method::Scheme::moreau || p.asks_functions || p.moves_in_time || options.callback ||
+           std::holds_alternative<SampledTorque>(p.actuation) || std::holds_alternative<TorqueTable>(p.actuation);
+}
+
+// Whether the accelerations and forces of every step's end tell something.
+bool asks_always(const Program& p, const Options& options) {
+    return options.method.scheme != Method::Scheme::moreau || options.output_dt == 0.0 || options.record.dense ||
+           options.callback || options.save || !options.events.empty() || !p.contacts.empty() || p.asks_functions;
+}
+
+}  // namespace
+
+TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, const Options& options,
+                           Torques& torques, Output& output, Notices& notices, ValueEvents& value_events,
+                           Recording& out)
+    : p(system.p), w(system.w), system_(system), now_(progress), options_(options), torques_(torques),
+      output_(output), notices_(notices), value_events_(value_events), out_(out), moreau_(system),
+      moreau_contacts_(system, watch), lasts_(!may_differ(system.p, options)),
+      asked_always_(asks_always(system.p, options)) {}
+
+double TimeStepping::end_of_step(double size, double stop, double t_end) const {
+    double end = std::min({now_.t + size, stop, torques_.next_stop(t_end)});
+    if (options_.output_dt > 0.0) end = std::min(end, std::max(output_.next(), std::nextafter(now_.t, stop)));
+    return stop - end < least_part * size ? stop : end;
+}
+
+// Whether nothing moves, and what sticks leaves no freedom.
+bool TimeStepping::rests() const {
+    return lasts_ && (system_.velocity(now_.y).array() == 0.0).all() && is_immobile(p, w);
+}
+
+// Whether anything asks for the accelerations and forces at the step's end: a sample, what follows the run, or slip
+// whose direction or limit goes on with them.
+bool TimeStepping::asks_for_motion(double end, double t_end) const {
+    if (asked_always_ || end >= t_end || end >= options_.end() || output_.next() <= end + same_time(end)) return true;
+    return std::any_of(w.now.slipping.begin(), w.now.slipping.end(), [&](int e) {
+        return p.frictions[e].dim > 1 || p.frictions[e].reaction != Reaction::none;
+    });
+}
+
+// With contacts that may open: of a step to `end` as much as edges that come at each other allow.
+void TimeStepping::take_part(double end, double t_end, double least) {
+    double& t = now_.t;
+    const double left = end - t, h = std::max(moreau_contacts_.allowed(t, left, now_.y), least);
+    const bool whole = h >= (1.0 - least_part) * left;
+    moreau_contacts_.step(t, whole ? left : h, now_.y, now_.moved_energy, now_.impact_energy);
+    t = whole ? end : t + h;
+    const bool goes_through = options_.method.scheme == Method::Scheme::moreau;
+    system_.settle(t, now_.y, now_.rate, whole && asks_for_motion(end, t_end), goes_through);
+    now_.moved_energy += system_.moved_energy;
+}
+
+void TimeStepping::take(double end, double t_end) {
+    double& t = now_.t;
+    if (system_.ng > 0) {
+        const double least = least_cut * (end - t);
+        while (t < end) take_part(end, t_end, least);
+        return;
+    }
+    VecX &y = now_.y, &y_from = y_from_;
+    const bool rested = rests();
+    Modes& before = before_step_;
+    if (rested) {
+        y_from = y;
+        before = w.state.mode;
+    }
+    const double moved_from = now_.moved_energy;
+    moreau_.step(t, end - t, y, now_.moved_energy);
+    t = end;
+    const bool held = rested && std::equal(before.begin(), before.end(), w.state.mode.begin());
+    if (!held) {
+        system_.settle(t, y, now_.rate, asks_for_motion(end, t_end), false);
+        now_.moved_energy += system_.moved_energy;
+        return;
+    }
+    // Rounding moves nothing that is held at rest; states of laws go on.
+    y.head(system_.nq + system_.nv) = y_from.head(system_.nq + system_.nv);
+    system_.work(y) = system_.work(y_from);
+    now_.moved_energy = moved_from;
+    system_.read(y);
+    system_.read_law_states(y);
+    begin_step(p, w, t, system_.q, system_.v);
+    system_.rate_of_evaluation(t, y, now_.rate);
+    stands_ = y == y_from;
+}
+
+void TimeStepping::step(double size, double stop, double t_end) {
+    torques_.enter();
+    torques_.sample();
+    double& t = now_.t;
+    VecX& y = now_.y;
+    const double end = end_of_step(size, stop, t_end), from = t;
+    const bool watched = system_.watches();
+    if (watched || !open_before_) {
+        before_ = w.state.mode;
+        closed_before_ = w.state.closed;
+        open_before_ = !watched;
+    }
+    const VecX y_from = options_.record.dense ? y : VecX();
+    if (!stands_) take(end, t_end);
+    t = end;
+    ++out_.steps;
+    output_.configured_now();
+    remember_directions(system_, now_.slip_at_start);
+    if (watched || system_.watches())
+        for (const Event& change : changes_since(system_, t, closed_before_, before_)) out_.events.push_back(change);
+    notices_.pulls(std::nullopt);
+    notices_.several(false);
+    output_.keep_time_step(from, y_from);
+    value_events_.look_at_end(t, y);
+    value_events_.tell(t, out_.events);
+    if (!value_events_.found().empty()) output_.now();
+    output_.end_time_step();
+}
+
+}  // namespace pn

@@ -1,0 +1,51 @@
+// A step of time stepping as a part of a run: it needs no events, ends where torques jump and samples are due, and is
+// recorded as any other.
+#pragma once
+
+#include "run/time_stepping/moreau.hpp"
+#include "run/time_stepping/moreau_contacts.hpp"
+#include "run/events/warnings.hpp"
+#include "run/torque_schedule.hpp"
+#include "run/events/value_events.hpp"
+
+namespace pn {
+
+class TimeStepping {
+public:
+    TimeStepping(System& system, Progress& progress, GapWatch& watch, const Options& options, Torques& torques,
+                 Output& output, Notices& notices, ValueEvents& value_events, Recording& out);
+
+    // One step of this size, not beyond `stop` nor the end of the run.
+    void step(double size, double stop, double t_end);
+    // Torques may have changed since the last step.
+    void forget() { stands_ = false; }
+
+private:
+    bool rests() const;
+    void take(double end, double t_end);
+    void take_part(double end, double t_end, double least);
+    bool asks_for_motion(double end, double t_end) const;
+    double end_of_step(double size, double stop, double t_end) const;
+
+    const Program& p;
+    Workspace& w;
+    System& system_;
+    Progress& now_;
+    const Options& options_;
+    Torques& torques_;
+    Output& output_;
+    Notices& notices_;
+    ValueEvents& value_events_;
+    Recording& out_;
+    Moreau moreau_;
+    MoreauContacts moreau_contacts_;
+    const bool lasts_;     // what a step has left as it was stays so
+    bool stands_ = false;  // the last step has left all as it was
+    const bool asked_always_;  // for the motion of every step's end
+    VecX y_from_;
+    Modes before_, before_step_;
+    std::vector<char> closed_before_;
+    bool open_before_ = false;  // they say that nothing is closed or rubs
+};
+
+}  // namespace pn

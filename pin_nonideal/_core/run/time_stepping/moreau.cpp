@@ -1,0 +1,177 @@
+#include "run/time_stepping/moreau.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "dynamics/power.hpp"
+#include "dynamics/friction_limit.hpp"
+#include "dynamics/acceleration.hpp"
+#include "dynamics/step_start.hpp"
+#include "complementarity/socp_mode_newton.hpp"
+#include "friction/stick_slip.hpp"
+#include "tree/lie_group.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr int load_passes = 60;           // of limits that depend on the load
+constexpr double load_tolerance = 1e-13;  // change of the limits, as a part of the largest, that is rounding
+constexpr double limit_rounding = 1e-12;  // part of its limit within which a force is at it
+
+// Of scenes without contacts that may open; others are for MoreauContacts.
+std::vector<int> all_elements(const System& system) {
+    std::vector<int> list(system.ng > 0 ? 0 : system.ne);
+    std::iota(list.begin(), list.end(), 0);
+    return list;
+}
+
+}  // namespace
+
+Moreau::Moreau(System& system)
+    : system_(system), p(system.p), w(system.w), problem_(p, all_elements(system)), modes_(system.ne, unloaded),
+      unloaded_(modes_), q_mid_(VecX::Zero(system.nq)), power_(VecX::Zero(system.nw)), limit_(system.ne, problem_.rows),
+      force_limit_(limit_) {
+    problem_.alpha0 = alpha_ = near_ = VecX::Zero(problem_.rows);
+    for (int dim : problem_.dims) boxes_ = boxes_ && dim == 1;
+}
+
+void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
+    const Mechanism& m = p.mechanism;
+    h_ = h;
+    v0_ = system_.velocity(y);
+    move_ = 0.5 * h * v0_;
+    retract(m, y.data(), move_.data(), q_mid_.data());
+    solve_without_friction(t + 0.5 * h);
+    pose_problem();
+    solve_friction(t);
+    end_velocity();
+    if (system_.energy) book_work(y, moved_energy);
+    set_modes(p, w, modes_);
+    if (system_.nz > 0) y.segment(system_.nq + system_.nv, system_.nz) += h * w.now.dz;
+    move_ = 0.5 * h * v1_;
+    retract(m, q_mid_.data(), move_.data(), y.data());
+    y.segment(system_.nq, system_.nv) = v1_;
+}
+
+void meet_at_end(const Program& p, const Evaluation& now, double h, VecX& b) {
+    for (int i = 0; i < p.first_gap; ++i) {
+        const Block& block = p.blocks[i];
+        for (size_t k = 0; k < block.kept.size(); ++k)
+            b[block.row + k] = 0.5 * b[block.row + k] - now.values[i].rate[block.kept[k]] / h;
+    }
+}
+
+// The motion without friction of the elements, constraints met at the end of the step.
+void Moreau::solve_without_friction(double t) {
+    set_modes(p, w, unloaded_);
+    begin_step(p, w, t, q_mid_, v0_);
+    a_free_ = w.now.a;
+    lam_free_ = w.now.lam;
+    if (w.now.rows.blocks.empty()) return;
+    b_ = w.now.b;
+    meet_at_end(p, w.now, h_, b_);
+    solve_motion(p, w, p.has_laws(), b_, a_free_, lam_free_);
+}
+
+// Slip velocities at the step's end over h take the place of slip accelerations.
+void Moreau::pose_problem() {
+    problem_.respond_in_step(p, w);
+    problem_.clean(p, w);
+    problem_.along(p, w, a_free_, problem_.alpha0);
+    int at = 0;
+    for (const Friction& friction : p.frictions) {
+        const RowValues& values = w.now.values[friction.block];
+        for (int k = 0; k < friction.dim; ++k) problem_.alpha0[at++] += values.rate[k] / h_ + 0.5 * values.drift[k];
+    }
+}
+
+// The motion under the friction forces.
+void Moreau::apply_forces() {
+    problem_.acceleration(p, w, force_, a_friction_);
+    w.now.a = a_free_ + a_friction_;
+    w.now.lam = lam_free_;
+    w.now.lam.noalias() += problem_.multipliers * force_;
+    for (int e = 0, at = 0; e < system_.ne; ++e) {
+        w.now.slip_force[e] = Vec3::Zero();
+        for (int k = 0; k < problem_.dims[e]; ++k) w.now.slip_force[e][k] = force_[at++];
+    }
+    w.now.renew();
+}
+
+// Limits for the load of the motion in the workspace; returns their largest change.
+double Moreau::update_limits(double t) {
+    double change = 0.0;
+    even_ = true;
+    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
+        const Friction& friction = p.frictions[e];
+        const double speed = slip_velocity(w.now, friction).norm();
+        const SlipLimits load = load_limits(p, w, friction, t, w.now.terms.q, v0_);
+        const SlipLimits limit = load * (speed == 0.0 ? friction.static_ratio : friction.speed_factor(speed));
+        change = std::max({change, std::abs(limit.reach() - limit_[e]), std::abs(limit.middle() - limit_.middle[at])});
+        limit_.size[e] = limit.reach();
+        limit_.middle[at] = limit.middle();
+        even_ = even_ && limit.middle() == 0.0;
+    }
+    return change;
+}
+
+// Friction forces, with limits for the load of this very step.
+void Moreau::solve_friction(double t) {
+    int at = 0;  // from forces of the last step, whose modes mostly last
+    for (const Friction& friction : p.frictions)
+        for (int k = 0; k < friction.dim; ++k) near_[at++] = w.state.percussion[p.blocks[friction.block].row + k];
+    force_.setZero(problem_.rows);
+    for (int pass = 0; pass < load_passes; ++pass) {
+        // Limits that no load decides need no motion.
+        if (pass == 0 || p.needs_reactions) apply_forces();
+        const double change = update_limits(t + 0.5 * h_);
+        const double largest = system_.ne > 0 ? std::max(0.0, limit_.size.maxCoeff()) : 0.0;
+        if (pass > 0 && (change <= load_tolerance * largest || !p.needs_reactions)) return;
+        if (!even_) force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_);
+        else if (problem_.rows > 0 && boxes_) box_.solve(problem_.W, problem_.alpha0, limit_.size, &near_, force_);
+        else force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_.size, &near_);
+        near_ = force_;
+        force_limit_ = limit_;
+        if (pass + 1 == load_passes) throw Failure(Failure::Kind::not_converged, t, problem_.elements);
+    }
+}
+
+// Velocity at the step's end, and the modes there: what stays below its limit sticks.
+void Moreau::end_velocity() {
+    alpha_ = problem_.alpha0;
+    alpha_.noalias() += problem_.W * force_;
+    problem_.acceleration(p, w, force_, a_friction_);
+    v1_ = v0_ + h_ * (a_free_ + a_friction_);
+    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
+        const int dim = problem_.dims[e];
+        w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim) = force_.segment(at, dim);
+        shifted_ = force_.segment(at, dim);
+        if (dim == 1) shifted_[0] -= force_limit_.middle[at];
+        const bool held = shifted_.norm() < force_limit_[e] * (1.0 - limit_rounding);
+        modes_[e] = held ? sticking : dim > 1 || alpha_[at] > 0.0 ? slip_plus : slip_minus;
+        const Block& block = p.blocks[p.frictions[e].block];
+        if (held && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
+    }
+}
+
+// Work over the step, by the mean velocity. Where a slip turns inside the step its mean velocity may go with the
+// friction that meets its end: that is work of the scheme, not of friction.
+void Moreau::book_work(VecX& y, double& moved_energy) {
+    w.now.lam = lam_free_;
+    w.now.lam.noalias() += problem_.multipliers * force_;
+    move_ = 0.5 * (v0_ + v1_);
+    powers(p, w, move_, power_.data());  // of all but dry friction, whose modes are still open
+    problem_.along(p, w, move_, alpha_);
+    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
+        double& power = power_[first_law_power + p.frictions[e].law];
+        power += alpha_.segment(at, problem_.dims[e]).dot(force_.segment(at, problem_.dims[e]));
+        if (!(power > 0.0)) continue;
+        moved_energy += h_ * power;
+        power = 0.0;
+    }
+    system_.work(y) += h_ * power_;
+}
+
+}  // namespace pn

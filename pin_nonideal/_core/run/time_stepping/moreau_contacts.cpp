@@ -1,0 +1,405 @@
+#include "run/time_stepping/moreau_contacts.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/queries.hpp"
+#include "contact/impact.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/power.hpp"
+#include "dynamics/projection.hpp"
+#include "dynamics/friction_limit.hpp"
+#include "dynamics/acceleration.hpp"
+#include "dynamics/step_start.hpp"
+#include "friction/problem.hpp"
+#include "run/time_stepping/moreau.hpp"
+#include "tree/mass_factor.hpp"
+#include "tree/lie_group.hpp"
+#include "tree/terms.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr int load_passes = 60;           // of limits that depend on the load
+constexpr double load_tolerance = 1e-12;  // change of the limits, as a part of the largest, that is rounding
+// Limits that change no less from pass to pass follow what the cones leave open of the forces: where slip is slow, its
+// direction.
+constexpr double contracting = 0.5;
+constexpr double limit_rounding = 1e-9;   // part of its limit within which a force is at it
+constexpr double width_rounding = 1e-12;   // part of the scene's size by which what stands may find a gap less wide
+constexpr double least_response = 1e-13;  // part of a row's free response that the constraints must leave it
+// Of the velocities in play, by which a step of a body that turns may contradict itself where corners share its load, and
+// of the forces in play, by which a limit may miss its load; the statistics tell.
+constexpr double most_miss = 1e-7;
+
+}  // namespace
+
+MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
+    : system_(system), p(system.p), w(system.w), watch_(watch), was_closed_(system.ng, 0), closed_(system.ng, 0),
+      open_(system.ng, 0), modes_(system.ne, unloaded), unloaded_(modes_), q_mid_(VecX::Zero(system.nq)),
+      v0_(VecX::Zero(system.nv)), v1_(v0_), a_free_(v0_),
+      power_(VecX::Zero(system.nw)), zero_(VecX::Zero(p.layout.rows)), force_(v0_) {
+    if (system.ng == 0) return;
+    solver_.take_misses(most_miss);
+    for (const Gap& gap : p.gaps) rounded_by_.push_back(rounded_by(p.blocks[gap.block].kind));
+    rounded_ = std::any_of(rounded_by_.begin(), rounded_by_.end(), [](double r) { return r < HUGE_VAL; });
+    for (int e = 0; e < system.ne; ++e)
+        if (p.frictions[e].gap < 0) own_.push_back(e);
+    const int most = p.layout.rows;
+    unit_ = lam_ = lam_free_ = zero_;
+    w0_ = w1_ = f_ = VecX::Zero(most);
+    W_.resize(most, most);
+    response_.resize(system.nv, most);
+    multipliers_.resize(most, most);
+    touching_.reserve(system.ng);
+    rubbing_.reserve(system.ne);
+    rows_.reserve(most);
+    parts_.reserve(most);
+    cones_.reserve(most);
+}
+
+double MoreauContacts::allowed(double t, double h, const VecX& y) {
+    if (!rounded_) return h;
+    bool placed = false;
+    double shortest = h;
+    for (int i : watch_.gaps.near_gaps) {
+        if (!(rounded_by_[i] < HUGE_VAL) || w.state.closed[i]) continue;
+        if (!placed) {
+            system_.read(y);
+            kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
+            placed = true;
+        }
+        follow_gap(p, w, t, system_.v, i);
+        const double width = gap_width(p, w, i), rate = gap_rate(p, w, i);
+        if (!(rate < 0.0) || !tells_way_out(i, width)) continue;
+        const double reach = width + (width > 0.0 ? 0.5 : 1.0) * rounded_by_[i];
+        shortest = std::min(shortest, reach / -rate);
+    }
+    return shortest;
+}
+
+void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, double& impact_energy) {
+    const Mechanism& m = p.mechanism;
+    h_ = h;
+    v0_ = system_.velocity(y);
+    force_ = 0.5 * h * v0_;
+    retract(m, y.data(), force_.data(), q_mid_.data());
+    const double middle = t + 0.5 * h;
+    const bool watched = system_.watches();
+    if (watched || marked_) {
+        std::copy(w.state.mode.begin(), w.state.mode.end(), modes_.begin());
+        was_closed_ = w.state.closed;
+    }
+    marked_ |= watched;
+    if (watch_.gaps.current || q_looked_.size() == 0) {
+        q_looked_ = y.head(system_.nq);
+        watch_.begin_time_steps(width_rounding * scene_size(p, w));
+    }
+    solve_free(middle);
+    find_touching(middle);
+    add_rows();
+    respond();
+    solve(middle);
+    end_velocity();
+    if (system_.energy) book_work(y, moved_energy, impact_energy);
+    select(closed_, modes_, rows_.empty());
+    marked_ = watched || !rows_.empty();
+    if (system_.nz > 0) y.segment(system_.nq + system_.nv, system_.nz) += h * w.now.dz;
+    force_ = 0.5 * h * v1_;
+    retract(m, q_mid_.data(), force_.data(), y.data());
+    y.segment(system_.nq, system_.nv) = v1_;
+}
+
+// Contacts and modes, with the rows that go with them; most of a flight nothing changes. `flies`: nothing is closed or rubs
+// in those asked for.
+void MoreauContacts::select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies) {
+    if (flies && !system_.watches() && !w.now.rows.redundant && !w.now.rows.orthogonal) w.now.renew();
+    else set_contacts(p, w, closed, modes);
+}
+
+// The motion without contacts and dry friction, constraints met at the step's end.
+void MoreauContacts::solve_free(double t) {
+    select(open_, unloaded_, true);
+    begin_step(p, w, t, q_mid_, v0_);
+    a_free_ = w.now.a;
+    if (w.now.rows.blocks.empty()) {
+        w.now.rows.distance = 1.0;
+        return;
+    }
+    unit_ = w.now.b;
+    meet_at_end(p, w.now, h_, unit_);
+    lam_free_ = w.now.lam;
+    solve_motion(p, w, p.has_laws(), unit_, a_free_, lam_free_);
+    unit_.setZero();
+}
+
+// By how much each dof has moved since gaps were looked at last, by projections too: where angles go round, not less than
+// by its velocity.
+const VecX& MoreauContacts::way_since_last() {
+    q_looked_ -= q_mid_;
+    ambient_to_tangent(p.mechanism, q_mid_.data(), q_looked_.data(), v1_.data());
+    force_ = v1_.cwiseAbs().cwiseMax(h_ * v0_.cwiseAbs());
+    q_looked_ = q_mid_;
+    return force_;
+}
+
+// Contacts whose gap is closed at the step's middle, and those that were closed: their loads tell whether they stay so.
+void MoreauContacts::find_touching(double t) {
+    touching_.clear();
+    for (int i : watch_.come(way_since_last())) {
+        measure_gap(p, w, t, v0_, i);
+        const double width = gap_width(p, w, i);
+        const bool touches = was_closed_[i] || (width <= 0.0 && tells_way_out(i, width));
+        if (touches) touching_.push_back(i);
+        watch_.gaps.width[i] = touches ? 0.0 : width - width_rounding * scene_size(p, w);  // that it is sure to have
+    }
+    watch_.leave_far();
+    for (int i : touching_) {
+        evaluate_block(p, w, t, v0_, p.gaps[i].block);
+        for (int e : p.gaps[i].elements) evaluate_block(p, w, t, v0_, p.frictions[e].block);
+    }
+    if (touching_.size() > 1) leave_one_of_each_place(p, w, was_closed_, touching_);
+}
+
+// The coefficient of a contact: the static one where it sticks or comes to rest.
+double MoreauContacts::coefficient(int element) const {
+    const Friction& friction = p.frictions[element];
+    const double speed = slip_velocity(w.now, friction).norm();
+    const bool rests = modes_[element] == sticking || speed <= rest_rate(v0_);
+    return rests ? friction.holding_limit(friction.mu) : friction.kinetic_limit(friction.mu, speed);
+}
+
+void MoreauContacts::add_part(Part part, int block, int kept, ConeElement element) {
+    for (int k = 0; k < kept; ++k) rows_.push_back({block, k});
+    if (part.gap >= 0 && part.element >= 0) {
+        const int slip = p.frictions[part.element].block;
+        for (size_t k = 0; k < p.blocks[slip].kept.size(); ++k) rows_.push_back({slip, static_cast<int>(k)});
+    }
+    parts_.push_back(part);
+    cones_.push_back(element);
+}
+
+// Contacts first, then dry friction that is not their sliding.
+void MoreauContacts::add_rows() {
+    rows_.clear();
+    parts_.clear();
+    cones_.clear();
+    rubbing_ = own_;
+    for (int i : touching_) {
+        const Gap& gap = p.gaps[i];
+        const int slides = gap.sliding < 0 ? 0 : static_cast<int>(p.blocks[p.frictions[gap.sliding].block].kept.size());
+        const double mu = gap.sliding < 0 ? 0.0 : coefficient(gap.sliding);
+        const double approach = gap.restitution * std::min(0.0, gap_rate(p, w, i));
+        add_part({i, gap.sliding, approach}, gap.block, 1, ConeElement::contact(1 + slides, mu));
+        for (int e : gap.elements)
+            if (e != gap.sliding) rubbing_.push_back(e);
+    }
+    std::sort(rubbing_.begin(), rubbing_.end());
+    for (int e : rubbing_) {
+        const int block = p.frictions[e].block, kept = static_cast<int>(p.blocks[block].kept.size());
+        if (kept > 0) add_part({-1, e, 0.0}, block, kept, ConeElement::box(kept, 0.0));
+    }
+}
+
+// What a unit of each force does, and the velocities at the step's end without them, over h.
+void MoreauContacts::respond() {
+    const int n = static_cast<int>(rows_.size());
+    if (n == 0) return;
+    scaled_ = !w.now.rows.refine;
+    for (int column = 0; column < n; ++column) {
+        const Row& row = rows_[column];
+        const Block& block = p.blocks[row.block];
+        force_.setZero();
+        unit_[block.row + row.k] = 1.0;
+        add_transpose(block, w.now.A, unit_, force_);
+        unit_[block.row + row.k] = 0.0;
+        double free;
+        if (scaled_) {
+            free = solve_scaled(p, w, force_, nullptr, zero_, lam_);
+            response_.col(column) = force_;
+        } else {
+            solve_acceleration(p, w, force_, zero_, v1_, lam_);
+            response_.col(column) = v1_;
+            solve_R(p.mechanism, w.now.terms, force_);
+            free = force_.squaredNorm();
+            for (int i = 0; i < n; ++i) {
+                multiply(p.blocks[rows_[i].block], w.now.A, v1_, w.scratch.r);
+                W_(i, column) = w.scratch.r[p.blocks[rows_[i].block].row + rows_[i].k];
+            }
+        }
+        if (!w.now.rows.blocks.empty()) multipliers_.col(column) = lam_;
+        f_[column] = free;
+    }
+    if (scaled_) gram(response_, n, W_);
+    for (int i = 0; i < n; ++i)
+        if (W_(i, i) <= least_response * f_[i]) W_(i, i) = 0.0;
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j < i; ++j) {
+            const bool held = W_(i, i) == 0.0 || W_(j, j) == 0.0;
+            W_(i, j) = W_(j, i) = held ? 0.0 : 0.5 * (W_(i, j) + W_(j, i));
+        }
+    measure_free();
+}
+
+void MoreauContacts::measure_free() {
+    const int n = static_cast<int>(rows_.size());
+    for (int i = 0; i < n; ++i) {
+        const Block& block = p.blocks[rows_[i].block];
+        const RowValues& values = w.now.values[rows_[i].block];
+        const int k = block.kept[rows_[i].k];
+        if (i == 0 || rows_[i].block != rows_[i - 1].block) multiply(block, w.now.A, a_free_, w.scratch.r);
+        w0_[i] = w.scratch.r[block.row + rows_[i].k] + values.rate[k] / h_ + 0.5 * values.drift[k];
+        f_[i] = w.state.percussion[block.row + rows_[i].k];
+    }
+    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) w0_[at] += parts_[e].approach / h_;
+}
+
+// The motion under the forces f.
+void MoreauContacts::apply() {
+    const int n = static_cast<int>(rows_.size());
+    w.now.a = a_free_;
+    w.now.renew();
+    if (n == 0) return;
+    force_.noalias() = response_.leftCols(n) * f_.head(n);
+    if (scaled_) solve_Rt(p.mechanism, w.now.terms, force_);
+    w.now.a += force_;
+    if (w.now.rows.blocks.empty()) w.now.lam.setZero();
+    else {
+        w.now.lam = lam_free_;
+        w.now.lam.noalias() += multipliers_.leftCols(n) * f_.head(n);
+    }
+    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
+        const int head = parts_[e].gap >= 0;
+        if (head) w.now.lam[p.blocks[p.gaps[parts_[e].gap].block].row] = f_[at];
+        if (parts_[e].element < 0) continue;
+        Vec3& force = w.now.slip_force[parts_[e].element];
+        force = Vec3::Zero();
+        for (int k = head; k < cones_[e].dim; ++k) force[k - head] = f_[at + k];
+    }
+}
+
+// Takes the limits of dry friction for the load of the motion at hand; whether they are what they were.
+bool MoreauContacts::limits_settle(double t) {
+    double change = 0.0, largest = 0.0;
+    for (size_t e = 0; e < parts_.size(); ++e) {
+        if (!cones_[e].is(ConeElement::Kind::box)) continue;
+        const Friction& friction = p.frictions[parts_[e].element];
+        const double speed = slip_velocity(w.now, friction).norm();
+        const SlipLimits load = friction.gap >= 0 ? SlipLimits(friction.constant + friction.mu * w.now.lam[friction.row])
+                                                  : load_limits(p, w, friction, t, w.now.terms.q, v0_);
+        const SlipLimits limits = load * (speed == 0.0 ? friction.static_ratio : friction.speed_factor(speed));
+        const double limit = limits.reach();
+        change = std::max({change, std::abs(limit - cones_[e].bound), std::abs(limits.middle() - parts_[e].middle)});
+        largest = std::max(largest, limit);
+        cones_[e].bound = std::max(0.0, limit);
+        parts_[e].middle = limits.middle();
+    }
+    const bool settles = change <= load_tolerance * largest ||
+                         (change > contracting * last_change_ &&
+                          change <= most_miss * f_.head(static_cast<int>(rows_.size())).cwiseAbs().maxCoeff());
+    last_change_ = change;
+    return settles;
+}
+
+// Boxes of the cone problem lie about no force: forces from the middles of their limits, and back.
+void MoreauContacts::measure_from_middles(double sign) {
+    const int n = static_cast<int>(rows_.size());
+    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
+        if (parts_[e].middle == 0.0) continue;
+        f_[at] -= sign * parts_[e].middle;
+        w0_.head(n) += sign * parts_[e].middle * W_.col(at).head(n);
+    }
+}
+
+void MoreauContacts::solve(double t) {
+    const int n = static_cast<int>(rows_.size());
+    const auto W = W_.topLeftCorner(n, n);
+    const bool loads = n > 0 && cones_.back().is(ConeElement::Kind::box);  // limits that may depend on the motion
+    last_change_ = HUGE_VAL;
+    for (int pass = 0; n > 0; ++pass) {
+        if (loads || pass > 0) apply();
+        if (limits_settle(t) && pass > 0) break;
+        if (pass == load_passes) throw Failure(Failure::Kind::not_converged, t);
+        measure_from_middles(1.0);
+        const ConeStatus status = solver_.solve(W, w0_.head(n), cones_, true, f_.head(n), true);
+        measure_from_middles(-1.0);
+        if (status != ConeStatus::solved) throw Failure(Failure::Kind::not_converged, t);
+        ++w.counters.iterations;
+    }
+    if (n == 0) apply();
+    if (presses_ || n > 0) w.state.percussion.setZero();
+    presses_ = n > 0;
+    for (int i = 0; i < n; ++i) w.state.percussion[p.blocks[rows_[i].block].row + rows_[i].k] = f_[i];
+    if (n == 0) return;
+    measure_from_middles(1.0);
+    const ConeResiduals r = ConeComplementarity::residuals(W, w0_.head(n), cones_, f_.head(n));
+    measure_from_middles(-1.0);
+    w.counters.signorini = std::max(w.counters.signorini, r.signorini);
+    w.counters.coulomb = std::max(w.counters.coulomb, r.coulomb);
+    w.counters.dissipation = std::max(w.counters.dissipation, r.dissipation);
+}
+
+// Velocity at the step's end, which contacts stay closed, and the modes: what stays below its limit sticks. Whether a
+// force is below it by what is rounding beside the others only the slip tells.
+void MoreauContacts::end_velocity() {
+    const int n = static_cast<int>(rows_.size());
+    v1_ = v0_ + h_ * w.now.a;
+    if (marked_) {
+        std::fill(closed_.begin(), closed_.end(), char(0));
+        std::fill(modes_.begin(), modes_.end(), unloaded);
+    }
+    if (n == 0) return;
+    const double still = rest_rate(v1_), clear = limit_rounding * f_.head(n).cwiseAbs().maxCoeff();
+    w1_.head(n) = w0_.head(n);
+    w1_.head(n).noalias() += W_.topLeftCorner(n, n) * f_.head(n);
+    w1_.head(n) *= h_;
+    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
+        const Part& part = parts_[e];
+        const int head = part.gap >= 0, dim = cones_[e].dim - head;
+        if (head) closed_[part.gap] = w1_[at] - part.approach <= still;
+        if (part.element < 0 || (head && !closed_[part.gap])) continue;
+        const double limit = cones_[e].bound * (head ? f_[at] : 1.0);
+        const double size = dim == 1 ? std::abs(f_[at + head] - part.middle) : f_.segment(at + head, dim).norm();
+        const bool rests = w1_.segment(at + head, dim).norm() <= still;
+        const bool held = limit - size > clear || (rests && (limit <= clear || size < limit * (1.0 - limit_rounding)));
+        const bool forward = dim > 1 || (dim > 0 && w1_[at + head] > 0.0);
+        modes_[part.element] = held && dim > 0 ? sticking : forward ? slip_plus : slip_minus;
+        const Block& block = p.blocks[p.frictions[part.element].block];
+        if (held && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
+    }
+    const auto rest = [&](int e) {  // what the constraints hold has no mode of its own but rest
+        if (modes_[e] == unloaded && (p.frictions[e].gap < 0 || closed_[p.frictions[e].gap])) modes_[e] = sticking;
+    };
+    for (int e : own_) rest(e);
+    for (int i : touching_)
+        for (int e : p.gaps[i].elements) rest(e);
+}
+
+// Work over the step, by the mean velocity. Where a slip turns inside the step its mean velocity may go with the
+// friction that meets its end: that is work of the scheme, not of friction.
+void MoreauContacts::book_work(VecX& y, double& moved_energy, double& impact_energy) {
+    const int n = static_cast<int>(rows_.size());
+    if (!w.now.rows.blocks.empty()) {
+        w.now.lam = lam_free_;
+        w.now.lam.noalias() += multipliers_.leftCols(n) * f_.head(n);
+    }
+    force_ = 0.5 * (v0_ + v1_);
+    powers(p, w, force_, power_.data());
+    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
+        double power = 0.0;
+        for (int k = 0; k < cones_[e].dim; ++k) {
+            const Row& row = rows_[at + k];
+            multiply(p.blocks[row.block], w.now.A, force_, w.scratch.r);
+            const double part = w.scratch.r[p.blocks[row.block].row + row.k] * f_[at + k];
+            if (k == 0 && parts_[e].gap >= 0) impact_energy += h_ * part;
+            else power += part;
+        }
+        if (parts_[e].element < 0) continue;
+        if (power > 0.0) moved_energy += h_ * power;
+        else power_[first_law_power + p.frictions[parts_[e].element].law] += power;
+    }
+    system_.work(y) += h_ * power_;
+}
+
+}  // namespace pn

@@ -1,0 +1,70 @@
+#include "run/torque_schedule.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <variant>
+
+#include "dynamics/step_start.hpp"
+
+namespace pn {
+
+namespace {
+
+// The quotient may miss a whole number by so much of itself and of one.
+constexpr double quotient_rounding = 1e-14, count_rounding = 1e-9;
+
+}  // namespace
+
+double whole_lengths(double time, double length) {
+    return std::floor(time / length * (1.0 + quotient_rounding) + count_rounding);
+}
+
+Torques::Torques(System& system, Progress& progress, const Options& options, Output& output, Breaks& breaks)
+    : p(system.p), w(system.w), system_(system), now_(progress), options_(options), output_(output),
+      breaks_(breaks) {}
+
+void Torques::sample() {
+    const auto* sampled = std::get_if<SampledTorque>(&p.actuation);
+    if (!sampled || w.now.has_override) return;
+    if (w.state.has_held && now_.t < options_.t0 + now_.next_period * sampled->period) return;
+    system_.read(now_.y);
+    sampled->function(now_.t, system_.q, system_.v, w.state.held_torque);
+    w.state.has_held = true;
+    now_.next_period = static_cast<long>(whole_lengths(now_.t - options_.t0, sampled->period)) + 1;
+    take_rate_anew();
+}
+
+bool Torques::ask_callback() {
+    system_.read(now_.y);
+    const Options::Told told = options_.callback(now_.t, system_.q, system_.v, w.scratch.work);
+    if (told != Options::Told::torque) return told == Options::Told::go_on;
+    set(w.scratch.work);
+    return true;
+}
+
+void Torques::set(const VecX& torque) {
+    w.now.has_override = true;
+    w.now.override_torque = torque;
+    system_.read(now_.y);
+    take_rate_anew();
+}
+
+// At the state that was read last.
+void Torques::take_rate_anew() {
+    begin_step(p, w, now_.t, system_.q, system_.v);
+    system_.rate_of_evaluation(now_.t, now_.y, now_.rate);
+    output_.configured_now();
+}
+
+double Torques::next_stop(double t_end) const {
+    double stop = std::min(t_end, breaks_.next());
+    if (const auto* sampled = std::get_if<SampledTorque>(&p.actuation))
+        stop = std::min(stop, options_.t0 + now_.next_period * sampled->period);
+    if (const auto* table = std::get_if<TorqueTable>(&p.actuation)) {
+        const auto next = std::upper_bound(table->times.begin(), table->times.end(), now_.t);
+        if (next != table->times.end()) stop = std::min(stop, *next);
+    }
+    return stop;
+}
+
+}  // namespace pn

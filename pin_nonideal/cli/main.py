@@ -1,0 +1,263 @@
+"""The command `pin-nonideal`: run robots, resume, replay and sweep, describe them, find where they rest.
+
+Exit codes: 0 done; 2 an error of the package, told in one line on standard error; 130 interrupted by Ctrl-C.
+What a run had computed when it failed or was interrupted is written to the files asked for all the same.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import runpy
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pin_nonideal as pn
+from pin_nonideal.errors import InputError, PinNonidealError, RunInterrupted
+from pin_nonideal.loading.load import robots
+from pin_nonideal.scene.scene import SEVERAL
+from pin_nonideal.trajectory.trajectory import Trajectory
+from pin_nonideal.types import Table
+from pin_nonideal.visualization.rendering import render
+
+from .commands import (
+    completion,
+    describe_robot,
+    named_values,
+    replay_file,
+    rest_robot,
+    sweep_file,
+)
+from .run import parameters, resume_run, run_robot
+
+EXIT_ERROR = 2
+EXIT_UNREAD = 141  # 128 and the number of SIGPIPE, as shells show it
+EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        arguments: the words after the command's name; those of the process when None.
+
+    Returns:
+        The exit code.
+    """
+    options, rest = _parser().parse_known_args(arguments)
+    if rest and options.command is not _bench:
+        _parser().error(f"unrecognized arguments: {' '.join(rest)}")
+    options.rest = rest
+    try:
+        code = int(options.command(options))
+        if sys.stdout is not None:  # which a shell may have closed
+            sys.stdout.flush()
+        return code
+    except RunInterrupted as error:
+        print(f"pin-nonideal: interrupted: {error}", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except KeyboardInterrupt:
+        print("pin-nonideal: interrupted", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:  # the reader of the output, such as `head`, has had enough
+        _print_no_more()
+        return EXIT_UNREAD
+    except PinNonidealError as error:
+        print(f"pin-nonideal: error: {error}", file=sys.stderr)
+        return EXIT_ERROR
+    except OSError as error:  # a disk that is full, or a terminal that went away
+        print(f"pin-nonideal: error: cannot print: {error.strerror or error}", file=sys.stderr)
+        _print_no_more()
+        return EXIT_ERROR
+
+
+def _print_no_more() -> None:
+    """Leaves what could not be printed to nobody, so that the interpreter does not try again at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="pin-nonideal",
+        description="Robots with loops, contacts and friction, simulated through their explicit equation.",
+    )
+    parser.add_argument("--version", action="version", version=f"%(prog)s {pn.__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    run = commands.add_parser("run", help="simulate a robot and write what is asked for")
+    _add_robot(run)
+    run.add_argument(
+        "--duration", type=float, default=5.0, metavar="S", help="length of time [s] (default: 5)"
+    )
+    run.add_argument("--method", help="integrator, e.g. dop853 (default), dopri5, rk4, Radau")
+    run.add_argument("--rtol", type=float, help="relative tolerance of adaptive methods")
+    run.add_argument("--atol", type=float, help="absolute tolerance of adaptive methods")
+    run.add_argument("--dt", type=float, metavar="S", help="step of fixed-step methods [s]")
+    run.add_argument(
+        "--output-dt",
+        type=float,
+        metavar="S",
+        help="time between samples [s] (default: every step; with --html or --plot at least 1200 samples)",
+    )
+    run.add_argument(
+        "--record",
+        metavar="NAMES",
+        help="what to record, separated by commas: a, forces, laws, reactions, energy, power "
+        "(default: nothing; forces,energy with --html or --plot)",
+    )
+    run.add_argument(
+        "--several",
+        choices=SEVERAL,
+        help="where friction allows several motions: stop (default), or go on with the nearest",
+    )
+    run.add_argument("--checkpoint", type=Path, metavar="FILE", help="keep the run in a file, for `resume`")
+    _add_start(run)
+    run.add_argument("--v0", **_start("velocity"))
+    _add_writers(run)
+    run.set_defaults(command=run_robot)
+
+    resume = commands.add_parser("resume", help="go on with a run from its checkpoint")
+    resume.add_argument("file", type=Path, metavar="CHECKPOINT", help="file of `run --checkpoint`")
+    _add_writers(resume)
+    resume.set_defaults(command=resume_run)
+
+    replay = commands.add_parser("replay", help="write the page of a saved run")
+    replay.add_argument(
+        "run", type=Path, metavar="RUN.npz", help="file of `run --save`, or folder of `sweep`"
+    )
+    replay.add_argument("page", type=Path, nargs="?", metavar="PAGE.html", help="default: the run's name")
+    replay.add_argument("--run", type=int, dest="number", metavar="K", help="which run of a sweep")
+    replay.add_argument("--robot", metavar="NAME_OR_PATH", help="of a run that does not know it")
+    replay.set_defaults(command=replay_file)
+
+    sweep = commands.add_parser("sweep", help="run a robot with many parameters, into a folder")
+    sweep.add_argument("file", type=Path, metavar="SWEEP.yaml", help="robot, duration, grid or samples, ...")
+    sweep.add_argument("--jobs", type=int, metavar="N", help="parallel jobs; -1 for all processors")
+    sweep.set_defaults(command=sweep_file)
+
+    equilibrium = commands.add_parser("equilibrium", help="find where a robot rests")
+    _add_robot(equilibrium)
+    _add_start(equilibrium)
+    equilibrium.add_argument("--json", action="store_true", help="for programs")
+    equilibrium.set_defaults(command=_equilibrium)
+
+    listing = commands.add_parser("list", help="robots of the package, by name")
+    listing.set_defaults(command=_list)
+
+    info = commands.add_parser("info", help="joints, loops, rows, rank, mobility and what is skipped")
+    _add_robot(info)
+    info.add_argument("--json", action="store_true", help="all tables, for programs")
+    info.set_defaults(command=_info)
+
+    picture = commands.add_parser("render", help="picture or video of a run: .png, .gif, .webm, .mp4")
+    picture.add_argument("run", metavar="RUN", help="file that `run --save` wrote (.npz)")
+    picture.add_argument("out", type=Path, metavar="OUT", help="file to write")
+    picture.add_argument(
+        "--robot", metavar="NAME_OR_PATH", help="robot of the run (default: the name that the run bears)"
+    )
+    picture.add_argument("--size", default="960x540", metavar="WxH", help="pixels (default: 960x540)")
+    picture.add_argument("--seconds", type=float, default=6.0, help="length of a video [s] (default: 6)")
+    picture.add_argument("--fps", type=float, default=25.0, help="pictures a second (default: 25)")
+    picture.add_argument("--time", type=float, metavar="S", help="of a single picture [s]")
+    picture.add_argument("--set", action="append", default=[], dest="settings", metavar="KEY=VALUE")
+    picture.set_defaults(command=_render)
+
+    complete = commands.add_parser("completion", help="print a script that completes words in a shell")
+    complete.add_argument("shell", choices=("bash", "zsh", "fish"))
+    complete.set_defaults(command=_complete)
+
+    bench = commands.add_parser(
+        "bench", help="run the benchmarks of a checkout; further words go to them", add_help=False
+    )
+    bench.set_defaults(command=_bench)
+    return parser
+
+
+def _add_robot(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "robot", metavar="NAME_OR_PATH", help="name from `list`, robot folder, .urdf or .xml (MJCF)"
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        dest="settings",
+        metavar="KEY=VALUE",
+        help="parameter of a generated robot, e.g. --set N=40; may be repeated",
+    )
+
+
+def _start(what: str) -> Table:
+    """An option that gives a state by joint name."""
+    return {
+        "action": "append",
+        "default": [],
+        "metavar": "JOINT=NUMBER",
+        "help": f"{what} of a joint at the start, e.g. elbow=0.5 or base.xyz=0,0,1; may be repeated",
+    }
+
+
+def _add_start(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--q0", **_start("configuration"))
+
+
+def _add_writers(parser: argparse.ArgumentParser) -> None:
+    page = "write the replay, one page that needs no network"
+    parser.add_argument("--html", type=Path, metavar="FILE", help=page)
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="write a figure (.png, .pdf, .svg)")
+    parser.add_argument("--save", type=Path, metavar="FILE", help="write the arrays (.npz)")
+    parser.add_argument("--events", action="store_true", help="print the events, a line each")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but what was asked for")
+
+
+def _equilibrium(options: argparse.Namespace) -> int:
+    scene = pn.load(options.robot, **parameters(options.settings))
+    return rest_robot(scene, named_values(options.q0, "--q0"), options.json)
+
+
+def _complete(options: argparse.Namespace) -> int:
+    print(completion(_parser(), options.shell, [name for name, _ in robots()]))
+    return 0
+
+
+def _list(options: argparse.Namespace) -> int:
+    del options
+    listed = robots()
+    width = max((len(name) for name, _ in listed), default=0)
+    for name, description in listed:
+        print(f"{name:{width}}  {description}".rstrip())
+    return 0
+
+
+def _info(options: argparse.Namespace) -> int:
+    return describe_robot(pn.load(options.robot, **parameters(options.settings)), options.json)
+
+
+def _render(options: argparse.Namespace) -> int:
+    run = Trajectory.load(options.run)
+    if run.scene is None:
+        scene = pn.load(options.robot or run.name, **parameters(options.settings))
+        run = replace(run, scene=scene)
+    try:
+        width, height = (int(x) for x in options.size.split("x"))
+    except ValueError:
+        raise InputError(f'--size needs WxH, for example 960x540; got "{options.size}"') from None
+    settings = {"width": width, "height": height, "seconds": options.seconds, "fps": options.fps}
+    print(f"wrote {render(run, options.out, **settings, time=options.time)}")
+    return 0
+
+
+def _bench(options: argparse.Namespace) -> int:
+    """Run the folder `benchmarks` of the checkout: benchmarks are no part of the installed package."""
+    places = [Path.cwd(), Path(__file__).resolve().parent.parent.parent]
+    for place in places:
+        folder = place / "benchmarks"
+        if (folder / "__main__.py").is_file():
+            sys.argv[1:] = options.rest
+            runpy.run_path(str(folder), run_name="__main__")
+            return 0
+    raise InputError(
+        "bench needs the folder benchmarks of a checkout; run it there: git clone, cd, pin-nonideal bench"
+    )

@@ -1,0 +1,252 @@
+"""The core's failures as exceptions that name what is to blame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import pinocchio as pin
+
+from pin_nonideal.core_loader import core
+from pin_nonideal.errors import (
+    DivergenceError,
+    FrictionConvergenceError,
+    FrictionParadoxError,
+    ImpactEnergyError,
+    InconsistentConstraintsError,
+    LoopClosureError,
+    NonFiniteError,
+    RunError,
+    RunInterrupted,
+    SingularMassError,
+    StepSizeError,
+    StiffnessError,
+    WallTimeError,
+)
+from pin_nonideal.types import Model
+
+
+def opened(name: str, gaps: dict[str, float], t: float, after: str = "") -> LoopClosureError:
+    """The exception of a run that has left its constraints.
+
+    Args:
+        name: of the constraint with the largest gap.
+        gaps: of each constraint [m or rad].
+        t: time [s].
+        after: more words.
+    """
+    return LoopClosureError(
+        f'loop "{name}" has opened by t = {t:.4g} s: gap {gaps[name]:.2g} (m or rad); no position near there '
+        f"satisfies all constraints: check lengths and drives{after}",
+        gaps=gaps,
+        time=t,
+    )
+
+
+class Circumstances(NamedTuple):
+    """Parts of a scene that errors of its runs refer to.
+
+    Attributes:
+        explicit_only: words on a part of the scene that no implicit method here takes, or empty.
+        sources: words for the actuation, the given forces and the laws.
+    """
+
+    explicit_only: str
+    sources: tuple[str, str, str]
+
+
+def named_failure(
+    failure: core.CoreFailure, model: Model, program: core.Program, around: Circumstances
+) -> RunError:
+    """The exception that says in names what the core says in numbers.
+
+    Args:
+        failure: the core's CoreFailure.
+        model: pinocchio.Model.
+        program: the scene as the core knows it.
+        around: parts of the scene to be named.
+    """
+    kinds, kind, t, value = core.FailureKind, failure.kind, failure.time, failure.value
+    if kind is kinds.singular_mass:
+        return _singular(model, failure.elements[0], t)
+    if kind is kinds.inconsistent:
+        names = [*(c.name for c in program.constraints), *program.element_names]
+        return _inconsistent(names, failure.elements, value, t)
+    if kind is kinds.not_finite:
+        return NonFiniteError(f"acceleration is not finite at t = {t:.4g} s", time=t)
+    if kind is kinds.paradox:
+        elements = ", ".join(program.element_names[i] for i in failure.elements)
+        return _paradox(elements or ", ".join(program.law_names), failure)
+    if kind is kinds.not_converged:
+        names = [program.element_names[i] for i in failure.elements]
+        return _unresolved(", ".join(names or [program.constraints[i].name for i in program.contacts]), t)
+    if kind is kinds.closure:
+        name = program.constraints[failure.elements[0]].name
+        return opened(name, {name: value}, t)
+    if kind is kinds.interrupted:
+        return RunInterrupted(f"the run was interrupted at t = {t:.4g} s", time=t)
+    if kind is kinds.impact_energy:
+        return _gained(", ".join(program.constraints[i].name for i in failure.elements), value, t)
+    if kind is kinds.stiff:
+        return _stiff(model, failure.elements[0], value, t, around.explicit_only)
+    if kind is kinds.growing:
+        return _growing(model, failure.elements[0], around.sources[failure.elements[1]], value, t)
+    if kind is kinds.steps:
+        return StepSizeError(
+            f"the run has taken all of its max_steps = {value:.0f} steps by t = {t:.4g} s; allow more, "
+            "loosen rtol and atol, or simulate a shorter duration",
+            time=t,
+        )
+    if kind is kinds.wall:
+        return WallTimeError(
+            f"the run has taken its max_wall = {value:g} s of wall time by t = {t:.4g} s; allow more, loosen "
+            "rtol and atol, or simulate a shorter duration",
+            time=t,
+        )
+    return _stuck(value, t, around.explicit_only)
+
+
+def _gained(element: str, gain: float, t: float) -> RunError:
+    return ImpactEnergyError(
+        f'the impact of "{element}" at t = {t:.6g} s gains {gain:.3g} J, as Newton\'s law of restitution '
+        "with friction may; use a smaller restitution, or strict=False",
+        element=element,
+        gain=gain,
+        time=t,
+    )
+
+
+def _growing(model: Model, dof: int, source: str, rate: float, t: float) -> RunError:
+    joint = str(model.names[joint_of(model, dof)])
+    return DivergenceError(
+        f'the speed of joint "{joint}" grows without bound by t = {t:.4g} s, by a factor of e every '
+        f"{1.0 / rate:.2g} s, over many decades, and {source} does most work on it: the motion is unstable; "
+        "look at the signs, gains and delays there, or follow it all the same with max_steps",
+        joint=joint,
+        source=source,
+        rate=rate,
+        time=t,
+    )
+
+
+def _stiff(model: Model, dof: int, rate: float, t: float, explicit_only: str) -> RunError:
+    joint = str(model.names[joint_of(model, dof)])
+    ways_out = (
+        "look at its damping, stiffness and inertia, or allow the steps with max_steps, since "
+        f"{explicit_only}"
+        if explicit_only
+        else "look at its damping, stiffness and inertia, "
+        'use method="Radau", or allow the steps with max_steps'
+    )
+    return StiffnessError(
+        f'joint "{joint}" is stiff at t = {t:.4g} s: its motion relaxes at {rate:.2g} 1/s, and an explicit '
+        f"method takes steps that short, too many to reach the end; {ways_out}",
+        joint=joint,
+        rate=rate,
+        time=t,
+    )
+
+
+def stiff_hint(model: Model, dof: int, rate: float, decays: bool, explicit_only: str) -> str:
+    """What to know of a run that takes long because its steps follow a fast motion.
+
+    Args:
+        model: pinocchio.Model.
+        dof: the one whose force does most to the fastest motion.
+        rate: of that motion [1/s].
+        decays: whether it decays; else it swings.
+        explicit_only: words on a part of the scene that no implicit method here takes, or empty.
+    """
+    joint = str(model.names[joint_of(model, dof)])
+    if decays:
+        ways_out = (
+            f"look at its damping, stiffness and inertia, or wait, since {explicit_only}"
+            if explicit_only
+            else 'use method="Radau", or look at its damping, stiffness and inertia'
+        )
+        return (
+            f'joint "{joint}" is stiff: its motion relaxes at {rate:.2g} 1/s, and an explicit method takes '
+            f"steps that short; {ways_out}"
+        )
+    ways_out = "" if explicit_only else 'damp them and use method="Radau", or '
+    return (
+        f'joint "{joint}" swings at {rate:.2g} rad/s, and the steps follow it; where these vibrations do not '
+        f"matter, {ways_out}loosen rtol and atol"
+    )
+
+
+def joint_of(model: Model, dof: int) -> int:
+    """The joint that a degree of freedom belongs to."""
+    return next(i for i, j in enumerate(model.joints) if i and j.idx_v <= dof < j.idx_v + j.nv)
+
+
+def _paradox(element: str, failure: core.CoreFailure) -> RunError:
+    shown, t = core.Solutions, failure.time
+    found, way_out = {
+        shown.several: ("several solutions", ', go on with the nearer one by several="continue",'),
+        shown.none: ("no solution", ","),
+    }.get(failure.solutions, ("no solution or several", ","))
+    limits = " and ".join(", ".join(f"{x:.4g}" for x in each) for each in failure.limits)
+    return FrictionParadoxError(
+        f'friction of "{element}" has {found} at t = {t:.4g} s: '
+        + (f"limits of {limits} (N m or N), " if limits else "")
+        + f'det(I - d lam\'/d lam) = {failure.value:.3g}; reduce mu{way_out} or use reaction="ideal"',
+        element=element,
+        determinant=failure.value,
+        time=t,
+        solutions=failure.accelerations,
+        limits=failure.limits,
+    )
+
+
+def _unresolved(element: str, t: float) -> RunError:
+    return FrictionConvergenceError(
+        f'whether "{element}" sticks or slips was not found at t = {t:.4g} s, which proves nothing; '
+        "take shorter steps, change an initial value a little, or give `modes` to solve",
+        element=element,
+        time=t,
+    )
+
+
+def _stuck(steps: float, t: float, explicit_only: str) -> RunError:
+    last = "or loosen rtol and atol" if explicit_only else 'loosen rtol and atol, or use "Radau"'
+    if steps:
+        return StepSizeError(
+            f"the run would never end: after {steps:.0f} steps it has come to t = {t:.4g} s; "
+            f"simulate a shorter duration, {last}",
+            time=t,
+        )
+    return StepSizeError(
+        f"the step size fell below rounding at t = {t:.6g} s: the motion is singular there, or stiff; "
+        f"look at the last samples, {last}",
+        time=t,
+    )
+
+
+def _inconsistent(names: Sequence[str], items: list[int], residual: float, t: float) -> RunError:
+    quoted = " and ".join(f'"{names[i]}"' for i in items)
+    if residual == 0.0:  # of an impact, which leaves none
+        return InconsistentConstraintsError(
+            f"no impulses part the bodies at {quoted} as their restitution asks at t = {t:.2f} s: with what"
+            ' else holds them they cannot move apart; lower restitution, or use Scene(..., impact="poisson")',
+            time=t,
+        )
+    blame = (
+        f"constraints {quoted} contradict each other"
+        if len(items) > 1
+        else f"constraint {quoted} contradicts itself"
+    )
+    return InconsistentConstraintsError(
+        f"{blame}: residual {abs(residual):.1e} m/s^2 at t = {t:.2f} s", time=t
+    )
+
+
+def _singular(model: Model, dof: int, t: float) -> RunError:
+    joint = joint_of(model, dof)
+    bodies = [f.name for f in model.frames if f.parentJoint == joint and f.type == pin.FrameType.BODY]
+    links = ", ".join(f'"{b}"' for b in bodies) or "its body"
+    return SingularMassError(
+        f'the mass matrix must be positive definite; it is singular at joint "{model.names[joint]}" '
+        f"(t = {t:.4g} s): give {links} mass and inertia, or the joint an armature",
+        time=t,
+    )

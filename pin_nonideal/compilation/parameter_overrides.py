@@ -1,0 +1,280 @@
+"""Numbers of a scene that each run of a batch may have for itself, without a scene of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.core_loader import core
+from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.types import Array
+from pin_nonideal.validation import array, label
+
+from .compiled_scene import CompiledScene
+from .lowering import Written, lowered
+from .resolver import Resolution
+
+NUMBERS = (float, list, np.ndarray)  # what arguments with a name come as, where a run may have its own
+WRITES = ("add_", "set_", "let_")  # what a builder's calls that write begin with
+# Least over largest principal moment of inertia that may be negative: rounding of a thin rod's.
+ROUNDING = 1e-9
+
+
+class Call(NamedTuple):
+    """A call of the core's builder.
+
+    Attributes:
+        name: of the method.
+        number: how many of that name came before.
+        positional: arguments without a name: what it belongs to, where it acts.
+        named: the others, numbers among them.
+        result: what it gave.
+    """
+
+    name: str
+    number: int
+    positional: tuple[Any, ...]
+    named: dict[str, Any]
+    result: Any
+
+
+class RunNumbers(NamedTuple):
+    """What the core takes for a batch.
+
+    Attributes:
+        names: (call, index, argument) of each number or group of them.
+        values: of all runs, (n, their number together).
+    """
+
+    names: list[tuple[str, int, str]]
+    values: Array
+
+
+def run_numbers(compiled: CompiledScene, parameters: Mapping[str, Any], n: int) -> RunNumbers:
+    """Numbers of the core's program from parameters of the runs.
+
+    Args:
+        compiled: the scene.
+        parameters: by name of a law, contact or force, or "actuation": values of its fields, one a run; by
+            name of a joint: "mass" or "inertia" of its body; "gravity".
+        n: number of runs.
+
+    Raises:
+        InputError: a value does not fit, or is more than a number in the scene.
+        UnknownNameError: there is nothing of that name.
+    """
+    columns: dict[tuple[str, int, str], Array] = {}
+    parts = _parts(compiled) if parameters else {}
+    for name, given in parameters.items():
+        if name == "gravity":
+            columns["gravity", 0, ""] = array("rollout: gravity", given, (n, 3))
+        elif isinstance(given, Mapping) and set(given) <= {"mass", "inertia"} and _is_body(compiled, name):
+            columns |= _body(compiled, name, given, n)
+        elif name in parts:
+            columns |= _columns(name, given, n, parts[name])
+        else:
+            known = [*parts, *list(compiled.model.names)[1:], "gravity"]
+            raise UnknownNameError(
+                f'rollout: parameters: no law, contact, force or joint "{name}"{nearest(str(name), known)}'
+            )
+    flat = [values.reshape(n, -1) for values in columns.values()]
+    names, values = list(columns), np.ascontiguousarray(np.hstack(flat)) if flat else np.zeros((n, 0))
+    if n:
+        _check_known(compiled.program, RunNumbers(names, values[:1]))
+    return RunNumbers(names, values)
+
+
+def _check_known(program: core.Program, first: RunNumbers) -> None:
+    """Raises unless the core knows all of them as numbers.
+
+    Raises:
+        InputError: one of them shapes the scene.
+    """
+    try:
+        core.with_numbers(program, *first)
+    except ValueError as error:
+        raise InputError(
+            f"rollout: parameters: {error} shapes the scene and cannot differ between runs; sweep makes a "
+            "scene for each"
+        ) from None
+
+
+def _is_body(compiled: CompiledScene, name: str) -> bool:
+    return bool(compiled.model.existJointName(name))
+
+
+def _parts(compiled: CompiledScene) -> dict[str, list[tuple[Written, _Again]]]:
+    """What the program is made of, by name, each with what it told the builder; a contact in two parts."""
+    said = compiled.said
+    builder: Any = _Recorder(core.Builder(compiled.model, core.Provider[said.terms]))
+    parts: dict[str, list[tuple[Written, _Again]]] = {}
+    kinds: dict[str, str] = {}
+    begin = 0
+    for written in lowered(said, builder, Resolution(compiled.model, compiled.q0)):
+        kind = kinds.setdefault(written.name, written.kind)
+        name = written.name if kind == written.kind else f"{written.kind} {written.name}"
+        parts.setdefault(name, []).append((written, _Again(builder, builder.calls[begin:])))
+        begin = len(builder.calls)
+    return parts
+
+
+def _body(compiled: CompiledScene, name: str, given: Mapping[str, Any], n: int) -> dict[Any, Array]:
+    """Mass, center and inertia of the body that hangs on a joint."""
+    who = f'rollout: parameters: "{name}"'
+    if compiled.said.terms != "core":
+        raise InputError(f'{who}: masses can differ between runs with terms="core" only')
+    if len(given) != 1:
+        raise InputError(f'{who}: give "mass" or "inertia", not both')
+    joint = int(compiled.model.getJointId(name))
+    own = compiled.model.inertias[joint]
+    if "mass" in given:
+        mass = array(f"{who}: mass", given["mass"], (n,))
+    else:
+        dynamic = array(f"{who}: inertia", given["inertia"], (n, 10))
+        mass = dynamic[:, 0]
+    if own.mass == 0.0 and "mass" in given:
+        raise InputError(f'{who}: the body has no mass, whose inertia would go with it; give "inertia"')
+    heavy = mass > 0.0  # of others Pinocchio makes no inertia
+    if not heavy.all():
+        bodies = []
+    elif "mass" in given:
+        bodies = [pin.Inertia(m, own.lever, own.inertia * (m / own.mass)) for m in mass]
+    else:
+        bodies = [pin.Inertia.FromDynamicParameters(p) for p in dynamic]
+    turns = np.array([body.inertia for body in bodies]).reshape(-1, 3, 3)
+    moments = np.linalg.eigvalsh(turns)
+    good = heavy if not bodies else moments[:, 0] >= -ROUNDING * moments[:, 2]
+    if not good.all():
+        k = int(np.argmin(good))
+        least = f" and a least moment of {moments[k, 0]:g} kg m^2" if bodies else ""
+        raise InputError(
+            f"{who}: masses must be positive, and so moments of inertia about the center of mass; "
+            f"run {k} has a mass of {mass[k]:g} kg{least}"
+        )
+    return {
+        ("body", joint, "mass"): mass,
+        ("body", joint, "com"): np.array([body.lever for body in bodies]),
+    } | {("body", joint, f"inertia {axis}"): turns[:, :, k] for k, axis in enumerate("xyz")}
+
+
+def _columns(name: str, given: Any, n: int, parts: list[tuple[Written, _Again]]) -> dict[Any, Array]:
+    """What of the program the fields of a description decide, for all runs."""
+    described = parts[0][0].description
+    others = list(_descriptions(name, described, given, n))
+    columns: dict[Any, Array] = {}
+    for written, again in parts:
+        told = [again.told(written, other, name) for other in others]
+        for k, call in enumerate(again.calls):
+            for key, base in call.named.items():
+                if isinstance(base, NUMBERS) and any(not np.array_equal(one[k][key], base) for one in told):
+                    columns[call.name, call.number, key] = np.array([one[k][key] for one in told])
+    return columns
+
+
+def _descriptions(name: str, described: Any, given: Any, n: int) -> Iterator[Any]:
+    """The description of each run, checked as all are."""
+    who = f'rollout: parameters: "{name}"'
+    if isinstance(described, np.ndarray):
+        yield from array(who, given, (n, len(described)))
+        return
+    if not is_dataclass(described) or not isinstance(given, Mapping):
+        raise InputError(
+            f"{who} must be values by field of a description; got {given!r} for {label(described)}"
+        )
+    known = [field.name for field in fields(described)]
+    for key, values in given.items():
+        if key not in known or key == "name":
+            raise UnknownNameError(f'{who}: no field "{key}"{nearest(str(key), known)}')
+        if not isinstance(values, (list, tuple, np.ndarray)) or np.shape(values)[:1] != (n,):
+            raise InputError(f"{who}: {key} must be {n} values, one a run; got {values!r}")
+    plain = {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in given.items()}
+    for k in range(n):
+        one: Any = described
+        try:
+            yield replace(one, **{key: values[k] for key, values in plain.items()})
+        except InputError as error:
+            raise InputError(f"rollout: parameters: run {k}: {error}") from None
+
+
+class _Recorder:
+    """The core's builder, with what it is told."""
+
+    def __init__(self, builder: core.Builder) -> None:
+        self._builder = builder
+        self.calls: list[Call] = []
+        self._counts: dict[str, int] = {}
+
+    def __getattr__(self, name: str) -> Any:
+        method = getattr(self._builder, name)
+        if not name.startswith(WRITES):
+            return method
+
+        def call(*positional: Any, **named: Any) -> Any:
+            result = method(*positional, **named)
+            index = self._counts.get(name, 0)
+            self._counts[name] = index + 1
+            self.calls.append(Call(name, index, positional, named, result))
+            return result
+
+        return call
+
+
+class _Again:
+    """What takes the calls of one description again, from others in its place, with the same answers.
+
+    Args:
+        builder: that was told first.
+        calls: what it was told.
+    """
+
+    def __init__(self, builder: Any, calls: list[Call]) -> None:
+        self._builder, self.calls = builder, calls
+        self._told: list[dict[str, Any]] = []
+        self._differs = False
+
+    def told(self, written: Written, other: Any, name: str) -> list[dict[str, Any]]:
+        """Named arguments of the calls of another description.
+
+        Raises:
+            InputError: it tells something else than other numbers.
+        """
+        self._told, self._differs = [], False
+        written.again(other, self)
+        if self._differs or len(self._told) != len(self.calls):
+            raise InputError(
+                f'rollout: parameters: "{name}" with {other!r} is more than other numbers: something would '
+                "begin or cease to act; keep zeros zero and others positive, or let sweep make a scene for "
+                "each"
+            )
+        return self._told
+
+    def __getattr__(self, name: str) -> Any:
+        if not name.startswith(WRITES):
+            return getattr(self._builder, name)
+
+        def call(*positional: Any, **named: Any) -> Any:
+            k = len(self._told)
+            expected = self.calls[k] if k < len(self.calls) else None
+            if expected is None or expected.name != name or expected.named.keys() != named.keys():
+                self._differs = True
+                return -1
+            fixed = {key: value for key, value in expected.named.items() if not isinstance(value, NUMBERS)}
+            self._differs |= not _same(expected.positional, positional)
+            self._differs |= not all(_same(value, named[key]) for key, value in fixed.items())
+            self._told.append(named)
+            return expected.result
+
+        return call
+
+
+def _same(a: Any, b: Any) -> bool:
+    """Whether arguments without a name are equal; functions count as functions."""
+    if isinstance(a, (tuple, list)):
+        return isinstance(b, (tuple, list)) and len(a) == len(b) and all(map(_same, a, b))
+    if isinstance(a, np.ndarray):
+        return bool(np.array_equal(a, b))
+    return callable(a) and callable(b) if callable(a) else bool(a == b)

@@ -1,0 +1,278 @@
+"""From names to numbers: which frame, joint and axis a description means, and what it is called itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.constraints import HingeAnchor, Rolling
+from pin_nonideal.description.contacts import PointContact
+from pin_nonideal.description.contacts.round import BoxContact, CapsuleContact, SphereContact, segments
+from pin_nonideal.description.contacts.solids import (
+    CylinderContact,
+    EllipsoidContact,
+    HullContact,
+    RevolvedContact,
+    RimContact,
+    core_hull,
+)
+from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.states.kinematics import frame_index, frame_on_joint, joint_placements
+from pin_nonideal.types import Array, Model, Placement
+from pin_nonideal.validation import Vector3, axis_triad, unit_axis
+
+# A frame as the core takes it: joint, orientation by rows, place.
+Frame = tuple[int, list[float], list[float]]
+
+WORLD: Frame = (0, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0])
+
+
+def placed_on(joint: int, placement: Placement) -> Frame:
+    """A placement on a joint's body as the core takes it.
+
+    Args:
+        joint: index of the joint.
+        placement: pinocchio.SE3.
+    """
+    return (int(joint), placement.rotation.ravel().tolist(), placement.translation.tolist())
+
+
+class Resolution:
+    """Frames and joints of a model by their names.
+
+    Args:
+        model: pinocchio.Model.
+        q0: configuration at which `frame2=None` and lengths left out are read, (nq,).
+    """
+
+    def __init__(self, model: Model, q0: Array) -> None:
+        self.model, self.q0 = model, q0
+        self._placements = joint_placements(model, q0)
+
+    def frame_id(self, name: str, who: str) -> int:
+        """Index of a frame, or of the frame of a joint."""
+        if self.model.existFrame(name):
+            return frame_index(self.model, name)
+        names = [f.name for f in self.model.frames]
+        raise UnknownNameError(f'{who}: no frame "{name}" in model "{self.model.name}"{nearest(name, names)}')
+
+    def frame(self, name: str, who: str) -> Frame:
+        """A frame, or a joint's own one, as the core takes it."""
+        if not self.model.existJointName(name):
+            self.frame_id(name, who)  # raises where there is neither
+        return placed_on(*frame_on_joint(self.model, name))
+
+    def plane(self, name: str | None, who: str) -> Frame:
+        """The frame that a plane belongs to: the world's when there is no name."""
+        return WORLD if name is None else self.frame(name, who)
+
+    def in_world(self, frame: Frame) -> Placement:
+        """Where a frame is in the world at q0, pinocchio.SE3."""
+        joint, R, p = frame
+        return self._placements[joint] * pin.SE3(np.reshape(R, (3, 3)), np.array(p))
+
+    def joint(self, name: str, who: str, *, freedoms: tuple[int, ...] = (1,)) -> int:
+        """Index of a joint with an allowed number of degrees of freedom."""
+        model = self.model
+        if not model.existJointName(name) or name == "universe":
+            if model.existFrame(name, pin.FrameType.FIXED_JOINT):
+                raise InputError(
+                    f'{who}: joint "{name}" is fixed (locked) and cannot move; unlock it or leave it out'
+                )
+            raise UnknownNameError(
+                f'{who}: no joint "{name}" in model "{model.name}"{nearest(name, list(model.names)[1:])}'
+            )
+        index = int(model.getJointId(name))
+        if model.joints[index].nv not in freedoms:
+            degrees = "1 degree" if freedoms == (1,) else f"{' or '.join(map(str, freedoms))} degrees"
+            raise InputError(
+                f'{who}: joint "{name}" must have {degrees} of freedom; it has {model.joints[index].nv}'
+            )
+        return index
+
+    def pair(self, description: Any, who: str) -> tuple[Frame, Frame]:
+        """Both frames of an anchor.  The world stands in for a missing second frame, in world axes."""
+        first = self.frame(description.frame1, who)
+        if description.frame2 is not None:
+            return first, self.frame(description.frame2, who)
+        here = self.in_world(first)
+        joint, R, p = first
+        level = np.reshape(R, (3, 3)) @ here.rotation.T  # equals the world's axes at q0
+        return (joint, level.ravel().tolist(), p), (0, WORLD[1], here.translation.tolist())
+
+    def hinge_axis(self, hinge: HingeAnchor, who: str) -> Vector3:
+        """The hinge's axis in the axes of frame2 (of the world without one)."""
+        axis = unit_axis(who, hinge.axis)
+        if hinge.frame2 is not None:
+            return axis
+        x, y, z = (float(x) for x in self.in_world(self.frame(hinge.frame1, who)).rotation @ np.array(axis))
+        return (x, y, z)
+
+    def contact(
+        self, c: PointContact | EllipsoidContact | Rolling, who: str
+    ) -> tuple[Frame, Frame, tuple[Vector3, Vector3, Vector3]]:
+        """Frame, plane, and right-handed directions (along, along, normal) in the axes of the plane."""
+        plane, axes = self.plane(c.plane, who), axis_triad(unit_axis(who, c.normal))
+        level = np.array(axes[2]) * getattr(c, "height", 0.0)
+        frame = self.frame(c.frame, who)
+        if frame[0] == plane[0]:
+            raise InputError(f"{who}: frame and plane are on the same body, which cannot touch itself")
+        return moved(frame, getattr(c, "offset", (0.0, 0.0, 0.0))), moved(plane, level), axes
+
+    def capsules(self, c: SphereContact | CapsuleContact, who: str) -> tuple[Frame, Frame, float, float]:
+        """Both frames in the middle of their segments, along z, and half the lengths of these [m]."""
+        (first, half1), (second, half2) = (
+            along(frame, ends, who) for frame, ends in zip(self._two_bodies(c, who), segments(c), strict=True)
+        )
+        return first, second, half1, half2
+
+    def box(self, c: BoxContact, who: str) -> tuple[Frame, Frame, list[float]]:
+        """Frames in the middle of the sphere and of the box, and half the box without its rounding [m]."""
+        first, second = self._two_bodies(c, who)
+        half = [0.5 * edge - c.radius2 for edge in c.size]
+        return moved(first, c.offset), turned(moved(second, c.xyz), c.rpy), half
+
+    def hull(
+        self, c: HullContact, who: str
+    ) -> tuple[Frame, Frame, tuple[list[float], list[float], list[int]]]:
+        """Frames in the middle of the sphere and of the hull, and its corners, planes and edges."""
+        first, second = self._two_bodies(c, who)
+        return moved(first, c.offset), second, core_hull(c)
+
+    def cylinder(
+        self, c: CylinderContact, who: str
+    ) -> tuple[Frame, Frame, tuple[float, float, float], float]:
+        """Frames in the middle of the sphere or capsule and of the axis, the solid, and half the capsule [m].
+
+        Of the solid half the length and the radii of both faces; the capsule's frame has z along it.
+        """
+        first, second = self._two_bodies(c, who)
+        above = c.below if c.above is None else c.above
+        first, half1 = along(first, np.array([c.offset, c.offset if c.end is None else c.end]), who)
+        return first, turned(moved(second, c.xyz), c.rpy), (0.5 * c.length, c.below, above), half1
+
+    def rim(self, c: RimContact, who: str) -> tuple[Frame, Frame, tuple[list[float], list[float], list[int]]]:
+        """Frames in the middle of the disk, its axis along z, and of the hull, and the hull."""
+        first, second = self._two_bodies(c, who)
+        return turned(moved(first, c.offset), c.rpy), second, core_hull(c)
+
+    def rims(self, c: RevolvedContact, who: str) -> tuple[Frame, Frame, Vector3, Vector3]:
+        """Frames in the middle of both, along z, and half the length and both radii of each [m]."""
+        first, second = self._two_bodies(c, who)
+        (length1, *radii1), (length2, *radii2) = c.solid1, c.solid2
+        one, other = (0.5 * length1, radii1[0], radii1[1]), (0.5 * length2, radii2[0], radii2[1])
+        return turned(moved(first, c.xyz1), c.rpy1), turned(moved(second, c.xyz2), c.rpy2), one, other
+
+    def _two_bodies(self, c: Any, who: str) -> list[Frame]:
+        ends = [self.frame(c.frame1, who), self.frame(c.frame2, who)]
+        if ends[0][0] == ends[1][0]:
+            raise InputError(f"{who}: frame1 and frame2 are on the same body, which cannot touch itself")
+        return ends
+
+    def bearing(self, joint: int) -> tuple[core.Load, list[float]]:
+        """What loads a joint that rubs, and its axis in the joint's frame, (3,).
+
+        Args:
+            joint: index.
+
+        Returns:
+            revolute (helical joints too), prismatic, spherical, or none for all others.
+        """
+        item = self.model.joints[joint]
+        data = item.createData()
+        item.calc(data, pin.neutral(self.model), np.zeros(self.model.nv))
+        S = np.asarray(data.S).reshape(6, -1)
+        if item.nv == 3:
+            spherical = "Spherical" in item.shortname() and "ZYX" not in item.shortname()
+            return (core.Load.spherical if spherical else core.Load.none), [0.0, 0.0, 1.0]
+        if item.nv != 1 or "Composite" in item.shortname():
+            return core.Load.none, [0.0, 0.0, 1.0]
+        lin, ang = S[:3, 0], S[3:, 0]
+        if np.linalg.norm(ang) > 0.5:
+            return core.Load.revolute, (ang / np.linalg.norm(ang)).tolist()
+        return core.Load.prismatic, (lin / np.linalg.norm(lin)).tolist()
+
+
+def moved(frame: Frame, by: Any) -> Frame:
+    """A frame at another place of its body.
+
+    Args:
+        frame: the frame.
+        by: the way there in its axes [m], (3,).
+    """
+    joint, R, p = frame
+    return (joint, R, (np.array(p) + np.reshape(R, (3, 3)) @ np.array(by)).tolist()) if np.any(by) else frame
+
+
+def along(frame: Frame, ends: Array, who: str) -> tuple[Frame, float]:
+    """A frame in the middle of a segment, along z, and half its length [m].
+
+    Args:
+        frame: on the same body.
+        ends: of the segment in its axes [m], (2, 3).
+        who: words for messages.
+    """
+    first, last = ends
+    half = 0.5 * float(np.linalg.norm(last - first))
+    joint, R, p = moved(frame, 0.5 * (first + last))
+    if half > 0.0:
+        triad = axis_triad(unit_axis(who, last - first))
+        R = (np.reshape(R, (3, 3)) @ np.column_stack(triad)).ravel().tolist()
+    return (joint, R, p), half
+
+
+def turned(frame: Frame, rpy: Any) -> Frame:
+    """A frame with other axes at the same place.
+
+    Args:
+        frame: the frame.
+        rpy: roll, pitch and yaw of the axes against its own [rad], (3,).
+    """
+    joint, R, p = frame
+    return joint, (np.reshape(R, (3, 3)) @ pin.rpy.rpyToMatrix(*rpy)).ravel().tolist(), p
+
+
+def unique_names(descriptions: Sequence[object], taken: set[str]) -> list[str]:
+    """A name for each description: its own, or its kind and what it acts on.
+
+    Args:
+        descriptions: constraints, laws or contacts.
+        taken: names in use; grows.
+
+    Raises:
+        InputError: two descriptions were given the same name.
+    """
+    names = []
+    for d in descriptions:
+        own = getattr(d, "name", None)
+        if own:
+            if own in taken:
+                raise InputError(f'names must be unique in a scene; "{own}" is used twice')
+            name = str(own)
+        else:
+            keys = ("frame1", "frame2", "joint1", "joint2", "joint", "frame")
+            parts = [str(getattr(d, k)) for k in keys if getattr(d, k, None) is not None]
+            base = name = type(d).__name__ + (f"({', '.join(parts)})" if parts else "")
+            count = 1
+            while name in taken:
+                count += 1
+                name = f"{base} #{count}"
+        taken.add(name)
+        names.append(name)
+    return names
+
+
+def words(description: object, name: str | None = None) -> str:
+    """Words that name a description in a message: its class, and the name it has or was given.
+
+    Args:
+        description: of anything in a scene.
+        name: the unique name that the scene gave it.
+    """
+    own = getattr(description, "name", None) or name
+    kind = type(description).__name__
+    return f'{kind} "{own}"' if own and not str(own).startswith(kind) else str(own or kind)

@@ -1,0 +1,198 @@
+"""What a scene is made of, as tables: `Scene.describe`."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pin_nonideal.states.joint_order import file_order
+from pin_nonideal.types import Model, Table
+
+from .compiled_scene import CompiledScene
+from .resolver import unique_names
+
+NO_LIMIT = 1e30  # models hold infinity, or the largest number, for none
+
+
+@dataclass(frozen=True)
+class Description:
+    """What a scene is made of: one table a row, as plain values; printed, a text.
+
+    Attributes:
+        name: of the scene.
+        joints: in the order of the model: name, kind, parent, where their values stand in q and v (`q_first`,
+            `nq`, `v_first`, `nv`), `file_index` (their place in the robot's file, where it has another order,
+            else None), `lower` and `upper` limits of position, `velocity` and `effort` limits (the file's,
+            which the motion may pass; None for none), `friction` and `damping` of the file, `armature`.
+        constraints: name, kind, `first` row and `rows` in `lam`, `dropped` rows, and what it was made with.
+        contacts: the same.
+        laws: name, kind, and what they were made with.
+        forces: kind, and what they were made with.
+        actuation: the same, or None.
+    """
+
+    name: str
+    joints: list[Table]
+    constraints: list[Table]
+    contacts: list[Table]
+    laws: list[Table]
+    forces: list[Table]
+    actuation: Table | None
+
+    def to_dict(self) -> Table:
+        """All tables as plain values that JSON holds."""
+        return dataclasses.asdict(self)
+
+    def __str__(self) -> str:
+        lines = [self.name]
+        keys = (
+            "name",
+            "kind",
+            "parent",
+            "q_first",
+            "v_first",
+            "lower",
+            "upper",
+            "effort",
+            "friction",
+            "damping",
+        )
+        lines += _table("joints", self.joints, keys)
+        for title in ("constraints", "contacts"):
+            lines += _table(title, getattr(self, title), ("name", "kind", "first", "rows", "made with"))
+        lines += _table("laws", self.laws, ("name", "kind", "made with"))
+        lines += _table("forces", self.forces, ("kind", "made with"))
+        lines += _table("actuation", [self.actuation] if self.actuation else [], ("kind", "made with"))
+        if any(joint["file_index"] is not None for joint in self.joints):
+            filed = sorted(
+                (j for j in self.joints if j["file_index"] is not None), key=lambda j: j["file_index"]
+            )
+            lines.append("order in the file: " + ", ".join(joint["name"] for joint in filed))
+        return "\n".join(lines)
+
+
+def _table(title: str, rows: Sequence[Table], keys: Sequence[str]) -> list[str]:
+    """A table in columns as wide as they must be."""
+    if not rows:
+        return []
+    cells = [[_cell(row, key) for key in keys] for row in rows]
+    widths = [max(len(key), *(len(row[k]) for row in cells)) for k, key in enumerate(keys)]
+    lines = [
+        "  " + "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in (list(keys), *cells)
+    ]
+    return [title, *lines]
+
+
+def _cell(row: Table, key: str) -> str:
+    if key == "made with":
+        own = {name: x for name, x in row["made_with"].items() if name != "name" and x not in (None, 0.0)}
+        return ", ".join(f"{name}={_words(x)}" for name, x in own.items())
+    return _words(row[key])
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, list):
+        return " ".join(_words(x) for x in value)
+    return "-" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def describe(scene: CompiledScene, name: str) -> Description:
+    """The tables of a scene.
+
+    Args:
+        scene: the compiled scene.
+        name: of the scene.
+    """
+    said = scene.said
+    rows = [
+        {
+            "name": key,
+            "first": s.start,
+            "rows": s.stop - s.start,
+            "dropped": [r for n, r, _ in scene.dropped if n == key],
+        }
+        for key, s in scene.slices.items()
+    ]
+    held = len(said.constraints)
+    kinds = [_made(each) for each in (*said.constraints, *said.contacts)]
+    tables = [{**row, **kind} for row, kind in zip(rows, kinds, strict=True)]
+    names = unique_names(said.laws, set())
+    return Description(
+        name=name,
+        joints=_joints(scene.model, scene),
+        constraints=tables[:held],
+        contacts=tables[held:],
+        laws=[{"name": n, **_made(law)} for n, law in zip(names, said.laws, strict=True)],
+        forces=[_made(force) for force in said.forces],
+        actuation=None if said.actuation is None else _made(said.actuation),
+    )
+
+
+def _joints(model: Model, scene: CompiledScene) -> list[Table]:
+    """A row for each joint; limits that are none are None."""
+    order, rows = file_order(model), []
+    for j, place in enumerate(scene.joints, start=1):
+        dofs = slice(place.v_first, place.v_first + place.nv)
+        own = slice(place.q_first, place.q_first + place.nq)
+        limits = {"lower": model.lowerPositionLimit, "upper": model.upperPositionLimit}
+        ranges = {"velocity": model.velocityLimit, "effort": model.upperEffortLimit}
+        numbers = {
+            "friction": model.upperDryFrictionLimit,
+            "damping": model.damping,
+            "armature": model.armature,
+        }
+        row: Table = {
+            "name": place.name,
+            "kind": place.kind.removeprefix("JointModel"),
+            "parent": str(model.names[model.parents[j]]),
+            "q_first": place.q_first,
+            "nq": place.nq,
+            "v_first": place.v_first,
+            "nv": place.nv,
+            "file_index": order.index(place.name) if order and place.name in order else None,
+        }
+        row |= {
+            key: [_limit(x) for x in values[own]] if place.nq == place.nv else None
+            for key, values in limits.items()
+        }
+        row |= {key: [_limit(x) for x in values[dofs]] for key, values in ranges.items()}
+        row |= {key: [float(x) for x in values[dofs]] for key, values in numbers.items()}
+        rows.append(row)
+    return rows
+
+
+def _limit(x: float) -> float | None:
+    """A limit that is one, or None."""
+    return float(x) if np.isfinite(x) and abs(x) < NO_LIMIT else None
+
+
+def _made(said: Any) -> Table:
+    """Kind of a description, and what it was made with as plain values; functions by their names."""
+    fields = (
+        {f.name: getattr(said, f.name) for f in dataclasses.fields(said)}
+        if dataclasses.is_dataclass(said)
+        else {}
+    )
+    kind = type(said).__name__
+    if kind in ("ndarray", "list", "tuple"):
+        kind, fields = "constant torques", {"torque": said}
+    elif kind == "function":
+        kind, fields = "function (t, q, v)", {"function": said}
+    return {"kind": kind, "made_with": {key: _plain(x) for key, x in fields.items()}}
+
+
+def _plain(x: Any) -> Any:
+    if isinstance(x, np.ndarray):
+        return x.tolist()
+    if isinstance(x, (list, tuple)):
+        return [_plain(each) for each in x]
+    if isinstance(x, np.generic):
+        return x.item()
+    if x is None or isinstance(x, (bool, int, float, str)):
+        return x
+    return str(getattr(x, "__name__", None) or getattr(x, "name", None) or type(x).__name__)

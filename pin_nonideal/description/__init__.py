@@ -1,0 +1,1 @@
+"""Descriptions of a scene: constraints, contacts, laws, forces, actuation and functions of time."""

@@ -1,0 +1,56 @@
+"""Checks that descriptions of contacts have in common; they also turn numbers into floats and tuples."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pin_nonideal.description.laws import static_ratio
+from pin_nonideal.errors import InputError
+from pin_nonideal.validation import array, fraction, label, nonnegative, optional_text, text
+
+
+def check_rubbing(c: Any, *lengths: str) -> str:
+    """Name, friction, restitution, and lengths that are not negative.
+
+    Args:
+        c: the description.
+        lengths: names of its fields.
+
+    Returns:
+        Words for messages.
+    """
+    optional_text(f"{type(c).__name__}: name", c.name)
+    who = label(c)
+    for key in (*lengths, "mu"):
+        object.__setattr__(c, key, nonnegative(f"{who}: {key}", getattr(c, key)))
+    object.__setattr__(c, "static_ratio", static_ratio(who, c.static_ratio))
+    object.__setattr__(c, "restitution", fraction(f"{who}: restitution", c.restitution))
+    return who
+
+
+def check_two_frames(c: Any, who: str) -> None:
+    """Names of frames on two bodies.
+
+    Args:
+        c: the description.
+        who: words for messages.
+
+    Raises:
+        InputError: they are the same.
+    """
+    text(f"{who}: frame1", c.frame1)
+    text(f"{who}: frame2", c.frame2)
+    if c.frame1 == c.frame2:
+        raise InputError(f'{who}: frame1 and frame2 must differ; both are "{c.frame1}"')
+
+
+def check_vectors(c: Any, who: str, *keys: str) -> None:
+    """Fields of three numbers each.
+
+    Args:
+        c: the description.
+        who: words for messages.
+        keys: names of the fields.
+    """
+    for key in keys:
+        object.__setattr__(c, key, tuple(array(f"{who}: {key}", getattr(c, key), (3,)).tolist()))

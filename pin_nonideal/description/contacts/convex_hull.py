@@ -1,0 +1,150 @@
+"""Convex hulls: corners, faces and edges of a cloud of points, and whether a mesh is convex."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pin_nonideal.errors import InputError
+from pin_nonideal.types import Array
+
+# Sine of the angle between two triangles of a hull below which they are one face: their normals are known to
+# fewer digits than those of their corners.
+ONE_FACE = 1e-9
+# Part of the size of a mesh by which its surface may lie inside its hull: files keep single precision.
+SINGLE_PRECISION = 1e-6
+# Part of the size of a hull within which corners are one.
+ONE_CORNER = 1e-12
+# Places of a mesh that are compared with all faces of its hull at once, to bound memory.
+AT_ONCE = 1000
+
+
+@dataclass(frozen=True)
+class ConvexHull:
+    """A convex solid with flat faces.
+
+    Attributes:
+        points: corners, (n, 3).
+        planes: outward normal and offset of each face, n . x = offset, (f, 4).
+        edges: two corners and the two faces that meet there, (e, 4).
+    """
+
+    points: Array
+    planes: Array
+    edges: NDArray[np.int64]
+
+
+def convex_hull(points: Array, what: str) -> ConvexHull:
+    """The convex hull of points; triangles that lie in one plane are one face.
+
+    Args:
+        points: (n, 3).
+        what: words for messages.
+
+    Raises:
+        InputError: they span no solid.
+    """
+    from scipy.spatial import ConvexHull as Qhull  # for a solid only: its import takes long
+    from scipy.spatial import QhullError
+
+    try:
+        found = Qhull(points)
+    except (QhullError, ValueError) as error:
+        raise InputError(
+            f"{what} must span a solid: four that lie in no plane at least; got {len(points)}"
+        ) from error
+    face = _faces(found.equations[:, :3], found.neighbors)
+    edges = [
+        (*(corner for j, corner in enumerate(found.simplices[i]) if j != k), face[i], face[other])
+        for i, beside in enumerate(found.neighbors)
+        for k, other in enumerate(beside)
+        if i < other and face[i] != face[other]
+    ]
+    meetings = np.array(edges, dtype=np.int64)
+    corners, numbers = np.unique(meetings[:, :2], return_inverse=True)
+    meetings[:, :2] = numbers.reshape(-1, 2)
+    planes = np.empty((face.max() + 1, 4))
+    planes[face, :3] = found.equations[:, :3]
+    planes[face, 3] = -found.equations[:, 3]
+    return ConvexHull(np.asarray(points[corners]), planes, meetings)
+
+
+def _faces(normals: Array, neighbors: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The face that each triangle belongs to, numbered from 0."""
+    face = np.full(len(normals), -1)
+    count = 0
+    for first in range(len(normals)):
+        if face[first] >= 0:
+            continue
+        face[first], left = count, [first]
+        while left:
+            for other in neighbors[left.pop()]:
+                if face[other] < 0 and np.linalg.norm(normals[other] - normals[first]) < ONE_FACE:
+                    face[other] = count
+                    left.append(other)
+        count += 1
+    return face
+
+
+def shrunk(points: Array, by: float, what: str) -> Array:
+    """Corners of the hull of points when each of its faces moves inward.
+
+    Args:
+        points: (n, 3).
+        by: how far [m].
+        what: words for messages.
+
+    Raises:
+        InputError: nothing is left of it.
+    """
+    from scipy.spatial import HalfspaceIntersection
+
+    planes = convex_hull(points, what).planes
+    middle = points.mean(axis=0)
+    room = planes[:, 3] - planes[:, :3] @ middle
+    if not by < room.min():
+        raise InputError(
+            f"{what} is too thin to round its edges by {by:g} m; give a rounding below {room.min():.3g} m"
+        )
+    halves = np.column_stack([planes[:, :3], by - planes[:, 3]])
+    corners = HalfspaceIntersection(halves, middle).intersections
+    grid = ONE_CORNER * float(np.ptp(points, axis=0).max())
+    _, kept = np.unique(np.round((corners - middle) / grid), axis=0, return_index=True)
+    return np.asarray(corners[np.sort(kept)])
+
+
+def check_convex(points: Array, triangles: NDArray[np.int64], what: str) -> None:
+    """Raises where a mesh is not the surface of its convex hull.
+
+    Args:
+        points: (n, 3).
+        triangles: numbers of the corners of each, (m, 3).
+        what: words for messages.
+
+    Raises:
+        InputError: a part of the surface lies inside the hull, or is missing.
+    """
+    from scipy.spatial import ConvexHull as Qhull
+
+    planes = convex_hull(points, what).planes
+    places = np.vstack([points[np.unique(triangles)], points[triangles].mean(axis=1)])
+    size = float(np.ptp(points, axis=0).max())
+    inside = max(
+        float(-(part @ planes[:, :3].T - planes[:, 3]).max(axis=1).min())
+        for part in np.array_split(places, len(places) // AT_ONCE + 1)
+    )
+    if inside > SINGLE_PRECISION * size:
+        raise InputError(
+            f"{what} is a mesh that must be convex; its surface lies {inside:.3g} m inside its convex hull: "
+            "split it into convex parts, or make a convex mesh of it"
+        )
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    whole = float(Qhull(points).area)
+    if area < (1.0 - SINGLE_PRECISION) * whole:
+        raise InputError(
+            f"{what} is a mesh that must be closed; {1.0 - area / whole:.2g} of its convex hull's surface is "
+            "missing: fill its holes, or make a convex mesh of it"
+        )

@@ -1,0 +1,376 @@
+"""What each nonideal law is: frozen descriptions of C(q, v, t, reactions) in Eq. (9), w^T F^c = w^T C.
+
+C never feeds energy when the law is a friction: its power v^T C is zero or negative.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from pin_nonideal.errors import InputError
+from pin_nonideal.validation import (
+    choice,
+    count,
+    function,
+    label,
+    nonnegative,
+    number,
+    optional_text,
+    positive,
+    text,
+)
+
+__all__ = [
+    "Drag",
+    "JointFriction",
+    "LuGre",
+    "SigmoidFriction",
+    "UserFriction",
+    "UserLaw",
+]
+
+
+@dataclass(frozen=True)
+class JointFriction:
+    """Friction in a joint, an anchor or a coupling, that may depend on the load it really carries.
+
+    With v_j the joint's velocity, f its reaction force split along (axial, normal) and across (radial) the
+    joint's axis and m_b its bending moment, the dry limit is
+
+        revolute, helical, universal:  limit = constant + mu (radius (|f_radial| + |m_b| / span)
+                                                             + axial_radius |f_axial|)       [N m]
+        spherical:          limit = constant + mu radius |f|                                 [N m]
+        prismatic:          limit = constant + mu (|f_radial| + |m| / span)                  [N]
+        planar:             limit = constant + mu (|f_normal| + |m_b| / span)                [N]
+        translation, free flyer:       limit = constant                                      [N]
+        coupling:           limit = constant + k |ratio lam|                                 [N m or N]
+
+    where constant = coulomb + preload and m is the reaction moment about the joint's origin, m_b its part
+    across the axis (of a planar joint the normal of its plane); without `span` moments are left out.
+    Sliding gives C_j = -limit s(v_j) sgn(v_j) - viscous v_j, with Stribeck's factor
+    s = 1 + (static_ratio - 1) exp(-(v_j / stribeck_velocity)^2), and s = 1 without stribeck_velocity.
+    Sticking holds while the force it needs is below static_ratio times the limit.
+
+    Directions.  A universal joint has two axes that rub each on its own.  In a ball joint (spherical, or a
+    `PointAnchor` of all three axes) C points against the angular velocity, |C| = limit.  Planar joints and
+    free flyers slide in two or three directions like that, and turn besides: against their turning rubs
+    radius times the limit [N m] and radius^2 times `viscous`, as of an area of that mean radius; without
+    `radius` turning is free.  Sliding and turning do not weaken each other.
+
+    Couplings.  lam is the multiplier of a `JointCoupling`, the force between its teeth as it acts on joint1
+    [N m or N]; limit and v_j are those of joint2.  Either the thread of a screw or worm on joint2 is given,
+    of lead angle l (the thread rises ratio = tan(l) times the thread's mean radius) and with
+    tan(p) = mu / cos(pressure_angle), or the efficiencies are:
+
+        joint2 drives:  efficiency      = tan(l) / tan(l + p)
+        joint1 drives:  efficiency_back = tan(l - p) / tan(l)
+
+    Both follow from one rubbing pair of surfaces, which carries lam and takes part a of it from joint1 and
+    part b from joint2: a = tan(p) tan(l) and b = tan(p) / tan(l), or with the efficiencies e and e'
+    a = (1 - 2 e + e e') / (1 - e e') and b = (1 - 2 e' + e e') / (1 - e e'); k = a + b.  Where b >= 1, that
+    is efficiency_back <= 0, joint1 cannot drive joint2: the coupling locks itself.
+
+    Args:
+        joint: name of a revolute, prismatic, helical, spherical, universal, planar, translation or
+            free-flyer joint, of a `HingeAnchor`, of a `PointAnchor` of three axes, or of a `JointCoupling`.
+        coulomb: constant dry friction [N m or N].
+        mu: coefficient of friction of the surfaces that bear.
+        radius: radius at which the radial load rubs [m]; of planar joints and free flyers the mean radius of
+            the area that turns.
+        axial_radius: mean radius at which the axial load rubs [m].
+        span: lever at which the moment loads the bearing [m]: half the distance of two bearings.
+        preload: dry friction of a preloaded bearing, present without load [N m or N].
+        static_ratio: static over kinetic friction, at least 1.
+        stribeck_velocity: velocity scale of the fall from static to kinetic [rad/s or m/s].
+        viscous: coefficient of the velocity [N m s/rad or N s/m].
+        reaction: "total" solves the implicit equation on the real reaction, friction included; "ideal"
+            evaluates the law on the ideal reaction, as the paper's Example (c) does.
+        lead_angle: of the thread of a coupling [rad], between 0 and pi/2; with `mu`.
+        pressure_angle: of its flanks, in the normal section [rad]: 0 for a square thread.
+        efficiency: power at joint1 over power at joint2 while joint2 drives, between 0 and 1.
+        efficiency_back: power at joint2 over power at joint1 while joint1 drives, below 1; zero or negative
+            where joint1 cannot drive.  None: equal to `efficiency`, as of a gear mesh.
+        name: used in messages and results.
+    """
+
+    joint: str
+    coulomb: float = 0.0
+    mu: float = 0.0
+    radius: float = 0.0
+    axial_radius: float = 0.0
+    span: float | None = None
+    preload: float = 0.0
+    static_ratio: float = 1.0
+    stribeck_velocity: float | None = None
+    viscous: float = 0.0
+    reaction: str = "total"
+    lead_angle: float | None = None
+    pressure_angle: float = 0.0
+    efficiency: float | None = None
+    efficiency_back: float | None = None
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        optional_text("JointFriction: name", self.name)
+        who = label(self)
+        text(f"{who}: joint", self.joint)
+        for key in ("coulomb", "mu", "radius", "axial_radius", "preload", "viscous"):
+            object.__setattr__(self, key, nonnegative(f"{who}: {key}", getattr(self, key)))
+        for key in ("span", "stribeck_velocity"):
+            if getattr(self, key) is not None:
+                object.__setattr__(self, key, positive(f"{who}: {key}", getattr(self, key)))
+        object.__setattr__(self, "static_ratio", static_ratio(who, self.static_ratio))
+        choice(f"{who}: reaction", self.reaction, ("total", "ideal"))
+        _thread(self, who)
+        _efficiencies(self, who)
+        if not (self.coulomb or self.mu or self.preload or self.viscous or self.efficiency):
+            raise InputError(
+                f"{who}: one of coulomb, mu, preload, viscous must be positive; all are zero, "
+                "so leave the law out"
+            )
+
+    @property
+    def tooth_losses(self) -> tuple[float, float]:
+        """Parts a and b of a coupling's tooth force that friction takes from joint1 and from joint2."""
+        if self.efficiency is not None:
+            e, back = self.efficiency, self.efficiency_back
+            back = e if back is None else back
+            return (1.0 - 2.0 * e + e * back) / (1.0 - e * back), (1.0 - 2.0 * back + e * back) / (
+                1.0 - e * back
+            )
+        if self.lead_angle is None:
+            return 0.0, 0.0
+        rough, rise = self.mu / math.cos(self.pressure_angle), math.tan(self.lead_angle)
+        return rough * rise, rough / rise
+
+
+def _acute(what: str, angle: float) -> float:
+    """An angle of a thread [rad], checked to be below a right one."""
+    if not angle < 0.5 * math.pi:
+        raise InputError(f"{what} must be below pi/2 rad; got {angle:g}")
+    return angle
+
+
+def _thread(law: JointFriction, who: str) -> None:
+    """The thread of a coupling: two angles, and the coefficient that they need."""
+    what = f"{who}: pressure_angle"
+    object.__setattr__(law, "pressure_angle", _acute(what, nonnegative(what, law.pressure_angle)))
+    if law.lead_angle is None:
+        if law.pressure_angle:
+            raise InputError(f"{who}: pressure_angle is that of a thread, which needs a lead_angle too")
+        return
+    what = f"{who}: lead_angle"
+    object.__setattr__(law, "lead_angle", _acute(what, positive(what, law.lead_angle)))
+    if not law.mu:
+        raise InputError(f"{who}: lead_angle needs a positive mu, with which the thread rubs")
+
+
+def _efficiencies(law: JointFriction, who: str) -> None:
+    """What a coupling leaves of power, there and back."""
+    if law.efficiency is None:
+        if law.efficiency_back is not None:
+            raise InputError(f"{who}: efficiency_back needs an efficiency too, of the way there")
+        return
+    if law.mu or law.lead_angle is not None:
+        raise InputError(
+            f"{who}: give either efficiency, or mu and lead_angle, from which it follows; got both"
+        )
+    forth = number(f"{who}: efficiency", law.efficiency)
+    if not 0.0 < forth < 1.0:
+        raise InputError(f"{who}: efficiency must lie between 0 and 1; got {forth:g}")
+    object.__setattr__(law, "efficiency", forth)
+    if law.efficiency_back is not None:
+        back = number(f"{who}: efficiency_back", law.efficiency_back)
+        if not back < 1.0:
+            raise InputError(f"{who}: efficiency_back must be below 1; got {back:g}")
+        object.__setattr__(law, "efficiency_back", back)
+
+
+@dataclass(frozen=True)
+class SigmoidFriction:
+    """Friction of a robot joint as identification gives it: smooth, and independent of the load.
+
+        C_j = -(phi1 / (1 + exp(-phi2 (v_j + phi3))) - phi1 / (1 + exp(-phi2 phi3)))          [N m]
+
+    It vanishes at rest, so it creeps under a load; use `JointFriction` where a joint must hold.
+    Source: Gaz, Cognetti, Oliva, Robuffo Giordano, De Luca, IEEE RA-L 4 (2019), Franka Emika Panda.
+
+    Args:
+        joint: name of a joint of one degree of freedom.
+        phi1: swing of the friction from one direction to the other [N m], not negative.
+        phi2: steepness [s/rad], positive.
+        phi3: velocity offset [rad/s].
+        name: used in messages and results.
+    """
+
+    joint: str
+    phi1: float
+    phi2: float
+    phi3: float = 0.0
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        optional_text("SigmoidFriction: name", self.name)
+        who = label(self)
+        text(f"{who}: joint", self.joint)
+        object.__setattr__(self, "phi1", nonnegative(f"{who}: phi1", self.phi1))
+        object.__setattr__(self, "phi2", positive(f"{who}: phi2", self.phi2))
+        object.__setattr__(self, "phi3", number(f"{who}: phi3", self.phi3))
+
+
+@dataclass(frozen=True)
+class LuGre:
+    """Bristle friction with presliding and hysteresis; its deflection z is integrated with the motion.
+
+        dz/dt = v - stiffness |v| z / g(v)
+        g(v) = coulomb + (stiction - coulomb) exp(-(v / stribeck_velocity)^2)
+        C_j = -(stiffness z + damping dz/dt + viscous v)                                       [N m or N]
+
+    z is one column of `Trajectory.z`.  Bristles give way a little under any load, and the body
+    drifts under a load that varies; use `JointFriction` where a joint must hold.
+    Source: Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Trans. Automatic Control 40 (1995).
+
+    Args:
+        joint: name of a joint of one degree of freedom.
+        stiffness: of the bristles [N m/rad or N/m], positive.
+        damping: of the bristles [N m s/rad or N s/m], not negative.
+        viscous: coefficient of the velocity, not negative.
+        coulomb: level at high velocity [N m or N], positive.
+        stiction: level near rest, at least `coulomb`; equal to it when None.
+        stribeck_velocity: velocity scale between both [rad/s or m/s], positive.
+        name: used in messages and results.
+    """
+
+    joint: str
+    stiffness: float
+    damping: float
+    coulomb: float
+    viscous: float = 0.0
+    stiction: float | None = None
+    stribeck_velocity: float = 1e-3
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        optional_text("LuGre: name", self.name)
+        who = label(self)
+        text(f"{who}: joint", self.joint)
+        for key in ("stiffness", "coulomb", "stribeck_velocity"):
+            object.__setattr__(self, key, positive(f"{who}: {key}", getattr(self, key)))
+        for key in ("damping", "viscous"):
+            object.__setattr__(self, key, nonnegative(f"{who}: {key}", getattr(self, key)))
+        level = self.coulomb if self.stiction is None else positive(f"{who}: stiction", self.stiction)
+        if level < self.coulomb:
+            raise InputError(
+                f"{who}: stiction must be at least coulomb (static friction is never below kinetic "
+                f"friction); got {level:g} and {self.coulomb:g}"
+            )
+        object.__setattr__(self, "stiction", level)
+
+
+@dataclass(frozen=True)
+class Drag:
+    """Resistance of a fluid against the motion of a frame's origin.
+
+    Force on the body at the origin of the frame, in world axes: f = -coefficient |u|^(exponent - 1) u, with u
+    its velocity, and C = J^T f.  The paper's Example (a), Eq. (58), is exponent = 2 beta.
+
+    Args:
+        frame: name of a frame of the model.
+        coefficient: [N (s/m)^exponent], not negative.
+        exponent: positive; 1 is linear drag, 2 is quadratic drag.
+        name: used in messages and results.
+    """
+
+    frame: str
+    coefficient: float
+    exponent: float = 1.0
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        optional_text("Drag: name", self.name)
+        who = label(self)
+        text(f"{who}: frame", self.frame)
+        object.__setattr__(self, "coefficient", nonnegative(f"{who}: coefficient", self.coefficient))
+        object.__setattr__(self, "exponent", positive(f"{who}: exponent", self.exponent))
+
+
+@dataclass(frozen=True)
+class UserLaw:
+    """Any law C(q, v, t, reactions) as a Python function, with states of its own when it needs them.
+
+    `reactions.lam` holds all multipliers, `reactions[name]` one constraint's slice, `reactions.wrench(name)`
+    the wrench of a joint or an anchor.  The function must be pure, and finite for any reactions: it is called
+    with provisional ones.
+
+    Args:
+        function: (t, q, v, reactions) -> C, shape (nv,); with states: (t, q, v, reactions, z) -> (C, dz/dt).
+        reaction: "total" solves the implicit equation, "ideal" evaluates once on the ideal reactions, None
+            passes None and costs nothing.
+        states: number of the law's own states z.
+        name: used in messages and results.
+    """
+
+    function: Callable[..., object]
+    reaction: str | None = "total"
+    states: int = 0
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        optional_text("UserLaw: name", self.name)
+        who = label(self)
+        object.__setattr__(self, "states", count(f"{who}: states", self.states))
+        signature = "(t, q, v, reactions, z) -> (C, dz)" if self.states else "(t, q, v, reactions) -> C"
+        function(f"{who}: function", self.function, signature)
+        choice(f"{who}: reaction", self.reaction, ("total", "ideal", None))
+
+
+@dataclass(frozen=True)
+class UserFriction:
+    """Dry friction along a generalized direction given by the user; the package owns its modes.
+
+    With d = direction(t, q) and slip velocity s = d . v, sliding gives C = -limit sgn(s) d, and sticking is
+    an ideal row that holds s at zero while the force it needs is below static_ratio times the limit.
+
+    If friction differs between both ways of slip, as in a one-way clutch or a ratchet, `limit` returns
+    (forward, backward): C = -forward d for s > 0, C = backward d for s < 0, and sticking holds with C = f d
+    while -static_ratio forward <= f <= static_ratio backward.
+
+    Args:
+        direction: (t, q) -> row, shape (nv,).
+        limit: (t, q, v, reactions) -> friction force while it slides, not negative: one number, or two, those
+            against slip forward (along `direction`) and backward.
+        static_ratio: static over kinetic friction, at least 1.
+        name: used in messages and results.
+    """
+
+    direction: Callable[..., object]
+    limit: Callable[..., object]
+    static_ratio: float = 1.0
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        optional_text("UserFriction: name", self.name)
+        who = label(self)
+        function(f"{who}: direction", self.direction, "(t, q) -> row")
+        function(f"{who}: limit", self.limit, "(t, q, v, reactions) -> force")
+        object.__setattr__(self, "static_ratio", static_ratio(who, self.static_ratio))
+
+
+def static_ratio(who: str, value: object) -> float:
+    """Static over kinetic friction, checked to be at least 1.
+
+    Raises:
+        InputError: it is below 1 or no finite number.
+    """
+    ratio = number(f"{who}: static_ratio", value)
+    if ratio < 1.0:
+        raise InputError(
+            f"{who}: static_ratio must be at least 1 (static friction is never below kinetic friction); "
+            f"got {ratio:g}"
+        )
+    return ratio
+
+
+Law = JointFriction | SigmoidFriction | LuGre | Drag | UserLaw | UserFriction

@@ -1,0 +1,1 @@
+"""Shapes of a collision model, and the contacts of pairs of them."""

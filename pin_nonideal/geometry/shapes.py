@@ -1,0 +1,119 @@
+"""Shapes of a collision model, read into what their contacts are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.description.contacts.convex_hull import check_convex, convex_hull
+from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.types import Array, Placement
+
+# Corners of a box of half edges 1.
+CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
+KNOWN = "spheres, capsules, boxes, cylinders, cones, ellipsoids, half-spaces and convex meshes"
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A geometry object in the axes of its joint's frame.
+
+    Attributes:
+        name: of the geometry object.
+        kind: as Coal calls it.
+        frame: name of the joint.
+        place: of the shape's own axes.
+        points: corners, ends of a capsule's middle line, the middle of a sphere, or the tip of a cone; one of
+            a half-space's boundary, (n, 3).
+        radius: around these.
+        normal: of a half-space, outward.
+        half: of a box, its edges halved.
+        ends: of a cylinder or cone, half its length and the radii of its lower and upper face.
+        semiaxes: of an ellipsoid.
+        solid: whether it is the convex hull of its points.
+    """
+
+    name: str
+    kind: str
+    frame: str
+    place: Placement
+    points: Array
+    radius: float = 0.0
+    normal: Array | None = None
+    half: Array | None = None
+    ends: tuple[float, float, float] | None = None
+    semiaxes: Array | None = None
+    solid: bool = False
+
+    @property
+    def is_round(self) -> bool:
+        """Whether it is a sphere or a capsule."""
+        return self.radius > 0.0
+
+
+def shape_of(who: str, name: str, model: pin.Model, geometry: pin.GeometryModel) -> Shape:
+    """A geometry object as a shape of one of the known kinds.
+
+    Args:
+        who: words for messages.
+        name: of the object.
+        model: pinocchio.Model.
+        geometry: pinocchio.GeometryModel.
+
+    Raises:
+        InputError: of another kind, or a mesh that is not convex.
+        UnknownNameError: there is no such object.
+    """
+    known = [g.name for g in geometry.geometryObjects]
+    if name not in known:
+        raise UnknownNameError(f'{who}: no geometry "{name}" in the collision model{nearest(name, known)}')
+    item = geometry.geometryObjects[known.index(name)]
+    frame, shape, place = str(model.names[item.parentJoint]), item.geometry, item.placement.copy()
+    kind = type(shape).__name__
+
+    def located(points: Array) -> Array:
+        return np.asarray(points @ place.rotation.T + place.translation)
+
+    origin = located(np.zeros((1, 3)))
+    if kind == "Halfspace":
+        normal = place.rotation @ np.array(shape.n)
+        return Shape(name, kind, frame, place, origin + shape.d * normal, normal=normal)
+    if kind == "Sphere":
+        return Shape(name, kind, frame, place, origin, float(shape.radius))
+    if kind == "Capsule":
+        ends = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]) * shape.halfLength
+        return Shape(name, kind, frame, place, located(ends), float(shape.radius))
+    if kind == "Box":
+        half = np.array(shape.halfSide)
+        return Shape(name, kind, frame, place, located(CORNERS * half), half=half, solid=True)
+    if kind == "Ellipsoid":
+        return Shape(name, kind, frame, place, np.empty((0, 3)), semiaxes=np.array(shape.radii))
+    if kind in ("Cylinder", "Cone"):
+        length, radius = float(shape.halfLength), float(shape.radius)
+        above = radius if kind == "Cylinder" else 0.0
+        tip = np.array([[0.0, 0.0, length]] if kind == "Cone" else np.empty((0, 3)))
+        return Shape(name, kind, frame, place, located(tip), ends=(length, radius, above))
+    corners = _corners(f'{who}: geometry "{name}"', shape, np.array(item.meshScale))
+    return Shape(name, "convex mesh", frame, place, located(corners), solid=True)
+
+
+def _corners(what: str, mesh: Any, scale: Array) -> Array:
+    """Corners of a convex mesh.
+
+    Raises:
+        InputError: it is no mesh, or not convex.
+    """
+    kind = type(mesh).__name__
+    if kind.startswith("Convex"):
+        points = np.array([mesh.point(i) for i in range(mesh.num_points)])
+        return convex_hull(points * scale, what).points
+    if "BVH" not in kind:
+        raise InputError(f"{what} is a {kind}; {KNOWN} do")
+    points = np.array(mesh.vertices()) * scale
+    triangles = [mesh.tri_indices(i) for i in range(mesh.num_tris)]
+    check_convex(points, np.array([[t[k] for k in range(3)] for t in triangles]), what)
+    return convex_hull(points, what).points

@@ -1,0 +1,1 @@
+"""Changes to a model: joints exchanged, locked or fixed, another base."""

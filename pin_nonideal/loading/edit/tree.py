@@ -1,0 +1,218 @@
+"""What a robot.yaml table changes of the tree: other joints, another base, joints locked or fixed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pin_nonideal.description.constraints import JointCoupling
+from pin_nonideal.errors import LoadingError
+from pin_nonideal.loading.urdf.geometry_sources import Shapes
+from pin_nonideal.loading.urdf.reader import RobotFile
+from pin_nonideal.loading.urdf.xml import listed
+from pin_nonideal.loading.yaml.initial_state import joint_index, vector
+from pin_nonideal.loading.yaml.robot import check_keys, joint_types, names_in, pitches
+from pin_nonideal.types import GeometryModel, Model, Table
+
+from .model import ball_chains, edit_joints
+
+# Beyond this a base loses a tenth of a micrometer to floating-point numbers [m or rad].
+FARTHEST = 1e9
+
+
+def exchange_joints(robot: RobotFile, table: Table, where: str, notes: list[str], merge: bool) -> None:
+    """Exchanges joint types as the table asks, and merges revolutes that make a ball joint.
+
+    Args:
+        robot: what the robot's file holds; changed.
+        table: content of robot.yaml.
+        where: names the table in messages.
+        notes: receives a note of the joints that were merged.
+        merge: merge three revolutes with massless links between into ball joints.
+
+    Raises:
+        LoadingError: a joint of the table does not exist, or cannot be exchanged.
+    """
+    types, screws = joint_types(table, where), pitches(table, where)
+    coupled = {n for c in robot.constraints for n in vars(c).values() if isinstance(n, str)}
+    keep = names_in(table) | set(robot.motors) | coupled
+    chains = ball_chains(robot.model, keep) if merge else []
+    if not chains and not types and not screws:
+        return
+    if chains:
+        balls = ", ".join(f'"{chain.name}"' for chain in chains)
+        notes.append(
+            f"three revolute joints with massless links between are merged into a ball joint each: {balls}"
+        )
+    model = robot.model
+    _exchange(robot, lambda geometries: edit_joints(model, geometries, chains, types, screws))
+    robot.q0 = robot.v0 = None
+
+
+def _exchange(robot: RobotFile, edit: Callable[[list[Any]], tuple[Any, Iterable[Any]]]) -> None:
+    """Puts an edited model and its geometries in the place of the robot's own."""
+    robot.model, _ = edit([])
+    _edit_shapes(robot, lambda geometry: next(iter(edit([geometry])[1])))
+
+
+def _edit_shapes(robot: RobotFile, edit: Callable[[GeometryModel], GeometryModel]) -> None:
+    """Edits the robot's shapes, those that are not read yet when they are."""
+    for key in ("visual", "collision"):
+        shapes = getattr(robot, key)
+        if shapes is not None:
+            setattr(robot, key, shapes.edited(edit) if isinstance(shapes, Shapes) else edit(shapes))
+
+
+def place_base(robot: RobotFile, table: Table, where: str) -> None:
+    """Mounts the robot where `model: {base: {xyz: ..., rpy: ...}}` says: on a wall, or from the ceiling.
+
+    Args:
+        robot: what the robot's file holds; changed.
+        table: content of robot.yaml.
+        where: names the table in messages.
+
+    Raises:
+        LoadingError: the entry is no placement.
+    """
+    entry = (table.get("model") or {}).get("base")
+    if entry is None:
+        return
+    where = f"{where}: model: base"
+    if not isinstance(entry, dict):
+        raise LoadingError(f"{where} must be a table with the keys xyz, rpy; got {entry!r}")
+    check_keys(entry, ("xyz", "rpy"), where)
+    xyz, rpy = (np.array(vector(entry.get(k, [0, 0, 0]), 3, f"{where}: {k}")) for k in ("xyz", "rpy"))
+    if np.abs([*xyz, *rpy]).max() > FARTHEST:
+        raise LoadingError(f"{where}: xyz and rpy must be at most {FARTHEST:g} (m, rad); got {entry!r}")
+    base, model = pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz), robot.model
+    for j in range(1, model.njoints):
+        if model.parents[j] == 0:
+            model.jointPlacements[j] = base * model.jointPlacements[j]
+    for frame in list(model.frames)[1:]:
+        if frame.parentJoint == 0:
+            frame.placement = base * frame.placement
+
+    def mounted(geometry: GeometryModel) -> GeometryModel:
+        for shape in geometry.geometryObjects:
+            if shape.parentJoint == 0:
+                shape.placement = base * shape.placement
+        return geometry
+
+    _edit_shapes(robot, mounted)
+
+
+def lock(
+    robot: RobotFile, table: Table, q0: NDArray[np.float64], v0: NDArray[np.float64], where: str
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Fixes the joints that `model: {locked: ...}` names where the initial configuration has them.
+
+    Args:
+        robot: what the robot's file holds; changed.
+        table: content of robot.yaml.
+        q0: initial configuration, (nq,).
+        v0: initial velocity, (nv,).
+        where: names the table in messages.
+
+    Returns:
+        Configuration and velocity of the joints that are left.
+
+    Raises:
+        LoadingError: a joint does not exist, or the entry is no list.
+    """
+    entry = table.get("model") or {}
+    locked = entry.get("locked") or []
+    if not isinstance(locked, list):
+        raise LoadingError(f"{where}: model: locked must be a list of joint names; got {locked!r}")
+    if not locked:
+        return q0, v0
+    indices = [joint_index(robot.model, n, f"{where}: model: locked") for n in locked]
+    return _reduced(robot, indices, q0, v0)
+
+
+def fix_idle(
+    robot: RobotFile, named: set[str], q0: NDArray[np.float64], v0: NDArray[np.float64], notes: list[str]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Fixes the joints that move no inertia at all, where neither a loop nor another joint hangs on them.
+
+    Args:
+        robot: what the robot's file holds; changed.
+        named: what robot.yaml names.
+        q0: initial configuration, (nq,).
+        v0: initial velocity, (nv,).
+        notes: receives a note of the joints that were fixed.
+
+    Returns:
+        Configuration and velocity of the joints that are left.
+    """
+    model = robot.model
+    idle = [j for j in range(1, model.njoints) if _moves_nothing(model, j)]
+    idle = [j for j in idle if not names_on(model, j) & named]
+    leaders = {c.joint2 for c in robot.constraints if isinstance(c, JointCoupling)}
+    names = {model.names[j] for j in idle}
+    followers = {c.joint1: c.joint2 for c in robot.constraints if isinstance(c, JointCoupling)}
+    lead = {n for n in names & leaders if any(f not in names for f, to in followers.items() if to == n)}
+    idle = [j for j in idle if model.names[j] not in lead]
+    if not idle or len(idle) == model.njoints - 1:
+        return q0, v0
+    names = {str(model.names[j]) for j in idle}
+    notes.append(f"joints that move no inertia are fixed: {listed(sorted(names))}")
+    robot.constraints = [c for c in robot.constraints if not names & set(map(str, vars(c).values()))]
+    return _reduced(robot, idle, q0, v0)
+
+
+def _moves_nothing(model: Model, joint: int) -> bool:
+    """Whether no link beyond a joint has mass or inertia, and no joint there a rotor's."""
+    beyond = list(model.subtrees[joint])
+    dofs = [i for j in beyond for i in range(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])]
+    bare = all(model.inertias[j].mass == 0.0 and not model.inertias[j].inertia.any() for j in beyond)
+    return bare and not model.armature[dofs].any()
+
+
+def names_on(model: Model, joint: int) -> set[str]:
+    """Names of a joint and of all frames beyond it.
+
+    Args:
+        model: pinocchio.Model.
+        joint: index.
+    """
+    beyond = set(model.subtrees[joint])
+    return {str(f.name) for f in model.frames if f.parentJoint in beyond} | {str(model.names[joint])}
+
+
+def _reduced(
+    robot: RobotFile, indices: list[int], q0: NDArray[np.float64], v0: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Fixes joints where they are at q0; returns the configuration and velocity of the others."""
+    model = robot.model
+    kept = [j for j in range(1, model.njoints) if j not in indices]
+    none = [np.zeros(0)]
+    q = np.concatenate([q0[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]] for j in kept] or none)
+    v = np.concatenate([v0[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] for j in kept] or none)
+    _exchange(robot, lambda geometries: pin.buildReducedModel(model, geometries, indices, q0))
+    return q, v
+
+
+def still_moves(model: Model, constraint: Any, where: str) -> bool:
+    """Whether a constraint of the robot's file still has its joints; without them it is met already.
+
+    Args:
+        model: pinocchio.Model.
+        constraint: of the robot's file.
+        where: names the table in messages.
+
+    Raises:
+        LoadingError: one of two coupled joints is locked and the other is not.
+    """
+    keys = ("joint", "joint1", "joint2")
+    names = [getattr(constraint, key) for key in keys if hasattr(constraint, key)]
+    gone = [n for n in names if not model.existJointName(n)]
+    if gone and len(gone) < len(names):
+        left = next(n for n in names if n not in gone)
+        raise LoadingError(
+            f'{where}: joint "{left}" follows the locked joint "{gone[0]}"; lock both or neither'
+        )
+    return not gone

@@ -1,0 +1,1 @@
+"""Example robots and generated mechanisms."""

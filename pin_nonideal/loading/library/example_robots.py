@@ -1,0 +1,101 @@
+"""Robots of example-robot-data, by name."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.errors import LoadingError, UnknownNameError, nearest
+from pin_nonideal.loading.urdf.geometry_sources import Shapes, kept_models, kept_shapes, stamps
+from pin_nonideal.loading.urdf.reader import RobotFile, read_mimics
+from pin_nonideal.types import Model
+
+
+def example_names() -> Sequence[str]:
+    """Names of example-robot-data, none where it is not installed."""
+    try:
+        from example_robot_data import robots_loader
+    except ImportError:
+        return ()
+    return tuple(robots_loader.ROBOTS)
+
+
+def example_robot(name: str, others: list[str]) -> RobotFile:
+    """A robot of example-robot-data, with its reference posture.
+
+    Raises:
+        UnknownNameError: neither this package nor example-robot-data has it.
+        LoadingError: example-robot-data has it but cannot load it.
+    """
+    try:
+        from example_robot_data import robots_loader
+    except ImportError as error:
+        raise LoadingError(
+            f'robot "{name}" may be one of example-robot-data, which cannot be imported ({error}); '
+            "pip install example-robot-data-loaders"
+        ) from None
+    if name not in robots_loader.ROBOTS:
+        raise UnknownNameError(f'no robot "{name}"{nearest(name, [*others, *robots_loader.ROBOTS])}')
+    try:
+        robot, path = _drawn_later(robots_loader, name)
+    except Exception as error:  # the loaders raise whatever their parsers raise
+        raise LoadingError(
+            f'example-robot-data cannot load "{name}": {" ".join(str(error).split())}'
+        ) from error
+    try:
+        mimics = read_mimics(path)
+    except LoadingError as error:
+        mimics = []
+        robot.notes.append(f"mimic joints are left free: {error}")
+    robot.constraints = [c for c in mimics if _has_joints(robot.model, c)]
+    return robot
+
+
+def _drawn_later(robots_loader: Any, name: str) -> tuple[RobotFile, Path]:
+    """What a loader of example-robot-data makes, without the meshes until something asks for them; its file.
+
+    A loader that edits what it read is left to its own ways, meshes and all.
+    """
+    kind = robots_loader.ROBOTS[name]
+    if kind.__init__ is not robots_loader.RobotLoader.__init__ or not kind.urdf_filename:
+        loader = robots_loader.loader(name)
+        robot = loader.robot
+        found = RobotFile(robot.model, robot.visual_model, robot.collision_model, q0=np.array(robot.q0))
+        return found, Path(loader.df_path)
+    inside = os.path.join(kind.path, kind.urdf_subpath, kind.urdf_filename)
+    base = kind.model_path or robots_loader.getModelPath(inside, False)
+    file, root = os.path.join(base, inside), pin.JointModelFreeFlyer() if kind.free_flyer else None
+    content = (*stamps([file]), kind.free_flyer)
+    read = partial(pin.buildModelFromUrdf, file, *([root] if root else []))
+    model = kept_models(content, read).copy()
+    q0, srdf = pin.neutral(model), None
+    if kind.srdf_filename:
+        srdf = os.path.join(base, kind.path, kind.srdf_subpath, kind.srdf_filename)
+        q0 = robots_loader.readParamsFromSrdf(model, srdf, False, kind.has_rotor_parameters, kind.ref_posture)
+    if kind.free_flyer:
+        model.upperPositionLimit[:7], model.lowerPositionLimit[:7] = 1.0, -1.0
+    read = partial(_example_shapes, model.copy(), file, os.path.join(base, "../.."), srdf)
+    shapes = partial(kept_shapes, (*content, *stamps([srdf] if srdf else [])), read)
+    visual, collision = (Shapes(cache(lambda k=k: shapes()[k].copy())) for k in range(2))
+    return RobotFile(model, visual, collision, q0=np.array(q0)), Path(file)
+
+
+def _example_shapes(model: Model, file: str, packages: str, srdf: str | None) -> tuple[Any, Any]:
+    """Drawn and colliding shapes of a robot of example-robot-data, with the pairs of its SRDF."""
+    kinds = (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION)
+    visual, collision = (pin.buildGeomFromUrdf(model, file, kind, package_dirs=[packages]) for kind in kinds)
+    if srdf is not None:
+        collision.addAllCollisionPairs()
+        pin.removeCollisionPairs(model, collision, srdf, False)
+    return visual, collision
+
+
+def _has_joints(model: Model, constraint: Any) -> bool:
+    names = [getattr(constraint, key, None) for key in ("joint", "joint1", "joint2")]
+    return all(model.existJointName(n) for n in names if n is not None)

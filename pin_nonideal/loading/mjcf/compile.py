@@ -1,0 +1,291 @@
+"""MJCF files compiled by MuJoCo itself, with meshes that carry no mass left for the replay to read."""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pin_nonideal.errors import LoadingError
+from pin_nonideal.loading.urdf.xml import read_text
+
+from .fields import CARRIED, CARRIED_OPTIONS
+
+OLDEST = 4  # version of MuJoCo whose compiled models are known field by field
+PLACEHOLDER = 1e-3  # radius of the sphere that stands for a shape that is not read [m]
+
+
+class Compiled(NamedTuple):
+    """What MuJoCo makes of a file.
+
+    Attributes:
+        model: mujoco.MjModel.
+        absent: indices of geoms whose mesh or height field was not found; spheres stand for them.
+        unread: indices of geoms whose mesh or height field was left unread; spheres stand for them.
+        notes: what the user should know about the reading.
+    """
+
+    model: Any
+    absent: frozenset[int]
+    unread: frozenset[int]
+    notes: list[str]
+
+
+def mujoco_module(path: Path) -> Any:
+    """MuJoCo's Python package.
+
+    Raises:
+        LoadingError: it is not installed, or too old.
+    """
+    try:
+        import mujoco
+    except ImportError as error:
+        raise LoadingError(
+            f'"{path}" is an MJCF file, which MuJoCo compiles, and mujoco cannot be imported ({error}); '
+            "pip install 'pin-nonideal[mjcf]'"
+        ) from None
+    if int(mujoco.__version__.split(".")[0]) < OLDEST:
+        raise LoadingError(
+            f'"{path}" needs mujoco {OLDEST} or newer; got {mujoco.__version__}; '
+            "pip install --upgrade 'pin-nonideal[mjcf]'"
+        )
+    return mujoco
+
+
+def compile_mjcf(path: Path, *, meshes: bool = False) -> Compiled:
+    """Compiles an MJCF file.
+
+    Args:
+        path: the file.
+        meshes: whether to read the meshes that carry no mass too, which takes most of the time.
+
+    Raises:
+        LoadingError: the file is malformed, MuJoCo refuses it, or a mesh that carries mass is missing.
+    """
+    mujoco = mujoco_module(path)
+    _require_root(path)
+    try:
+        compiled = _compile(mujoco, path, meshes, probe=False)
+    except LoadingError:
+        if not meshes:
+            raise
+        compiled = _compile(mujoco, path, meshes, probe=True)
+    _require_numbers(compiled.model, path)
+    return compiled
+
+
+def _compile(mujoco: Any, path: Path, meshes: bool, *, probe: bool) -> Compiled:
+    """Compiles a file; `probe` also leaves out the meshes without mass that MuJoCo cannot read."""
+    notes: list[str] = []
+    with warnings.catch_warnings(record=True) as caught, _heard(mujoco) as told:
+        warnings.simplefilter("always")
+        try:
+            spec = mujoco.MjSpec.from_file(str(path))
+        except ValueError as error:
+            raise LoadingError(_parse_message(path, _one_line(error))) from None
+        absent, unread = _assets(mujoco, spec, path, meshes, probe, notes)
+        try:
+            model = spec.compile()
+        except ValueError as error:
+            raise LoadingError(f'"{path}" cannot be compiled by MuJoCo: {_one_line(error)}') from None
+    words = [" ".join(text.split()) for text in (*(str(one.message) for one in caught), *told)]
+    notes += [f"MuJoCo: {text}" for text in dict.fromkeys(words)]
+    identities = [frozenset(int(g.id) for g in geoms) for geoms in (absent, unread)]
+    return Compiled(model, identities[0], identities[1], notes)
+
+
+@contextmanager
+def _heard(mujoco: Any) -> Iterator[list[str]]:
+    """What MuJoCo warns of, which it prints and writes to a file in the working directory otherwise."""
+    told: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(told.append)
+    try:
+        yield told
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def _require_numbers(model: Any, path: Path) -> None:
+    """MuJoCo only warns of NaN, and would take a range of it for none."""
+    fields = {f"option {name}": getattr(model.opt, name) for name in CARRIED_OPTIONS.split()}
+    fields |= {name: getattr(model, name) for name in CARRIED.split() if name != "opt"}
+    bad = [name for name, values in fields.items() if np.isnan(np.asarray(values, dtype=float)).any()]
+    if bad:
+        raise LoadingError(f'"{path}" must hold finite numbers; MuJoCo finds NaN in {", ".join(bad)}')
+
+
+def _require_root(path: Path) -> None:
+    """Another XML file is said to be one; MuJoCo would read a URDF in its own way."""
+    text = re.sub(r"<!--.*?(-->|\Z)|<\?.*?\?>", "", read_text(path), flags=re.DOTALL)
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise LoadingError(f'"{path}" must not declare a DOCTYPE or entities; remove them')
+    root = re.match(r"[\ufeff\s]*<([\w:.-]+)[\s/>]", text)
+    if root is None:
+        raise LoadingError(f'"{path}" is truncated or not XML: there is no root element; export it again')
+    if root[1] not in ("mujoco", "mujocoinclude"):
+        raise LoadingError(f'"{path}" must have the root element <mujoco>; got <{root[1]}>')
+
+
+def _parse_message(path: Path, words: str) -> str:
+    if "XML parse error" in words:
+        return f'"{path}" is truncated or not XML: {words}; export it again'
+    return f'"{path}" cannot be read by MuJoCo: {words}'
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split()).removeprefix("Error: ")
+
+
+def _assets(
+    mujoco: Any, spec: Any, path: Path, meshes: bool, probe: bool, notes: list[str]
+) -> tuple[list[Any], list[Any]]:
+    """Takes away textures, skins, and shapes that are missing or that only a replay needs.
+
+    Returns:
+        Geoms whose shape is absent, and geoms whose shape was left unread.
+
+    Raises:
+        LoadingError: a shape that carries mass is missing.
+    """
+    _strip(spec, notes)
+    assets = [*spec.meshes, *spec.hfields]
+    homes = [Path(spec.modelfiledir or "."), *_homes(path)]
+    places = {_shape(asset): _place(spec, asset, homes) for asset in assets if asset.file}
+    lost = {shape for shape, place in places.items() if place is None}
+    broken = {_shape(a) for a in assets if probe and not _is_readable(mujoco, a, places.get(_shape(a)))}
+    files = {_shape(asset): asset.file for asset in assets}
+    absent, unread = [], []
+    wrapping = _wrapping(mujoco, spec)
+    for geom in spec.geoms:
+        shape = geom.meshname or geom.hfieldname
+        if not shape:
+            continue
+        if _carries_mass(mujoco, spec, geom) or geom.name in wrapping:
+            if shape in lost:  # one that is no asset, or that is broken, is for MuJoCo to refuse
+                raise LoadingError(
+                    f'"{path}": body "{geom.parent.name}" has its mass from mesh "{files[shape]}", which was '
+                    "not found; put the mesh there or give the body an <inertial>"
+                )
+        elif shape in lost | broken:
+            absent.append(geom)
+        elif not meshes:
+            unread.append(geom)
+    for geom in (*absent, *unread):
+        geom.type, geom.size = mujoco.mjtGeom.mjGEOM_SPHERE, [PLACEHOLDER, 0.0, 0.0]
+        geom.meshname = geom.hfieldname = ""
+        geom.plugin.active, geom.mass = False, 0.0
+    _drop_unused(spec)
+    for shape in (s for s in files if s in lost | broken):
+        what = "was not found" if shape in lost else "cannot be read"
+        notes.append(f'mesh "{files[shape]}" {what}; its shape is left out')
+    return absent, unread
+
+
+def _strip(spec: Any, notes: list[str]) -> None:
+    """Takes away what is only drawn or measured, and may name files that did not travel along."""
+    for material in spec.materials:
+        material.textures = [""] * len(material.textures)
+    for asset in (*spec.textures, *spec.skins):
+        spec.delete(asset)
+    for sensor in list(spec.sensors):
+        if sensor.plugin.active:
+            notes.append(f'sensor "{sensor.name}" of a plugin is not read')
+            spec.delete(sensor)
+
+
+def _shape(asset: Any) -> str:
+    return str(asset.name or Path(asset.file).stem)
+
+
+def _is_readable(mujoco: Any, asset: Any, place: Path | None) -> bool:
+    """Whether MuJoCo can compile a mesh or a height field by itself; what has no file is for it to refuse."""
+    if place is None:
+        return True
+    probe = mujoco.MjSpec()
+    geom = probe.worldbody.add_geom()
+    if hasattr(asset, "nrow"):  # a height field
+        probe.add_hfield(name="probe", file=str(place), size=asset.size)
+        geom.type, geom.hfieldname = mujoco.mjtGeom.mjGEOM_HFIELD, "probe"
+    else:
+        probe.add_mesh(name="probe", file=str(place), scale=asset.scale, inertia=asset.inertia)
+        geom.type, geom.meshname = mujoco.mjtGeom.mjGEOM_MESH, "probe"
+    try:
+        probe.compile()
+    except ValueError:
+        return False
+    return True
+
+
+def _place(spec: Any, asset: Any, homes: Sequence[Path]) -> Path | None:
+    """Where the file of a mesh or a height field lies, None where it is nowhere."""
+    name = Path(asset.file).name if spec.strippath else asset.file
+    folders = [asset.compiler.meshdir or "", spec.meshdir or "", ""]
+    places = (home / folder / name for home in homes for folder in folders)
+    return next((place.resolve() for place in places if place.is_file()), None)
+
+
+def _homes(path: Path) -> list[Path]:
+    """Folders from which paths lead: of the file, and of the models that it or its includes attach."""
+    homes: dict[Path, None] = {}
+    left, seen = [(path.resolve(), path.resolve().parent)], set()
+    while left:
+        file, home = left.pop()
+        if file in seen:
+            continue
+        seen.add(file)
+        homes[home] = None
+        try:
+            text = file.read_text(encoding="utf-8", errors="ignore")
+        except OSError:  # which MuJoCo has refused, or does not need
+            continue
+        for tag, name in re.findall(r"<(include|model)\b[^>]*?\bfile\s*=\s*[\"']([^\"']+)[\"']", text):
+            named = (home / name).resolve()
+            left.append((named, home if tag == "include" else named.parent))
+    return list(homes)
+
+
+def _wrapping(mujoco: Any, spec: Any) -> set[str]:
+    """Names of the geoms that tendons go around; a geom that is not there is for MuJoCo to refuse."""
+    around = (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER)
+    wraps = [w for tendon in spec.tendons for w in tendon.path if w.type in around]
+    return {w.target.name for w in wraps if w.target is not None}
+
+
+def _moves(body: Any) -> bool:
+    """Whether a joint moves a body."""
+    while body is not None:
+        if body.joints:
+            return True
+        body = body.parent
+    return False
+
+
+def _carries_mass(mujoco: Any, spec: Any, geom: Any) -> bool:
+    """Whether MuJoCo takes the mass of a body that moves from this geom, or a share of the mass of all."""
+    compiler, body = geom.compiler, geom.parent
+    if not _moves(body) and spec.compiler.settotalmass <= 0.0:
+        return False
+    rule = mujoco.mjtInertiaFromGeom
+    if compiler.inertiafromgeom == rule.mjINERTIAFROMGEOM_FALSE or body.name == "world":
+        return False
+    if body.explicitinertial and compiler.inertiafromgeom == rule.mjINERTIAFROMGEOM_AUTO:
+        return False
+    low, high = compiler.inertiagrouprange
+    massless = geom.mass == 0.0 or (math.isnan(geom.mass) and geom.density == 0.0)
+    return bool(low <= geom.group <= high and not massless and not geom.hfieldname)
+
+
+def _drop_unused(spec: Any) -> None:
+    """Takes away the assets that no shape needs any more."""
+    used = {name for geom in spec.geoms for name in (geom.meshname, geom.hfieldname)}
+    used |= {getattr(site, "meshname", "") for site in spec.sites}
+    for asset in (*spec.meshes, *spec.hfields):
+        if _shape(asset) not in used:
+            spec.delete(asset)

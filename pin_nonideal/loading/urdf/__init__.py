@@ -1,0 +1,1 @@
+"""URDF files: parsing, checks, meshes, inertias."""

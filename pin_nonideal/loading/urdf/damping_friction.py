@@ -1,0 +1,83 @@
+"""Damping and dry friction that a robot's file states for its joints, as laws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pin_nonideal.description.constraints import JointCoupling, PrescribedMotion
+from pin_nonideal.description.laws import JointFriction
+from pin_nonideal.types import Model
+
+
+def dissipation(
+    model: Model, taken: Sequence[Any], couplings: Sequence[Any], notes: list[str]
+) -> list[JointFriction]:
+    """Joint friction that the robot's file states, as laws.
+
+    URDF has it in `<dynamics>`, MJCF in `damping` and `frictionloss`.  Pinocchio keeps these numbers in
+    `model.damping` and `model.upperDryFrictionLimit` and its forward dynamics ignores them.  A mimic joint
+    q = r q_leader + c hands its friction to its leader: dry friction times |r|, damping times r^2.
+
+    Args:
+        model: pinocchio.Model.
+        taken: laws already given; a JointFriction among them replaces the file's numbers for its joint.
+        couplings: constraints of the file; its mimic joints are `JointCoupling` or, when held,
+            `PrescribedMotion`.
+        notes: receives a note for each replacement, and for each joint that has several velocities.
+    """
+    given = {law.joint for law in taken if isinstance(law, JointFriction)}
+    leaders = {c.joint1: (c.joint2, c.ratio) for c in couplings if isinstance(c, JointCoupling)}
+    held = {c.joint for c in couplings if isinstance(c, PrescribedMotion)}
+    dry: dict[str, float] = {}
+    viscous: dict[str, float] = {}
+    radius: dict[str, float] = {}
+    replaced: dict[str, None] = {}
+    for j in range(1, model.njoints):
+        dofs = slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])
+        name, damping, friction = model.names[j], model.damping[dofs], model.upperDryFrictionLimit[dofs]
+        if not (damping.any() or friction.any()):
+            continue
+        if model.nvs[j] != 1 and not _slides_and_turns(model, j, damping, friction, notes):
+            continue
+        ratio = 1.0
+        for _ in leaders:
+            if name in leaders:
+                ratio *= leaders[name][1]
+                name = leaders[name][0]
+        if model.nvs[j] != 1:
+            radius[name] = 1.0  # so that numbers are the same in both units
+        if name in given:
+            replaced[name] = None
+        elif name not in held:
+            dry[name] = dry.get(name, 0.0) + abs(ratio) * float(friction[0])
+            viscous[name] = viscous.get(name, 0.0) + ratio**2 * float(damping[0])
+    if replaced:
+        notes.append(
+            "laws given replace the damping and friction of the robot's file in " + ", ".join(replaced)
+        )
+    return [
+        JointFriction(n, coulomb=dry[n], viscous=viscous[n], radius=radius.get(n, 0.0), name=f"{n} dynamics")
+        for n in dry
+    ]
+
+
+def _slides_and_turns(
+    model: Model, j: int, damping: NDArray[np.float64], friction: NDArray[np.float64], notes: list[str]
+) -> bool:
+    """Whether the file states one number for all velocities of a joint; notes what is made of it."""
+    name, kind = model.names[j], model.joints[j].shortname()
+    alike = np.ptp(damping) == 0.0 and np.ptp(friction) == 0.0
+    if not alike or kind not in ("JointModelPlanar", "JointModelFreeFlyer"):
+        notes.append(
+            f'joint "{name}" has {model.nvs[j]} axes: damping and friction of the robot\'s file are left out'
+        )
+        return False
+    notes.append(
+        f'joint "{name}" slides and turns: damping {damping[0]:g} of the robot\'s file is taken in N s/m and '
+        f"N m s/rad, friction {friction[0]:g} in N and N m"
+    )
+    return True

@@ -1,0 +1,224 @@
+"""Loops whose frames were rounded: which rows depend on others within the tolerance of the assembly.
+
+Exports of CAD round frames to 1e-8 m or so.  A loop that closes in theory then has a gap that no motion can
+close, and rows that depend on others gain a tiny part of their own, which would decide rank and reactions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.constraints import FrameAnchor, JointCoupling, PointAnchor
+from pin_nonideal.scene.scene import Scene, program_of
+from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
+from pin_nonideal.states.projection import nearest_closure
+from pin_nonideal.states.rows import rows_at
+from pin_nonideal.types import Array, Model
+
+# Rows of A, and singular values of its rows at unit length, that are zero to rounding; those between this and
+# the assembly's tolerance are rounded frames.
+ROUNDING = 1e-11
+MOST_ROWS = 200  # whose rank is decided on a dense matrix
+PROBES = 3  # closed configurations at which the rank is looked at: one may be singular
+TOLD = 1e-4  # singular values up to this, beyond the tolerance, are told: links of nearly equal length
+REACH = 0.2  # of the probes [m or rad]
+
+
+class Relaxed(NamedTuple):
+    """Constraints of a scene without the rows that depend on others to the tolerance of the assembly.
+
+    Attributes:
+        model: of the scene, with frames for the points by which welds are held that lose rows.
+        constraints: what remains of them.
+        q: configuration with the smallest gaps, (nq,).
+        note: what was left out.
+    """
+
+    model: Model
+    constraints: list[Any]
+    q: Array
+    note: str
+
+
+# A weld as points of its two frames that lie on each other, each row of which can go by itself: with the
+# origins O, and X and Y at a unit length along the axes x and y, place is held at O, turns about z and y by
+# X along y and z, and turns about x by Y along z.
+_Points = tuple[PointAnchor, ...]
+
+
+def relaxed(scene: Scene, tolerance: float) -> Relaxed | None:
+    """The constraints of a scene whose loops were rounded; None where rounding plays no part.
+
+    Args:
+        scene: as the file states it.
+        tolerance: to which lengths and angles of the loops are given [m or rad].
+    """
+    constraints = list(scene.constraints)
+    program = program_of(scene)
+    holonomic = all(holds for c in program.constraints for holds in c.holonomic)
+    looped = [isinstance(c, (PointAnchor, JointCoupling, FrameAnchor)) for c in constraints]
+    if (
+        sum(looped) < 2
+        or not holonomic
+        or len(program.constraints) != len(looped)
+        or program.rows > MOST_ROWS
+    ):
+        return None
+    kept, q, gap, nearly = _independent_rows(scene, program, tolerance)
+    if kept is None:
+        return Relaxed(scene.model, constraints, scene.q0, nearly) if nearly else None
+    model, welds = _by_points(scene.model, constraints, [c.name for c in program.constraints])
+    if welds:
+        split = [part for c in constraints for part in (welds.get(id(c), (c,)))]
+        scene = Scene(model, constraints=split, q0=scene.q0, assembly_tolerance=tolerance)
+        program = program_of(scene)
+        kept, q, gap, nearly = _independent_rows(scene, program, tolerance)
+        if kept is None:
+            return Relaxed(model, constraints, scene.q0, nearly) if nearly else None
+    left, gone = _remaining(constraints, welds, program, kept)
+    if not gone:
+        return None
+    note = (
+        f"loops close to {gap:.1e} m or rad, within the tolerance of the assembly ({tolerance:g}): rows "
+        f"{', '.join(gone)} depend on others and are left out"
+    )
+    return Relaxed(model, left, q, "; ".join(filter(None, (note, nearly))))
+
+
+def _by_points(model: Model, constraints: list[Any], names: list[str]) -> tuple[Model, dict[int, _Points]]:
+    """The model with frames for the points of all welds between two frames, and these by the weld's id."""
+    welds: dict[int, _Points] = {}
+    model = model.copy()
+    for c, name in zip(constraints, names, strict=True):
+        if not isinstance(c, FrameAnchor) or c.frame2 is None:
+            continue
+        points = [PointAnchor(c.frame1, c.frame2, name=name)]
+        for axis, rows in (("x", "yz"), ("y", "z")):
+            offset = pin.SE3(np.eye(3), np.eye(3)["xyz".index(axis)])
+            ends = [f"{side} of {name}, {axis}" for side in (c.frame1, c.frame2)]
+            for side, end in zip((c.frame1, c.frame2), ends, strict=True):
+                frame = model.frames[model.getFrameId(side)]
+                place = frame.placement * offset
+                model.addFrame(pin.Frame(end, frame.parentJoint, place, pin.FrameType.OP_FRAME), False)
+            points.append(PointAnchor(ends[0], ends[1], axes=rows, name=f"{name}, {axis}"))
+        welds[id(c)] = tuple(points)
+    return model, welds
+
+
+def _remaining(
+    constraints: list[Any], welds: dict[int, _Points], program: core.Program, kept: NDArray[np.bool_]
+) -> tuple[list[Any], list[str]]:
+    """What remains of the constraints, and words for rows that do not; welds that lose none stay welds."""
+    left: list[Any] = []
+    gone: list[str] = []
+    described = iter(program.constraints)
+    first = 0
+    for c in constraints:
+        parts = welds.get(id(c), (c,))
+        remaining = []
+        for part in parts:
+            rows = next(described)
+            mine = kept[first : first + rows.count]
+            first += rows.count
+            stays = part if mine.all() else _part(part, mine)
+            if stays is not None:
+                remaining.append(stays)
+            if stays is not part:
+                gone.append(f"{rows.name}[{', '.join(map(str, np.flatnonzero(~mine)))}]")
+        left += [c] if remaining == list(parts) else remaining
+    return left, gone
+
+
+def _part(c: Any, kept: NDArray[np.bool_]) -> Any:
+    """A constraint with some of its rows, None with none; whole where a part of it has no description."""
+    if not kept.any():
+        return None
+    if isinstance(c, PointAnchor):
+        return replace(c, axes="".join(axis for axis, stays in zip(c.axes, kept, strict=True) if stays))
+    return c
+
+
+def _independent_rows(
+    scene: Scene, program: core.Program, tolerance: float
+) -> tuple[NDArray[np.bool_] | None, Array, float, str]:
+    """Which rows are independent, the configuration with the smallest gaps, the largest gap there, a note.
+
+    The note tells of rows that depend on others nearly, though not to the tolerance, wherever loops close.
+    There are none to name where the loops close and no row depends on others by rounded frames alone.
+    """
+    model, runner = scene.model, program.runner()
+    q, gap = nearest_closure(model, program, runner, scene.q0, tolerance)
+    if gap > tolerance:
+        return None, q, gap, ""
+    generator = np.random.default_rng(5)
+    independent, rank, rounded, least = _independent(model, runner, q, tolerance)
+    nearest = [least]
+    for _ in range(PROBES):
+        free = _null_space(model, runner, q, tolerance)
+        if not free.shape[1]:
+            break
+        step = free @ generator.uniform(-REACH, REACH, free.shape[1])
+        probe, apart = nearest_closure(model, program, runner, pin.integrate(model, q, step), tolerance)
+        if apart <= tolerance:
+            found = _independent(model, runner, probe, tolerance)
+            rounded = rounded or found[2]
+            nearest.append(found[3])
+            if found[1] > rank:
+                independent, rank = found[:2]
+    nearly, apart = "", max(nearest)
+    if apart <= TOLD:
+        nearly = (
+            f"rows of the loops depend on others to {apart:.1e} m or rad, beyond the tolerance of the "
+            f"assembly ({tolerance:g}): they may lock what should move; "
+            f"load(..., assembly_tolerance={TOLD:g}) leaves such rows out"
+        )
+    return (independent if rounded or gap > CLOSURE_TOLERANCE else None), q, gap, nearly
+
+
+def _unit_rows(model: Model, runner: core.Runner, q: Array, tolerance: float) -> tuple[Array, bool]:
+    """A at q with rows of unit length, and whether rounding gives any its length.
+
+    Rows that are short to the tolerance beside the longest hold nothing, and are zero: out of the plane of a
+    planar linkage they would point anywhere.
+    """
+    A = rows_at(runner, q, np.zeros(model.nv), 0.0)[0]
+    length = np.linalg.norm(A, axis=1)
+    longest = length.max(initial=0.0)
+    short = length <= tolerance * longest
+    A = np.where(short[:, None], 0.0, A / np.where(short, 1.0, length)[:, None])
+    return np.asarray(A), bool((short & (length > ROUNDING * longest)).any())
+
+
+def _independent(
+    model: Model, runner: core.Runner, q: Array, tolerance: float
+) -> tuple[NDArray[np.bool_], int, bool, float]:
+    """Which rows are independent, longest remainders first, and how many; whether rounding counts more.
+
+    The last is the smallest singular value beyond the tolerance.
+    """
+    rest, rounded = _unit_rows(model, runner, q, tolerance)
+    values = np.linalg.svd(rest, compute_uv=False) if rest.size else np.zeros(0)
+    rounded = rounded or bool(((values > ROUNDING) & (values <= tolerance)).any())
+    least = float(values[values > tolerance].min(initial=np.inf))
+    kept = np.zeros(len(rest), dtype=bool)
+    while True:
+        length = np.linalg.norm(rest, axis=1)
+        best = int(np.argmax(length)) if len(rest) else 0
+        if not len(rest) or length[best] <= tolerance:
+            return kept, int(kept.sum()), rounded, least
+        kept[best] = True
+        direction = rest[best] / length[best]
+        rest = rest - np.outer(rest @ direction, direction)
+        rest[kept] = 0.0
+
+
+def _null_space(model: Model, runner: core.Runner, q: Array, tolerance: float) -> Array:
+    """Directions of motion that the rows leave free, (nv, freedoms)."""
+    _, values, directions = np.linalg.svd(_unit_rows(model, runner, q, tolerance)[0])
+    return np.asarray(directions[int((values > tolerance).sum()) :].T)

@@ -1,0 +1,300 @@
+"""URDF files, read with care.
+
+What Pinocchio's reader passes over in silence is an error, a note, a law or a constraint here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.description.constraints import Constraint, JointCoupling, PrescribedMotion
+from pin_nonideal.description.time_functions import Constant
+from pin_nonideal.errors import LoadingError, nearest
+from pin_nonideal.types import Array, GeometryModel, Model
+
+from .density import add_inertias, without_inertia
+from .geometry_sources import Shapes, kept_models, kept_shapes, stamps
+from .meshes import resolve_meshes
+from .repair import tidy
+from .validation import check_urdf
+from .xacro import urdf_text
+from .xml import listed, numbers, parse_xml, read_text
+
+
+class Keyframe(NamedTuple):
+    """A state that a file names.
+
+    Attributes:
+        q: configuration, (nq,).
+        v: velocity, (nv,).
+        apply: sets the controls that belong to it.
+    """
+
+    q: Array
+    v: Array
+    apply: Callable[[], None]
+
+
+@dataclass
+class RobotFile:
+    """What a robot's file holds, before a scene is made of it.
+
+    Attributes:
+        model: pinocchio.Model.
+        visual: pinocchio.GeometryModel for display, `Shapes` that make one, or None.
+        collision: the same for collision.
+        constraints: constraints that the file itself states (mimic joints, equalities).
+        forces: given forces that the file itself states (joint springs).
+        motors: joints with a transmission.
+        notes: what the user should know about the reading.
+        q0: initial configuration that the file states, shape (nq,), or None.
+        v0: initial velocity that the file states, shape (nv,), or None.
+        laws: nonideal laws that the file itself states, beside those that the model holds.
+        actuation: what drives the joints, or None.
+        keyframes: states that the file names.
+        advice: what may help where the mass matrix is singular, "" for nothing.
+        to_float: what makes it float where nothing moves, "" for nothing.
+        contact_friction: coefficients of sliding, spinning and rolling by the geometry's name.
+        joint_order: names of the joints in the order of the file.
+    """
+
+    model: Model
+    visual: GeometryModel | None = None
+    collision: GeometryModel | None = None
+    constraints: list[Constraint] = field(default_factory=list)
+    forces: list[Any] = field(default_factory=list)
+    motors: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    q0: Array | None = None
+    v0: Array | None = None
+    laws: list[Any] = field(default_factory=list)
+    actuation: Any = None
+    keyframes: dict[str, Keyframe] = field(default_factory=dict)
+    advice: str = ""
+    to_float: str = ""
+    contact_friction: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    joint_order: tuple[str, ...] = ()
+
+
+def read_urdf(
+    path: Path,
+    *,
+    free_flyer: bool = False,
+    package_dirs: Sequence[str | Path] = (),
+    density: float | None = None,
+) -> RobotFile:
+    """Reads a URDF file.
+
+    Args:
+        path: the file.
+        free_flyer: give the root link a floating base, joint "root_joint".
+        package_dirs: folders that hold the packages of `package://` paths; the file's own folder and those
+            above it, and the paths of ROS, are searched as well.
+        density: of links that state no inertia [kg/m^3], which is then that of their shapes.
+
+    Raises:
+        LoadingError: the file is malformed, holds a loop, or a link or joint that cannot be.
+    """
+    root = parse_xml(urdf_text(path, package_dirs), path, "robot")
+    name = root.get("name") or path.parent.name
+    root.set("name", name)
+    notes = tidy(root)
+    check_urdf(root, path, ("universe", "root_joint") if free_flyer else ("universe",))
+    shaped = without_inertia(root)
+    notes += resolve_meshes(root, path, package_dirs)
+    bare = without_inertia(root)
+    if density is not None:
+        add_inertias(root, density, notes)
+    xml = ElementTree.tostring(root, encoding="unicode")
+    try:
+        model = kept_models((xml, free_flyer), lambda: _model(xml, free_flyer)).copy()
+    except (ValueError, RuntimeError) as error:
+        raise LoadingError(f'"{path}" cannot be read by Pinocchio: {error}') from None
+    _keep_dynamics(model, root, path)
+    _turn_planes(model, root, path, notes)
+    notes += _unused(root)
+    visual, collision = (
+        _shapes(model.copy(), root, path, kind, free_flyer) for kind in ("visual", "collision")
+    )
+    motors = [j.get("name", "") for j in root.findall("transmission/joint")]
+    robot = RobotFile(model, visual, collision, constraints=_mimics(root, path), motors=motors, notes=notes)
+    robot.to_float = "load(..., free_flyer=True) gives the root link a floating base"
+    robot.joint_order = tuple(j.get("name", "") for j in root.findall("joint"))
+    lost = [link for link in shaped if link not in bare]
+    if lost and (density is not None or not bare):
+        robot.advice = (
+            f"the meshes of links {listed(lost)}, which state no inertia, were not found: put them there, or "
+            "name the folders of their packages with package_dirs"
+        )
+    elif bare and density is None:
+        robot.advice = "load(..., density=1000.0) computes the inertia of such links from their shapes"
+    return robot
+
+
+def _model(xml: str, free_flyer: bool) -> Model:
+    return pin.buildModelFromXML(xml, pin.JointModelFreeFlyer()) if free_flyer else pin.buildModelFromXML(xml)
+
+
+def _shapes(model: Model, root: ElementTree.Element, path: Path, kind: str, free_flyer: bool) -> Shapes:
+    """Geometry of one kind, read when something asks for it."""
+    notes: list[str] = []
+
+    def read() -> tuple[GeometryModel, list[str]]:
+        dropped: list[str] = []
+        return _geometry(model, root, path, kind, dropped), dropped
+
+    @cache
+    def shapes() -> GeometryModel:
+        meshes = (mesh.get("filename", "") for mesh in root.iter("mesh"))
+        content = (ElementTree.tostring(root), free_flyer, kind, stamps(meshes))
+        geometry, dropped = kept_shapes(content, read)
+        notes.extend(dropped)
+        return geometry.copy()
+
+    return Shapes(shapes, notes)
+
+
+def _keep_dynamics(model: Model, root: ElementTree.Element, path: Path) -> None:
+    """`<dynamics>` of planar and floating joints, for each dof; Pinocchio's reader keeps those of others."""
+    for joint in root.findall("joint"):
+        dynamics, name = joint.find("dynamics"), joint.get("name", "")
+        if dynamics is None or joint.get("type") not in ("planar", "floating"):
+            continue
+        where, j = f'"{path}": joint "{name}"', model.getJointId(name)
+        dofs = slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])
+        model.damping[dofs] = numbers(dynamics, "damping", 1, (0,), where)[0]
+        friction = numbers(dynamics, "friction", 1, (0,), where)[0]
+        model.upperDryFrictionLimit[dofs], model.lowerDryFrictionLimit[dofs] = friction, -friction
+
+
+def _turn_planes(model: Model, root: ElementTree.Element, path: Path, notes: list[str]) -> None:
+    """Planar joints move in the plane normal to their axis; Pinocchio's reader takes x-y for all."""
+    up = np.array([0.0, 0.0, 1.0])
+    for joint in root.findall("joint"):
+        name = joint.get("name", "")
+        axis = numbers(joint.find("axis"), "xyz", 3, (1, 0, 0), f'"{path}": joint "{name}"')
+        normal = axis / np.linalg.norm(axis) if axis.any() else up
+        if joint.get("type") != "planar" or np.array_equal(normal, up):
+            continue
+        j, turn = model.getJointId(name), pin.Quaternion.FromTwoVectors(up, normal).matrix()
+        forth = pin.SE3(turn, np.zeros(3))
+        back = forth.inverse()
+        model.jointPlacements[j] = model.jointPlacements[j] * forth
+        model.inertias[j] = model.inertias[j].se3Action(back)
+        for k in range(1, model.njoints):
+            if model.parents[k] == j:
+                model.jointPlacements[k] = back * model.jointPlacements[k]
+        for frame in model.frames:
+            if frame.parentJoint == j and frame.type != pin.FrameType.JOINT:
+                frame.placement = back * frame.placement
+        x, y = (" ".join(f"{round(c, 9):g}" for c in 0.0 + column) for column in turn.T[:2])
+        whose = "its axis" if joint.find("axis") is not None else "URDF's axis, for the file states none,"
+        notes.append(
+            f'planar joint "{name}" moves in the plane normal to {whose} '
+            f"{' '.join(f'{c:g}' for c in normal)}: its x and y are along {x} and {y} in the joint's frame"
+        )
+
+
+def _unused(root: ElementTree.Element) -> list[str]:
+    """Notes on limits of effort and velocity, and on reductions of transmissions."""
+    notes = []
+    limits = [j.find("limit") for j in root.findall("joint") if j.get("type") != "fixed"]
+    told = []
+    for key in ("effort", "velocity"):
+        bounded = sum(float(numbers(limit, key, 1, (0,), "limit")[0]) > 0.0 for limit in limits)
+        if bounded:
+            told.append(f"the {key} of {bounded} joints (scene.model.upper{key.capitalize()}Limit)")
+    if told:
+        notes.append(f"bounds of {' and '.join(told)} are not enforced")
+    geared = [
+        str(t.get("name"))
+        for t in root.findall("transmission")
+        for e in t.iter("mechanicalReduction")
+        if (e.text or "").strip() not in ("", "1", "1.0")
+    ]
+    joints = {j.get("name") for j in root.findall("joint")}
+    strange = [str(j.get("name")) for j in root.findall("transmission/joint") if j.get("name") not in joints]
+    if strange:
+        notes.append(f"transmissions drive joints that do not exist: {listed(strange)}")
+    if geared:
+        notes.append(
+            f"reductions of transmissions {listed(geared)} are not used: torques are those at the joints"
+        )
+    return notes
+
+
+def read_mimics(path: Path) -> list[Constraint]:
+    """The mimic joints of a URDF file as couplings.
+
+    Raises:
+        LoadingError: the file is malformed, or a mimic joint follows nothing.
+    """
+    return _mimics(parse_xml(read_text(path), path, "robot"), path)
+
+
+def _mimics(root: ElementTree.Element, path: Path) -> list[Constraint]:
+    """Mimic joints as couplings: q = multiplier q_leader + offset (Pinocchio's reader leaves them free)."""
+    kinds = {j.get("name", ""): j.get("type") for j in root.findall("joint")}
+    result: list[Constraint] = []
+    for joint in root.findall("joint"):
+        mimic = joint.find("mimic")
+        if mimic is None or joint.get("type") == "fixed":
+            continue
+        name = joint.get("name", "")
+        where = f'"{path}": joint "{name}"'
+        leader = mimic.get("joint", "")
+        if leader not in kinds:
+            raise LoadingError(
+                f'{where} mimics joint "{leader}", which does not exist{nearest(leader, kinds)}'
+            )
+        if leader == name:
+            raise LoadingError(f"{where} must mimic another joint; it mimics itself")
+        multiplier = float(numbers(mimic, "multiplier", 1, (1,), where)[0])
+        offset = float(numbers(mimic, "offset", 1, (0,), where)[0])
+        if multiplier == 0.0 or kinds[leader] == "fixed":
+            result.append(PrescribedMotion(name, Constant(offset), name=f"{name} mimic"))
+        else:
+            result.append(JointCoupling(name, leader, multiplier, offset, name=f"{name} mimic"))
+    return result
+
+
+def _geometry(model: Model, root: ElementTree.Element, path: Path, kind: str, notes: list[str]) -> Any:
+    """Geometry of one kind, without the meshes that the mesh reader refuses (each leaves a note)."""
+    geometry_type = pin.GeometryType.VISUAL if kind == "visual" else pin.GeometryType.COLLISION
+    try:
+        return pin.buildGeomFromUrdfString(
+            model, ElementTree.tostring(root, encoding="unicode"), geometry_type
+        )
+    except (ValueError, RuntimeError):
+        _drop_unreadable(root, kind, notes)
+    try:
+        return pin.buildGeomFromUrdfString(
+            model, ElementTree.tostring(root, encoding="unicode"), geometry_type
+        )
+    except (ValueError, RuntimeError) as error:
+        raise LoadingError(f'"{path}": the {kind} geometry cannot be read by Pinocchio: {error}') from None
+
+
+def _drop_unreadable(root: ElementTree.Element, kind: str, notes: list[str]) -> None:
+    """Removes the shapes whose mesh cannot be read."""
+    import coal
+
+    for link in root.findall("link"):
+        for shape in link.findall(kind):
+            mesh = shape.find("geometry/mesh")
+            if mesh is None:
+                continue
+            filename = mesh.get("filename", "")
+            try:
+                coal.MeshLoader().load(filename, np.ones(3))
+            except (ValueError, RuntimeError):
+                link.remove(shape)
+                notes.append(f'mesh "{filename}" cannot be read; its shape is left out')

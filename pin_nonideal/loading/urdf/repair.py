@@ -1,0 +1,230 @@
+"""What does not move a robot is no reason to refuse its file: it is mended or left out, and told."""
+
+from __future__ import annotations
+
+import math
+import sys
+from xml.etree import ElementTree
+
+import numpy as np
+
+from .unread_tags import tell_unread
+from .validation import SHAPES
+from .xml import listed
+
+# Tags of URDF that the robot's own elements may hold; what other tools add is left out.
+ROBOT = ("link", "joint", "material", "transmission")
+VERSION = "1.1"  # of URDF; Pinocchio's parser forgets capsules and quaternions where a file states none
+WORLD = "world"  # link that many files attach to and do not declare
+INFINITE = ("inf", "-inf", "+inf", "infinity", "-infinity", "+infinity")  # bounds that are none
+LEFT_OUT = "{"  # tags of a namespace begin so
+# Principal moments below this part of the mass times (1 m)^2 are rounding.
+LEAST_INERTIA = 1e-12
+UNBALANCED = 1e-2  # part by which a principal moment may exceed the sum of the others: files round them
+
+
+def tidy(root: ElementTree.Element) -> list[str]:
+    """Mends what is cosmetic in a URDF file.
+
+    Args:
+        root: the `<robot>` element; changed.
+
+    Returns:
+        Notes on what was done.
+    """
+    notes = [*_foreign(root), *_stray_shapes(root), *tell_unread(root), *_world(root)]
+    root.set("version", VERSION)
+    for number, material in enumerate(root.iter("material")):
+        if not material.get("name"):
+            material.set("name", f"material {number}")
+    notes += _colors(root)
+    notes += _undefined_materials(root)
+    sizeless = []
+    for link in root.findall("link"):
+        for kind in ("visual", "collision"):
+            for shape in link.findall(kind):
+                if _sizeless(shape):
+                    link.remove(shape)
+                    sizeless.append(str(link.get("name")))
+                _uniform_scale(shape)
+    if sizeless:
+        notes.append(f"shapes of size zero are left out, in links {listed(sizeless)}")
+    return notes + _inertias(root) + _limits(root)
+
+
+def _foreign(root: ElementTree.Element) -> list[str]:
+    """Leaves out elements of other tools and of other namespaces."""
+    found: dict[str, None] = {}
+    for element in list(root):
+        if element.tag not in ROBOT:
+            found[str(element.tag).rpartition("}")[2]] = None
+            root.remove(element)
+    for parent in list(root.iter()):
+        for child in [c for c in parent if str(c.tag).startswith(LEFT_OUT)]:
+            found[str(child.tag).rpartition("}")[2]] = None
+            parent.remove(child)
+        for key in [k for k in parent.attrib if k.startswith(LEFT_OUT)]:
+            del parent.attrib[key]
+    return (
+        [f"elements of other tools are not read: {', '.join(f'<{tag}>' for tag in found)}"] if found else []
+    )
+
+
+def _stray_shapes(root: ElementTree.Element) -> list[str]:
+    """Leaves out of a `<geometry>` what stands beside its shape."""
+    lost: dict[str, None] = {}
+    for link in root.findall("link"):
+        for geometry in (g for kind in ("visual", "collision") for g in link.findall(f"{kind}/geometry")):
+            stray = [e for e in geometry if e.tag not in SHAPES]
+            if len(geometry) - len(stray) == 1:
+                for element in stray:
+                    geometry.remove(element)
+                    lost[f'<{element.tag}> in link "{link.get("name")}"'] = None
+    return [f"elements beside the shape of a <geometry> are not read: {', '.join(lost)}"] if lost else []
+
+
+def _world(root: ElementTree.Element) -> list[str]:
+    """Declares the link "world" where joints hang on it and the file forgot it."""
+    declared = {link.get("name") for link in root.findall("link")}
+    named = {e.get("link") for joint in root.findall("joint") for e in joint.findall("parent")}
+    if WORLD in declared or WORLD not in named or not declared:
+        return []
+    root.append(ElementTree.Element("link", {"name": WORLD}))
+    return [f'link "{WORLD}", on which joints hang, is not declared; it is added without inertia']
+
+
+def _colors(root: ElementTree.Element) -> list[str]:
+    bad = []
+    for material in root.iter("material"):
+        for color in material.findall("color"):
+            try:
+                values = [float(x) for x in (color.get("rgba") or "").split()]
+            except ValueError:
+                values = []
+            if len(values) == 3:
+                values.append(1.0)
+                color.set("rgba", " ".join(map(repr, values)))
+            if len(values) != 4 or not all(0.0 <= value <= 1.0 for value in values):
+                material.remove(color)
+                bad.append(str(material.get("name")))
+    return (
+        [f"colors that are not four numbers from 0 to 1 are left out, of materials {listed(bad)}"]
+        if bad
+        else []
+    )
+
+
+def _undefined_materials(root: ElementTree.Element) -> list[str]:
+    """Materials that are named and nowhere defined lose their mention; the shape keeps its own color."""
+    defined = {m.get("name") for m in root.iter("material") if len(m)}
+    lost = []
+    for link in root.findall("link"):
+        for visual in link.findall("visual"):
+            for material in visual.findall("material"):
+                if not len(material) and material.get("name") not in defined:
+                    visual.remove(material)
+                    lost.append(str(material.get("name")))
+    for material in [m for m in root.findall("material") if not len(m)]:
+        root.remove(material)
+    notes = [f"materials that are not defined are left out: {listed(lost)}"] if lost else []
+    named: set[str | None] = set()
+    twice = []
+    for material in root.findall("material"):
+        if material.get("name") in named:
+            root.remove(material)
+            twice.append(str(material.get("name")))
+        named.add(material.get("name"))
+    return notes + ([f"of materials defined twice the first counts: {listed(twice)}"] if twice else [])
+
+
+def _sizeless(shape: ElementTree.Element) -> bool:
+    """Whether a shape has a dimension of zero, or none at all."""
+    geometry = shape.find("geometry")
+    if geometry is None or not len(geometry):
+        return True
+    inner = geometry[0]
+    if inner.tag == "mesh" and inner.get("filename") == "":
+        return True
+    keys = [key for key in SHAPES.get(inner.tag, ()) if key != "scale"]
+    try:
+        sizes = [float(x) for key in keys for x in (inner.get(key) or "nan").split()]
+    except ValueError:
+        return False
+    return 0.0 in sizes and not any(size < 0.0 for size in sizes)
+
+
+def _uniform_scale(shape: ElementTree.Element) -> None:
+    """A scale of one number stands for three."""
+    mesh = shape.find("geometry/mesh")
+    if mesh is not None and len((mesh.get("scale") or "").split()) == 1:
+        mesh.set("scale", " ".join([str(mesh.get("scale"))] * 3))
+
+
+def _inertias(root: ElementTree.Element) -> list[str]:
+    """Principal moments that miss zero by rounding are zero; those that no body has are told."""
+    keys, rounded, unbalanced = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), [], []
+    for link in root.findall("link"):
+        element, mass = link.find("inertial/inertia"), link.find("inertial/mass")
+        if element is None or mass is None:
+            continue
+        try:
+            xx, xy, xz, yy, yz, zz = (float(element.get(key, "nan")) for key in keys)
+            scale = abs(float(mass.get("value", "nan")))
+        except ValueError:
+            continue
+        moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if not np.isfinite(moments).all():
+            continue
+        values, axes = np.linalg.eigh(moments)
+        if -LEAST_INERTIA * max(scale, values[2]) <= values[0] < 0.0:
+            moments = axes @ np.diag(np.maximum(values, 0.0)) @ axes.T
+            for key, value in zip(keys, moments[np.triu_indices(3)], strict=True):
+                element.set(key, repr(float(value)))
+            rounded.append(str(link.get("name")))
+        elif values[0] >= 0.0 and values[2] > (1.0 + UNBALANCED) * (values[0] + values[1]):
+            unbalanced.append(str(link.get("name")))
+    notes = []
+    if rounded:
+        notes.append(f"moments of inertia below zero by rounding are zero, of links {listed(rounded)}")
+    if unbalanced:
+        notes.append(
+            f"inertias that no body has are taken as they are, of links {listed(unbalanced)}: their largest "
+            "principal moment exceeds the sum of the others"
+        )
+    return notes
+
+
+def _limits(root: ElementTree.Element) -> list[str]:
+    """Limits play no part in the motion: what is missing or turned around in them is mended."""
+    mended = []
+    for joint in root.findall("joint"):
+        kind, limit = joint.get("type"), joint.find("limit")
+        if kind in ("revolute", "prismatic") and limit is None:
+            limit = ElementTree.SubElement(joint, "limit", {"effort": "0", "velocity": "0"})
+            mended.append(str(joint.get("name")))
+        if limit is None:
+            continue
+        for key in ("effort", "velocity", "lower", "upper"):
+            if (limit.get(key) or "").strip().lower() in INFINITE:
+                limit.set(key, repr(math.copysign(sys.float_info.max, float(limit.get(key, "0")))))
+                mended.append(str(joint.get("name")))
+        for key in ("effort", "velocity"):
+            if limit.get(key) is None:
+                limit.set(key, "0")
+                mended.append(str(joint.get("name")))
+            elif (limit.get(key) or "").strip().startswith("-"):
+                limit.set(key, (limit.get(key) or "").strip()[1:])
+                mended.append(str(joint.get("name")))
+        try:
+            lower, upper = (float(limit.get(key, "0")) for key in ("lower", "upper"))
+        except ValueError:
+            continue
+        if lower > upper:
+            limit.set("lower", repr(upper))
+            limit.set("upper", repr(lower))
+            mended.append(str(joint.get("name")))
+    if not mended:
+        return []
+    return [
+        f"limits that are none, missing, negative or turned around are mended, of joints {listed(mended)}"
+    ]

@@ -1,0 +1,1 @@
+"""robot.yaml: loops, laws, contacts and initial states of a robot."""

@@ -1,0 +1,173 @@
+"""Where a robot starts: the file's state, what robot.yaml says of it, what the caller of `load` asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pin_nonideal.errors import InputError, LoadingError, UnknownNameError, nearest
+from pin_nonideal.loading.urdf.reader import RobotFile
+from pin_nonideal.states.held import Held
+from pin_nonideal.states.joint_order import order_words, tell_order
+from pin_nonideal.states.parsing import (
+    joint_named,
+    named_configuration,
+    named_coordinates,
+    named_entries,
+    named_velocity,
+    with_unit_lengths,
+)
+from pin_nonideal.types import Model
+from pin_nonideal.validation import array
+
+from .robot import check_keys
+
+Start = Sequence[float] | NDArray[np.float64] | Mapping[str, Any] | str | None
+
+
+def joint_index(model: Model, name: Any, where: str) -> int:
+    """Index of a joint.
+
+    Args:
+        model: pinocchio.Model.
+        name: of the joint.
+        where: words for messages.
+
+    Raises:
+        LoadingError: there is none of that name.
+    """
+    if not isinstance(name, str) or not model.existJointName(name):
+        raise LoadingError(f'{where}: no joint "{name}"{nearest(str(name), list(model.names)[1:])}')
+    return int(model.getJointId(name))
+
+
+def vector(value: Any, size: int, where: str) -> list[float]:
+    """A list of finite numbers.
+
+    Args:
+        value: the candidate.
+        size: how many there must be.
+        where: words for messages.
+
+    Raises:
+        LoadingError: they are others.
+    """
+    try:
+        return [float(x) for x in array(where, value, (size,))]
+    except InputError as error:
+        raise LoadingError(str(error)) from None
+
+
+def initial_state(
+    robot: RobotFile, initial: Any, where: str, notes: list[str]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Initial q and v: the file's own, changed joint by joint by the table.
+
+    Args:
+        robot: what the robot's file holds.
+        initial: the entry of robot.yaml, or None.
+        where: words for messages.
+        notes: receives one where a list is not in the order of the URDF.
+
+    Raises:
+        LoadingError: a joint does not exist, or a value is refused.
+    """
+    model = robot.model
+    q0 = pin.neutral(model) if robot.q0 is None else np.array(robot.q0, dtype=float)
+    v0 = np.zeros(model.nv) if robot.v0 is None else np.array(robot.v0, dtype=float)
+    if initial is None:
+        return q0, v0
+    where = f"{where}: initial"
+    if not isinstance(initial, dict):
+        raise LoadingError(f"{where} must be a table with the keys q, v, reference; got {initial!r}")
+    check_keys(initial, ("q", "v", "reference"), where)
+    for key in ("q", "v"):
+        if not isinstance(initial.get(key) or {}, (list, dict)):
+            raise LoadingError(
+                f"{where}: {key} must be a table by joint name or a full list; got {initial[key]!r}"
+            )
+        words = order_words(model) if isinstance(initial.get(key), list) else None
+        if words is not None:
+            notes.append(f"{where}: {key}: {words}")
+    try:
+        if "reference" in initial:
+            q0 = named_configuration(model, str(initial["reference"]), q0, where)
+        q0 = _written(model, initial.get("q"), q0, f"{where}: q", named_configuration)
+        return q0, _written(model, initial.get("v"), v0, f"{where}: v", named_velocity)
+    except (InputError, UnknownNameError) as error:
+        raise LoadingError(str(error)) from None
+
+
+def _written(model: Model, given: Any, base: NDArray[np.float64], where: str, parse: Any) -> Any:
+    """A state of a file: a table by name, a list, or nothing."""
+    if isinstance(given, list) and parse is named_configuration:
+        return with_unit_lengths(model, np.array(array(where, given, (model.nq,))), where)
+    return parse(model, np.asarray(given) if isinstance(given, list) else given or {}, base, where)
+
+
+def asked_start(
+    robot: RobotFile, q0: NDArray[np.float64], v0: NDArray[np.float64], start: Start, speed: Start
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The state that the caller of `load` asks for, with the velocity of a keyframe.
+
+    Args:
+        robot: what the robot's file holds.
+        q0: configuration so far, (nq,).
+        v0: velocity so far, (nv,).
+        start: configuration that is asked for, or None.
+        speed: velocity that is asked for, or None.
+
+    Raises:
+        InputError, UnknownNameError: it does not fit the model.
+    """
+    if isinstance(start, str) and start in robot.keyframes:
+        keyframe = robot.keyframes[start]
+        keyframe.apply()
+        q0, v0 = np.array(keyframe.q), np.array(keyframe.v)
+    elif start is not None:
+        q0 = _asked(robot.model, start, q0)
+    if speed is not None:
+        v0 = named_velocity(robot.model, speed, v0, "load: v0")
+    return q0, v0
+
+
+def held_start(robot: RobotFile, table: Mapping[str, Any], start: Start, speed: Start) -> Held:
+    """Entries that the caller of `load` names, or else the tables of the file.
+
+    Args:
+        robot: content of the robot's file, its joints as the scene has them.
+        table: content of robot.yaml.
+        start: configuration that is asked for, or None.
+        speed: velocity that is asked for, or None.
+    """
+    model, initial = robot.model, table.get("initial") or {}
+    of_keyframe = isinstance(start, str) and start in robot.keyframes
+
+    def named(asked: Start, key: str) -> Any:
+        given = initial.get(key) if asked is None else asked
+        if asked is None and isinstance(given, dict):  # joints that were fixed have no entries any more
+            given = {name: value for name, value in given.items() if _moves(model, name)}
+        return given
+
+    speeds = None if of_keyframe and speed is None else named(speed, "v")
+    return Held(named_coordinates(model, named(start, "q")), named_entries(model, speeds))
+
+
+def _moves(model: Model, name: Any) -> bool:
+    try:
+        joint_named(model, name, "initial")
+    except UnknownNameError:
+        return False
+    return True
+
+
+def _asked(model: Model, start: Any, q0: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A configuration by name, or in numbers as they were written."""
+    if isinstance(start, (str, Mapping)):
+        return named_configuration(model, start, q0, "load: q0")
+    tell_order(model, start, "load: q0", "nqs")
+    return with_unit_lengths(model, np.array(array("load: q0", start, (model.nq,))), "load: q0")

@@ -1,0 +1,71 @@
+"""YAML files as plain values: nothing in them is executed, and nothing is read as other than it looks."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+from pin_nonideal.errors import LoadingError
+from pin_nonideal.loading.urdf.xml import read_text
+
+
+def plain_yaml(path: Path) -> Any:
+    """What a YAML file holds: tables, lists, texts and numbers that are what they look like.
+
+    Args:
+        path: the file.
+
+    Raises:
+        LoadingError: it is truncated or malformed, or holds tags that name code, anchors, a key twice, or
+            octal or sexagesimal numbers.
+    """
+    import yaml
+
+    try:
+        return yaml.load(read_text(path), Loader=_loader())  # a SafeLoader: plain values only
+    except yaml.YAMLError as error:
+        raise LoadingError(f'"{path}" cannot be read as plain YAML: {_one_line(error)}') from None
+    except RecursionError:
+        raise LoadingError(f'"{path}" is nested too deeply; it must be a flat table') from None
+
+
+def _loader() -> Any:
+    """yaml.SafeLoader that also refuses repeated keys and anchors, and reads 1e-3 as a number."""
+    import yaml
+
+    class Loader(yaml.SafeLoader):
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            event = self.peek_event()  # type: ignore[no-untyped-call]
+            if getattr(event, "anchor", None) is not None:
+                raise yaml.YAMLError(f"anchors and aliases are not read (line {event.start_mark.line + 1})")
+            return super().compose_node(parent, index)
+
+        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+            seen = set()
+            for key, _ in node.value:
+                if not isinstance(key, yaml.ScalarNode):
+                    raise yaml.YAMLError(f"a key must be a word (line {key.start_mark.line + 1})")
+                if key.value in seen:
+                    raise yaml.YAMLError(f'key "{key.value}" appears twice (line {key.start_mark.line + 1})')
+                seen.add(key.value)
+            return super().construct_mapping(node, deep)
+
+        def construct_scalar(self, node: Any) -> Any:
+            surprising = re.fullmatch(
+                r"[-+]?(0[0-7_]+|[0-9][0-9_]*(:[0-5]?[0-9])+(\.[0-9_]*)?)", str(node.value)
+            )
+            if surprising and node.style is None and node.tag.endswith((":int", ":float")):
+                line = node.start_mark.line + 1
+                raise yaml.YAMLError(
+                    f"{node.value} is octal or sexagesimal in YAML (line {line}); write decimals, or a text"
+                )
+            return super().construct_scalar(node)
+
+    number = re.compile(r"^[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$")
+    Loader.add_implicit_resolver("tag:yaml.org,2002:float", number, list("-+.0123456789"))
+    return Loader
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())

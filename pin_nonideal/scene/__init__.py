@@ -1,0 +1,1 @@
+"""Scene: a model with all its descriptions, compiled."""

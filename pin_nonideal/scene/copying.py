@@ -1,0 +1,120 @@
+"""Scenes that travel: to other processes by pickle, and as copies; made again from what they were made of."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from typing import Any
+
+from pin_nonideal.errors import InputError
+from pin_nonideal.states.joint_order import file_order, remember_order
+from pin_nonideal.types import Table
+from pin_nonideal.validation import label
+
+LISTS = ("constraints", "laws", "contacts", "forces")
+
+
+class Packed:
+    """Something that pickle does not take and cloudpickle does, such as a function without a module.
+
+    Args:
+        content: what cloudpickle made of it.
+    """
+
+    def __init__(self, content: bytes) -> None:
+        self.content = content
+
+
+def parts_of(scene: Any) -> Table:
+    """What a scene was made of, as it is now.
+
+    Args:
+        scene: the Scene.
+    """
+    shapes = scene._shape_sources or (scene._visual, scene._collision)
+    made = {
+        key: getattr(scene, key)
+        for key in (*LISTS, "actuation", "name", "source", "licence", "terms", "impact")
+    }
+    made |= {"q0": scene.q0, "v0": scene.v0, "assembly_tolerance": scene._assembly_tolerance}
+    made |= {"visual_model": shapes[0], "collision_model": shapes[1]}
+    later = {"notes": list(scene.notes), "contact_friction": scene.contact_friction}
+    later |= {"_origin": scene._origin, "_shape_sources": scene._shape_sources, "_held": scene._held}
+    return {"model": scene.model, "made": made, "later": later, "order": file_order(scene.model)}
+
+
+def rebuilt(kind: type, parts: Table) -> Any:
+    """The scene made of such parts; equal to the first one bit by bit.
+
+    Args:
+        kind: Scene, or a class derived from it.
+        parts: of `parts_of`, packed or not.
+    """
+    made = {key: _unpacked(value) for key, value in parts["made"].items()}
+    if parts["order"] is not None:
+        remember_order(parts["model"], parts["order"])
+    scene = kind(parts["model"], **made)
+    for key, value in parts["later"].items():
+        setattr(scene, key, value)
+    return scene
+
+
+def copied(scene: Any, memo: dict[int, Any]) -> Any:
+    """A scene of its own, with a model of its own; functions are the same.
+
+    Args:
+        scene: the Scene.
+        memo: of `copy.deepcopy`.
+    """
+    parts = parts_of(scene)
+    shapes = {key: parts["made"].pop(key) for key in ("visual_model", "collision_model")}
+    parts["made"] = copy.deepcopy(parts["made"], memo) | shapes  # meshes are shared, and nobody changes them
+    parts["later"] = copy.deepcopy(parts["later"], memo)
+    return rebuilt(type(scene), parts | {"model": scene.model.copy()})
+
+
+def packed(parts: Table, name: str) -> Table:
+    """The parts with what pickle refuses packed by cloudpickle.
+
+    Args:
+        parts: of `parts_of`.
+        name: of the scene.
+
+    Raises:
+        InputError: something cannot be pickled; names it.
+    """
+    made = dict(parts["made"])
+    for key in (*LISTS, "actuation", "visual_model", "collision_model"):
+        value = made[key]
+        if isinstance(value, tuple):
+            made[key] = tuple(_packed(each, label(each), name) for each in value)
+        else:
+            made[key] = _packed(value, key, name)
+    return {**parts, "made": made}
+
+
+def _packed(value: Any, what: str, scene: str) -> Any:
+    if value is None or isinstance(value, str):
+        return value
+    try:
+        pickle.dumps(value)
+        return value
+    except Exception as error:  # pickle raises whatever the object's own methods raise
+        reason = f"{type(error).__name__}: {error}"
+    advice = "define its functions in a module"
+    try:
+        import cloudpickle
+
+        return Packed(cloudpickle.dumps(value))
+    except ImportError:
+        advice += ", or pip install cloudpickle"
+    except Exception as error:
+        reason = f"{reason}; {type(error).__name__}: {error}"
+        advice += ", and leave out of them what cannot travel"
+    raise InputError(f'scene "{scene}" cannot be pickled: {what} cannot ({reason}); {advice}')
+
+
+def _unpacked(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_unpacked(each) for each in value)
+    return pickle.loads(value.content) if isinstance(value, Packed) else value

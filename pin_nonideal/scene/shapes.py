@@ -1,0 +1,47 @@
+"""Shapes of a scene, made or read when something first asks for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pinocchio as pin
+
+from pin_nonideal.errors import InputError
+from pin_nonideal.types import GeometryModel
+
+
+class Geometry:
+    """Shapes for display and for collisions.
+
+    Attributes:
+        notes: remarks of the loader; grow where shapes that are read at last have some.
+    """
+
+    notes: list[str]
+    _visual: GeometryModel | Callable[[], GeometryModel] | None
+    _collision: GeometryModel | Callable[[], GeometryModel] | None
+
+    @property
+    def visual_model(self) -> GeometryModel | None:
+        """pinocchio.GeometryModel for the replay, or None; meshes of a file are read when first asked for."""
+        self._visual = self._read(self._visual)
+        return self._visual
+
+    @property
+    def collision_model(self) -> GeometryModel | None:
+        """pinocchio.GeometryModel for collisions, or None; meshes are read when first asked for."""
+        self._collision = self._read(self._collision)
+        return self._collision
+
+    def _read(self, shapes: GeometryModel | Callable[[], GeometryModel] | None) -> GeometryModel | None:
+        """The geometry itself, made now where only the means to make it were given."""
+        if not callable(shapes):
+            return shapes
+        geometry = shapes()
+        if not isinstance(geometry, pin.GeometryModel):
+            raise InputError(
+                "Scene: what makes a geometry must return a pinocchio.GeometryModel; "
+                f"got {type(geometry).__name__}"
+            )
+        self.notes += [note for note in getattr(shapes, "notes", ()) if note not in self.notes]
+        return geometry

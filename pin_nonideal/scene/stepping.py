@@ -1,0 +1,238 @@
+"""Steps of a scene for loops of one's own: one at a time from any state, or period by period in one run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pin_nonideal.core_loader import core
+from pin_nonideal.errors import InputError
+from pin_nonideal.types import Array, State
+from pin_nonideal.validation import array, choice, nonnegative, number, positive
+
+if TYPE_CHECKING:
+    from pin_nonideal.compilation.compiled_scene import CompiledScene
+
+# The core's own methods, and those of them that take steps of a fixed length.
+STEPPING = tuple(method.name for method in core.methods() if not method.outside)
+FIXED = tuple(method.name for method in core.methods() if not method.outside and not method.adaptive)
+RTOL, ATOL = 1e-8, 1e-10
+# Steps fit into a period if their number is whole but for so much.
+WHOLE = 1e-9
+
+
+class Stepper:
+    """A run that a controller takes period by period: it goes on where the last period ended.
+
+    Made by `Scene.stepper`.  Between two periods torques may change; steps, modes of dry friction and factors
+    are kept, so that a period costs its own steps and nothing beside them.
+
+    Args:
+        run: of the core.
+        compiled: what the core knows of the scene.
+    """
+
+    def __init__(self, run: core.SteppedRun, compiled: CompiledScene) -> None:
+        self._run, self._compiled = run, compiled
+
+    def __repr__(self) -> str:
+        at = f"at t = {self.t:g} s" if self._run.begun else "stopped"
+        return f"<Stepper {at}>"
+
+    @property
+    def t(self) -> float:
+        """Time now [s]."""
+        self._require_begun()
+        return self._run.t
+
+    @property
+    def q(self) -> Array:
+        """Configuration now, (nq,), a copy."""
+        self._require_begun()
+        return self._run.state()[0]
+
+    @property
+    def v(self) -> Array:
+        """Velocity now, (nv,), a copy."""
+        self._require_begun()
+        return self._run.state()[1]
+
+    @property
+    def modes(self) -> Array:
+        """Mode of each frictional element now: +1 or -1 slips, 0 sticks, 2 where its contact is open."""
+        return np.array([int(mode) for mode in self._run.modes], dtype=np.int8)
+
+    def step(self, tau: ArrayLike | None = None) -> tuple[Array, Array]:
+        """Goes on for a period.
+
+        Args:
+            tau: joint torques in place of the scene's actuation from here on, (nv,) [N m or N]; None leaves
+                them as they are.
+
+        Returns:
+            q (nq,) and v (nv,) at its end.
+
+        Raises:
+            InputError: tau does not fit, or the run has stopped.
+            RunError: the run stops here; `reset` begins anew.
+        """
+        self._require_begun()
+        self._guarded(self._run.advance, tau)
+        return self._run.state()
+
+    def reset(self, q: Array, v: Array, t: float = 0.0, tau: ArrayLike | None = None) -> None:
+        """Begins anew; nothing is left of what was before.
+
+        Args:
+            q: configuration on the constraints, (nq,), as `Scene.project` gives it.
+            v: velocity on them, (nv,).
+            t: time [s].
+            tau: joint torques in place of the scene's actuation, (nv,), or None.
+
+        Raises:
+            InputError: an argument does not fit.
+            RunError: there is no motion from there.
+        """
+        model = self._compiled.model
+        at, speed = array("Stepper: q", q, (model.nq,)), array("Stepper: v", v, (model.nv,))
+        time = number("Stepper: t", t)
+        self._compiled.check_functions(at, speed, time)
+        self._guarded(lambda torque: self._run.begin(at, speed, time, torque), tau)
+
+    def _guarded(self, act: Callable[[Any], None], tau: ArrayLike | None) -> None:
+        try:
+            act(tau)
+        except (TypeError, ValueError):
+            torque = None if tau is None else array("Stepper: tau", tau, (self._compiled.model.nv,))
+            try:
+                act(None if torque is None else np.ascontiguousarray(torque))
+            except ValueError as error:
+                raise InputError(f"Stepper: {error}") from None
+            except core.CoreFailure as failure:
+                raise self._compiled.named(failure) from None
+        except core.CoreFailure as failure:
+            raise self._compiled.named(failure) from None
+
+    def _require_begun(self) -> None:
+        if not self._run.begun:
+            raise InputError("Stepper: the run has stopped; begin anew with reset(q, v)")
+
+
+class Steps:
+    """What a Scene does for loops of one's own."""
+
+    if TYPE_CHECKING:
+        _compiled: CompiledScene
+        _steps: dict[tuple[str, float], core.SteppedRun]
+        _call: Callable[..., Any]
+        _require_unchanged: Callable[[], None]
+        _checked_at: Callable[[State, State, float], None]
+        project: Callable[..., Any]
+
+    def step(
+        self,
+        q: State,
+        v: State,
+        tau: ArrayLike | None,
+        dt: float,
+        *,
+        t: float = 0.0,
+        method: str = "semi_implicit_euler",
+    ) -> tuple[Array, Array]:
+        """One step of a method from any state, for controllers and learning loops.
+
+        It is what `simulate(scene, dt, q, v, method=method, dt=dt)` ends with, events of friction and
+        contacts inside the step included.
+
+        Args:
+            q: configuration on the constraints, (nq,) or by joint name.
+            v: velocity on them, (nv,) or by joint name.
+            tau: joint torques, (nv,) [N m or N]; those of the scene's actuation when None.
+            dt: length of the step [s].
+            t: time at its start [s].
+            method: one of the core's with a fixed step: "semi_implicit_euler", "rk4" or "moreau".
+
+        Returns:
+            q (nq,) and v (nv,) at its end.
+
+        Raises:
+            InputError: an argument does not fit.
+            RunError: the run stops inside the step.
+        """
+        self._require_unchanged()
+        known = isinstance(dt, float) and isinstance(method, str)
+        run = self._steps.get((method, dt)) if known else None
+        if run is None:
+            choice("step: method", method, FIXED)
+            length = positive("step: dt", dt)
+            run = self._steps[method, length] = self._new_run(method, length, length, RTOL, ATOL)
+        if self._compiled.unchecked:
+            self._checked_at(q, v, t)
+        try:  # arrays of the right shape go straight to the core, which checks sizes, lengths and finiteness
+            return run.step(q, v, t, tau)
+        except (TypeError, ValueError, core.CoreFailure):
+            return self._call(run.step, q, v, t, tau)  # type: ignore[no-any-return]
+
+    def stepper(
+        self,
+        period: float,
+        q: State | None = None,
+        v: State | None = None,
+        *,
+        t0: float = 0.0,
+        tau: ArrayLike | None = None,
+        method: str = "semi_implicit_euler",
+        dt: float | None = None,
+        rtol: float | None = None,
+        atol: float | None = None,
+    ) -> Stepper:
+        """A run that is taken period by period, with torques of one's own, and keeps its state between them.
+
+        Args:
+            period: length of time of each call of `Stepper.step` [s].
+            q: initial configuration, (nq,) or by joint name, put onto the constraints; the scene's when None.
+            v: initial velocity, (nv,) or by joint name; the scene's when None.
+            t0: initial time [s].
+            tau: joint torques in place of the scene's actuation from the start on, (nv,), or None.
+            method: one of the core's: adaptive, or with a fixed step.
+            dt: step of methods with a fixed step [s], a whole number of them in the period; the period when
+                None.
+            rtol: relative tolerance of adaptive methods, 1e-8 when None.
+            atol: absolute tolerance, 1e-10 when None.
+
+        Returns:
+            The Stepper, at its initial state.
+
+        Raises:
+            InputError: an argument does not fit.
+            RunError: there is no motion from there.
+        """
+        choice("stepper: method", method, STEPPING)
+        length = positive("stepper: period", period)
+        if dt is not None and method not in FIXED:
+            raise InputError(f'stepper: method "{method}" chooses its own steps; leave dt out')
+        size = length if dt is None else positive("stepper: dt", dt)
+        if (
+            not length / size >= 1.0 - WHOLE
+            or abs(length / size - round(length / size)) > WHOLE * length / size
+        ):
+            raise InputError(
+                f"stepper: period must be a whole number of steps; got {length:g} s and dt = {size:g} s"
+            )
+        tolerances = (
+            RTOL if rtol is None else positive("stepper: rtol", rtol),
+            ATOL if atol is None else nonnegative("stepper: atol", atol),
+        )
+        made = Stepper(self._new_run(method, length, size, *tolerances), self._compiled)
+        begin = number("stepper: t0", t0)
+        at, speed = self.project(q, v, begin)
+        made.reset(at, speed, begin, tau)
+        return made
+
+    def _new_run(self, method: str, period: float, dt: float, rtol: float, atol: float) -> core.SteppedRun:
+        program = self._compiled.program
+        tolerance = np.full(2 * self._compiled.model.nv + program.states, atol)
+        return core.SteppedRun(program, method, period, dt, rtol, tolerance)

@@ -1,0 +1,226 @@
+"""Checkpoint: a run between two steps in one file, from which it goes on bit by bit.
+
+The file is a NumPy archive without pickles: a header in JSON, and the core's state as bytes with their
+digest.  Reading it executes nothing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pin_nonideal.atomic_files import file_path, whole_file
+from pin_nonideal.compilation.lowering import lower
+from pin_nonideal.compilation.resolver import Resolution
+from pin_nonideal.core_loader import core
+from pin_nonideal.errors import InputError, LoadingError, OutputError
+from pin_nonideal.scene.scene import Scene
+from pin_nonideal.trajectory.file import UNREADABLE
+from pin_nonideal.types import Table
+from pin_nonideal.validation import nonnegative
+from pin_nonideal.version import __version__
+
+from .options import RunOptions
+
+FORMAT = 2
+# Longer than any run [s].
+FOREVER = 1e8
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A run between two steps.
+
+    Attributes:
+        scene: name of the scene.
+        origin: name and parameters that `load` makes the scene from, or None.
+        fingerprint: of the scene, see `fingerprint`.
+        options: of the run, as `simulate` checked them.
+        interval: wall time between checkpoints [s].
+        wall_s: wall time so far [s].
+        notes: on the start of the run.
+        state: of the core.
+    """
+
+    scene: str
+    origin: Table | None
+    fingerprint: str
+    options: RunOptions
+    interval: float
+    wall_s: float
+    notes: list[str]
+    state: bytes
+
+
+class Saver:
+    """Writes the checkpoints of one run.
+
+    Args:
+        path: the file.
+        scene: what runs.
+        options: of the run.
+        interval: wall time between checkpoints [s].
+        wall_s: wall time that earlier parts of the run took [s].
+        notes: notes on the start of the run.
+
+    Attributes:
+        interval: see above, bounded.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        scene: Scene,
+        options: RunOptions,
+        interval: float,
+        wall_s: float = 0.0,
+        notes: Sequence[str] = (),
+    ) -> None:
+        self._path = file_path("simulate: checkpoint", path)
+        self._wall = wall_s - time.perf_counter()
+        self._written = False
+        self.interval = min(nonnegative("simulate: checkpoint_interval", interval), FOREVER)
+        self._header = {
+            "format": FORMAT,
+            "version": _version(),
+            "scene": scene.name,
+            "origin": scene._origin,
+            "fingerprint": fingerprint(scene),
+            "options": {**vars(options), "atol": options.atol.tolist()},
+            "interval": self.interval,
+            "notes": list(notes),
+        }
+
+    def __call__(self, state: bytes) -> None:
+        """Replaces the file; a run that has a checkpoint goes on when a later one cannot be written.
+
+        Raises:
+            OutputError: the first one cannot be written.
+        """
+        wall = self._wall + time.perf_counter()
+        header = {**self._header, "wall_s": wall, "digest": hashlib.sha256(state).hexdigest()}
+        arrays: Table = {
+            "header": np.array(json.dumps(header)),
+            "state": np.frombuffer(state, dtype=np.uint8),
+        }
+        try:
+            with whole_file(self._path, "the checkpoint") as file:
+                np.savez(file, **arrays)
+        except OutputError as error:
+            if not self._written:
+                raise
+            warnings.warn(
+                f"{error}; the run goes on, the last checkpoint stays", RuntimeWarning, stacklevel=2
+            )
+        self._written = True
+
+
+def read_checkpoint(path: Path) -> Checkpoint:
+    """Reads a file that a run with `checkpoint` wrote.
+
+    Args:
+        path: the file.
+
+    Raises:
+        LoadingError: it is missing, damaged, no checkpoint, or of another version of this package.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            header, state = json.loads(str(file["header"])), bytes(file["state"])
+        if header["format"] != FORMAT or header["version"] != _version():
+            raise LoadingError(
+                f'"{path}" was written by another version of pin_nonideal; finish the run with that version, '
+                "or start it again"
+            )
+        if hashlib.sha256(state).hexdigest() != header["digest"]:
+            raise LoadingError(f'"{path}" is damaged: its state is not the one that was written')
+        held = header["options"]
+        return Checkpoint(
+            scene=header["scene"],
+            origin=header["origin"],
+            fingerprint=header["fingerprint"],
+            options=RunOptions(**{**held, "atol": np.array(held["atol"], dtype=float)}),
+            interval=float(header["interval"]),
+            wall_s=float(header["wall_s"]),
+            notes=[str(note) for note in header["notes"]],
+            state=state,
+        )
+    except LoadingError:
+        raise
+    except UNREADABLE as error:
+        raise LoadingError(
+            f'cannot read a checkpoint from "{path}": {type(error).__name__}: {error}; '
+            "it must be a file that simulate(..., checkpoint=path) wrote"
+        ) from error
+
+
+def _version() -> list[str]:
+    """Of the package and of what its core keeps of a run: another one steps differently in the last bits."""
+    return [__version__, core.state_layout]
+
+
+def fingerprint(scene: Scene) -> str:
+    """Digest of all that the core knows of a scene: the model, and every row, law and force in numbers.
+
+    Functions of the user count as functions, whatever they compute.
+
+    Args:
+        scene: the scene.
+    """
+    digest = hashlib.sha256((scene.model.saveToString() + scene.terms).encode())
+    transcript: Any = _Transcript(core.Builder(scene.model), digest)
+    lower(scene._compiled.said, transcript, Resolution(scene.model, scene.q0))
+    return digest.hexdigest()
+
+
+class _Transcript:
+    """The core's builder, with a digest of what it is told."""
+
+    def __init__(self, builder: core.Builder, digest: Any) -> None:
+        self._builder, self._digest = builder, digest
+
+    def __getattr__(self, name: str) -> Any:
+        method = getattr(self._builder, name)
+        if not callable(method):
+            return method
+
+        def told(*arguments: Any, **named: Any) -> Any:
+            said = [name, _plain(arguments), {key: _plain(value) for key, value in named.items()}]
+            self._digest.update(json.dumps(said).encode())
+            return method(*arguments, **named)
+
+        return told
+
+
+def _plain(x: Any) -> Any:
+    """Numbers, names and functions as JSON knows them."""
+    if isinstance(x, (list, tuple, np.ndarray)):
+        return [_plain(each) for each in x]
+    if isinstance(x, np.generic):
+        return x.item()
+    if isinstance(x, Enum):
+        return x.name
+    return "a function" if callable(x) else x
+
+
+def refuse_other_scene(held: Checkpoint, scene: Scene, path: Path) -> None:
+    """Raises unless the scene is the one that the run was of.
+
+    Raises:
+        InputError: its model, rows, laws or forces differ.
+    """
+    if fingerprint(scene) != held.fingerprint:
+        raise InputError(
+            f'resume: the scene must be the one that "{path}" was written with ("{held.scene}"); '
+            f'"{scene.name}" differs from it in its model, constraints, laws, contacts, forces or actuation'
+        )

@@ -1,0 +1,179 @@
+"""Mechanisms of one scene that share nothing, neither joint, row nor load.
+
+They are found once a scene; each is a scene of its own, whose run is that of it alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pin_nonideal.description.actuation import HoldPosition
+from pin_nonideal.description.constraints import (
+    Distance,
+    FrameAnchor,
+    HingeAnchor,
+    JointCoupling,
+    KnifeEdge,
+    PointAnchor,
+    PrescribedMotion,
+)
+from pin_nonideal.description.forces import JointSpring, SpringDamper, Wrench
+from pin_nonideal.description.laws import Drag, JointFriction, SigmoidFriction
+from pin_nonideal.scene.scene import Scene
+from pin_nonideal.types import Model
+
+Indices = NDArray[np.intp]
+# What acts on the bodies that it names and on no other.
+LOCAL = (
+    *(PointAnchor, FrameAnchor, HingeAnchor, Distance, JointCoupling, PrescribedMotion, KnifeEdge),
+    *(JointFriction, SigmoidFriction, Drag, SpringDamper, JointSpring, Wrench),
+)
+PLACES = ("frame", "frame1", "frame2", "joint", "joint1", "joint2")
+
+
+@dataclass(frozen=True, eq=False)
+class Component:
+    """A mechanism of a scene that shares nothing with the others.
+
+    Attributes:
+        scene: it alone.
+        q: where its configuration stands in that of the whole, (nq,).
+        v: its velocity, (nv,).
+        elements: its frictional elements, (ne,).
+        works: its columns of work.
+    """
+
+    scene: Scene
+    q: Indices
+    v: Indices
+    elements: Indices
+    works: Indices
+
+
+def components(scene: Scene) -> list[Component]:
+    """The mechanisms of a scene, where there are several and dry friction makes events; none otherwise.
+
+    Args:
+        scene: the whole.
+    """
+    found: list[Component] | None = scene.__dict__.get("_components")
+    if found is None:
+        found = scene.__dict__["_components"] = _components(scene)
+    return found
+
+
+def _components(scene: Scene) -> list[Component]:
+    model, program = scene.model, scene._compiled.program
+    held = scene.actuation
+    by_position = isinstance(held, HoldPosition) and np.ndim(held.kp) == 0 and np.ndim(held.kd) == 0
+    said = [*scene.constraints, *scene.laws, *scene.forces]
+    whole = (
+        not scene.element_names
+        or program.states
+        or scene.contacts
+        or not (held is None or by_position)
+        or any(type(one) not in LOCAL for one in said)
+        or sum(parent == 0 for parent in list(model.parents)[1:]) < 2
+    )
+    if whole:
+        return []
+    tree = _trees(model)
+    anchors = dict(zip(scene.constraint_slices, scene.constraints, strict=False))
+    touched = [_touched(one, model, tree, anchors) for one in said]
+    group = {root: root for root in tree[1:]}
+    for roots in touched:
+        joined = {group[root] for root in roots}
+        group = {root: min(joined) if of in joined else of for root, of in group.items()}
+    if len(set(group.values())) < 2 or not all(touched):
+        return []
+    own = [group[min(roots)] for roots in touched]
+    return [
+        _component(scene, said, own, [group.get(root) for root in tree], of)
+        for of in sorted(set(group.values()))
+    ]
+
+
+def _trees(model: Model) -> list[int]:
+    """The joint at the root of each joint's tree."""
+    tree = [0]
+    for joint, parent in enumerate(list(model.parents)[1:], 1):
+        tree.append(tree[parent] if parent else joint)
+    return tree
+
+
+def _touched(one: Any, model: Model, tree: Sequence[int], anchors: dict[str, Any]) -> set[int]:
+    """Roots of the trees that a description acts on."""
+    roots: set[int] = set()
+    for place in (f.name for f in fields(one) if f.name in PLACES):
+        name = getattr(one, place)
+        if name is None:
+            continue
+        if place.startswith("joint") and model.existJointName(name):
+            roots.add(tree[model.getJointId(name)])
+        elif model.existFrame(name):
+            roots.add(tree[model.frames[model.getFrameId(name)].parentJoint])
+        elif is_dataclass(anchors.get(name)):
+            roots |= _touched(anchors[name], model, tree, {})
+    return roots - {0}
+
+
+def _component(
+    scene: Scene, said: Sequence[Any], own: Sequence[int], group: Sequence[int | None], of: int
+) -> Component:
+    joints = [joint for joint, each in enumerate(group) if each == of]
+    model, q, v = _alone(scene.model, joints)
+    mine = [one for one, each in zip(said, own, strict=True) if each == of]
+    held = scene.actuation
+    if isinstance(held, HoldPosition) and held.q is not None:
+        held = replace(held, q=np.asarray(held.q)[q])
+    alone = Scene(
+        model,
+        constraints=[one for one in mine if any(one is each for each in scene.constraints)],
+        laws=[one for one in mine if any(one is each for each in scene.laws)],
+        forces=[one for one in mine if any(one is each for each in scene.forces)],
+        actuation=held,
+        q0=scene.q0[q],
+        v0=scene.v0[v],
+        name=scene.name,
+        terms=scene.terms,
+        assembly_tolerance=scene._assembly_tolerance,
+    )
+    elements = [scene.element_names.index(name) for name in alone.element_names]
+    powers = scene._compiled.program.power_names
+    works = [powers.index(name) for name in alone._compiled.program.power_names]
+    return Component(alone, q, v, np.array(elements, dtype=np.intp), np.array(works, dtype=np.intp))
+
+
+def _alone(model: Model, joints: Sequence[int]) -> tuple[Model, Indices, Indices]:
+    """Some trees of a model as a model, and where its coordinates stand in the whole."""
+    alone, number = pin.Model(), {0: 0}
+    alone.name, alone.gravity = model.name, model.gravity
+    q: list[int] = []
+    v: list[int] = []
+    for joint in joints:
+        kind = model.joints[joint]
+        at_q, at_v = slice(kind.idx_q, kind.idx_q + kind.nq), slice(kind.idx_v, kind.idx_v + kind.nv)
+        number[joint] = alone.addJoint(
+            number[model.parents[joint]], kind, model.jointPlacements[joint], model.names[joint]
+        )
+        alone.appendBodyToJoint(number[joint], model.inertias[joint], pin.SE3.Identity())
+        mine = alone.joints[number[joint]]
+        to_q, to_v = slice(mine.idx_q, mine.idx_q + mine.nq), slice(mine.idx_v, mine.idx_v + mine.nv)
+        for name in ("lowerPositionLimit", "upperPositionLimit"):
+            getattr(alone, name)[to_q] = getattr(model, name)[at_q]
+        for name in ("armature", "rotorInertia", "rotorGearRatio", "damping", "friction"):
+            if hasattr(model, name):
+                getattr(alone, name)[to_v] = getattr(model, name)[at_v]
+        q.extend(range(at_q.start, at_q.stop))
+        v.extend(range(at_v.start, at_v.stop))
+    for frame in list(model.frames)[1:]:
+        if frame.parentJoint in number and not alone.existFrame(frame.name, frame.type):
+            joint = number[frame.parentJoint]
+            alone.addFrame(pin.Frame(frame.name, joint, 0, frame.placement, frame.type), False)
+    return alone, np.array(q, dtype=np.intp), np.array(v, dtype=np.intp)

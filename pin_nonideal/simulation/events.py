@@ -1,0 +1,143 @@
+"""What a user asks of a run while it goes: events by functions, and a callback between steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pin_nonideal.compilation.callbacks import checked, named, numbers_of
+from pin_nonideal.errors import InputError
+from pin_nonideal.types import Array
+from pin_nonideal.validation import count
+
+from .options import RunOptions
+
+Watched = tuple[Callable[..., float], int, int]  # function, direction, how many end the run
+SEPARATE = "separate"
+SAME_TIME = 1e-12  # part of a time, or number of seconds, below which two are one
+
+
+class Asked(NamedTuple):
+    """Events that a user asks for.
+
+    Attributes:
+        watched: as the core takes them.
+        names: of the functions.
+        separate: whether events are no samples of the trajectory.
+    """
+
+    watched: list[Watched]
+    names: tuple[str, ...]
+    separate: bool
+
+
+NOTHING = Asked([], (), False)
+
+
+def asked_events(events: object) -> Asked:
+    """Functions whose zeros are events, and whether events stay out of the samples.
+
+    Args:
+        events: None, "separate", a function (t, q, v) -> number, or a list of these.
+
+    Raises:
+        InputError: something else is there, or `terminal` or `direction` of a function is none.
+    """
+    if events is None:
+        return NOTHING
+    listed = list(events) if isinstance(events, (list, tuple)) else [events]
+    functions = [each for each in listed if not (isinstance(each, str) and each == SEPARATE)]
+    names: list[str] = []
+    watched: list[Watched] = []
+    for f in functions:
+        if not callable(f):
+            raise InputError(
+                f'simulate: events must be functions (t, q, v) -> number, or "{SEPARATE}"; got {f!r}'
+            )
+        name = base = str(getattr(f, "__name__", type(f).__name__))
+        number = 1
+        while name in names:
+            number += 1
+            name = f"{base} #{number}"
+        names.append(name)
+        who = f'event "{name}"'
+        watched.append((_valued(f, who), _direction(f, who), _terminal(f, who)))
+    return Asked(watched, tuple(names), len(functions) < len(listed))
+
+
+def _valued(f: Callable[..., Any], who: str) -> Callable[..., float]:
+    call = checked(f, who, ())
+    return lambda t, q, v: float(call(t, q, v))
+
+
+def _direction(f: Callable[..., Any], who: str) -> int:
+    """Sign of the attribute `direction`, as solve_ivp has it."""
+    given = getattr(f, "direction", 0)
+    if isinstance(given, bool) or not isinstance(given, (int, float, np.number)) or not np.isfinite(given):
+        raise InputError(f"{who}: direction must be a number, of which the sign counts; got {given!r}")
+    return int(np.sign(given))
+
+
+def _terminal(f: Callable[..., Any], who: str) -> int:
+    """The attribute `terminal`, as solve_ivp has it: whether it ends the run, or how many of them do."""
+    given = getattr(f, "terminal", False)
+    if given is None or isinstance(given, (bool, np.bool_)):
+        return int(bool(given))
+    return count(f"{who}: terminal", given)
+
+
+def asked_callback(callback: object, nv: int) -> Callable[[float, Array, Array], Any] | None:
+    """The callback between steps, with its result checked.
+
+    Args:
+        callback: None, or a function (t, q, v) -> None, True to stop, or torques (nv,).
+        nv: number of velocities.
+
+    Raises:
+        InputError: it cannot be called.
+    """
+    if callback is None:
+        return None
+    if not callable(callback):
+        raise InputError(f"simulate: callback must be a function (t, q, v); got {callback!r}")
+    ask = named(callback, "callback")
+
+    def call(t: float, q: Array, v: Array) -> Any:
+        answer = ask(t, q, v)
+        if answer is None or isinstance(answer, (bool, np.bool_)):
+            return True if answer else None
+        return numbers_of(answer, (nv,), "callback")
+
+    return call
+
+
+def grid_of(t: Array, options: RunOptions) -> NDArray[np.bool_]:
+    """Which samples lie on the asked grid, both ends among it; of several at one time the last.
+
+    Args:
+        t: times [s], (nt,).
+        options: of the run.
+
+    Returns:
+        Mask, (nt,).
+    """
+    if options.output_dt == 0.0 or not len(t):
+        return np.ones(len(t), dtype=bool)
+    near = SAME_TIME * np.maximum(1.0, np.abs(t))
+    on = np.abs(t - exact_grid(t, options)) <= near
+    return np.asarray(on & ~np.append(np.diff(t) <= near[1:], False))
+
+
+def exact_grid(t: Array, options: RunOptions) -> Array:
+    """The times of the asked grid nearest to those of samples, (nt,).
+
+    Args:
+        t: times [s], (nt,).
+        options: of the run.
+    """
+    nearest = options.t0 + options.output_dt * np.round((t - options.t0) / options.output_dt)
+    end = options.t0 + options.duration
+    return np.where(np.abs(t - end) < np.abs(t - nearest), end, nearest)

@@ -1,0 +1,170 @@
+"""The outcome of a scene put together from those of its components, each of which took its own steps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from pin_nonideal.core_loader import core
+from pin_nonideal.scene.scene import Scene
+from pin_nonideal.trajectory.dense_output import DenseOutput, dense_output, inside_steps
+from pin_nonideal.types import Array
+
+from .components import Component
+from .options import RunOptions
+
+COUNTERS = ("steps", "rejected", "evaluations", "factorizations", "projections", "iterations", "limited")
+Motion = tuple[Array, Array, Array, Array, Array]  # states, modes, directions, sought, moved
+
+
+class JoinedEvent(NamedTuple):
+    """An event of one component, by the numbers of the whole."""
+
+    time: float
+    kind: core.EventKind
+    element: int
+    of_contact: bool = False
+
+
+def joined_outcome(
+    scene: Scene,
+    parts: Sequence[Component],
+    outcomes: Sequence[core.Outcome],
+    options: RunOptions,
+    stopped: BaseException | None = None,
+) -> core.Outcome:
+    """The outcome of the whole, with samples on the asked grid and at all events.
+
+    Without a grid they are at the steps of the component that takes most.
+
+    Args:
+        scene: the whole.
+        parts: its components.
+        outcomes: of each, with interpolants.
+        options: of the run.
+        stopped: what stopped it, or None.
+    """
+    dense = [
+        dense_output(one, options, part.v.size, part.elements.size)
+        for one, part in zip(outcomes, parts, strict=True)
+    ]
+    events = sorted(
+        (
+            JoinedEvent(event.time, event.kind, int(part.elements[event.element]))
+            for one, part in zip(outcomes, parts, strict=True)
+            for event in one.events
+        ),
+        key=lambda event: event.time,
+    )
+    if options.output_dt:
+        times = [one.t for one in outcomes]
+    else:
+        times = [
+            max((one.t for one in outcomes), key=len, default=np.zeros(0)),
+            np.array([e.time for e in events]),
+        ]
+    t = np.unique(np.concatenate(times or [np.zeros(0)]))
+    motion = _motion(scene, parts, dense, t)
+    joined = SimpleNamespace(**_samples(scene, options, t, *motion))
+    for name in COUNTERS:
+        setattr(joined, name, sum(getattr(one, name) for one in outcomes))
+    joined.rounding = max((one.rounding for one in outcomes), default=0.0)
+    joined.events, joined.stopped = events, stopped
+    if options.dense:
+        _join_dense(scene, parts, dense, joined)
+    return cast(core.Outcome, joined)
+
+
+def _motion(scene: Scene, parts: Sequence[Component], dense: Sequence[DenseOutput], t: Array) -> Motion:
+    """States of the whole at some times, with the modes, directions of slip and moved energy there.
+
+    Directions have no columns if every element slips along one direction.
+    """
+    nq, nv, ne = scene.model.nq, scene.model.nv, len(scene.element_names)
+    work = dense[0].states.shape[2] - parts[0].q.size - parts[0].v.size if dense else 0
+    columns = len(scene._compiled.program.power_names) if work else 0
+    # A row for each coordinate, in which times stand one after the other, as each component fills them.
+    states, moved = np.zeros((nq + nv + columns, t.size)), np.zeros(t.size)
+    modes, sought = np.zeros((2, ne, t.size), dtype=np.int8)
+    turns = any(one.directions.shape[2] for one in dense)
+    directions = np.zeros((ne if turns else 0, 3, t.size))
+    for part, one in zip(parts, dense, strict=True):
+        step = np.searchsorted(one.times[:, 0], t, side="right") - 1
+        np.minimum(np.maximum(step, 0, out=step), len(one) - 1, out=step)
+        begin, end = one.times[step].T
+        at = (t - begin) / (end - begin)
+        own = inside_steps(one.states, step, at).T
+        first, last = part.q.size, part.q.size + part.v.size
+        states[part.q], states[nq + part.v] = own[:first], own[first:last]
+        if columns:
+            states[nq + nv + part.works] += own[last:]
+        modes[part.elements] = one.modes[step].T
+        sought[part.elements] = one.sought[step].T
+        if one.directions.shape[2]:
+            own = inside_steps(one.directions, step, at).reshape(t.size, -1, 3)
+            directions[part.elements] = own.transpose(1, 2, 0)
+        before = np.concatenate([[0.0], one.moved])[step]
+        moved += before + at * (one.moved[step] - before)
+    return states.T, modes.T, directions.reshape(-1, t.size).T, sought.T, moved
+
+
+def _samples(
+    scene: Scene,
+    options: RunOptions,
+    t: Array,
+    states: Array,
+    modes: Array,
+    directions: Array,
+    sought: Array,
+    moved: Array,
+) -> dict[str, Any]:
+    """The samples as the core has them: evaluated where more than the state of a tree is asked for."""
+    program, (nq, nv) = scene._compiled.program, (scene.model.nq, scene.model.nv)
+    asked = (
+        options.a,
+        options.tau,
+        options.forces,
+        options.laws,
+        options.reactions,
+        options.power,
+        options.energy,
+    )
+    evaluated = any(asked) or program.rows or nq != nv
+    k, none = t.size if evaluated else 0, np.zeros((0, nv))
+    y, held, turns, found = (
+        np.ascontiguousarray(x[:k], dtype=float) for x in (states, modes, directions, sought)
+    )
+    inside = core.sample_inside(program, options, t[:k], y, held, turns, found, none, moved[:k])
+    samples = {name: getattr(inside, name) for name in dir(core.Outcome) if not name.startswith("_")}
+    if evaluated:
+        return samples
+    return samples | {
+        "t": t,
+        "q": np.ascontiguousarray(states[:, :nq]).ravel(),
+        "v": np.ascontiguousarray(states[:, nq : nq + nv]).ravel(),
+        "violation": np.zeros(t.size),
+        "violation_rate": np.zeros(t.size),
+        "modes": modes.ravel(),
+    }
+
+
+def _join_dense(
+    scene: Scene, parts: Sequence[Component], dense: Sequence[DenseOutput], joined: SimpleNamespace
+) -> None:
+    """Interpolants between all steps of all components: the polynomials of each, on shorter stretches."""
+    ends = np.unique(np.concatenate([one.times.ravel() for one in dense]))
+    points = dense[0].states.shape[1]
+    part = 0.5 * (1.0 - np.cos(np.pi * np.arange(points) / (points - 1)))
+    stretches = np.stack([ends[:-1], ends[1:]], axis=1)
+    # Inside, so that the ends of a stretch belong to it.
+    inside = np.clip(part, 1e-9, 1.0 - 1e-9)
+    t = (stretches[:, :1] + inside * np.diff(stretches, axis=1)).ravel()
+    states, modes, directions, sought, _ = _motion(scene, parts, dense, t)
+    joined.dense_times, joined.dense_states = stretches.ravel(), states.ravel()
+    joined.dense_modes = modes[::points].ravel()
+    joined.dense_directions, joined.dense_sought = directions.ravel(), sought[::points].ravel()
+    joined.dense_torque = np.zeros(0)
+    joined.dense_moved = _motion(scene, parts, dense, ends[1:])[4]

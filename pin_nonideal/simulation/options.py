@@ -1,0 +1,285 @@
+"""What a run was asked for: method, tolerances, lengths of time and records, checked before it starts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.actuation import SampledControl, asked_by
+from pin_nonideal.errors import InputError
+from pin_nonideal.scene.scene import SEVERAL, Scene
+from pin_nonideal.types import Array
+from pin_nonideal.validation import array, choice, count, flag, label, nonnegative, number, positive, sequence
+
+# Whether each chooses its own steps.
+METHODS = {method.name: method.adaptive for method in core.methods()}
+# Those of SciPy, and of them those that go on from a state that was put in place.
+SCIPY = tuple(method.name for method in core.methods() if method.outside)
+ONE_STEP = tuple(method.name for method in core.methods() if method.outside and method.one_step)
+RECORDS = ("a", "forces", "energy", "power", "laws", "reactions", "tau", "dense")
+FIELDS = {"F_ideal": "forces", "F_nonideal": "forces", "lam": "forces", "lam_ideal": "forces"}
+DEFAULT_RTOL, DEFAULT_ATOL = 1e-8, 1e-10
+# Times are floating-point numbers: a step of fewer of their spacings is off by more than a percent, and one
+# shorter than a spacing leads nowhere.
+LEAST_SPACINGS = 100.0
+NO_LIMIT = 2**62  # of steps
+MOST_KEPT = 32  # options that a scene keeps
+MOST_SAMPLES = 1e8  # some gigabytes for a small robot
+# No step meets a tolerance below rounding; the square of what misses it must not overflow.
+LEAST_RTOL, LEAST_ATOL = 1e-14, 1e-100
+
+
+@dataclass(frozen=True, eq=False)
+class RunOptions:
+    """What a run was asked for, as the core reads it and a checkpoint holds it.
+
+    Attributes:
+        method: of integration.
+        duration: length of time [s].
+        t0: initial time [s].
+        rtol: relative tolerance.
+        atol: absolute tolerances of positions, velocities and states of laws, (2 nv + nz,).
+        dt: step of the fixed-step methods [s], or 0.
+        output_dt: time between samples [s], or 0 for every accepted step.
+        max_steps: most accepted steps, or 0 for as many as it takes, and fewer of a stiff scene.
+        a: whether accelerations are recorded.
+        forces: whether forces and multipliers are.
+        energy: whether the ledger is.
+        power: whether powers are.
+        laws: whether the forces of each law are, and limits of friction.
+        reactions: whether the wrenches that joints and anchors carry are.
+        tau: whether torques of the actuation are.
+        dense: whether interpolants of the steps are.
+        max_wall: wall time that the run may take [s], or 0 for as much as it takes.
+        event_names: of the user's functions whose zeros are events.
+        separate: whether samples lie on the asked grid only.
+        several: "error" or "continue" where the laws allow several motions.
+        strict: whether an impact that gains energy is an error.
+    """
+
+    method: str
+    duration: float
+    t0: float
+    rtol: float
+    atol: Array
+    dt: float
+    output_dt: float
+    max_steps: int
+    a: bool
+    forces: bool
+    energy: bool
+    power: bool
+    laws: bool
+    reactions: bool
+    tau: bool
+    dense: bool
+    max_wall: float
+    event_names: tuple[str, ...]
+    separate: bool
+    several: str
+    strict: bool
+
+
+def run_options(
+    scene: Scene,
+    duration: float,
+    t0: float,
+    method: str,
+    rtol: float | None,
+    atol: ArrayLike | None,
+    dt: float | None,
+    output_dt: float | None,
+    max_steps: float | None,
+    record: str | Sequence[str],
+    several: str,
+    max_wall: float | None = None,
+    event_names: tuple[str, ...] = (),
+    separate: bool = False,
+    strict: bool = False,
+) -> RunOptions:
+    """Options of a run, checked.
+
+    Args:
+        scene: what to simulate.
+        duration: length of time [s].
+        t0: initial time [s].
+        method: of integration.
+        rtol: relative tolerance, or None.
+        atol: absolute tolerance, a number or an array (2 nv,), or None.
+        dt: step of the fixed-step methods [s], or None.
+        output_dt: time between samples [s], or None.
+        max_steps: most accepted steps, infinite too, or None.
+        record: names of what to record.
+        several: "error" or "continue".
+        max_wall: most wall time [s], infinite too, or None.
+        event_names: of the user's functions whose zeros are events.
+        separate: whether samples lie on the asked grid only.
+        strict: whether an impact that gains energy is an error.
+
+    Raises:
+        InputError: one is wrong, or they do not go together.
+    """
+    choice("simulate: method", method, tuple(METHODS))
+    if not METHODS[method]:
+        if dt is None:
+            raise InputError(f'simulate: method "{method}" needs a step dt')
+        unused = [name for name, value in (("rtol", rtol), ("atol", atol)) if value is not None]
+        if unused:
+            raise InputError(
+                f'simulate: method "{method}" takes steps of the length dt; leave {" and ".join(unused)} out'
+            )
+    elif dt is not None:
+        raise InputError(f'simulate: method "{method}" chooses its own steps; leave dt out, or set output_dt')
+    if opening := scene._compiled.opening_names:
+        _check_opening(method, record, opening[0])
+    nv = scene.model.nv
+    if nv == 0:
+        raise InputError(f'simulate: "{scene.name}" has no joint that moves; there is nothing to simulate')
+    tolerance = np.full(2 * nv + scene._compiled.program.states, DEFAULT_ATOL)
+    if atol is not None:
+        if np.asarray(atol, dtype=object).ndim == 0:
+            tolerance[:] = nonnegative("simulate: atol", atol)
+        else:
+            tolerance[: 2 * nv] = array("simulate: atol", atol, (2 * nv,))
+            tolerance[2 * nv :] = tolerance[: 2 * nv].min()
+            if (tolerance < 0.0).any():
+                raise InputError(f"simulate: atol must not be negative; got {tolerance.min():g}")
+    relative = DEFAULT_RTOL if rtol is None else nonnegative("simulate: rtol", rtol)
+    if relative == 0.0 and not (tolerance > 0.0).all():
+        raise InputError("simulate: rtol and atol must not both be zero; set one of them")
+    begin, length = number("simulate: t0", t0), positive("simulate: duration", duration)
+    steps = {"dt": dt, "output_dt": output_dt}
+    lengths = {key: positive(f"simulate: {key}", value) for key, value in steps.items() if value is not None}
+    if separate and output_dt is None:
+        raise InputError(
+            'simulate: events="separate" needs an output_dt: without one, every step is a sample'
+        )
+    _check_clock(scene, begin, length, lengths)
+    wanted = {record} if isinstance(record, str) else set(sequence("simulate: record", record))
+    groups = set()
+    for name in wanted:
+        groups.add(FIELDS.get(name, name))
+        choice("simulate: record", FIELDS.get(name, name), RECORDS)
+    return RunOptions(
+        method=method,
+        duration=length,
+        t0=begin,
+        rtol=max(relative, LEAST_RTOL) if relative else 0.0,
+        atol=np.ascontiguousarray(np.maximum(tolerance, LEAST_ATOL)),
+        dt=lengths.get("dt", 0.0),
+        output_dt=lengths.get("output_dt", 0.0),
+        max_steps=_most_steps(max_steps),
+        a="a" in groups,
+        forces="forces" in groups,
+        energy="energy" in groups,
+        power="power" in groups,
+        laws="laws" in groups or "forces" in groups,
+        reactions="reactions" in groups,
+        tau="tau" in groups or "forces" in groups,
+        several=choice("simulate: several", several, SEVERAL),
+        dense="dense" in groups,
+        max_wall=0.0 if max_wall in (None, np.inf) else positive("simulate: max_wall", max_wall),
+        event_names=event_names,
+        separate=separate,
+        strict=flag("simulate: strict", strict),
+    )
+
+
+def kept_options(scene: Scene, *asked: Any) -> RunOptions:
+    """The same as `run_options`, checked once: controllers ask for the same run again and again.
+
+    Args:
+        scene: what to simulate, which keeps them.
+        *asked: the other arguments of `run_options`, in order.
+    """
+    kept: dict[Any, RunOptions] = scene.__dict__.setdefault("_kept_options", {})
+    key = (asked, tuple(map(type, asked)))  # True is no 1.0
+    try:
+        if key in kept:
+            return kept[key]
+    except TypeError:  # lists and arrays, which may change
+        return run_options(scene, *asked)
+    if len(kept) >= MOST_KEPT:
+        kept.clear()
+    kept[key] = options = run_options(scene, *asked)
+    return options
+
+
+def _check_opening(method: str, record: str | Sequence[str], name: str) -> None:
+    """Refuses methods and records that know no contacts that open.
+
+    Raises:
+        InputError: it is one.
+    """
+    if "dense" in ((record,) if isinstance(record, str) else record):
+        raise InputError(
+            f'simulate: record "dense" knows no contacts that open, and "{name}" may open; leave it out, or '
+            "keep the contact closed with unilateral=False"
+        )
+    known = [m for m in METHODS if m not in SCIPY]
+    if method not in known:
+        raise InputError(
+            f'simulate: method "{method}" cannot open and close contacts, and "{name}" may open; use one of '
+            f"{', '.join(known)}, with max_steps where one of them calls the scene stiff, or keep it closed "
+            "with unilateral=False"
+        )
+
+
+def _most_steps(max_steps: float | None) -> int:
+    """A number of steps as the core reads it; infinity is one that no run reaches.
+
+    Args:
+        max_steps: a whole number of at least 1, infinity, or None.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if max_steps is None:
+        return 0
+    if isinstance(max_steps, float) and max_steps == np.inf:
+        return NO_LIMIT
+    whole = isinstance(max_steps, float) and max_steps.is_integer()
+    return count("simulate: max_steps", int(max_steps) if whole else max_steps, least=1, most=NO_LIMIT)
+
+
+def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, float]) -> None:
+    """Refuses lengths of time that floating-point times near the end of the run cannot tell apart.
+
+    Args:
+        scene: what to simulate.
+        t0: initial time [s].
+        duration: length of time [s].
+        lengths: dt and output_dt, as far as given [s].
+
+    Raises:
+        InputError: a length is too short, or leaves more samples than a run can hold.
+    """
+    end = max(abs(t0), abs(t0 + duration))
+    spacing = float(np.spacing(end))
+    named = {f"simulate: {key}": value for key, value in {"duration": duration, **lengths}.items()}
+    control = asked_by(scene.actuation)
+    if isinstance(control, SampledControl):
+        named[f"{label(control)}: period"] = control.period
+    for what, value in named.items():
+        if not value >= LEAST_SPACINGS * spacing:  # also when the end is beyond all numbers
+            raise InputError(
+                f"{what} must be at least {LEAST_SPACINGS:g} times the spacing of floating-point times, "
+                f"which is {spacing:.2g} s at t = {end:g} s; got {value:g} s"
+            )
+    key = next((key for key in ("output_dt", "dt") if key in lengths), None)
+    if key is not None and duration / lengths[key] > MOST_SAMPLES:
+        raise InputError(
+            f"simulate: {key} must leave at most {MOST_SAMPLES:g} samples; {lengths[key]:g} s leaves "
+            f"{duration / lengths[key]:.2g}; set a longer {'output_dt' if key == 'dt' else key}"
+        )
+    if isinstance(control, SampledControl) and duration / control.period > MOST_SAMPLES:
+        raise InputError(
+            f"{label(control)}: period must leave at most {MOST_SAMPLES:g} calls in a run; "
+            f"{control.period:g} s leaves {duration / control.period:.2g}; "
+            "set a longer period"
+        )

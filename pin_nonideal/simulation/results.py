@@ -1,0 +1,140 @@
+"""What the core hands over as a Trajectory; what stopped the run as an exception that holds it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from pin_nonideal.compilation.error_context import opened
+from pin_nonideal.core_loader import core
+from pin_nonideal.errors import (
+    LoopClosureError,
+    NonFiniteError,
+    OutputError,
+    RunError,
+    RunInterrupted,
+    UserFunctionError,
+)
+from pin_nonideal.scene.scene import Scene
+from pin_nonideal.states.rows import gap_rows, rows_at
+from pin_nonideal.trajectory.dense_output import dense_output
+from pin_nonideal.trajectory.outcome import outcome_fields, outcome_stats
+from pin_nonideal.trajectory.records import UserEventRecord
+from pin_nonideal.trajectory.trajectory import Trajectory, with_defaults
+from pin_nonideal.types import Table
+
+from .events import exact_grid, grid_of
+from .options import RunOptions
+
+# A sample with a larger gap than this [m or rad] has left the constraints: after every step projection comes
+# down to rounding, and in singular positions to the square root of it.
+LEFT = 1e-6
+KEPT = "the trajectory up to there is in error.trajectory"
+
+
+def finish(
+    scene: Scene,
+    outcome: core.Outcome,
+    stopped: BaseException | None,
+    options: RunOptions,
+    wall: float,
+    notes: Sequence[str] = (),
+) -> Trajectory:
+    """The trajectory of a run; raises what stopped it, with the trajectory attached.
+
+    Args:
+        scene: the scene that ran.
+        outcome: of the core.
+        stopped: a failure of the core, what a function of the user raised, an interrupt, or None.
+        options: what was asked for.
+        wall: wall time [s].
+        notes: what to know of it.
+
+    Raises:
+        RunError: the run stopped early.
+        OutputError: its first checkpoint could not be written.
+    """
+    fields = partial(_fields, scene, outcome, options, list(notes))
+    stats = outcome_stats(outcome, wall)
+
+    def shaped() -> Trajectory:
+        return Trajectory(**fields(), stats=stats)
+
+    # A time step may enter a contact, which the next one finds; a loop that opens ends the steps by itself.
+    enters = options.method == "moreau" and bool(scene._compiled.opening_names)
+    if (
+        not enters
+        and outcome.largest_violation > LEFT
+        and (stopped is None or isinstance(stopped, core.CoreFailure))
+    ):
+        raise _opened(scene, shaped())
+    if stopped is None:
+        return Trajectory.later(fields, stats=stats)
+    if isinstance(stopped, OutputError):
+        raise stopped
+    trajectory = shaped()
+    last = float(trajectory.t[-1]) if len(trajectory) else options.t0
+    cause: BaseException | None = None
+    if isinstance(stopped, core.CoreFailure):
+        error = scene._compiled.named(stopped)
+        error.args = (f"{error}{_fixed_step_hint(error, options)}; {KEPT}", *error.args[1:])
+    elif isinstance(stopped, KeyboardInterrupt):
+        error = RunInterrupted(f"the run was interrupted at t = {last:.4g} s; {KEPT}", time=last)
+    elif isinstance(stopped, RunError):
+        error, cause = stopped, stopped.__cause__
+    else:
+        error = UserFunctionError(f"a function of the scene failed at t = {last:.4g} s: {stopped}", time=last)
+        cause = stopped
+    error.time = last if error.time is None else error.time
+    error.trajectory = _stopped(trajectory, error)
+    raise error from cause
+
+
+def _fields(scene: Scene, outcome: core.Outcome, options: RunOptions, notes: list[str]) -> Table:
+    """All fields of the trajectory but its counters; without its events, where they are to be kept apart."""
+    fields = outcome_fields(scene, outcome, options)
+    t, q, v = fields["t"], fields["q"], fields["v"]
+    grid = grid_of(t, options)
+    for name in options.event_names:
+        times = [e.time for e in fields["events"] if e.kind == "user" and e.element == name]
+        at = np.searchsorted(t, times) if times else np.zeros(0, dtype=int)
+        fields.setdefault("user_events", []).append(UserEventRecord(name, np.array(times), q[at], v[at]))
+    if options.dense:
+        fields["dense"] = dense_output(outcome, options, scene.model.nv, len(scene.element_names))
+    made = with_defaults({**fields, "grid": grid, "notes": notes})
+    if not options.separate:
+        return made
+    run = Trajectory(**made).samples(grid)
+    run.t[:] = exact_grid(run.t, options)
+    return {name: value for name, value in vars(run).items() if name != "stats"}
+
+
+def _opened(scene: Scene, trajectory: Trajectory) -> LoopClosureError:
+    """A run has left its constraints, as it must when a drive pulls a loop apart; with the samples before."""
+    k = int((trajectory.violation > LEFT).argmax())
+    t = float(trajectory.t[k])
+    runner = scene._compiled.program.runner()
+    residual = rows_at(runner, trajectory.q[k], trajectory.v[k], t)[2]
+    left = np.where(gap_rows(scene._compiled.program), np.maximum(-residual, 0.0), np.abs(residual))
+    gaps = {key: float(left[rows].max()) for key, rows in scene.constraint_slices.items()}
+    stopped = opened(max(gaps, key=lambda key: gaps[key]), gaps, t, f"; {KEPT}")
+    stopped.trajectory = _stopped(trajectory.first(k), stopped)
+    return stopped
+
+
+def _fixed_step_hint(error: RunError, options: RunOptions) -> str:
+    """Words on a run by fixed steps that has overflowed; none for other failures."""
+    if not (isinstance(error, NonFiniteError) and options.dt > 0.0):
+        return ""
+    return (
+        f": where steps of dt = {options.dt:g} s are too long for the stiffest force the motion overflows; "
+        'take a shorter dt, or method="dop853", with max_steps where it calls the scene stiff'
+    )
+
+
+def _stopped(trajectory: Trajectory, error: RunError) -> Trajectory:
+    """A trajectory that tells what stopped it."""
+    return replace(trajectory, failure=str(error).removesuffix(f"; {KEPT}"))

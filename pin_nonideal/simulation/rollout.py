@@ -1,0 +1,209 @@
+"""rollout: many runs of one scene in native threads."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pin_nonideal.compilation.parameter_overrides import RunNumbers, run_numbers
+from pin_nonideal.core_loader import core
+from pin_nonideal.errors import InputError, PinNonidealError, RunError, RunInterrupted
+from pin_nonideal.scene.scene import Scene
+from pin_nonideal.states.joint_layout import require_resolved
+from pin_nonideal.types import Array
+from pin_nonideal.validation import array, choice, count
+
+from .decoupled import roll_apart, stepped_apart
+from .options import SCIPY, RunOptions, run_options
+from .results import finish
+from .rollout_arrays import RunArrays, run_arrays
+
+
+def rollout(
+    scene: Scene,
+    q: ArrayLike | None,
+    v: ArrayLike | None,
+    duration: float,
+    *,
+    parameters: Mapping[str, Any] | None = None,
+    t0: float = 0.0,
+    method: str = "dop853",
+    rtol: float | None = None,
+    atol: ArrayLike | None = None,
+    dt: float | None = None,
+    output_dt: float | None = None,
+    max_steps: float | None = None,
+    record: str | Sequence[str] = (),
+    several: str = "error",
+    threads: int = 1,
+    failures: str = "raise",
+    as_arrays: bool = False,
+) -> Any:
+    """Runs many initial states in native threads; each result is bitwise that of its own `simulate`.
+
+    With `parameters` every run has numbers of its own, and is bitwise that of a scene with these:
+
+        pn.rollout(scene, None, None, 1.0, parameters={
+            "elbow": {"mu": [0.1, 0.2, 0.3]},              # fields of the law, contact or force of that name
+            "forearm_joint": {"mass": [1.0, 1.5, 2.0]},    # the body that hangs on a joint
+            "actuation": {"kp": [50.0, 80.0, 90.0]},       # fields of HoldPosition, or torques (n, nv)
+        })
+
+    They are the numbers of laws (coefficients, radii, ratios), of contacts (mu, restitution, resistances), of
+    forces (stiffness, damping, lengths) and of the actuation (kp, kd, q); "mass" [kg] of a body, whose
+    inertia goes with it, or all its "inertia", (n, 10), as `pinocchio.Inertia.FromDynamicParameters` has it;
+    and "gravity", (n, 3) [m/s^2].  What shapes the scene (frames, lengths and ratios of constraints, radii of
+    contacts, functions, a friction that begins or ceases to be) takes a scene for each: `sweep`.
+    `run.scene` is the one given.
+
+    Args:
+        scene: what to simulate.
+        q: initial configurations, (n, nq); the scene's own for every run when None.
+        v: initial velocities, (n, nv); the scene's own when None.
+        duration: length of time [s].
+        parameters: numbers of each run, by name and field, (n,) or (n, ...); see above.
+        t0: initial time [s].
+        method: one of the core's methods (not SciPy's).
+        rtol: relative tolerance.
+        atol: absolute tolerance, a number or an array (2 nv,).
+        dt: step of the fixed-step methods [s].
+        output_dt: time between samples [s]; every accepted step when None.
+        max_steps: as in `simulate`.
+        record: as in `simulate`; "dense" goes without parameters only.
+        several: "error" or "continue", as in `simulate`.
+        threads: number of native threads.
+        failures: "raise" raises what stopped the first run that failed, when all are through; "keep" returns
+            the errors in the places of their runs.
+        as_arrays: returns states as arrays by run and sample, a `RunArrays`, with no object for each run:
+            for many short runs.  Nothing else is recorded.
+
+    Returns:
+        One Trajectory a state, or with failures="keep" the error that stopped it; or the RunArrays.
+
+    Raises:
+        InputError, UnknownNameError: an argument does not fit.
+        RunError: a run stopped early: the first one that did; `index` tells which, `trajectory` has its
+            samples, and `results` holds the trajectories and errors of all runs.
+        RunInterrupted: Ctrl-C, which ends all runs; the same.
+    """
+    if not isinstance(scene, Scene):
+        raise InputError(f"rollout: scene must be a Scene; got {type(scene).__name__}")
+    threads = count("rollout: threads", threads, least=1)
+    keep = choice("rollout: failures", failures, ("raise", "keep")) == "keep"
+    starts_q, starts_v = _starts(scene, q, v, parameters)
+    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, max_steps, record, several)
+    if method in SCIPY:
+        raise InputError(f'rollout: method must be one of the core\'s; "{method}" runs in SciPy')
+    if parameters and options.dense:
+        raise InputError('rollout: record "dense" goes without parameters; take output_dt for more samples')
+    numbers = run_numbers(scene._compiled, parameters or {}, len(starts_q))
+    if choice("rollout: as_arrays", as_arrays, (True, False)):
+        return _arrays(scene, starts_q, starts_v, numbers, options, threads, keep, record)
+    results = _run(scene, starts_q, starts_v, numbers, options, threads)
+    failed = [each for each in results if isinstance(each, PinNonidealError)]
+    interrupted = [each for each in failed if isinstance(each, RunInterrupted)]
+    if interrupted or (failed and not keep):
+        error = (interrupted or failed)[0]
+        if isinstance(error, RunError):
+            error.results = results
+        raise error
+    return results
+
+
+def _starts(scene: Scene, q: Any, v: Any, parameters: Any) -> tuple[Array, Array]:
+    """States of all runs: as given, or the scene's own as often as there are runs."""
+    if parameters is not None and not isinstance(parameters, Mapping):
+        raise InputError(f"rollout: parameters must be values by name; got {parameters!r}")
+    starts_q = None if q is None else array("rollout: q", q, (None, scene.model.nq), copy=False)
+    starts_v = None if v is None else array("rollout: v", v, (None, scene.model.nv), copy=False)
+    given: list[Any] = [each for each in (starts_q, starts_v) if each is not None]
+    for values in (parameters or {}).values():
+        given += [*values.values()] if isinstance(values, Mapping) else [values]
+    counts = [len(each) for each in given if isinstance(each, (list, tuple)) or np.ndim(each) > 0]
+    if not counts:
+        raise InputError("rollout needs states or parameters of its runs: rollout(scene, q, v, duration)")
+    if starts_q is None:
+        starts_q = np.tile(scene.initial_state()[0], (counts[0], 1))
+    if starts_v is None:
+        starts_v = np.tile(scene.initial_state()[1], (counts[0], 1))
+    if len(starts_q) != len(starts_v):
+        raise InputError(f"rollout: q and v must have as many rows; got {len(starts_q)} and {len(starts_v)}")
+    return starts_q, starts_v
+
+
+def _arrays(
+    scene: Scene,
+    q: Array,
+    v: Array,
+    numbers: RunNumbers,
+    options: RunOptions,
+    threads: int,
+    keep: bool,
+    record: str | Sequence[str],
+) -> RunArrays:
+    """The runs as arrays."""
+    if len(record):
+        raise InputError("rollout: as_arrays records states alone; leave record out, or as_arrays")
+    if scene._unit_parts:
+        q = np.array([scene._configuration(one, "q") for one in q]).reshape(q.shape)
+    require_resolved(scene.model, q)
+    if len(q):
+        scene._compiled.check_functions(q[0], v[0], options.t0)
+    on, v_on, opened = scene._compiled.projection.nearest_of_each(q, v, options.t0, threads, numbers)
+    for i, failure in opened.items():
+        error = scene._compiled.named(failure) if isinstance(failure, core.CoreFailure) else failure
+        if isinstance(error, RunError):
+            error.index = i
+        raise error
+    made = run_arrays(scene, np.ascontiguousarray(on), np.ascontiguousarray(v_on), numbers, options, threads)
+    for i, error in made.failures.items():
+        if isinstance(error, RunError):
+            error.index = i
+    if made.failures and not keep:
+        error = made.failures[min(made.failures)]
+        if isinstance(error, RunError):
+            error.results = [made]
+        raise error
+    return made
+
+
+def _run(
+    scene: Scene, q: Array, v: Array, numbers: RunNumbers, options: RunOptions, threads: int
+) -> list[Any]:
+    """A Trajectory of each run, or what stopped it."""
+    begin = time.perf_counter()
+    compiled = scene._compiled
+    if scene._unit_parts:
+        q = np.array([scene._configuration(one, "q") for one in q]).reshape(q.shape)
+    require_resolved(scene.model, q)
+    if len(q):
+        compiled.check_functions(q[0], v[0], options.t0)
+    on, v_on, open_starts = compiled.projection.nearest_of_each(q, v, options.t0, threads, numbers)
+    results: list[Any] = [None] * len(q)
+    for i, failure in open_starts.items():
+        results[i] = compiled.named(failure) if isinstance(failure, core.CoreFailure) else failure
+    going = [i for i in range(len(q)) if i not in open_starts]
+    rows = slice(None) if len(going) == len(q) else going
+    started = np.ascontiguousarray(on[rows]), np.ascontiguousarray(v_on[rows])
+    values = np.ascontiguousarray(numbers.values[rows])
+    if not numbers.names and (parts := stepped_apart(scene, options)):
+        outcomes = roll_apart(scene, parts, *started, options, threads)
+    else:
+        outcomes = core.rollout(compiled.program, *started, options, threads, numbers.names, values)
+    wall = time.perf_counter() - begin
+    for i, outcome in zip(going, outcomes, strict=True):
+        if outcome is None:  # not begun when an interrupt ended all
+            continue
+        try:
+            moved = scene._moved(q[i], on[i]) + scene._followed(v[i], v_on[i])
+            results[i] = finish(scene, outcome, outcome.stopped, options, wall, moved)
+        except PinNonidealError as error:
+            results[i] = error
+    for i, result in enumerate(results):
+        if isinstance(result, RunError):
+            result.index = i
+    return results

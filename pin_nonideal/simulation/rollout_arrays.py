@@ -1,0 +1,132 @@
+"""Samples of many runs as arrays, without an object for each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pin_nonideal.compilation.parameter_overrides import RunNumbers
+from pin_nonideal.core_loader import core
+from pin_nonideal.errors import LoopClosureError, PinNonidealError, RunInterrupted, UserFunctionError
+from pin_nonideal.scene.scene import Scene
+from pin_nonideal.types import Array
+
+from .decoupled import roll_apart, stepped_apart
+from .options import RunOptions
+from .results import LEFT
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RunArrays:
+    """Samples of many runs, by run and sample; what `rollout(..., as_arrays=True)` returns.
+
+    Attributes:
+        t: times [s], (n, nt); not a number beyond the last sample of a run that has fewer than others.
+        q: configurations, (n, nt, nq), likewise.
+        v: velocities, (n, nt, nv), likewise.
+        samples: how many samples each run has, (n,).
+        violation: largest |residual| of each run [m or rad], (n,).
+        steps: accepted steps of each run, (n,).
+        failures: what stopped runs before their end, by index.
+        scene: the scene that ran.
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    samples: NDArray[np.int64]
+    violation: Array
+    steps: NDArray[np.int64]
+    failures: dict[int, PinNonidealError] = field(default_factory=dict)
+    scene: Scene | None = None
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        most, failed = self.t.shape[1], len(self.failures)
+        return f"<RunArrays: {len(self)} runs of up to {most} samples, {failed} failed>"
+
+    @property
+    def last(self) -> tuple[Array, Array]:
+        """Configurations (n, nq) and velocities (n, nv) of each run's last sample, if it has one."""
+        runs, at = np.arange(len(self)), np.maximum(self.samples - 1, 0)
+        none = self.samples == 0
+        q, v = self.q[runs, at], self.v[runs, at]
+        q[none], v[none] = np.nan, np.nan
+        return q, v
+
+
+def run_arrays(
+    scene: Scene, q0: Array, v0: Array, numbers: RunNumbers, options: RunOptions, threads: int
+) -> RunArrays:
+    """Runs from states that lie on the constraints.
+
+    Args:
+        scene: what to simulate.
+        q0: initial configurations, (n, nq).
+        v0: initial velocities, (n, nv).
+        numbers: of the runs that differ.
+        options: of all runs.
+        threads: number of native threads.
+    """
+    n, compiled = len(q0), scene._compiled
+    parts = [] if numbers.names else stepped_apart(scene, options)
+    if parts:
+        outcomes = [one for one in roll_apart(scene, parts, q0, v0, options, threads) if one is not None]
+        return _of_outcomes(scene, outcomes)
+    numbers_of_runs = np.ascontiguousarray(numbers.values)
+    t, q, v, samples, violation, steps, stopped = core.rollout_arrays(
+        compiled.program, q0, v0, options, threads, numbers.names, numbers_of_runs
+    )
+    most = t.size // n if n else 0
+    made = RunArrays(
+        t.reshape(n, most),
+        q.reshape(n, most, -1) if n * most else np.zeros((n, most, q0.shape[1])),
+        v.reshape(n, most, -1) if n * most else np.zeros((n, most, v0.shape[1])),
+        samples.astype(np.int64),
+        violation,
+        steps.astype(np.int64),
+        scene=scene,
+    )
+    made.failures.update(_failures(scene, dict(stopped), violation))
+    return made
+
+
+def _of_outcomes(scene: Scene, outcomes: Sequence[core.Outcome]) -> RunArrays:
+    """The same of runs whose mechanisms took their own steps."""
+    n, (nq, nv) = len(outcomes), (scene.model.nq, scene.model.nv)
+    samples = np.array([len(one.t) for one in outcomes], dtype=np.int64)
+    most = int(samples.max(initial=0))
+    t, q, v = np.full((n, most), np.nan), np.full((n, most, nq), np.nan), np.full((n, most, nv), np.nan)
+    for i, one in enumerate(outcomes):
+        t[i, : samples[i]] = one.t
+        q[i, : samples[i]] = one.q.reshape(-1, nq)
+        v[i, : samples[i]] = one.v.reshape(-1, nv)
+    violation = np.array([one.largest_violation for one in outcomes])
+    steps = np.array([one.steps for one in outcomes], dtype=np.int64)
+    stopped = {i: one.stopped for i, one in enumerate(outcomes) if one.stopped is not None}
+    return RunArrays(t, q, v, samples, violation, steps, _failures(scene, stopped, violation), scene)
+
+
+def _failures(
+    scene: Scene, stopped: dict[int, BaseException], violation: Array
+) -> dict[int, PinNonidealError]:
+    """Errors by name of what stopped runs, and of runs that have left their constraints."""
+    failures: dict[int, PinNonidealError] = {}
+    for i, cause in stopped.items():
+        if isinstance(cause, core.CoreFailure):
+            failures[i] = scene._compiled.named(cause)
+        elif isinstance(cause, PinNonidealError):
+            failures[i] = cause
+        elif isinstance(cause, KeyboardInterrupt):
+            failures[i] = RunInterrupted("the runs were interrupted")
+        else:
+            failures[i] = UserFunctionError(f"a function of the scene failed: {cause}")
+    for i in map(int, np.flatnonzero(violation > LEFT)):
+        gap = f"gap {violation[i]:.1e} (m or rad)"
+        failures.setdefault(i, LoopClosureError(f"run {i} has left its constraints: {gap}", gaps={}))
+    return failures

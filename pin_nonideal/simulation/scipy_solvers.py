@@ -1,0 +1,165 @@
+"""SciPy's implicit methods on the core's right-hand side, for stiff scenes.
+
+The state is y = (q, v, states of laws, work of the ledger's columns), with q in ambient coordinates:
+quaternions and (cos, sin) pairs are plain numbers, and the right-hand side is smooth off unit length as well.
+The core follows the steps: modes of dry friction are held over each, events inside it are located by the
+method's own interpolant, and the integrator starts again behind them.  Radau, a one-step method, goes on from
+the projected state after every step; BDF and LSODA remember earlier steps, so that only their samples are
+projected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
+import numpy as np
+
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.actuation import SampledControl, asked_by
+from pin_nonideal.errors import InputError, RunError, StepSizeError
+from pin_nonideal.scene.scene import Scene
+from pin_nonideal.types import Array
+
+from .events import Watched
+from .options import ONE_STEP, RunOptions
+
+Tick = Callable[[float], None]  # with the time
+
+# SciPy refuses, or cannot reach, tolerances below this.
+LEAST_RTOL = 1e-13
+# Work is integrated along and takes no part in the choice of steps.
+FREE = 1e100
+
+
+class _Run:
+    """One run: what SciPy asks of it, step by step."""
+
+    def __init__(
+        self, scene: Scene, options: RunOptions, tick: Tick | None, events: Sequence[Watched]
+    ) -> None:
+        self.model, self.options = scene.model, options
+        self.core = core.FollowedRun(scene._compiled.program, options, tick, list(events))
+        self.failure: core.CoreFailure | None = None
+
+    def rate(self, t: float, y: Array) -> Array:
+        """dy/dt; not a number where a trial state has none, so that a shorter step is tried."""
+        try:
+            return self.core.derivative(t, np.ascontiguousarray(y))
+        except core.CoreFailure as failure:
+            if self.options.method == "LSODA":  # which does not look
+                raise
+            self.failure = failure
+            return np.full(y.shape, np.nan)
+
+    def jacobian(self, t: float, y: Array) -> Array:
+        """d(dy/dt)/dy; SciPy's own differences grow with a coordinate that has turned many times."""
+        return self.core.jacobian(t, np.ascontiguousarray(y))
+
+    def tolerance(self, size: int) -> Array:
+        """Absolute tolerance in ambient coordinates: a quaternion takes the smallest of its joint's."""
+        given, model = self.options.atol, self.model
+        positions = np.empty(model.nq)
+        for joint in list(model.joints)[1:]:
+            own = given[joint.idx_v : joint.idx_v + joint.nv]
+            same = joint.nq == joint.nv
+            positions[joint.idx_q : joint.idx_q + joint.nq] = own if same else own.min(initial=np.inf)
+        known = np.concatenate([positions, given[model.nv :]])
+        return np.concatenate([known, np.full(size - known.size, FREE)])
+
+    def smooth_stretch(self, method: Any, t_end: float) -> None:
+        """To the next event or break of a function of time, or to the end."""
+        self._require_regular_start()
+        y = self.core.y
+        tolerance = {"rtol": max(self.options.rtol, LEAST_RTOL), "atol": self.tolerance(y.size)}
+        stop = self.core.stop_before(t_end)
+        solver = method(self.rate, self.core.t, y, stop, jac=self.jacobian, **tolerance)
+        while solver.status == "running":
+            self.failure = None
+            self._step(solver)
+            if self.core.stop_before(solver.t) < solver.t:  # inside the step, which is taken again
+                return
+            if self.core.follow(solver.t, solver.dense_output()):
+                return
+            if self.options.method in ONE_STEP and not np.array_equal(solver.y, self.core.y):
+                solver.y, solver.f = self.core.y, self.core.rate
+
+    def _require_regular_start(self) -> None:
+        """Refuses an onset of slip whose direction relaxes faster than any of these methods' steps.
+
+        Raises:
+            StepSizeError: slip in several directions begins so.
+        """
+        element = self.core.singular_onset
+        if element is None:
+            return
+        raise StepSizeError(
+            f'{self.options.method} cannot go on at t = {self.core.t:.6g} s: "{element}" begins to slip in '
+            "several directions with hardly any acceleration, where its direction relaxes faster than any "
+            'step; use method="dop853", which solves for the direction of an onset, or a larger '
+            "static_ratio; the trajectory up to there is in error.trajectory",
+            time=self.core.t,
+        )
+
+    def _step(self, solver: Any) -> None:
+        message = solver.step()
+        if solver.status != "failed":
+            return
+        if self.failure is not None:
+            raise self.failure
+        raise StepSizeError(
+            f"{self.options.method} cannot go on at t = {solver.t:.6g} s ({message}): the motion is "
+            "singular there; look at the last samples, or loosen rtol and atol; the trajectory up to "
+            "there is in error.trajectory",
+            time=float(solver.t),
+        )
+
+
+def _one_blas_thread() -> AbstractContextManager[Any]:
+    """Factors of small matrices cost many times more on several threads, which wait for each other."""
+    try:
+        from threadpoolctl import threadpool_limits
+    except ImportError:  # the same results, later
+        return nullcontext()
+    limits: AbstractContextManager[Any] = threadpool_limits(limits=1, user_api="blas")
+    return limits
+
+
+def simulate_stiff(
+    scene: Scene,
+    q0: Array,
+    v0: Array,
+    options: RunOptions,
+    tick: Tick | None,
+    events: Sequence[Watched] = (),
+) -> tuple[core.Outcome, BaseException | None]:
+    """Runs one of SciPy's implicit methods.
+
+    Args:
+        scene: what to simulate.
+        q0: initial configuration on the constraints, (nq,).
+        v0: initial velocity on the constraints, (nv,).
+        options: as checked by `simulate`.
+        tick: called with the time now and then.
+        events: functions of the user whose zeros are events.
+
+    Returns:
+        What the core recorded of it, and what stopped the run.
+
+    Raises:
+        InputError: the scene's torque is held between samples, which these methods would step over.
+    """
+    from scipy import integrate
+
+    if isinstance(asked_by(scene.actuation), SampledControl):
+        raise InputError(f'simulate: SampledControl needs one of the core\'s methods; got "{options.method}"')
+    run = _Run(scene, options, tick, events)
+    try:
+        with _one_blas_thread():
+            run.core.start(q0, v0)
+            while not run.core.done:
+                run.smooth_stretch(getattr(integrate, options.method), options.t0 + options.duration)
+    except (KeyboardInterrupt, RunError, core.CoreFailure) as error:
+        return run.core.outcome(), error
+    return run.core.outcome(), None

@@ -1,0 +1,117 @@
+"""What is said of a state that cannot be put on the constraints."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pin_nonideal.core_loader import core
+from pin_nonideal.errors import InconsistentConstraintsError, InputError, LoopClosureError
+from pin_nonideal.types import Array
+
+from .loop_closure import CLOSURE_TOLERANCE
+from .rows import row_slices
+
+
+def deepest_contact(phi: Array, program: core.Program) -> tuple[str, float]:
+    """The contact that is deepest inside its plane, and its depth; none where there is no contact.
+
+    Args:
+        phi: residuals of all rows, (m,).
+        program: the scene as the core knows it.
+    """
+    slices = row_slices(program)
+    depths = {c.name: -float(phi[slices[c.name]].min()) for c in program.constraints[program.first_gap :]}
+    name = max(depths, key=lambda key: depths[key], default="")
+    return name, depths.get(name, 0.0)
+
+
+def largest_loop_gap(phi: Array, program: core.Program) -> float:
+    """The largest residual of what always holds and is a matter of positions.
+
+    Args:
+        phi: residuals of all rows, (m,).
+        program: the scene as the core knows it.
+    """
+    slices = row_slices(program)
+    loops = [phi[slices[c.name]] for c in program.constraints[: program.first_gap] if all(c.holonomic)]
+    return max((float(np.abs(part).max(initial=0.0)) for part in loops), default=0.0)
+
+
+def refuse_deep_starts(phi: Array, program: core.Program, allowed: float, t: float) -> None:
+    """Raises where a contact that may open starts far inside, if the loops tell that its place is meant.
+
+    Args:
+        phi: residuals of all rows, (m,).
+        program: the scene as the core knows it.
+        allowed: depth that is moved out.
+        t: time [s].
+
+    Raises:
+        InputError: one does.
+    """
+    if largest_loop_gap(phi, program) > allowed:
+        return
+    name, depth = deepest_contact(phi, program)
+    if name and depth > allowed:
+        raise InputError(
+            f'contact "{name}" starts {depth:.3g} (m or rad) inside at t = {t:.4g} s; it must '
+            f"start open, closed, or at most {allowed:.2g} inside, which is moved out: change the start"
+        )
+
+
+def no_way_out(phi: Array, program: core.Program, t: float) -> InputError:
+    """Of a contact that starts inside and is found no way out of its plane, or none but a long one.
+
+    Args:
+        phi: residuals of all rows at the start, (m,).
+        program: the scene as the core knows it.
+        t: time [s].
+    """
+    name, depth = deepest_contact(phi, program)
+    return InputError(
+        f'contact "{name}" starts {depth:.3g} (m or rad) inside at t = {t:.4g} s, and no short move was '
+        "found that leads out of all planes: change the start"
+    )
+
+
+def open_loops(phi: Array, program: core.Program, t: float) -> LoopClosureError:
+    """Of loops that do not close.
+
+    Args:
+        phi: residuals of all rows, (m,).
+        program: the scene as the core knows it.
+        t: time [s].
+    """
+    slices = row_slices(program)
+    gaps = {c.name: _largest(phi[slices[c.name]]) for c in program.constraints[: program.first_gap]}
+    gaps |= {
+        c.name: _largest(np.minimum(phi[slices[c.name]], 0.0))
+        for c in program.constraints[program.first_gap :]
+    }
+    largest = max(gaps.values())
+    left_open = {name: gap for name, gap in gaps.items() if not gap <= min(CLOSURE_TOLERANCE, 0.5 * largest)}
+    text = "; ".join(f'loop "{name}" does not close: gap {gap:.2g}' for name, gap in left_open.items())
+    return LoopClosureError(
+        f"{text} after several starts; check the lengths and frames, or start nearer", gaps=gaps, time=t
+    )
+
+
+def lost_velocity(rate: Array, program: core.Program, t: float) -> InconsistentConstraintsError:
+    """Of rates that no velocity has.
+
+    Args:
+        rate: of all rows, (m,).
+        program: the scene as the core knows it.
+        t: time [s].
+    """
+    slices = row_slices(program)
+    worst = max(slices, key=lambda name: _largest(rate[slices[name]]))
+    return InconsistentConstraintsError(
+        f'no velocity satisfies the constraints at t = {t:.2f} s: "{worst}" misses its rate by '
+        f"{_largest(rate):.1e}",
+        time=t,
+    )
+
+
+def _largest(values: Array) -> float:
+    return float(np.abs(values).max(initial=0.0))

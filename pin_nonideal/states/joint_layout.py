@@ -1,0 +1,133 @@
+"""Configurations at the door: unit lengths restored, and coordinates too large to move refused."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from pin_nonideal.errors import InputError
+from pin_nonideal.types import JointModel, Model
+from pin_nonideal.validation import array
+
+# Lengths off by less than this are rounding of a file or a printout and are restored; more is an error.
+UNIT_TOLERANCE = 1e-6
+
+# Coarsest spacing of floating-point numbers about a coordinate of an initial state [m or rad]: a joint that
+# its own steps cannot move stands still whatever drives it.
+COARSEST_SPACING = 1e-3
+
+# Joints whose configuration ends in the cosine and sine of an angle, by the beginnings of their names.
+CIRCLES = ("JointModelRUB", "JointModelRevoluteUnbounded", "JointModelPlanar")
+
+
+class JointPlace(NamedTuple):
+    """Where the values of a joint stand.
+
+    Attributes:
+        name: of the joint.
+        kind: Pinocchio's name of its kind.
+        q_first: where they begin in a configuration.
+        nq: how many they are there.
+        v_first: where they begin in a velocity.
+        nv: how many they are there.
+    """
+
+    name: str
+    kind: str
+    q_first: int
+    nq: int
+    v_first: int
+    nv: int
+
+
+def joint_places(model: Model) -> list[JointPlace]:
+    """Where the values of each joint stand, in the order of the model.
+
+    Args:
+        model: pinocchio.Model.
+    """
+    sizes = zip(model.names, model.joints, model.idx_qs, model.nqs, model.idx_vs, model.nvs, strict=True)
+    return [
+        JointPlace(str(name), str(joint.shortname()), int(q), int(nq), int(v), int(nv))
+        for name, joint, q, nq, v, nv in list(sizes)[1:]
+    ]
+
+
+def unit_parts(model: Model) -> Iterator[tuple[str, slice]]:
+    """Stretches of a configuration that must have length 1, with the joint's name.
+
+    Args:
+        model: pinocchio.Model.
+    """
+    for i in range(1, model.njoints):
+        for part in _parts(model.joints[i]):
+            yield model.names[i], part
+
+
+def _parts(joint: JointModel) -> Iterator[slice]:
+    kind = joint.shortname()
+    if kind == "JointModelComposite":
+        for part in joint.extract().joints:
+            yield from _parts(part)
+    elif joint.nq != joint.nv:  # a quaternion or (cos, sin) ends the joint's stretch
+        end = joint.idx_q + joint.nq
+        yield slice(end - (2 if kind.startswith(CIRCLES) else 4), end)
+
+
+def configuration(
+    model: Model, q: ArrayLike, what: str, parts: Sequence[tuple[str, slice]] | None = None
+) -> NDArray[np.float64]:
+    """A configuration with unit quaternions and (cos, sin) pairs, (nq,).
+
+    Args:
+        model: pinocchio.Model.
+        q: configuration, (nq,).
+        what: words for messages.
+        parts: those of `unit_parts`, when known.
+
+    Raises:
+        InputError: wrong shape, not finite, or a part far from unit length.
+    """
+    result = np.array(array(what, q, (model.nq,)))
+    parts = tuple(unit_parts(model)) if parts is None else parts
+    if not parts:
+        return result
+    for joint, part in parts:
+        length = math.hypot(*result[part])
+        if abs(length - 1.0) > UNIT_TOLERANCE:
+            kind = "quaternion" if part.stop - part.start == 4 else "(cos, sin) pair"
+            raise InputError(
+                f'{what}: the {kind} of joint "{joint}" must have length 1; got {length:g}; normalize it'
+            )
+    return np.asarray(pin.normalize(model, result))
+
+
+def require_resolved(model: Model, q: NDArray[np.float64]) -> None:
+    """Refuses initial states in which a joint cannot move by less than `COARSEST_SPACING`.
+
+    Args:
+        model: pinocchio.Model.
+        q: configuration, or several, (..., nq).
+
+    Raises:
+        InputError: a coordinate is too large; names its joint.
+    """
+    if q.ndim == 1:
+        farthest = max(map(abs, q.tolist()), default=0.0)
+    else:
+        farthest = max(float(q.max(initial=0.0)), -float(q.min(initial=0.0)))
+    spacing = math.ulp(farthest)
+    if spacing <= COARSEST_SPACING:
+        return
+    k = int(np.argmax(np.abs(q))) % model.nq
+    joint = next(i for i, j in enumerate(model.joints) if i and j.idx_q <= k < j.idx_q + j.nq)
+    raise InputError(
+        f'q: joint "{model.names[joint]}" must start where floating-point numbers are at most '
+        f"{COARSEST_SPACING:g} (m or rad) apart; at {farthest:g} they are {spacing:.2g} apart; "
+        "leave out whole turns, or move the origin"
+    )

@@ -1,0 +1,254 @@
+"""States by name: a configuration or velocity as numbers (nq,) or (nv,), or as a table by joint name.
+
+One parser serves Scene, simulate, project, solve, load, the command line and robot.yaml.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.types import Array, Model, State
+from pin_nonideal.validation import array, number
+
+from .joint_layout import CIRCLES, configuration, unit_parts
+from .joint_order import tell_order
+
+# A quaternion written by hand this close to unit length is normalized; one farther away is a mistake.
+WRITTEN_UNIT_TOLERANCE = 1e-3
+
+
+class Piece(NamedTuple):
+    """A named part of the values of one joint.
+
+    Attributes:
+        first: where it begins among the joint's values.
+        size: how many numbers are given.
+        kind: "" for numbers as they are, "rpy" or "angle" for what becomes a quaternion or (cos, sin).
+    """
+
+    first: int
+    size: int
+    kind: str = ""
+
+
+TURN = {"quaternion": Piece(0, 4), "rpy": Piece(0, 3, "rpy")}
+# Pieces of a joint's configuration and velocity, by the beginning of the name of its kind.
+PIECES: dict[str, tuple[dict[str, Piece], dict[str, Piece]]] = {
+    "JointModelFreeFlyer": (
+        {"xyz": Piece(0, 3)} | {name: piece._replace(first=3) for name, piece in TURN.items()},
+        {"linear": Piece(0, 3), "angular": Piece(3, 3)},
+    ),
+    "JointModelSphericalZYX": ({}, {}),
+    "JointModelSpherical": (TURN, {"angular": Piece(0, 3)}),
+    "JointModelPlanar": (
+        {"xy": Piece(0, 2), "angle": Piece(2, 1, "angle")},
+        {"linear": Piece(0, 2), "angular": Piece(2, 1)},
+    ),
+    "JointModelTranslation": ({"xyz": Piece(0, 3)}, {"linear": Piece(0, 3)}),
+}
+
+
+def named_configuration(
+    model: Model,
+    given: State,
+    base: Array,
+    what: str,
+    parts: Sequence[tuple[str, slice]] | None = None,
+) -> Array:
+    """A configuration from numbers or by name, (nq,).
+
+    A table holds, by joint name, a number, the joint's values, or a table of them: {"xyz": .., "rpy": ..} or
+    {"xyz": .., "quaternion": [x, y, z, w]} of a floating base (also called "base", or by its body), "rpy" or
+    "quaternion" of a ball joint, "xy" and "angle" of a planar one, "xyz" of a translation; an angle [rad]
+    stands for its (cos, sin).  What it leaves out stays as in `base`.  A text names a reference
+    configuration of the model.
+
+    Args:
+        model: pinocchio.Model.
+        given: see above.
+        base: configuration that a table changes, (nq,).
+        what: words for messages.
+        parts: those of `unit_parts`, when known.
+
+    Raises:
+        InputError: wrong shape, not finite, or a part far from unit length.
+        UnknownNameError: there is no such joint, piece or reference configuration.
+    """
+    if isinstance(given, str):
+        known = [entry.key() for entry in model.referenceConfigurations]
+        if given not in known:
+            raise UnknownNameError(f'{what}: no reference configuration "{given}"{nearest(given, known)}')
+        return np.array(model.referenceConfigurations[given])
+    if not isinstance(given, Mapping):
+        tell_order(model, given, what, "nqs")
+        return configuration(model, given, what, parts)
+    q = np.array(base)
+    for name, value in given.items():
+        j = joint_named(model, name, what)
+        first, size = model.idx_qs[j], model.nqs[j]
+        q[first : first + size] = _values(model, j, 0, value, q[first : first + size], f'{what} of "{name}"')
+    return with_unit_lengths(model, q, what)
+
+
+def named_velocity(model: Model, given: State, base: Array, what: str) -> Array:
+    """A velocity from numbers or by name, (nv,).
+
+    A table holds, by joint name, a number, the joint's values, or a table of them: "linear" and "angular" of
+    a floating base (in its own axes, as Pinocchio has them) or a planar joint, "angular" of a ball joint,
+    "linear" of a translation.  What it leaves out stays as in `base`.
+
+    Args:
+        model: pinocchio.Model.
+        given: see above.
+        base: velocity that a table changes, (nv,).
+        what: words for messages.
+
+    Raises:
+        InputError: wrong shape, or not finite.
+        UnknownNameError: there is no such joint or piece.
+    """
+    if not isinstance(given, Mapping):
+        tell_order(model, given, what, "nvs")
+        return np.array(array(what, given, (model.nv,)))
+    v = np.array(base)
+    for name, value in given.items():
+        j = joint_named(model, name, what)
+        first, size = model.idx_vs[j], model.nvs[j]
+        v[first : first + size] = _values(model, j, 1, value, v[first : first + size], f'{what} of "{name}"')
+    return v
+
+
+def named_entries(model: Model, given: State | None) -> NDArray[np.bool_] | None:
+    """Which entries of a velocity a table names, (nv,); None of anything else.
+
+    Args:
+        model: pinocchio.Model.
+        given: a velocity as `named_velocity` takes it.
+    """
+    if not isinstance(given, Mapping):
+        return None
+    return ~np.isnan(named_velocity(model, given, np.full(model.nv, np.nan), "v"))
+
+
+def named_coordinates(model: Model, given: State | None) -> NDArray[np.bool_] | None:
+    """Which tangent coordinates a table of a configuration names, (nv,); None of anything else.
+
+    Args:
+        model: pinocchio.Model.
+        given: a configuration as `named_configuration` takes it.
+    """
+    if not isinstance(given, Mapping):
+        return None
+    named = np.zeros(model.nv, dtype=bool)
+    for name, value in given.items():
+        j = joint_named(model, name, "q")
+        own = named[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]]
+        if not isinstance(value, Mapping):
+            own[:] = True
+            continue
+        places = len(own) - 3 if model.joints[j].shortname().startswith("JointModelFreeFlyer") else 0
+        for key in value:
+            if key in ("xyz", "xy"):
+                own[: len(key)] = True
+            elif key == "angle":
+                own[2] = True
+            else:  # an orientation
+                own[places:] = True
+    return named
+
+
+def joint_named(model: Model, name: object, what: str) -> int:
+    """Index of the joint of that name; a floating base goes by "base" and by the name of its body as well.
+
+    Args:
+        model: pinocchio.Model.
+        name: of the joint.
+        what: words for messages.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    known = [str(n) for n in model.names][1:]
+    if isinstance(name, str) and name in known:
+        return int(model.getJointId(name))
+    floating = [j for j in range(1, model.njoints) if model.joints[j].shortname() == "JointModelFreeFlyer"]
+    for j in floating:
+        if name == "base" and len(floating) == 1:
+            return j
+        if isinstance(name, str) and model.existFrame(name, pin.FrameType.BODY):
+            frame = model.frames[model.getFrameId(name, pin.FrameType.BODY)]
+            if frame.parentJoint == j and frame.placement.isIdentity():
+                return j
+    if isinstance(name, str) and model.existFrame(name, pin.FrameType.FIXED_JOINT):
+        raise UnknownNameError(f'{what}: joint "{name}" is fixed (locked) and cannot move; leave it out')
+    raise UnknownNameError(f'{what}: no joint "{name}"{nearest(str(name), known)}')
+
+
+def _values(model: Model, j: int, level: int, value: Any, now: Array, what: str) -> Array:
+    """Values of one joint: of its configuration (level 0) or of its velocity (1).
+
+    Args:
+        model: pinocchio.Model.
+        j: index of the joint.
+        level: see above.
+        value: what was given.
+        now: the values so far, which the pieces that are not given keep.
+        what: words for messages.
+    """
+    kind = model.joints[j].shortname()
+    if isinstance(value, Mapping):
+        return _pieced(kind, level, value, now, what)
+    if isinstance(value, pin.SE3) and level == 0 and kind == "JointModelFreeFlyer":
+        return np.array(pin.SE3ToXYZQUAT(value))
+    plain = np.asarray(value, dtype=object).reshape(-1).tolist()
+    if level == 0 and kind.startswith(CIRCLES) and len(plain) == model.nvs[j]:
+        angle = number(what, plain[-1])
+        plain = [*plain[:-1], float(np.cos(angle)), float(np.sin(angle))]
+    return array(what, plain, (now.size,))
+
+
+def _pieced(kind: str, level: int, table: Mapping[Any, Any], now: Array, what: str) -> Array:
+    """Values of a joint whose pieces are given by name."""
+    pieces = next((both[level] for start, both in PIECES.items() if kind.startswith(start)), {})
+    values = np.array(now)
+    for key, given in table.items():
+        if key not in pieces:
+            raise UnknownNameError(
+                f'{what}: no "{key}" in a {kind.removeprefix("JointModel")} joint{nearest(str(key), pieces)}'
+            )
+        first, size, way = pieces[key]
+        numbers = array(f"{what}: {key}", [given] if size == 1 and np.ndim(given) == 0 else given, (size,))
+        if way == "rpy":
+            numbers = pin.Quaternion(pin.rpy.rpyToMatrix(*numbers)).coeffs()
+        elif way == "angle":
+            numbers = np.array([np.cos(numbers[0]), np.sin(numbers[0])])
+        values[first : first + len(numbers)] = numbers
+    if {"rpy", "quaternion"} <= set(table):
+        raise InputError(f'{what}: give "rpy" or "quaternion", not both')
+    return values
+
+
+def with_unit_lengths(model: Model, q: Array, what: str) -> Array:
+    """Quaternions and (cos, sin) pairs written by hand, of unit length.
+
+    Args:
+        model: pinocchio.Model.
+        q: configuration, (nq,); changed.
+        what: words for messages.
+
+    Raises:
+        InputError: one is far from unit length.
+    """
+    for joint, part in unit_parts(model):
+        length = float(np.linalg.norm(q[part]))
+        if abs(length - 1.0) > WRITTEN_UNIT_TOLERANCE:
+            kind = "quaternion [x, y, z, w]" if part.stop - part.start == 4 else "cosine and sine"
+            raise InputError(f'{what}: {kind} of joint "{joint}" must have length 1; got {length:g}')
+        q[part] /= length
+    return q

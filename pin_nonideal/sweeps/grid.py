@@ -1,0 +1,78 @@
+"""Parameters of sweeps: grids, and samples that fill a box evenly."""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from pin_nonideal.errors import InputError
+from pin_nonideal.types import Table
+from pin_nonideal.validation import array, choice, count
+
+
+def sweep_grid(**axes: Iterable[Any]) -> list[Table]:
+    """Every combination of the values of each parameter, the last one changing fastest.
+
+    Args:
+        axes: values of each parameter, by its name.
+
+    Returns:
+        One mapping a run, for `sweep`.
+
+    Raises:
+        InputError: the values of one are no list.
+    """
+    for name, values in axes.items():
+        if (
+            isinstance(values, (str, bytes))
+            or not isinstance(values, Iterable)
+            or getattr(values, "ndim", 1) == 0
+        ):
+            raise InputError(f"sweep_grid: {name} must be a list of values; got {values!r}")
+    listed = [[_plain(value) for value in values] for values in axes.values()]
+    return [dict(zip(axes, point, strict=True)) for point in itertools.product(*listed)]
+
+
+def sweep_samples(
+    n: int, *, kind: str = "sobol", seed: int = 0, **ranges: tuple[float, float]
+) -> list[Table]:
+    """Points that fill a box evenly, by scipy.stats.qmc.
+
+    Args:
+        n: how many; a power of two for "sobol" to be balanced.
+        kind: "sobol" (scrambled), "latin" (hypercube), "halton", or "random".
+        seed: of the scrambling: the same points again.
+        ranges: (least, largest) of each parameter, by its name.
+
+    Returns:
+        One mapping a run, for `sweep`.
+
+    Raises:
+        InputError: an argument does not fit.
+    """
+    number = count("sweep_samples: n", n, least=1)
+    choice("sweep_samples: kind", kind, ("sobol", "latin", "halton", "random"))
+    count("sweep_samples: seed", seed)
+    if not ranges:
+        raise InputError("sweep_samples needs the range of a parameter, such as mu=(0.1, 0.5)")
+    bounds = np.array([array(f"sweep_samples: {name}", pair, (2,)) for name, pair in ranges.items()])
+    from scipy.stats import qmc
+
+    d = len(ranges)
+    if kind == "random":
+        unit = np.random.default_rng(seed).random((number, d))
+    else:
+        engines = {"sobol": qmc.Sobol, "latin": qmc.LatinHypercube, "halton": qmc.Halton}
+        with warnings.catch_warnings():  # that a number which is no power of two is not balanced
+            warnings.simplefilter("ignore", UserWarning)
+            unit = engines[kind](d=d, seed=int(seed)).random(number)
+    points = bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0])
+    return [dict(zip(ranges, point.tolist(), strict=True)) for point in points]
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value

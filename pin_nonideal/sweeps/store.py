@@ -1,0 +1,281 @@
+"""Runs of a sweep in a folder: files that hold them, and an index of what became of each."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pin_nonideal.atomic_files import file_path
+from pin_nonideal.errors import InputError, LoadingError, OutputError, RunError
+from pin_nonideal.scene.scene import Scene
+from pin_nonideal.trajectory.file import read_from
+from pin_nonideal.trajectory.trajectory import Trajectory
+from pin_nonideal.types import Table
+
+from .pack import SUFFIX, archive_of, runs_in
+
+FORMAT = 2
+QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+
+
+class Sweep(Sequence[Trajectory]):
+    """Runs of a sweep that are kept in a folder, read one at a time when asked for.
+
+    Args:
+        folder: that `sweep(..., store=folder)` filled.
+
+    Attributes:
+        folder: see above.
+        records: of each run, in order: its `parameters`, `error` (what stopped it, or None), `t_end`,
+            `steps`, `evaluations`, `violation` (largest), `wall_s`, and what `measure` gave; None of a run
+            that is missing.
+
+    Raises:
+        LoadingError: there is no sweep in it.
+    """
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        self.folder = file_path("Sweep: folder", folder)
+        try:
+            with (self.folder / "index.jsonl").open(encoding="utf-8") as lines:
+                self._header = json.loads(next(lines))
+                if self._header["format"] != FORMAT:
+                    raise ValueError(f"format {self._header['format']} instead of {FORMAT}")
+                self.records: list[Table | None] = [None] * int(self._header["runs"])
+                self._places: list[tuple[str, int, int] | None] = [None] * len(self.records)
+                for line in lines:
+                    if line.endswith("\n"):  # not cut off by a kill
+                        self._take(json.loads(line))
+            self._unlisted = list(self._found())
+        except (OSError, ValueError, LookupError, TypeError, StopIteration) as error:
+            raise LoadingError(
+                f'"{self.folder}" holds no sweep: {type(error).__name__}: {error}; it must be a folder that '
+                "sweep(..., store=folder) made"
+            ) from error
+
+    def _take(self, record: Table) -> None:
+        name, at, size = record.pop("at")
+        k = record.pop("run")
+        self.records[k], self._places[k] = record, (str(name), int(at), int(size))
+
+    def _found(self) -> Iterator[Table]:
+        """Runs that were done before a kill and did not come into the index."""
+        ends: dict[str, int] = {}
+        for place in self._places:
+            if place is not None:
+                ends[place[0]] = max(ends.get(place[0], 0), place[1] + place[2])
+        for entry in sorted(os.scandir(self.folder), key=lambda each: each.name):
+            if entry.name.endswith(SUFFIX) and entry.stat().st_size > ends.get(entry.name, 0):
+                for record in runs_in(Path(entry.path), ends.get(entry.name, 0)):
+                    self._take(dict(record))
+                    yield record
+
+    def __len__(self) -> int:
+        return len(self.records)
+
+    def __getitem__(self, k: Any) -> Any:
+        if isinstance(k, slice):
+            return [self[i] for i in range(*k.indices(len(self)))]
+        return self.load(k, scene=None)
+
+    def load(self, k: int, scene: Scene | str | None = "source") -> Trajectory:
+        """One run, with its scene where that can be had.
+
+        Args:
+            k: number of the run.
+            scene: as in `Trajectory.load`.
+
+        Raises:
+            InputError: the scene is not the one of the run.
+            LoadingError: the run is missing, failed before its first sample, or its file is damaged.
+        """
+        k = range(len(self))[k]
+        record, place = self.records[k], self._places[k]
+        if record is None or place is None:
+            raise LoadingError(f"run {k} of the {self} is not done; the same call of sweep does it")
+        if place[2] == 0:
+            raise LoadingError(f"run {k} of the {self} has no samples; it failed: {record['error']}")
+        path = self.folder / place[0]
+        try:
+            content = archive_of(self.folder, place)
+        except OSError as error:
+            raise LoadingError(f'cannot read run {k} from "{path}": {error.strerror or error}') from error
+        return Trajectory._made(*read_from(io.BytesIO(content), path), path, scene)
+
+    def __iter__(self) -> Iterator[Trajectory]:
+        return (self[k] for k in range(len(self)))
+
+    def __str__(self) -> str:
+        done = len(self) - len(self.missing)
+        return f"sweep in {self.folder}: {done} of {len(self)} runs, {len(self.failures)} of them failed"
+
+    @property
+    def missing(self) -> list[int]:
+        """Runs that are not done."""
+        return [k for k, record in enumerate(self.records) if record is None]
+
+    @property
+    def failures(self) -> dict[int, str]:
+        """What stopped the runs that failed."""
+        return {k: r["error"] for k, r in enumerate(self.records) if r is not None and r["error"] is not None}
+
+    def summary(self) -> Table:
+        """Over all runs that are done, without reading them: mean, deviation and quantiles of each number.
+
+        Returns:
+            By name of the number ("violation", "steps", ..., and those of `measure`): "mean", "std", "count",
+            "quantiles" (by level) and "worst" (the run with the largest one).
+        """
+        done = [(k, r) for k, r in enumerate(self.records) if r is not None]
+        names = sorted({key for _, r in done for key, x in r.items() if isinstance(x, (int, float))})
+        table: Table = {}
+        for name in names:
+            runs, values = zip(
+                *((k, r[name]) for k, r in done if isinstance(r.get(name), (int, float))), strict=True
+            )
+            x = np.array(values, dtype=float)
+            levels = {level: float(np.quantile(x, level)) for level in QUANTILES}
+            worst = int(runs[int(np.argmax(x))])
+            table[name] = {"mean": float(x.mean()), "std": float(x.std()), "count": len(x)}
+            table[name] |= {"quantiles": levels, "worst": worst}
+        return table
+
+
+def opened_store(folder: Path, digest: str, runs: int) -> list[int]:
+    """Begins a sweep in a folder, or goes on with it; the runs that are missing.
+
+    Args:
+        folder: of the sweep.
+        digest: of all that decides it.
+        runs: how many there are.
+
+    Raises:
+        InputError: the folder holds another sweep.
+        OutputError: it cannot be written.
+    """
+    index = folder / "index.jsonl"
+    if index.exists():
+        held = Sweep(folder)
+        if held._header.get("digest") != digest or held._header.get("format") != FORMAT:
+            raise InputError(
+                f'sweep: store "{folder}" holds another sweep: its parameters, duration or options differ; '
+                "name another folder"
+            )
+        if held._unlisted:
+            note(folder, held._unlisted)
+        return held.missing
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise InputError(
+                f'sweep: store "{folder}" must be empty or hold this sweep; it holds other files'
+            )
+        header = {"format": FORMAT, "digest": digest, "runs": runs}
+        index.write_text(json.dumps(header) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f'cannot write the sweep to "{folder}": {error.strerror or error}') from error
+    return list(range(runs))
+
+
+def note(folder: Path, records: Sequence[Table]) -> None:
+    """Adds what became of some runs to the index.
+
+    Args:
+        folder: of the sweep.
+        records: of the runs, each with its number as "run".
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    index = folder / "index.jsonl"
+    try:
+        with index.open("rb+") as stream:
+            _end_after_whole_line(stream)
+            stream.write("".join(json.dumps(record) + "\n" for record in records).encode())
+    except OSError as error:
+        raise OutputError(f'cannot write "{index}": {error.strerror or error}') from error
+
+
+def _end_after_whole_line(stream: Any) -> None:
+    """Goes to the end, without the part of a line that a kill left behind."""
+    stream.seek(0, os.SEEK_END)
+    size = stream.tell()
+    stream.seek(max(0, size - 1))
+    if size == 0 or stream.read(1) == b"\n":
+        return
+    stream.seek(0)
+    whole = stream.read().rfind(b"\n") + 1
+    stream.seek(whole)
+    stream.truncate()
+
+
+def record_of(
+    k: int, parameters: Mapping[str, Any], run: Trajectory | None, error: str | None, more: Table
+) -> Table:
+    """What the index tells of a run.
+
+    Args:
+        k: its number.
+        parameters: its own.
+        run: its trajectory, or None where there is none.
+        error: what stopped it, or None.
+        more: what `measure` gave.
+    """
+    record: Table = {
+        "run": k,
+        "parameters": json.loads(json.dumps(dict(parameters), default=repr)),
+        "error": error,
+    }
+    if run is not None:
+        stats = run.stats
+        record |= {"t_end": float(run.t[-1]) if len(run) else None, "steps": stats.steps}
+        record |= {"evaluations": stats.evaluations, "wall_s": stats.wall_s}
+        record |= {"violation": float(run.violation.max(initial=0.0))}
+    return record | more
+
+
+def digest_of(make: Any, parameters: Sequence[Mapping[str, Any]], duration: float, options: Table) -> str:
+    """Of all that decides a sweep, as far as it has a name.
+
+    Args:
+        make: what builds its scenes.
+        parameters: of its runs.
+        duration: of each [s].
+        options: of `simulate`.
+    """
+    said = [_said(make), [dict(p) for p in parameters], duration, sorted(options.items())]
+    return hashlib.sha256(json.dumps(said, default=_said).encode()).hexdigest()
+
+
+def _said(value: Any) -> Any:
+    """What decides a value that JSON does not know: the same in every process."""
+    if isinstance(value, partial):
+        return [_said(value.func), value.args, value.keywords]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    if hasattr(value, "__qualname__"):
+        return f"{value.__module__}.{value.__qualname__}"
+    if " at 0x" not in (told := repr(value)):
+        return told
+    try:  # an address tells nothing in another process
+        return [type(value).__qualname__, json.dumps(vars(value), default=_said)]
+    except (TypeError, ValueError, RecursionError):
+        return type(value).__qualname__
+
+
+def failed_run(error: RunError) -> Trajectory | None:
+    """What a run had computed when it failed, or None.
+
+    Args:
+        error: what it raised.
+    """
+    found = error.trajectory
+    return found if isinstance(found, Trajectory) else None

@@ -1,0 +1,217 @@
+"""Many runs of scenes that differ: joblib carries them in threads, processes, or on a cluster (Dask, Ray)."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pin_nonideal.atomic_files import file_path
+from pin_nonideal.compilation.callbacks import named
+from pin_nonideal.errors import (
+    InputError,
+    OutputError,
+    PinNonidealError,
+    RunError,
+    RunInterrupted,
+    UserFunctionError,
+)
+from pin_nonideal.scene.scene import Scene
+from pin_nonideal.simulation.simulate import simulate
+from pin_nonideal.trajectory.file import to_bytes
+from pin_nonideal.trajectory.trajectory import Trajectory
+from pin_nonideal.types import Table
+from pin_nonideal.validation import choice, count, function, number, positive, sequence
+
+from .pack import Pack
+from .store import Sweep, digest_of, failed_run, note, opened_store, record_of
+
+MOST_JOBS = 100_000  # also of negative numbers: -n leaves n - 1 processors free
+# Runs that a worker takes at once: enough that handing them over costs little, few enough to share evenly.
+MOST_AT_ONCE, SHARES = 200, 16
+
+
+def sweep(
+    make: Callable[..., Scene],
+    parameters: Sequence[Mapping[str, Any]],
+    duration: float,
+    *,
+    jobs: int | None = None,
+    store: str | os.PathLike[str] | None = None,
+    failures: str = "raise",
+    measure: Callable[[Trajectory], Mapping[str, float]] | None = None,
+    show: bool | None = None,
+    **options: Any,
+) -> list[Any] | Sweep:
+    """Simulates `make(**p)` for each p of `parameters`, in parallel.
+
+    The backend is joblib's: processes by default, or what `joblib.parallel_config` chooses around the call
+    ("threading", "dask", "ray").  For many states of one scene use `rollout`, which needs no processes.
+    `sweep_grid` and `sweep_samples` make parameters.
+
+    With `store` every run is in a file as soon as it is done, and the memory that a sweep takes does not grow
+    with its trajectories.  The same call on the same folder goes on after a kill with what is missing.
+
+    Args:
+        make: builds a scene from one entry of `parameters`; for processes it must be a function of a module.
+        parameters: keyword arguments, one mapping a run.
+        duration: length of time [s].
+        jobs: number of parallel jobs; joblib's choice when None, all processors when -1, all but one when -2.
+        store: folder for the runs, new or of this very sweep; None keeps them in memory.
+        failures: "raise" stops at the first run that fails; "keep" goes on, and the error stands in its place
+            (its `trajectory` has the samples before), in a store beside those samples.
+        measure: run -> numbers by name, taken where the run is; they go into the index of a store.
+        show: progress bar on standard error; None shows it on a terminal only.
+        options: passed to `simulate`.
+
+    Returns:
+        Without a store one Trajectory a run, in order, without their scenes, which `make` makes again; with
+        one a `Sweep`, which reads them one at a time.
+
+    Raises:
+        InputError: `make` cannot be called or sent to a process, `parameters` holds no mappings, `jobs` is no
+            number of jobs, or the store is that of another sweep.
+        OutputError: the store cannot be written; what is done stays.
+        RunError: a run stopped early; `index` tells which.
+    """
+    function("sweep: make", make, "(**parameters) -> Scene")
+    table = sequence("sweep: parameters", parameters)
+    for entry in table:
+        if not isinstance(entry, Mapping) or not all(isinstance(key, str) for key in entry):
+            raise InputError(f"sweep: parameters must hold mappings of keyword arguments; got {entry!r}")
+    length = positive("sweep: duration", duration)
+    if jobs is not None and count("sweep: jobs", jobs, least=-MOST_JOBS, most=MOST_JOBS) == 0:
+        raise InputError("sweep: jobs must not be zero; leave it out for joblib's choice")
+    if options.get("checkpoint") is not None:
+        raise InputError("sweep: checkpoint is the file of one run; its runs would overwrite one another's")
+    keep = choice("sweep: failures", failures, ("raise", "keep")) == "keep"
+    if measure is not None:
+        function("sweep: measure", measure, "(run) -> numbers by name")
+        if store is None:
+            raise InputError("sweep: measure writes into the index of a store; name one, or measure the runs")
+    options.setdefault("progress", False)
+    folder = None if store is None else file_path("sweep: store", store)
+    numbers = list(range(len(table)))
+    if folder is not None:
+        numbers = opened_store(folder, digest_of(make, table, length, options), len(table))
+    work = _Work(make, length, options, folder, keep, measure)
+    found: list[Any] = [None] * (len(table) if folder is None else 0)
+    for part in _carried(work, [(k, dict(table[k])) for k in numbers], jobs, show):
+        for k, result in part:
+            if isinstance(result, PinNonidealError) and not (keep and folder is None):
+                raise result
+            if folder is None:
+                found[k] = result
+        if folder is not None:
+            note(folder, [record for _, record in part])
+    return found if folder is None else Sweep(folder)
+
+
+def _carried(
+    work: _Work, runs: list[Any], jobs: int | None, show: bool | None
+) -> Iterator[list[tuple[int, Any]]]:
+    """Results by parts as they come in, from joblib's workers."""
+    from joblib import Parallel, delayed
+    from joblib.parallel import get_active_backend
+    from tqdm import tqdm
+
+    backend, configured = get_active_backend()
+    asked = jobs if jobs is not None else configured
+    workers = max(1, backend.effective_n_jobs(asked if asked is not None else 1))
+    size = max(1, min(MOST_AT_ONCE, len(runs) // (SHARES * workers) + 1))
+    parts = [runs[i : i + size] for i in range(0, len(runs), size)]
+    lazy = getattr(backend, "supports_return_generator", False)
+    parallel = Parallel(n_jobs=jobs, batch_size=1, return_as="generator_unordered" if lazy else "list")
+    shown = sys.stderr.isatty() if show is None else choice("sweep: show", show, (True, False, None))
+    try:
+        with tqdm(total=len(runs), unit="run", disable=not shown) as bar:
+            for part in parallel(delayed(work)(each) for each in parts):
+                bar.update(len(part))
+                yield part
+    except (pickle.PicklingError, TypeError, AttributeError) as error:
+        if "pickle" not in str(error):
+            raise
+        raise InputError(f"sweep: {_unsendable(work, runs)}") from error
+
+
+def _unsendable(work: _Work, runs: list[Any]) -> str:
+    """Says what of a sweep another process cannot have, and why."""
+    try:
+        import cloudpickle
+    except ImportError:  # joblib before 1.6 brings its own
+        from joblib.externals import cloudpickle
+    parts = [("make", work.make), ("measure", work.measure), *work.options.items()]
+    for name, value in [*parts, *((f"parameters[{k}]", entry) for k, entry in runs)]:
+        try:
+            cloudpickle.dumps(value)
+        except Exception as error:  # whatever the object's own methods raise
+            return f"{name} must be such that another process can have it; {type(error).__name__}: {error}"
+    return "what a run leaves must be such that another process can have it; give it a store"
+
+
+class _Work:
+    """What a worker does with its part of the runs."""
+
+    def __init__(
+        self, make: Any, duration: float, options: Table, folder: Path | None, keep: bool, measure: Any
+    ) -> None:
+        self.make, self.duration, self.options = make, duration, options
+        self.folder, self.keep, self.measure = folder, keep, measure
+
+    def __call__(self, runs: list[tuple[int, Table]]) -> list[tuple[int, Any]]:
+        """Numbers of the runs with their trajectories, their records in the store, or what stopped them."""
+        if self.folder is None:
+            return [(k, self._bare(k, entry)) for k, entry in runs]
+        with Pack(self.folder, runs[0][0]) as pack:
+            return [(k, self._kept(k, entry, pack)) for k, entry in runs]
+
+    def _bare(self, k: int, entry: Table) -> Any:
+        """The trajectory of a run without its scene, or what stopped it."""
+        run, stopped = self._one(k, entry)
+        return stopped or replace(run, scene=None)
+
+    def _kept(self, k: int, entry: Table, pack: Pack) -> Any:
+        """The record of a run that stands in the store, or what stopped it where that stops all."""
+        run, stopped = self._one(k, entry)
+        if stopped is not None and not self.keep:
+            return stopped
+        more = self._measured(run) if self.measure is not None and stopped is None else {}
+        error = None if stopped is None else f"{type(stopped).__name__}: {stopped}"
+        return pack.add(record_of(k, entry, run, error, more), b"" if run is None else to_bytes(run))
+
+    def _one(self, k: int, entry: Table) -> Any:
+        """A run, and what stopped it."""
+        try:
+            return simulate(self._scene(entry), self.duration, **self.options), None
+        except (RunInterrupted, OutputError):
+            raise
+        except PinNonidealError as error:
+            run = None
+            if isinstance(error, RunError):
+                error.index = k
+                run = failed_run(error)
+                error.trajectory = None if run is None else replace(run, scene=None)
+            return run, error
+
+    def _scene(self, entry: Table) -> Any:
+        try:
+            scene = self.make(**entry)
+        except PinNonidealError:
+            raise
+        except Exception as error:
+            raise UserFunctionError(
+                f"sweep: make raised {type(error).__name__}: {error}; it was called with {entry!r}"
+            ) from error
+        if not isinstance(scene, Scene):
+            raise UserFunctionError(f"sweep: make must return a Scene; got {scene!r} for {entry!r}")
+        return scene
+
+    def _measured(self, run: Trajectory) -> Table:
+        found = named(self.measure, "sweep: measure")(run)
+        if not isinstance(found, Mapping):
+            raise UserFunctionError(f"sweep: measure must return numbers by name; got {found!r}")
+        return {str(name): number(f'sweep: measure: "{name}"', x) for name, x in found.items()}

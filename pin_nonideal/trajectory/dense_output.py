@@ -1,0 +1,148 @@
+"""Dense output of a run: the interpolant of every step, and samples of the run at any time from it.
+
+A step keeps the values of its method's own interpolant at Chebyshev's points, through which one polynomial
+goes: that of dop853 is of degree 7, so that its local error is of order 8 in the step, as the global one of
+the steps is.  A sample is put back on the constraints, and evaluated under the modes of its step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pin_nonideal.core_loader import core
+from pin_nonideal.errors import InputError
+from pin_nonideal.scene.scene import Scene, program_of
+from pin_nonideal.types import Array, Table
+
+from .outcome import outcome_fields
+
+
+@dataclass(frozen=True, eq=False)
+class DenseOutput:
+    """Interpolants of the steps of a run.
+
+    Attributes:
+        times: start and end of each step [s], (n, 2).
+        states: q, v, states of laws and work of the ledger at each point of each step, (n, points, size).
+        modes: of the frictional elements over each step, (n, ne).
+        directions: of their slip at each point of each step, (n, points, 3 ne), or without columns if every
+            element slips along one direction.  A step that did not seek them holds those of its end.
+        sought: of each element, whether its slip was too slow to tell its direction, so that the step sought
+            it, (n, ne).
+        torque: held over each step, (n, nv), not a number where none is; (0, nv) where none ever is.
+        moved: energy moved by projection up to the end of each step [J], (n,).
+        options: what the run was asked for, a RunOptions.
+    """
+
+    times: Array
+    states: Array
+    modes: NDArray[np.int8]
+    directions: Array
+    sought: NDArray[np.int8]
+    torque: Array
+    moved: Array
+    options: Any
+
+    def check(self) -> None:
+        """Refuses arrays that do not fit together, as a damaged file may hold them.
+
+        Raises:
+            ValueError: see above.
+        """
+        n, elements = len(self.times), self.modes.shape[1]
+        shapes = [self.times.shape[1:] == (2,), self.states.ndim == 3, self.moved.shape == (n,)]
+        shapes += [self.torque.ndim == 2, self.sought.shape == (n, elements), self.directions.ndim == 3]
+        shapes += [self.directions.shape[:2] == self.states.shape[:2]]
+        shapes += [self.directions.shape[2:] in ((0,), (3 * elements,))]
+        rows = {len(x) for x in (self.states, self.modes, self.moved)} | {len(self.torque) or n}
+        if not all(shapes) or rows != {n} or not np.isin(self.modes, [int(mode) for mode in core.Mode]).all():
+            raise ValueError("dense output does not fit together")
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def at(self, scene: Scene, t: Array) -> Table:
+        """Fields of a Trajectory of samples at any times of the run.
+
+        At a time where a step ends and another begins, as at an event, the one that begins is taken.
+
+        Args:
+            scene: the scene that ran.
+            t: times [s], (k,).
+
+        Raises:
+            InputError: a time lies outside of the run.
+        """
+        if len(t) and not (len(self) and self.times[0, 0] <= t.min() and t.max() <= self.times[-1, 1]):
+            span = f"{self.times[0, 0]:g} to {self.times[-1, 1]:g} s" if len(self) else "no time"
+            late = t.max() if len(self) and self.times[0, 0] <= t.min() else t.min()
+            raise InputError(f"at: t must lie in the run, which took {span}; got {late:g} s")
+        sizes = (self.states.shape[2], self.modes.shape[1], len(self.torque) and self.torque.shape[1])
+        program, nv = program_of(scene), scene.model.nv
+        work = len(program.power_names) if self.options.energy else 0
+        known = (scene.model.nq + nv + program.states + work, len(program.element_names))
+        if sizes[:2] != known or sizes[2] not in (0, nv):
+            raise InputError(f'at: the scene "{scene.name}" is not the one of the run')
+        step = np.maximum(np.searchsorted(self.times[:, 0], t, side="right") - 1, 0)
+        begin, end = self.times[step].T
+        part = (t - begin) / (end - begin)
+        moved_before = np.concatenate([[0.0], self.moved])[step]
+        moved = moved_before + part * (self.moved[step] - moved_before)
+        states = inside_steps(self.states, step, part)
+        outcome = core.sample_inside(
+            program,
+            self.options,
+            np.ascontiguousarray(t),
+            np.ascontiguousarray(states),
+            np.ascontiguousarray(self.modes[step], dtype=float),
+            inside_steps(self.directions, step, part),
+            np.ascontiguousarray(self.sought[step], dtype=float),
+            np.ascontiguousarray(self.torque[step] if len(self.torque) else self.torque),
+            moved,
+        )
+        return outcome_fields(scene, outcome, self.options)
+
+
+def inside_steps(states: Array, step: NDArray[np.int64], part: Array) -> Array:
+    """Values of the polynomials of steps, through the values at Chebyshev's points of the second kind.
+
+    Args:
+        states: at the points of each step, (n, points, size).
+        step: in which each value lies, (k,).
+        part: of the step, where it lies, (k,).
+
+    Returns:
+        (k, size).
+    """
+    return core.inside_steps(states, step, part).reshape(len(part), states.shape[2])
+
+
+def dense_output(outcome: core.Outcome, options: Any, nv: int, elements: int) -> DenseOutput:
+    """Dense output from the core's flat arrays.
+
+    Args:
+        outcome: of the core.
+        options: of the run, a RunOptions.
+        nv: number of velocities.
+        elements: number of frictional elements.
+    """
+    times = outcome.dense_times.reshape(-1, 2)
+    n = len(times)
+    points = core.dense_points(options.method)
+    turns = 3 * elements if outcome.dense_directions.size else 0
+    return DenseOutput(
+        times,
+        outcome.dense_states.reshape(n, points, -1) if n else np.zeros((0, points, 0)),
+        outcome.dense_modes.reshape(n, elements),
+        outcome.dense_directions.reshape(n, points, turns),
+        np.broadcast_to(outcome.dense_sought.reshape(n, -1), (n, elements))
+        if n
+        else np.zeros((0, elements), np.int8),
+        outcome.dense_torque.reshape(-1, nv),
+        outcome.dense_moved,
+        options,
+    )

@@ -1,0 +1,310 @@
+"""Files of trajectories: one NumPy archive without pickles, a header in JSON and an array a field."""
+
+from __future__ import annotations
+
+import json
+import os
+import tokenize
+import zipfile
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from pin_nonideal.atomic_files import file_path, mode_of, whole_file
+from pin_nonideal.errors import LoadingError, PinNonidealError
+from pin_nonideal.loading.load import load_again
+from pin_nonideal.scene.scene import Scene
+from pin_nonideal.states.joint_layout import JointPlace
+from pin_nonideal.types import Table
+
+from .dense_output import DenseOutput
+from .npz import npz_bytes
+from .records import LEDGER, Event, Stats, UserEventRecord
+
+FORMAT = 1
+# Up to this size [bytes] a file is packed, in less than a tenth of a second; of motions with all their digits
+# that would save a tenth of the room, and take ten to thirty times as long as writing them.
+PACKED_BYTES = 1_000_000
+# What NumPy, zip archives and JSON raise on files that are damaged or something else.
+UNREADABLE: tuple[type[Exception], ...] = (OSError, ValueError, LookupError, TypeError, AttributeError)
+UNREADABLE += (EOFError, RuntimeError, tokenize.TokenError, zipfile.BadZipFile, zlib.error)
+REQUIRED = ("t", "q", "v", "violation", "violation_rate")
+OPTIONAL = ("a", "tau", "F_ideal", "F_nonideal", "lam", "lam_ideal", "z", "modes", "closed", "limits")
+# By name, with one row or number a sample: of these a file holds a table, or nothing.
+GROUPS = ("energy", "power", "law_forces", "reactions", "contact_forces")
+DENSE = ("times", "states", "modes", "directions", "sought", "torque", "moved")
+LISTS = ("element_names", "element_laws", "law_names", "law_dofs")
+
+
+def write(run: Any, path: str | os.PathLike[str]) -> Path:
+    """Writes all arrays of a Trajectory to one .npz file, whole or not at all.
+
+    Args:
+        run: the Trajectory.
+        path: file name; ".npz" is appended when it is missing.
+
+    Returns:
+        The path written.
+
+    Raises:
+        InputError: `path` is no name of a file.
+        OutputError: the file cannot be written.
+    """
+    target = file_path("Trajectory.save: path", path)
+    if target.suffix != ".npz":
+        mode_of(target, "the trajectory")  # /dev/null is no beginning of a name
+        target = target.with_name(target.name + ".npz")
+    arrays = _arrays(run)
+    size = sum(np.asarray(x).nbytes for x in arrays.values())
+    with whole_file(target, "the trajectory") as stream:
+        (np.savez_compressed if size <= PACKED_BYTES else np.savez)(stream, **arrays)
+    return target
+
+
+def to_bytes(run: Any) -> bytes:
+    """What `write` writes, not compressed, for one of very many runs.
+
+    Args:
+        run: the Trajectory.
+    """
+    arrays = _arrays(run)
+    arrays["header"] = np.array(str(arrays["header"]).encode())  # JSON in ASCII, a quarter of the room
+    return npz_bytes(arrays)
+
+
+def _arrays(run: Any) -> Table:
+    """All arrays of a trajectory, the header among them, by their names in a file."""
+    arrays: Table = {key: getattr(run, key) for key in REQUIRED}
+    arrays |= {key: getattr(run, key) for key in OPTIONAL if getattr(run, key) is not None}
+    if run.closed is not None:
+        arrays["closed"] = run.closed.astype(np.int8)
+    tables = {group: getattr(run, group) for group in GROUPS}
+    for group, table in tables.items():
+        arrays |= {f"{group}/{i}": x for i, x in enumerate((table or {}).values())}
+    header = {
+        "format": FORMAT,
+        "name": run.name,
+        "notes": run.notes,
+        "failure": run.failure,
+        "events": [_listed(e) for e in run.events],
+        "stats": vars(run.stats),
+        "origin": None if run.scene is None else run.scene._origin,
+    }
+    header |= {key: getattr(run, key) for key in (*LISTS, "joints", "rows")}
+    header |= {group: None if table is None else list(table) for group, table in tables.items()}
+    arrays |= {f"loose/{key}": x for key, x in _loose(run).items()}
+    header["user_events"] = [record.name for record in run.user_events]
+    if run.dense is not None:
+        asked = vars(run.dense.options)
+        header["dense"] = {**asked, "atol": asked["atol"].tolist()}
+    arrays["header"] = np.array(json.dumps(header))
+    return arrays
+
+
+def read(path: str | os.PathLike[str]) -> tuple[Table, Table | None]:
+    """Fields of the Trajectory in a file, and what its scene was loaded from; nothing in it is executed.
+
+    Args:
+        path: file name.
+
+    Raises:
+        InputError: `path` is no name of a file.
+        LoadingError: the file is missing, truncated, or no trajectory.
+    """
+    source = file_path("Trajectory.load: path", path)
+    return read_from(source, source)
+
+
+def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
+    """The same of an open file.
+
+    Args:
+        stream: the file, or its name.
+        source: its name, for messages.
+
+    Raises:
+        LoadingError: it is truncated, or no trajectory.
+    """
+    try:
+        with np.load(stream, allow_pickle=False) as file:
+            arrays = {key: file[key] for key in file.files}
+        header = json.loads(arrays.pop("header").item())
+        if header.get("format") != FORMAT:
+            raise LoadingError(f'"{source}" must have format {FORMAT}; it has {header.get("format")}')
+        missing = [key for key in REQUIRED if key not in arrays]
+        if missing:
+            raise LoadingError(f'"{source}" is no complete trajectory: {", ".join(missing)} missing')
+        loose = {key: arrays.pop(key) for key in list(arrays) if key.startswith("loose/")}
+        _check_arrays(arrays, source)
+        fields: Table = {key: arrays.get(key) for key in (*REQUIRED, *OPTIONAL)}
+        for group in GROUPS:
+            if header.get(group) is not None:  # files of earlier versions have fewer
+                if group == "energy":
+                    _check_ledger(header[group], source)
+                fields[group] = {name: arrays[f"{group}/{i}"] for i, name in enumerate(header[group])}
+        fields |= {key: list(header.get(key, ())) for key in LISTS}
+        events = [_event(*each) for each in header["events"]]
+        if fields["closed"] is not None:
+            fields["closed"] = fields["closed"].astype(bool)
+        fields["joints"] = [
+            JointPlace(str(n), str(k), *map(int, at)) for n, k, *at in header.get("joints", ())
+        ]
+        fields["rows"] = {
+            str(n): (int(first), int(end), bool(c)) for n, (first, end, c) in header.get("rows", {}).items()
+        }
+        whole = {
+            **fields,
+            **_from_loose(loose, header, len(arrays["t"])),
+            "events": events,
+            "stats": Stats(**header["stats"]),
+            "name": str(header["name"]),
+            "notes": [str(note) for note in header.get("notes", [])],
+            "failure": None if header.get("failure") is None else str(header["failure"]),
+        }
+        return whole, header.get("origin")
+    except LoadingError:
+        raise
+    except UNREADABLE as error:
+        raise LoadingError(
+            f'cannot read a trajectory from "{source}": {type(error).__name__}: {error}; '
+            "it must be an .npz file written by Trajectory.save"
+        ) from error
+
+
+def fits(scene: Scene, joints: Sequence[JointPlace], rows: Table) -> bool:
+    """Whether a scene has the joints and rows of a run.
+
+    Args:
+        scene: the scene.
+        joints: of the run.
+        rows: of the run.
+    """
+    return scene._compiled.joints == list(joints) and scene._compiled.rows == rows
+
+
+def scene_again(origin: Any, joints: Sequence[JointPlace], rows: Table, notes: list[str]) -> Scene | None:
+    """The scene of a saved run, loaded again; None, with a note, where that is not the same any more.
+
+    Args:
+        origin: name and parameters of `load`, or None.
+        joints: of the run.
+        rows: of the run.
+        notes: of the run; may grow.
+    """
+    if origin is None:
+        return None
+    try:
+        scene = load_again(origin)
+    except (PinNonidealError, OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+        notes.append(f"the scene of the run cannot be loaded again: {error}")
+        return None
+    if fits(scene, joints, rows):
+        return scene
+    notes.append(f'the robot "{origin["name"]}" is no longer the one of the run; its scene is left out')
+    return None
+
+
+def _listed(e: Event) -> list[Any]:
+    """An event as a file holds it."""
+    if e.impulse is None or e.v_minus is None or e.v_plus is None:
+        return [e.time, e.kind, e.element]
+    vectors = [x.tolist() for x in (e.impulse, e.v_minus, e.v_plus)]
+    return [e.time, e.kind, e.element, e.energy_change, *vectors]
+
+
+def _event(t: float, kind: str, element: str, change: float = 0.0, *vectors: Sequence[float]) -> Event:
+    """An event as a file gives it."""
+    if not vectors:
+        return Event(float(t), str(kind), str(element))
+    impulse, before, after = (np.array(x, dtype=float) for x in vectors)
+    return Event(float(t), str(kind), str(element), impulse, float(change), before, after)
+
+
+def _loose(run: Any) -> Table:
+    """Arrays that have no row for each sample, by name."""
+    found: Table = {} if run.grid is None else {"grid": run.grid.astype(np.int8)}
+    for k, record in enumerate(run.user_events):
+        found |= {f"event/{k}/{key}": getattr(record, key) for key in ("t", "q", "v")}
+    if run.dense is not None:
+        found |= {f"dense/{key}": getattr(run.dense, key) for key in DENSE}
+    return found
+
+
+def _from_loose(loose: Table, header: Table, samples: int) -> Table:
+    """Fields made of them; what does not fit raises one of `UNREADABLE`."""
+    fields: Table = {}
+    if "loose/grid" in loose:
+        fields["grid"] = loose["loose/grid"].astype(bool).reshape(samples)
+    fields["user_events"] = [
+        UserEventRecord(str(name), *(loose[f"loose/event/{k}/{key}"] for key in ("t", "q", "v")))
+        for k, name in enumerate(header.get("user_events", ()))
+    ]
+    if "dense" in header:
+        options = SimpleNamespace(**header["dense"])
+        options.atol = np.array(options.atol, dtype=float)
+        dense = {key: loose[f"loose/dense/{key}"] for key in DENSE if key != "sought"}
+        if "loose/dense/sought" in loose:
+            dense["sought"] = loose["loose/dense/sought"]
+        else:  # a file of an earlier version holds the directions of each step's end
+            points = dense["states"].shape[1]
+            dense["directions"] = np.repeat(dense["directions"][:, None], points, axis=1)
+            dense["sought"] = np.zeros_like(dense["modes"])
+        fields["dense"] = DenseOutput(**dense, options=options)
+        fields["dense"].check()
+    return fields
+
+
+def _check_ledger(names: Sequence[str], source: Path) -> None:
+    """Raises unless the ledger has the columns that every ledger has.
+
+    Raises:
+        LoadingError: one is missing.
+    """
+    missing = [name for name in LEDGER if name not in names]
+    if missing:
+        raise LoadingError(f'"{source}" is no trajectory: its energy has no {", ".join(missing)}')
+
+
+def _check_arrays(arrays: Table, source: Path) -> None:
+    """Raises unless every array holds numbers and has a row for each sample.
+
+    Raises:
+        LoadingError: one does not.
+    """
+    rows = arrays["t"].shape[:1]
+    t = arrays["t"]
+    if t.dtype.kind in "fi" and t.ndim == 1:
+        if not np.isfinite(t).all():
+            raise LoadingError(
+                f'"{source}" is no trajectory: t must be finite; it holds {t[~np.isfinite(t)][0]}'
+            )
+        early = np.flatnonzero(np.diff(t) < 0.0)
+        if early.size:
+            i = int(early[0])
+            raise LoadingError(
+                f'"{source}" is no trajectory: t must not fall; t[{i + 1}] = {t[i + 1]:g} follows {t[i]:g}'
+            )
+    for key, x in arrays.items():
+        if x.dtype.kind not in "fi":
+            raise LoadingError(f'"{source}" is no trajectory: {key} must hold numbers; got {x.dtype.name}')
+        if key in ("q", "v") and not np.isfinite(x).all():
+            raise LoadingError(
+                f'"{source}" is no trajectory: {key} must be finite; it holds {x[~np.isfinite(x)][0]}'
+            )
+        columns = (
+            2
+            if key in ("q", "v", *OPTIONAL)
+            or key.startswith(("law_forces/", "reactions/", "contact_forces/"))
+            else 1
+        )
+        if x.ndim != columns:
+            shape = "a table" if columns == 2 else "one column"
+            raise LoadingError(f'"{source}" is no trajectory: {key} must be {shape}; got shape {x.shape}')
+        if x.shape[:1] != rows:
+            raise LoadingError(
+                f'"{source}" is no trajectory: {key} must have {rows[0]} rows as t has; got shape {x.shape}'
+            )

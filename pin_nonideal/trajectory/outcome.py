@@ -1,0 +1,163 @@
+"""What the core hands over, as the fields of a Trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pin_nonideal.compilation.error_context import joint_of
+from pin_nonideal.core_loader import core
+from pin_nonideal.scene.scene import Scene
+from pin_nonideal.types import Array, Table
+
+from .records import LEDGER, Event, Stats
+
+
+def outcome_stats(outcome: core.Outcome, wall: float) -> Stats:
+    """Counters of a run.
+
+    Args:
+        outcome: of the core.
+        wall: wall time [s].
+    """
+    return Stats(
+        outcome.steps,
+        outcome.rejected,
+        outcome.evaluations,
+        outcome.factorizations,
+        outcome.projections,
+        outcome.iterations,
+        wall,
+        *outcome.contact_misses,
+        outcome.limited,
+        outcome.rounding,
+    )
+
+
+def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any) -> Table:
+    """Fields of a Trajectory from the core's flat arrays; all but its counters.
+
+    Args:
+        scene: the scene that ran.
+        outcome: of the core.
+        options: what was asked for, a RunOptions.
+    """
+    t, nq, nv, program = outcome.t, scene.q0.size, scene.v0.size, scene._compiled.program
+    nt = len(t)
+    fields: Table = {}
+    if options.a:
+        fields["a"] = outcome.a.reshape(nt, nv)
+    if options.tau:
+        fields["tau"] = outcome.tau.reshape(nt, nv)
+    if options.forces:
+        fields["F_ideal"] = outcome.F_ideal.reshape(nt, nv)
+        fields["F_nonideal"] = outcome.F_nonideal.reshape(nt, nv)
+        fields["lam"] = outcome.lam.reshape(nt, program.rows)
+        fields["lam_ideal"] = outcome.lam_ideal.reshape(nt, program.rows)
+        fields["contact_forces"] = _contact_forces(scene, outcome)
+    if options.laws:
+        fields |= _of_laws(scene, outcome)
+    if options.reactions:
+        fields["reactions"] = _reactions(scene, outcome)
+    if options.power or options.energy:
+        columns = _columns(program)
+    if options.power:
+        power = outcome.power.reshape(nt, len(columns))
+        fields["power"] = dict(zip(columns, power.T, strict=True))
+    if options.energy:
+        jumps = ["impacts"] if scene._compiled.opening_names else []
+        fields["energy"] = _ledger([*columns, *jumps], outcome.energy)
+    if scene.contact_names:
+        fields["closed"] = outcome.closed.reshape(nt, len(scene.contact_names)).astype(bool)
+    if program.states:
+        fields["z"] = outcome.z.reshape(nt, program.states)
+    elements = scene.element_names
+    if elements:
+        fields["modes"] = outcome.modes.reshape(nt, len(elements))
+    return dict(
+        t=t,
+        q=outcome.q.reshape(nt, nq),
+        v=outcome.v.reshape(nt, nv),
+        violation=outcome.violation,
+        violation_rate=outcome.violation_rate,
+        events=[_event(scene, event, options.event_names) for event in outcome.events],
+        scene=scene,
+        element_names=list(elements),
+        element_laws=list(program.element_laws),
+        law_names=list(program.law_names),
+        joints=scene._compiled.joints,
+        rows=scene._compiled.rows,
+        name=scene.name,
+        **fields,
+    )
+
+
+def _of_laws(scene: Scene, outcome: core.Outcome) -> Table:
+    """Forces of the laws on the degrees of freedom that each acts on, and limits of the elements."""
+    program, nt = scene._compiled.program, len(outcome.t)
+    supports = program.law_supports
+    ends = np.cumsum([len(dofs) for dofs in supports])
+    parts = np.split(outcome.law_forces.reshape(nt, int(ends[-1]) if len(ends) else 0), ends[:-1], axis=1)
+    elements = len(scene.element_names)
+    return {
+        "law_forces": dict(zip(program.law_names, parts, strict=False)),
+        "law_dofs": [list(dofs) for dofs in supports],
+        "limits": outcome.limits.reshape(nt, elements) if elements else None,
+    }
+
+
+def _contact_forces(scene: Scene, outcome: core.Outcome) -> dict[str, Array]:
+    """Force of each contact between two frames, in world axes."""
+    program = scene._compiled.program
+    names = [program.constraints[block].name for block in program.framed_contacts]
+    forces = outcome.contact_forces.reshape(len(outcome.t), len(names), 3)
+    return {name: forces[:, k] for k, name in enumerate(names)}
+
+
+def _reactions(scene: Scene, outcome: core.Outcome) -> dict[str, Array]:
+    """Wrenches of joints, then of anchors and contacts, in their own axes and in world axes."""
+    program = scene._compiled.program
+    joints = [str(name) for name in scene.model.names][1:]
+    names = [*joints, *(program.constraints[block].name for block in program.reaction_blocks)]
+    wrenches = outcome.reactions.reshape(len(outcome.t), len(names), 12)
+    return {name: wrenches[:, k] for k, name in enumerate(names)}
+
+
+def _event(scene: Scene, event: core.Event, functions: Sequence[str]) -> Event:
+    """An event with the name of its element, contact or constraint, or of the user's function."""
+    if event.kind is core.EventKind.user:
+        return Event(event.time, event.kind.name, functions[event.element])
+    if event.kind in (core.EventKind.saturate, core.EventKind.desaturate):
+        joint = scene.model.names[joint_of(scene.model, event.element)]
+        return Event(event.time, event.kind.name, str(joint))
+    if not event.of_contact and event.kind is not core.EventKind.jump:
+        # A cluster of events without any friction is one of contacts.
+        names = scene.element_names or scene._compiled.opening_names
+        return Event(event.time, event.kind.name, names[event.element])
+    name = scene._compiled.program.constraints[event.element].name
+    if event.kind not in (core.EventKind.impact, core.EventKind.jump):
+        return Event(event.time, event.kind.name, name)
+    change = event.energy_change
+    return Event(event.time, event.kind.name, name, event.impulse, change, event.v_minus, event.v_plus)
+
+
+def _ledger(columns: Sequence[str], energy: Array) -> dict[str, Array]:
+    """The core's columns of energy, stored and done since the start, and their sums."""
+    stored, done = ("kinetic", "potential"), (*columns, "projection")
+    split = len(stored)
+    numbers = energy.reshape(-1, split + len(done))
+    ledger = dict(zip(stored, numbers.T[:split], strict=True))
+    ledger["total"] = ledger["kinetic"] + ledger["potential"]
+    ledger |= dict(zip(done, numbers.T[split:], strict=True))
+    ledger["balance"] = ledger["total"] - ledger["total"][:1] - numbers[:, split:].sum(axis=1)
+    return ledger
+
+
+def _columns(program: core.Program) -> list[str]:
+    """Columns of power, with laws under names that no other column of a ledger bears."""
+    names = program.power_names
+    first_law = len(names) - len(program.law_names)
+    taken = {*LEDGER, *names[:first_law], "projection"}
+    return names[:first_law] + [f"law {name}" if name in taken else name for name in names[first_law:]]

@@ -1,0 +1,95 @@
+"""Arrows of what acts where it is said: springs, wrenches and drag."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.description.forces import JointSpring, SpringDamper, Wrench
+from pin_nonideal.description.laws import Drag
+from pin_nonideal.states.kinematics import frame_on_joint
+from pin_nonideal.types import Array
+
+from .force_arrows import Arrow, along
+from .frames import Motion
+from .markers import Mark
+
+if TYPE_CHECKING:
+    from pin_nonideal.trajectory.trajectory import Trajectory
+
+
+def given_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]:
+    """Arrows of the springs, wrenches and laws of drag of a scene, where they act.
+
+    Args:
+        run: the run.
+        motion: its motion.
+        marks: of the scene, for the ends of springs.
+    """
+    ends = {mark.name: mark for mark in marks if mark.kind == "spring"}
+    found: list[Arrow] = []
+    for item in run.scene.forces:
+        if isinstance(item, SpringDamper):
+            found.append(_spring(run, motion, item, ends[item.name or f"spring {item.frame1}"]))
+        elif isinstance(item, JointSpring):
+            joint = run.scene.model.getJointId(item.joint)
+            q, v = run.scene.model.joints[joint].idx_q, run.scene.model.joints[joint].idx_v
+            if run.scene.model.joints[joint].nq == 1:
+                torque = (
+                    -item.stiffness * (motion.q[:, q] - item.rest) - item.damping * motion.of(run.v)[:, v]
+                )
+                name = item.name or f"spring {item.joint}"
+                found += along(run.scene.model, motion, name, "spring", joint, torque)
+        elif isinstance(item, Wrench):
+            found += _wrench(run, motion, item)
+    for law in run.scene.laws:
+        if isinstance(law, Drag):
+            joint, place = frame_on_joint(run.scene.model, law.frame)
+            point = np.asarray(place.translation)
+            slip = _velocity(run, motion, joint, point)
+            speed = np.linalg.norm(slip, axis=1, keepdims=True)
+            push = np.where(
+                speed > 0.0, -law.coefficient * np.maximum(speed, 1e-300) ** (law.exponent - 1.0) * slip, 0.0
+            )
+            found.append(
+                Arrow(law.name or f"drag {law.frame}", "drag", "N", push, joint, motion.point(joint, point))
+            )
+    return found
+
+
+def _spring(run: Trajectory, motion: Motion, item: SpringDamper, mark: Mark) -> Arrow:
+    """The force on the body of its first frame."""
+    first, second = motion.point(mark.joint1, mark.point1), motion.point(mark.joint2, mark.point2)
+    length = np.linalg.norm(first - second, axis=1, keepdims=True)
+    way = np.divide(first - second, length, out=np.zeros_like(first), where=length > 0.0)
+    rate = _velocity(run, motion, mark.joint1, mark.point1) - _velocity(run, motion, mark.joint2, mark.point2)
+    size = item.stiffness * (length - item.rest_length) + item.damping * np.sum(
+        rate * way, axis=1, keepdims=True
+    )
+    return Arrow(mark.name, "spring", "N", -size * way, mark.joint1, first)
+
+
+def _wrench(run: Trajectory, motion: Motion, item: Wrench) -> list[Arrow]:
+    joint, place = frame_on_joint(run.scene.model, item.frame)
+    given: Any = item.value
+    values = np.array([np.asarray(given(t) if callable(given) else given, dtype=float) for t in motion.times])
+    origin, name = motion.point(joint, np.asarray(place.translation)), item.name or f"wrench {item.frame}"
+    return [
+        Arrow(name, "given", unit, part, joint, origin)
+        for unit, part in (("N", values[:, :3]), ("N m", values[:, 3:]))
+    ]
+
+
+def _velocity(run: Trajectory, motion: Motion, joint: int, point: Array) -> Array:
+    """Velocity of a point that a joint carries at each frame, in world axes [m/s], (n, 3)."""
+    if not joint:
+        return np.zeros((len(motion.times), 3))
+    model, v = run.scene.model, motion.of(run.v)
+    data, found = model.createData(), np.empty((len(v), 3))
+    for k, q in enumerate(motion.q):
+        pin.forwardKinematics(model, data, q, v[k])
+        own = data.v[joint]
+        found[k] = data.oMi[joint].rotation @ (own.linear + np.cross(own.angular, point))
+    return found

@@ -1,0 +1,186 @@
+"""What contacts touch: the ground, other planes as patches, and the stops of joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.description.contacts import JointLimit
+from pin_nonideal.description.contacts.round import CapsuleContact, SphereContact, segments
+from pin_nonideal.states.kinematics import frame_on_joint
+from pin_nonideal.types import Array
+from pin_nonideal.validation import axis_triad, unit_axis
+
+from .frames import Motion
+from .visuals import LINK_COLORS, Color, Shape, Visual, joint_axis
+
+if TYPE_CHECKING:
+    from pin_nonideal.scene.scene import Scene
+    from pin_nonideal.trajectory.trajectory import Trajectory
+
+# A patch reaches so far beyond what touches it, and so far at most from where that is mostly, in sizes.
+BEYOND, FARTHEST = 0.25, 2.5
+PATCH: Color = (0.66, 0.46, 0.24, 0.6)
+STOP: Color = (0.28, 0.33, 0.41, 1.0)
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A plane that contacts touch.
+
+    Attributes:
+        joint: index of the joint that carries it, 0 for the world.
+        point: a point of it in that joint's frame [m], (3,).
+        normal: unit, there, (3,).
+        touching: joint and point of what touches it, (3,) each.
+    """
+
+    joint: int
+    point: Array
+    normal: Array
+    touching: list[tuple[int, Array]]
+
+    def same(self, other: Plane) -> bool:
+        """Whether both are one plane."""
+        return self.joint == other.joint and bool(
+            self.normal @ other.normal > 1.0 - 1e-9
+            and abs(self.normal @ (self.point - other.point)) < 1e-9 * (1.0 + np.abs(self.point).max())
+        )
+
+
+def planes_of(scene: Scene) -> list[Plane]:
+    """Planes of all contacts and rolling bodies, each once."""
+    found: list[Plane] = []
+    for item in [*scene.contacts, *scene.constraints]:
+        name = getattr(item, "plane", "")
+        if not hasattr(item, "normal") or (name is not None and not (name and scene.model.existFrame(name))):
+            continue
+        joint, place = (0, pin.SE3.Identity()) if name is None else frame_on_joint(scene.model, name)
+        normal = np.asarray(place.rotation) @ np.asarray(unit_axis("normal", item.normal))
+        point = np.asarray(place.translation) + getattr(item, "height", 0.0) * normal
+        plane = Plane(joint, point, normal, [_touching(scene.model, item)])
+        known = next((other for other in found if other.same(plane)), None)
+        if known is None:
+            found.append(plane)
+        else:
+            known.touching.extend(plane.touching)
+    return found
+
+
+def _touching(model: pin.Model, item: Any) -> tuple[int, Array]:
+    joint, place = frame_on_joint(model, item.frame)
+    return joint, np.asarray(place.act(np.asarray(getattr(item, "offset", np.zeros(3)), dtype=float)))
+
+
+def ground_of(planes: list[Plane], up: Array) -> Plane | None:
+    """The lowest plane of the world that lies level."""
+    level = [plane for plane in planes if not plane.joint and plane.normal @ up > 0.999]
+    return min(level, key=lambda plane: float(plane.point @ up)) if level else None
+
+
+def touched_of(run: Trajectory, motion: Motion, visuals: list[Visual], up: Array) -> list[Visual]:
+    """Patches of planes that nothing is drawn of, and stops that were struck.
+
+    Args:
+        run: the run.
+        motion: its motion.
+        visuals: what is drawn already.
+        up: direction against gravity, (3,).
+    """
+    planes = planes_of(run.scene)
+    ground, drawn = ground_of(planes, up), {visual.joint for visual in visuals}
+    hidden = [
+        plane for plane in planes if plane is not ground and (plane.joint not in drawn or not plane.joint)
+    ]
+    patches = [
+        _patch(number, plane, motion) for number, plane in enumerate(hidden) if 0 not in drawn or plane.joint
+    ]
+    return patches + _stops(run, motion) + _rounds(run.scene)
+
+
+def _rounds(scene: Scene) -> list[Visual]:
+    """Spheres and capsules that touch each other, of a scene without shapes."""
+    if scene.visual_model is not None and len(scene.visual_model.geometryObjects):
+        return []
+    found: dict[tuple[str, bytes], Visual] = {}
+    for item in scene.contacts:
+        if not isinstance(item, SphereContact | CapsuleContact):
+            continue
+        for frame, (start, end), radius in zip(
+            (item.frame1, item.frame2), segments(item), (item.radius1, item.radius2), strict=True
+        ):
+            joint, place = frame_on_joint(scene.model, frame)
+            way = end - start
+            turn = (
+                pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), way).matrix()
+                if way.any()
+                else np.eye(3)
+            )
+            shape = (
+                Shape("capsule", (radius, float(np.linalg.norm(way))))
+                if way.any()
+                else Shape("ellipsoid", (radius,) * 3)
+            )
+            middle = place * pin.SE3(turn, (start + end) / 2.0)
+            if radius > 0.0:
+                found[frame, way.tobytes()] = Visual(
+                    f"{frame} round", joint, middle, shape, LINK_COLORS[joint % len(LINK_COLORS)]
+                )
+    return list(found.values())
+
+
+def _patch(number: int, plane: Plane, motion: Motion) -> Visual:
+    """A thin plate on a plane around the path of what touches it."""
+    t1, t2, _ = (np.asarray(axis) for axis in axis_triad(unit_axis("normal", plane.normal)))
+    clouds = [motion.local(plane.joint, motion.point(joint, local)) for joint, local in plane.touching]
+    cloud = np.concatenate(clouds) - plane.point
+    along = np.column_stack([cloud @ t1, cloud @ t2])
+    middle, reach = np.median(along, axis=0), FARTHEST * motion.size
+    low = np.maximum(along.min(axis=0), middle - reach) - BEYOND * motion.size
+    high = np.minimum(along.max(axis=0), middle + reach) + BEYOND * motion.size
+    thick, center = 0.01 * motion.size, (low + high) / 2.0
+    place = plane.point + center[0] * t1 + center[1] * t2 - 0.5 * thick * plane.normal
+    turn = np.column_stack([t1, t2, plane.normal])
+    shape = Shape("box", (float(high[0] - low[0]), float(high[1] - low[1]), thick))
+    return Visual(f"plane {number + 1}", plane.joint, pin.SE3(turn, place), shape, PATCH)
+
+
+def _stops(run: Trajectory, motion: Motion) -> list[Visual]:
+    """Stops of joints that were struck: where the body points at the end of a turning joint, or a plate."""
+    struck = {str(event.element) for event in run.events if event.kind in ("impact", "touch_down")}
+    found = []
+    model = run.scene.model
+    limits = {"lower": model.lowerPositionLimit, "upper": model.upperPositionLimit}
+    for name, item in run.scene._compiled.described.items():
+        if isinstance(item, JointLimit) and name in struck:
+            joint, end = model.getJointId(item.joint), name.rpartition(" ")[2]
+            given = getattr(item, end)
+            at = float(limits[end][model.joints[joint].idx_q] if given is None else given)
+            found.append(_stop(model, motion, name, joint, at))
+    return found
+
+
+def _stop(model: pin.Model, motion: Motion, name: str, joint: int, at: float) -> Visual:
+    axis, turning = joint_axis(model, joint)
+    way, base, parent = np.asarray(axis), model.jointPlacements[joint], int(model.parents[joint])
+    z, thick = np.array([0.0, 0.0, 1.0]), 0.012 * motion.size
+    if not turning:
+        turn = pin.Quaternion.FromTwoVectors(z, way).matrix()
+        plate = Shape("box", (0.2 * motion.size, 0.2 * motion.size, 0.5 * thick))
+        return Visual(name, parent, base * pin.SE3(turn, at * way), plate, STOP)
+    ends = [np.asarray(model.inertias[joint].lever)]
+    ends += [
+        np.asarray(place.translation) for place in np.asarray(model.jointPlacements)[model.children[joint]]
+    ]
+    across = max((end - (end @ way) * way for end in ends), key=lambda end: float(np.linalg.norm(end)))
+    length = float(np.linalg.norm(across)) or 0.5 * motion.size
+    across = (
+        across / length if np.linalg.norm(across) > 0.0 else np.array(axis_triad(unit_axis("axis", way))[0])
+    )
+    there = pin.AngleAxis(at, way).toRotationMatrix() @ across
+    turn = pin.Quaternion.FromTwoVectors(z, there).matrix()
+    bar = Shape("capsule", (0.5 * thick, 0.5 * length))
+    return Visual(name, parent, base * pin.SE3(turn, 0.55 * length * there), bar, STOP)

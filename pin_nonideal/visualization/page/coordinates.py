@@ -1,0 +1,84 @@
+"""Coordinates of joints that can be plotted: angles, displacements and their rates, with labels and units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.types import Array
+
+from .visuals import joint_axis
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One number of a configuration or velocity that can be plotted.
+
+    Attributes:
+        joint: name of its joint.
+        label: the joint's name, with the component when the joint has several.
+        unit: unit.
+        values: one a sample, (nt,).
+    """
+
+    joint: str
+    label: str
+    unit: str
+    values: Array
+
+
+def positions(model: pin.Model, q: Array) -> list[Coordinate]:
+    """Angles and displacements of all joints; of an orientation in space there is none.
+
+    Args:
+        model: the model.
+        q: configurations, (nt, nq).
+    """
+    found = []
+    for joint in range(1, model.njoints):
+        name, kind = str(model.names[joint]), model.joints[joint].shortname()
+        first, nq, nv = model.joints[joint].idx_q, model.joints[joint].nq, model.joints[joint].nv
+        part = q[:, first : first + nq]
+        if nv == 1:
+            unit = "rad" if joint_axis(model, joint)[1] else "m"
+            value = part[:, 0] if nq == 1 else np.unwrap(np.arctan2(part[:, 1], part[:, 0]))
+            found.append(Coordinate(name, name, unit, value))
+        elif kind in ("JointModelFreeFlyer", "JointModelTranslation", "JointModelPlanar"):
+            axes = "xy" if kind == "JointModelPlanar" else "xyz"
+            found += [Coordinate(name, f"{name} {a}", "m", part[:, i]) for i, a in enumerate(axes)]
+            if kind == "JointModelPlanar":
+                angle = np.unwrap(np.arctan2(part[:, 3], part[:, 2]))
+                found.append(Coordinate(name, f"{name} angle", "rad", angle))
+    return found
+
+
+def velocities(model: pin.Model, v: Array, per: str = "/s") -> list[Coordinate]:
+    """Components of a velocity or, with `per` "/s²", of an acceleration.
+
+    Args:
+        model: the model.
+        v: velocities, (nt, nv).
+        per: what is added to rad and m.
+    """
+    found = []
+    for joint in range(1, model.njoints):
+        name, kind = str(model.names[joint]), model.joints[joint].shortname()
+        first, nv = model.joints[joint].idx_v, model.joints[joint].nv
+        if nv == 1:
+            units, labels = ["rad" if joint_axis(model, joint)[1] else "m"], [name]
+        elif kind == "JointModelFreeFlyer":
+            units = ["m"] * 3 + ["rad"] * 3
+            labels = [f"{name} {c}" for c in ("vx", "vy", "vz", "wx", "wy", "wz")]
+        elif kind == "JointModelTranslation":
+            units, labels = ["m"] * 3, [f"{name} {c}" for c in ("vx", "vy", "vz")]
+        elif kind == "JointModelPlanar":
+            units, labels = ["m", "m", "rad"], [f"{name} {c}" for c in ("vx", "vy", "wz")]
+        elif kind in ("JointModelSpherical", "JointModelSphericalZYX"):
+            units, labels = ["rad"] * 3, [f"{name} {c}" for c in ("wx", "wy", "wz")]
+        else:
+            continue
+        for i, (unit, label) in enumerate(zip(units, labels, strict=True)):
+            found.append(Coordinate(name, label, unit + per, v[:, first + i]))
+    return found

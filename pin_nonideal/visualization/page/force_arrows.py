@@ -1,0 +1,270 @@
+"""What the replay shows of the forces of constraint: arrows where bodies meet, and at joints.
+
+The arrow at an anchor is the reaction on the body of frame1, from the anchor's rows of `lam`, split by
+`lam_ideal` into its ideal and its nonideal part, its moment an arc beside it.  `F_nonideal` is drawn at the
+joints, and so are the torques `tau` of the actuation; `F_ideal` is when no constraint has a place of its own
+(those of a user have none).  The arrow of a contact is all that presses and rubs there, on the body that it
+presses, at the place where it touches; what opens a gap of the user's is drawn at the joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.contacts import UserContact
+from pin_nonideal.states.rows import rows_at
+from pin_nonideal.types import Array
+from pin_nonideal.validation import axis_triad, unit_axis
+
+from .contact_points import Touch
+from .frames import Motion
+from .markers import Side, constraints_of, side_of, sides_of
+from .visuals import joint_axis
+
+if TYPE_CHECKING:
+    from pin_nonideal.scene.scene import Scene
+    from pin_nonideal.trajectory.trajectory import Trajectory
+
+
+# A force below this part of the largest one is rounding and gets no arrow; moments are measured by the
+# largest moment and by the largest force at the length of a link.
+SMALLEST = 1e-9
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """A force that the replay draws.
+
+    Attributes:
+        name: name of the constraint or joint.
+        kind: "total", "ideal", "nonideal", "drive", "spring", "drag" or "given".
+        unit: "N" or "N m"; a moment is drawn as an arc about its axis.
+        values: force or moment in world axes, (n, 3), or moment about the axis, (n,).
+        joint: index of the joint that carries the place where it acts.
+        origin: that place in the world [m], (n, 3); None for the origin of the joint.
+        axis: axis of a moment in the joint's frame, (3,); None where the values are vectors.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    values: Array
+    joint: int = 0
+    origin: Array | None = None
+    axis: Array | None = None
+
+    def largest(self) -> float:
+        """Its largest size over the run [N or N m]."""
+        sizes = self.values if self.values.ndim == 1 else np.linalg.norm(self.values, axis=1)
+        return float(np.abs(sizes).max(initial=0.0))
+
+
+def arrows_of(
+    run: Trajectory, motion: Motion, touches: Sequence[Touch], more: Sequence[Arrow] = ()
+) -> list[Arrow]:
+    """Arrows of the forces that the run recorded, as far as they are more than rounding.
+
+    Args:
+        run: the run; without record "forces" it has none of constraints.
+        motion: its motion.
+        touches: the contacts of the run.
+        more: arrows of other forces.
+    """
+    forces = getattr(run, "contact_forces", None) or {}
+    arrows = [
+        Arrow(touch.name, "total", "N", motion.of(forces[touch.name]), touch.joint, touch.place)
+        for touch in touches
+        if touch.name in forces
+    ]
+    if run.lam is not None:
+        for name, item, shown in constraints_of(run.scene):
+            rows = run.scene.constraint_slices[name]
+            parts = {"total": motion.of(run.lam[:, rows])}
+            if run.lam_ideal is not None:
+                ideal = motion.of(run.lam_ideal[:, rows])
+                rest = parts["total"] - ideal
+                acts = np.abs(rest).max(initial=0.0) > SMALLEST * np.abs(ideal).max(initial=0.0)
+                parts = {"ideal": ideal} | ({"nonideal": rest} if acts else {})
+            if isinstance(item, UserContact):
+                arrows += _opening_the_gap(run, motion, name, motion.of(run.lam[:, rows]))
+                continue
+            for kind, lam in parts.items():
+                arrows += _reaction(run.scene, motion, name, kind, item, shown, lam)
+    # What rubs in contacts alone is part of the forces drawn there.
+    touching = {*forces, *(arrow.name for arrow in [*arrows, *more] if arrow.kind == "total")}
+    drawn = [] if run.law_names and touching.issuperset(run.law_names) else [("nonideal", run.F_nonideal)]
+    if not arrows and not touching:
+        drawn.append(("ideal", run.F_ideal))
+    drawn.append(("drive", run.tau))
+    for kind, force in drawn:
+        if force is not None:
+            arrows += _at_joints(run.scene.model, motion, kind, motion.of(force))
+    return _acting([*arrows, *more], run.scene.model, motion.size)
+
+
+def _acting(arrows: list[Arrow], model: pin.Model, size: float) -> list[Arrow]:
+    """The arrows that are more than rounding of the largest ones and of the weight of all bodies."""
+    weight = sum(inertia.mass for inertia in model.inertias) * float(np.linalg.norm(model.gravity.linear))
+    force = max([weight, *(arrow.largest() for arrow in arrows if arrow.unit == "N")])
+    moment = max([weight * size, *(arrow.largest() for arrow in arrows if arrow.unit == "N m")])
+    least = {"N": SMALLEST * max(force, moment / size), "N m": SMALLEST * max(moment, force * size)}
+    return [arrow for arrow in arrows if arrow.largest() > least[arrow.unit]]
+
+
+def _reaction(
+    scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.Shown, lam: Array
+) -> list[Arrow]:
+    """Arrows of one constraint: the force on its first body, or the force on its joints."""
+    model = scene.model
+    if hasattr(item, "lower"):  # a stop of a joint pushes away from its end
+        way = -1.0 if name.endswith(" upper") else 1.0
+        return along(model, motion, name, kind, model.getJointId(item.joint), way * lam[:, 0])
+    if shown in (core.Shown.anchor, core.Shown.rod):
+        return _between(scene, motion, name, kind, item, shown, lam)
+    if shown == core.Shown.rolling:
+        body = side_of(model, item.frame)
+        force, place = _rolling(model, motion, item, lam)
+        return [Arrow(name, kind, "N", force, body.joint, place)]
+    if shown == core.Shown.edge:
+        edge = side_of(model, item.frame)
+        force = edge.turned(motion, lam[:, :1] * np.array(unit_axis("axis", item.axis)))
+        return [Arrow(name, kind, "N", force, edge.joint, motion.point(edge.joint, edge.point))]
+    if shown == core.Shown.drive:
+        return along(model, motion, name, kind, model.getJointId(item.joint), lam[:, 0])
+    if shown == core.Shown.gear:
+        driven = along(model, motion, name, kind, model.getJointId(item.joint1), lam[:, 0])
+        leading = along(model, motion, name, kind, model.getJointId(item.joint2), -item.ratio * lam[:, 0])
+        return driven + leading
+    return []
+
+
+def _opening_the_gap(run: Trajectory, motion: Motion, name: str, lam: Array) -> list[Arrow]:
+    """The generalized force A^T lam on a gap of the user's, at the joints."""
+    scene, runner = run.scene, run.scene._compiled.program.runner()
+    states = zip(motion.q, motion.of(run.v), motion.times, lam, strict=True)
+    rows = scene.constraint_slices[name]
+    force = np.array([rows_at(runner, q, v, float(t))[0][rows].T @ own for q, v, t, own in states])
+    found = _at_joints(scene.model, motion, "total", force)
+    return [replace(arrow, name=f"{name}, {arrow.name}") for arrow in found]
+
+
+def _between(
+    scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.Shown, lam: Array
+) -> list[Arrow]:
+    """Force on the first of two frames that are tied, and the moment where the tie takes one."""
+    first, second = sides_of(scene, item)
+    origin = motion.point(first.joint, first.point)
+    if shown == core.Shown.rod:
+        force = lam[:, :1] * _unit(origin - motion.point(second.joint, second.point))
+        return [Arrow(name, kind, "N", force, first.joint, origin)]
+    axes = ["xyz".index(axis) for axis in getattr(item, "axes", "xyz")]
+    local = np.zeros((len(lam), 3))
+    local[:, axes] = lam[:, : len(axes)]
+    arrows = [Arrow(name, kind, "N", second.turned(motion, local), first.joint, origin)]
+    if lam.shape[1] > 3:
+        about = np.eye(3)  # of a hinge: the two directions across its axis
+        if lam.shape[1] == 5:
+            about = np.array(axis_triad(unit_axis("axis", item.axis))[:2])
+        moment = second.turned(motion, lam[:, 3:] @ about)
+        arrows.append(Arrow(name, kind, "N m", moment, first.joint, origin))
+    return arrows
+
+
+def _rolling(model: pin.Model, motion: Motion, item: Any, lam: Array) -> tuple[Array, Array]:
+    """Force on a sphere or disk that rolls on a plane, and the place where it touches, (n, 3) each."""
+    t1, t2, normal = (np.array(axis) for axis in axis_triad(unit_axis("normal", item.normal)))
+    local = lam @ np.array([t1, t2, normal])
+    body = side_of(model, item.frame)
+    plane = Side(0, pin.SE3.Identity()) if item.plane is None else side_of(model, item.plane)
+    up = plane.turned(motion, np.tile(normal, (len(lam), 1)))
+    if item.axis is not None:  # a disk: its lowest point
+        axis = body.turned(motion, np.tile(unit_axis("axis", item.axis), (len(lam), 1)))
+        up = _unit(up - np.sum(up * axis, axis=1, keepdims=True) * axis)
+    return plane.turned(motion, local), motion.point(body.joint, body.point) - item.radius * up
+
+
+def _unit(vectors: Array) -> Array:
+    """Vectors of length one; zero stays zero."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0))
+
+
+def along(model: pin.Model, motion: Motion, name: str, kind: str, joint: int, values: Array) -> list[Arrow]:
+    """Generalized force on a joint of one degree of freedom, along or about its axis; else nothing.
+
+    Args:
+        model: the model.
+        motion: the motion.
+        name: of the arrow.
+        kind: of the arrow.
+        joint: index of the joint.
+        values: the force or torque at each frame [N or N m], (n,).
+    """
+    axis, turning = joint_axis(model, joint)
+    if axis is None:
+        return []
+    if turning:
+        return [Arrow(name, kind, "N m", values, int(joint), axis=axis)]
+    force = motion.rotation(joint) @ axis * values[:, None]
+    return [Arrow(name, kind, "N", force, int(joint), motion.poses[:, joint, :3])]
+
+
+def _at_joints(model: pin.Model, motion: Motion, kind: str, force: Array) -> list[Arrow]:
+    """A generalized force at all joints, (n, nv): forces and moments along the directions of their motion.
+
+    Joints that only slide, one on the other without a mass between them, move one particle: their forces are
+    one arrow.
+    """
+    arrows: list[Arrow] = []
+    taken: set[int] = set()
+    for joint in reversed(range(1, model.njoints)):
+        if joint in taken:
+            continue
+        chain = _sliding(model, joint)
+        taken.update(chain)
+        name = ", ".join(str(model.names[j]) for j in reversed(chain))
+        if len(chain) > 1:
+            parts = [along(model, motion, name, kind, j, force[:, model.joints[j].idx_v])[0] for j in chain]
+            total = np.sum([part.values for part in parts], axis=0)
+            own = [Arrow(name, kind, "N", total, joint, parts[0].origin)]
+        elif model.joints[joint].nv == 1:
+            own = along(model, motion, name, kind, joint, force[:, model.joints[joint].idx_v])
+        else:
+            own = _wrench(model, motion, kind, joint, force)
+        arrows = own + arrows
+    return arrows
+
+
+def _sliding(model: pin.Model, joint: int) -> list[int]:
+    """A joint and those before it that move the same particle."""
+    chain = [joint]
+    while _slides(model, joint):
+        joint = int(model.parents[joint])
+        if not _slides(model, joint) or model.inertias[joint].mass > 0.0:
+            break
+        chain.append(joint)
+    return chain
+
+
+def _slides(model: pin.Model, joint: int) -> bool:
+    axis, turning = joint_axis(model, joint) if joint else (None, False)
+    return axis is not None and not turning
+
+
+def _wrench(model: pin.Model, motion: Motion, kind: str, joint: int, force: Array) -> list[Arrow]:
+    """The least force and moment S^T w = tau along the motions of a joint of several degrees of freedom."""
+    item, name = model.joints[joint], str(model.names[joint])
+    data, local = item.createData(), np.empty((len(force), 6))
+    for k, row in enumerate(force[:, item.idx_v : item.idx_v + item.nv]):
+        item.calc(data, motion.q[k])
+        local[k] = np.linalg.pinv(np.asarray(data.S)).T @ row
+    turn = motion.rotation(joint)
+    linear, angular = (np.einsum("nij,nj->ni", turn, part) for part in np.hsplit(local, 2))
+    place = motion.poses[:, joint, :3]
+    return [Arrow(name, kind, "N", linear, joint, place), Arrow(name, kind, "N m", angular, joint, place)]

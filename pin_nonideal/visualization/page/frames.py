@@ -1,0 +1,324 @@
+"""How the replay moves: frames of a run, close together where it moves fast, as placements of all joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pin_nonideal.errors import InputError, PinNonidealError
+from pin_nonideal.types import Array
+
+from .joint_tracks import Tracks, halfway, turned
+
+if TYPE_CHECKING:
+    from pin_nonideal.trajectory.trajectory import Trajectory
+
+
+# More frames than this make a page that no browser opens: an hour at 50 frames a second.
+MAX_FRAMES = 200_000
+# Chosen frames: at least so many, also where little moves, and at most so many numbers in all of them.
+LEAST_FRAMES, MOST_NUMBERS = 600, 400_000
+# Between frames the page may err by this part of the smallest link.
+CLOSE = 2e-3
+# An interval whose end rates and displacement disagree by more than this [rad, or part of the size] was
+# sampled too coarsely to tell the motion in it; so was one that must be moved so far to close its loops.
+TOLD = 0.3
+# Rounds of halving: 2^12 frames between two samples.
+ROUNDS = 12
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A run at the frames of the replay.
+
+    Attributes:
+        times: time of each frame [s], (n,), from the first to the last sample of the run.
+        poses: placement of each joint in the world as x, y, z, qx, qy, qz, qw, (n, njoints, 7); joint 0 is
+            the world itself.
+        before: sample of the run before each frame, (n,).
+        part: how far the frame lies between that sample and the next, 0 to 1, (n,).
+        q: configurations, (n, nq).
+        coordinates: those of all joints, (n, width), see `Tracks`.
+        held: intervals in which the run does not tell the motion, (n - 1,): the page shows their first frame.
+        size: diagonal of the model at the start [m].
+    """
+
+    times: Array
+    poses: Array
+    before: NDArray[np.int64]
+    part: Array
+    q: Array
+    coordinates: Array
+    held: NDArray[np.bool_]
+    size: float = 1.0
+
+    def of(self, values: Array) -> Array:
+        """Samples of the run at the frames, by linear interpolation; (nt, ...) gives (n, ...)."""
+        part = self.part.reshape(-1, *[1] * (values.ndim - 1))
+        after = np.minimum(self.before + 1, len(values) - 1)
+        return np.asarray((1.0 - part) * values[self.before] + part * values[after])
+
+    def only(self, chosen: NDArray[np.int64]) -> Motion:
+        """Some of the frames."""
+        return Motion(
+            times=self.times[chosen],
+            poses=self.poses[chosen],
+            before=self.before[chosen],
+            part=self.part[chosen],
+            q=self.q[chosen],
+            coordinates=self.coordinates[chosen],
+            held=np.zeros(max(len(chosen) - 1, 0), dtype=bool),
+            size=self.size,
+        )
+
+    def rotation(self, joint: int) -> Array:
+        """Orientation of a joint in the world at each frame, (n, 3, 3)."""
+        columns = [
+            turned(self.poses[:, joint, 3:], np.tile(axis, (len(self.times), 1))) for axis in np.eye(3)
+        ]
+        return np.stack(columns, axis=-1)
+
+    def point(self, joint: int, local: Array) -> Array:
+        """World position of a point fixed to a joint at each frame [m], (n, 3)."""
+        moved = np.broadcast_to(np.asarray(local, dtype=float), (len(self.times), 3))
+        return np.asarray(self.poses[:, joint, :3] + turned(self.poses[:, joint, 3:], moved))
+
+    def along(self, joint: int, vectors: Array) -> Array:
+        """Vectors in world axes (n, 3) in the axes of a joint, (n, 3)."""
+        return turned(self.poses[:, joint, 3:] * np.array([-1.0, -1.0, -1.0, 1.0]), np.asarray(vectors))
+
+    def local(self, joint: int, points: Array) -> Array:
+        """Points of the world (n, 3) as a joint carries them [m], (n, 3)."""
+        return self.along(joint, np.asarray(points) - self.poses[:, joint, :3])
+
+
+def sample(run: Trajectory, fps: float | None = None, share: int = 1) -> Motion:
+    """The run at the frames of a replay.
+
+    Args:
+        run: the run.
+        fps: even frames, so many a second; None for frames chosen by the motion: the samples of the run, and
+            between them as many as keep what the page blends within `CLOSE` of the smallest link.
+        share: how many runs share the room of a page.
+
+    Raises:
+        InputError: the run has no sample or is not finite, or it needs more than `MAX_FRAMES` frames.
+    """
+    t = np.asarray(run.t, dtype=np.float64)
+    if len(t) == 0:
+        raise InputError("a replay needs a run with at least one sample; this one has none")
+    if not (np.isfinite(run.q).all() and np.isfinite(run.v).all()):
+        raise InputError("a replay needs finite q and v; this run holds NaN or infinity")
+    frames = _Frames(run, share)
+    if fps is None:
+        frames.choose()
+    else:
+        frames.even(fps)
+    return frames.motion()
+
+
+class _Frames:
+    """Frames of a run while they are chosen: sample before, part of the way to the next, coordinates."""
+
+    def __init__(self, run: Trajectory, share: int) -> None:
+        # Ghosts by the dozen have fewer frames each.
+        self.least = max(LEAST_FRAMES // max(share // 4, 1), 60)
+        self.most = MOST_NUMBERS // share
+        self.run, self.t = run, np.asarray(run.t, dtype=np.float64)
+        self.tracks = Tracks(run.scene.model)
+        start = self.tracks.placements(self.tracks.coordinates(run.q[:1]))[0]
+        self.size, self.link = _sizes(run.scene.model, start)
+        if self.size == 0.0:  # a particle: as large as its path
+            every = np.unique(np.linspace(0, len(self.t) - 1, LEAST_FRAMES).astype(int))
+            path = self.tracks.placements(self.tracks.coordinates(run.q[every]))[:, 1:, :3]
+            self.size = self.link = float(np.linalg.norm(np.ptp(path.reshape(-1, 3), axis=0))) or 1.0
+        self.reach = np.minimum(np.maximum(self.tracks.reaches(start), self.link), self.size)
+        self.dense = getattr(run, "dense", None) is not None
+        self.told = np.ones(max(len(self.t) - 1, 0), dtype=bool) if self.dense else _told(run, self.size)
+        self.before, self.part = np.zeros(0, dtype=np.int64), np.zeros(0)
+        self.q, self.rows = np.zeros((0, run.q.shape[1])), np.zeros((0, self.tracks.width))
+
+    def times(self) -> Array:
+        after = np.minimum(self.before + 1, len(self.t) - 1)
+        return np.asarray(self.t[self.before] + self.part * (self.t[after] - self.t[self.before]))
+
+    def even(self, fps: float) -> None:
+        """So many frames a second."""
+        t, duration = self.t, float(self.t[-1] - self.t[0])
+        if duration * fps > MAX_FRAMES:
+            raise InputError(
+                f"fps * duration must be at most {MAX_FRAMES} frames; got {fps:g} * {duration:g} s: lower fps"
+            )
+        count = int(np.ceil(duration * fps - 1e-9)) + 1
+        times = t[0] + np.minimum(np.arange(count) / fps, duration)
+        self.before = np.clip(np.searchsorted(t, times, side="right") - 1, 0, max(len(t) - 2, 0))
+        length = t[np.minimum(self.before + 1, len(t) - 1)] - t[self.before]
+        self.part = np.divide(times - t[self.before], length, out=np.zeros(count), where=length > 0.0)
+        self.q = self._configurations(self.before, self.part)
+        self.rows = self.tracks.steady(self.tracks.coordinates(self.q))
+
+    def choose(self) -> None:
+        """The samples, thinned where there are too many, and frames between them where the motion asks."""
+        most = int(np.clip(self.most // max(self.tracks.width, 1), 2 * self.least, MAX_FRAMES // 10))
+        self.before = _base(self.run, self.size, most)
+        self.part = np.zeros(len(self.before))
+        self.q = np.asarray(self.run.q[self.before])
+        self.rows = self.tracks.steady(self.tracks.coordinates(self.q))
+        longest = (self.t[-1] - self.t[0]) / self.least
+        open_ones = np.ones(max(len(self.before) - 1, 0), dtype=bool)
+        for _ in range(ROUNDS):
+            room = most - len(self.before)
+            where = np.flatnonzero(open_ones & self._divisible())
+            if room <= 0 or not len(where):
+                return
+            before, part = self._middle(where)
+            q, times = self._configurations(before, part), self.times()
+            blended = halfway(times, self.rows)[where]
+            rows = self.tracks.near(self.tracks.coordinates(q), blended)
+            gap = self.tracks.distance(rows, blended, self.reach)
+            wrong = (gap > CLOSE * self.link) | (np.diff(times)[where] > longest)
+            new = np.flatnonzero(wrong)
+            new = np.sort(new[np.argsort(-gap[new], kind="stable")[:room]])
+            # What was right stays so; each new frame opens the two intervals beside it.
+            open_ones[where[~wrong]] = False
+            open_ones = np.insert(open_ones, where[new], True)
+            at = where[new] + 1
+            self.before, self.part = (
+                np.insert(self.before, at, before[new]),
+                np.insert(self.part, at, part[new]),
+            )
+            self.q = np.insert(self.q, at, q[new], axis=0)
+            self.rows = self.tracks.steady(np.insert(self.rows, at, rows[new], axis=0))
+
+    def _divisible(self) -> NDArray[np.bool_]:
+        """Intervals of time that have a length and a told motion."""
+        last = len(self.told) - 1
+        alone = self.before[:-1] == np.where(self.part[1:] == 0.0, self.before[1:] - 1, self.before[1:])
+        told = ~alone | (self.told[np.clip(self.before[:-1], 0, last)] if last >= 0 else False)
+        return np.asarray((np.diff(self.times()) > 1e-12 * (1.0 + abs(self.t[-1]))) & told)
+
+    def _middle(self, where: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
+        """The sample in the middle of each interval, or the middle between two samples."""
+        k0, k1 = self.before[where], self.before[where + 1]
+        s0, s1 = self.part[where], self.part[where + 1]
+        inside = (k1 == k0) | ((k1 == k0 + 1) & (s1 == 0.0))
+        part = np.where(inside, (s0 + np.where(k1 == k0, s1, 1.0)) / 2.0, 0.0)
+        return np.where(inside, k0, (k0 + k1 + 1) // 2), part
+
+    def _configurations(self, before: NDArray[np.int64], part: Array) -> Array:
+        if self.dense:
+            found, inner = self.run.q[np.where(part < 1.0, before, before + 1)], (part > 0.0) & (part < 1.0)
+            if inner.any():
+                length = self.t[before[inner] + 1] - self.t[before[inner]]
+                found[inner] = self.run.at(self.t[before[inner]] + part[inner] * length).q
+            return np.asarray(found)
+        each = [self._configuration(int(k), float(s)) for k, s in zip(before, part, strict=True)]
+        return np.array(each).reshape(-1, self.run.q.shape[1])
+
+    def _configuration(self, k: int, s: float) -> Array:
+        """Configuration at the part s between samples k and k + 1, its loops closed."""
+        run = self.run
+        if s in (0.0, 1.0) or len(self.t) == 1:
+            return np.asarray(run.q[k if s < 1.0 else k + 1])
+        q = np.asarray(pin.integrate(run.scene.model, run.q[k], cubic(run, k, s)[0]))
+        project = getattr(run.scene, "project", None)
+        if project is None or not run.scene.constraint_slices:
+            return q
+        t = float(self.t[k] + s * (self.t[k + 1] - self.t[k]))
+        try:
+            closed, _ = project(q, (1.0 - s) * run.v[k] + s * run.v[k + 1], t)
+        except PinNonidealError:
+            self.told[k] = False
+            return q
+        if np.abs(pin.difference(run.scene.model, q, closed)).max(initial=0.0) > TOLD * min(1.0, self.size):
+            self.told[k] = False
+        return np.asarray(closed)
+
+    def motion(self) -> Motion:
+        poses = self.tracks.placements(self.rows)
+        # q and -q are one rotation: neighbors in time take the nearer sign.
+        turned_over = np.sum(poses[1:, :, 3:] * poses[:-1, :, 3:], axis=2) < 0.0
+        poses[1:, :, 3:] *= np.cumprod(np.where(turned_over, -1.0, 1.0), axis=0)[:, :, None]
+        held = np.zeros(max(len(self.before) - 1, 0), dtype=bool)
+        if len(self.told):
+            held = ~self.told[np.minimum(self.before[:-1], len(self.told) - 1)]
+        return Motion(self.times(), poses, self.before, self.part, self.q, self.rows, held, self.size)
+
+
+def cubic(run: Trajectory, k: int, s: float) -> tuple[Array, Array]:
+    """What leads from sample k to the part s before the next, (nv,), and its rate in time, (nv,).
+
+    The cubic with the q and v of both samples at its ends runs in the tangent space at sample k, where the
+    rate at k + 1 is d difference/d q_1 times v.
+
+    Args:
+        run: the run.
+        k: sample.
+        s: part of the way to the next, 0 to 1.
+    """
+    model = run.scene.model
+    q0, q1, v0, v1 = run.q[k], run.q[k + 1], run.v[k], run.v[k + 1]
+    h = run.t[k + 1] - run.t[k]
+    step = pin.difference(model, q0, q1)
+    for joint in model.joints:
+        if joint.nq == 2 and joint.nv == 1:  # a continuous joint may turn more than once in a long step
+            i = joint.idx_v
+            step[i] += 2.0 * np.pi * np.round((h * (v0[i] + v1[i]) / 2.0 - step[i]) / (2.0 * np.pi))
+    end_rate = pin.dDifference(model, q0, q1, pin.ARG1) @ v1
+    xi = h * s * (1.0 - s) ** 2 * v0 + s * s * (3.0 - 2.0 * s) * step - h * s * s * (1.0 - s) * end_rate
+    rate = (1.0 - s) * (1.0 - 3.0 * s) * v0 + 6.0 * s * (1.0 - s) / h * step - s * (2.0 - 3.0 * s) * end_rate
+    return np.asarray(xi), np.asarray(rate)
+
+
+def _told(run: Trajectory, size: float) -> NDArray[np.bool_]:
+    """Intervals between samples whose motion the rates at their ends tell, (nt - 1,).
+
+    There the displacement is the mean rate times the length up to its curvature; turns of a continuous joint
+    and orientations in space count as told.
+    """
+    model, h = run.scene.model, np.diff(np.asarray(run.t, dtype=float))[:, None]
+    told = np.ones(len(h), dtype=bool)
+    for joint in list(model.joints)[1:]:
+        if joint.nq != 1 or joint.nv != 1:
+            continue
+        q, v = run.q[:, joint.idx_q : joint.idx_q + 1], run.v[:, joint.idx_v : joint.idx_v + 1]
+        mean = h * (v[1:] + v[:-1]) / 2.0
+        scale = 1.0 if "P" not in joint.shortname().removeprefix("JointModel")[:1] else size
+        told &= (np.abs(np.diff(q, axis=0) - mean) < TOLD * scale)[:, 0]
+    # Among intervals that are not told, some agree by chance.
+    beside = np.convolve(~told, np.ones(7), mode="same") if len(told) else np.zeros(0)
+    return np.asarray(beside[: len(told)] == 0.0 if len(told) >= 7 else np.full(len(told), told.all()))
+
+
+def _base(run: Trajectory, size: float, most: int) -> NDArray[np.int64]:
+    """All samples, or as many as half of the frames allow, evenly along the motion."""
+    count = len(run.t)
+    if count <= most // 2:
+        return np.arange(count)
+    speed = np.abs(run.v).max(axis=1, initial=0.0) / min(1.0, size)
+    h = np.diff(np.asarray(run.t, dtype=float))
+    way = np.append(0.0, np.cumsum(h * (speed[1:] + speed[:-1]) / 2.0))
+    way = way / (way[-1] or 1.0) + np.linspace(0.0, 1.0, count) / 4.0
+    even = np.searchsorted(way, np.linspace(0.0, way[-1], most // 2))
+    return np.unique(np.clip(np.append(even, [0, count - 1]), 0, count - 1))
+
+
+def _sizes(model: pin.Model, poses: Array) -> tuple[float, float]:
+    """Diagonal of the box around all joints and centers of mass, and the smallest link [m]."""
+    levers = np.array([model.inertias[joint].lever for joint in range(model.njoints)])
+    centers = poses[:, :3] + turned(poses[:, 3:], levers)
+    frames = [
+        poses[f.parentJoint, :3] + turned(poses[f.parentJoint, None, 3:], f.placement.translation[None])[0]
+        for f in model.frames
+    ]
+    size = float(np.linalg.norm(np.ptp(np.vstack([poses[:, :3], centers, *frames]), axis=0)))
+    lengths = np.linalg.norm(
+        np.array([m.translation for m in model.jointPlacements][1:]).reshape(-1, 3), axis=1
+    )
+    lengths = np.append(lengths, np.linalg.norm(levers[1:], axis=1))
+    real = lengths[lengths > 1e-3 * size]
+    return (size, float(real.min())) if len(real) and size > 1e-6 else (size if size > 1e-6 else 0.0, size)

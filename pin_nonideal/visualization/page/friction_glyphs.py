@@ -1,0 +1,129 @@
+"""Frictional elements where they are: their modes, how near each is to its limit, and cones of contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pin_nonideal.states.kinematics import frame_on_joint
+from pin_nonideal.types import Array
+from pin_nonideal.validation import unit_axis
+
+from .contact_points import Touch
+from .frames import Motion
+from .markers import Mark
+from .mode_timeline import bands_of
+from .visuals import joint_axis
+from .xy_plots import friction_joints
+
+if TYPE_CHECKING:
+    from pin_nonideal.trajectory.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Element:
+    """A frictional element as the replay draws it.
+
+    Attributes:
+        name: as the run names it.
+        band: its number among the modes of the run.
+        joint: index of the joint that carries its place, 0 for the world.
+        point: the place in that joint's frame [m], (3,), or where it moves, that at each frame, (n, 3).
+        axis: axis of the joint or normal of the contact, in the frame of `axis_joint`, in the same way.
+        axis_joint: index of the joint that carries the axis.
+        mu: half-opening of the friction cone, radius over height; 0 for a joint.
+        share: friction over its limit at each frame, 0 to 1, (n,), or None when it was not recorded.
+        normal: normal force of a contact at each frame [N], (n,), or None.
+        stays: whether it is drawn while its contact is open too.
+    """
+
+    name: str
+    band: int
+    joint: int
+    point: Array
+    axis: Array
+    axis_joint: int
+    mu: float = 0.0
+    share: Array | None = None
+    normal: Array | None = None
+    stays: bool = True
+
+
+def elements_of(
+    run: Trajectory, motion: Motion, marks: list[Mark], touches: Sequence[Touch] = ()
+) -> list[Element]:
+    """The elements of a run that have a place: friction in joints and at anchors, and contacts.
+
+    Args:
+        run: the run.
+        motion: its motion.
+        marks: of the scene.
+        touches: the contacts of the run.
+    """
+    joints, found = friction_joints(run), []
+    contacts = {touch.name: touch for touch in touches}
+    places = {mark.name: mark for mark in marks}
+    laws = dict(zip(run.element_names, run.element_laws, strict=False))
+    for band, (name, _) in enumerate(bands_of(run)):
+        law = run.law_names[laws[name]] if name in laws else name
+        whole = name not in laws or run.element_laws.count(laws[name]) == 1
+        if law in joints:
+            at, share = joints[law], _joint_share(run, law, joints[law], run.element_names.index(name))
+            axis, part = joint_axis(run.scene.model, at)[0], None if share is None else motion.of(share)
+            found.append(Element(name, band, at, np.zeros(3), np.asarray(axis), at, share=part))
+        elif law in contacts:
+            found.append(_contact(run, motion, name, band, contacts[law], whole))
+        elif (mark := places.get(_anchor(run, law))) is not None:
+            along = _hinge_axis(run, mark.name)
+            found.append(Element(name, band, mark.joint1, mark.point1, along, mark.joint1))
+    return found
+
+
+def _anchor(run: Trajectory, law: str) -> str:
+    """The anchor that a law rubs in, by name."""
+    for item in run.scene.laws:
+        label = getattr(item, "name", None) or f"{type(item).__name__}({getattr(item, 'joint', '')})"
+        if label == law:
+            return str(getattr(item, "joint", ""))
+    return ""
+
+
+def _hinge_axis(run: Trajectory, anchor: str) -> Array:
+    """Axis of a hinge in the frame of the joint that carries frame1, (3,); z of an anchor without one."""
+    item = dict(zip(run.scene.constraint_slices, run.scene.constraints, strict=False)).get(anchor)
+    if item is None or not hasattr(item, "frame1"):
+        return np.array([0.0, 0.0, 1.0])
+    _, place = frame_on_joint(run.scene.model, item.frame1)
+    return np.asarray(place.rotation @ np.asarray(unit_axis("axis", getattr(item, "axis", "z"))))
+
+
+def _joint_share(run: Trajectory, law: str, joint: int, element: int) -> Array | None:
+    """Friction in a joint over its limit, (nt,)."""
+    force, limits = run.law(law).force, run.limits
+    if force is None or limits is None:
+        return None
+    return _part(np.abs(force[:, run.scene.model.joints[joint].idx_v]), limits[:, element])
+
+
+def _part(size: Array, limit: Array) -> Array:
+    return np.clip(np.divide(size, limit, out=np.zeros_like(size), where=limit > 0.0), 0.0, 1.0)
+
+
+def _contact(run: Trajectory, motion: Motion, name: str, band: int, touch: Touch, whole: bool) -> Element:
+    """A contact with its cone, and how much of it the force needs where forces were recorded."""
+    share = pressing = None
+    mu = float(getattr(touch.item, "mu", 0.0)) if whole or name == touch.name else 0.0
+    forces = getattr(run, "contact_forces", None) or {}
+    if touch.name in forces:
+        force = motion.of(forces[touch.name])
+        pressing = np.sum(force * touch.normal, axis=1)
+        across = np.linalg.norm(force - pressing[:, None] * touch.normal, axis=1)
+        if mu > 0.0:
+            share = _part(across, mu * np.abs(pressing))
+    point, axis = motion.local(touch.joint, touch.place), motion.along(touch.other, touch.normal)
+    return Element(
+        name, band, touch.joint, point, axis, touch.other, mu, share, pressing, stays=touch.on_plane
+    )

@@ -1,0 +1,207 @@
+"""How the joints of a tree move: coordinates that a page blends in time and turns into placements.
+
+A joint that turns or slides along one axis has one coordinate, every other one the placement of its frame
+after the joint against the one before it.  Blended coordinates keep what a joint joins together, however far
+apart the frames of a replay lie.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.types import Array
+
+from .visuals import joint_axis
+
+# Joints with one axis through the origin of their frame.
+ONE_AXIS = re.compile(r"JointModel(R[XYZ]|RUB[XYZ]|P[XYZ]|Revolute|Prismatic)")
+
+
+@dataclass(frozen=True)
+class Track:
+    """One joint.
+
+    Attributes:
+        parent: index of the joint before it.
+        place: its fixed placement there, as x, y, z, qx, qy, qz, qw, (7,).
+        first: column of its first coordinate.
+        axis: in its own frame, (3,); None for a joint whose seven coordinates are its placement.
+        turning: whether it turns about its axis, or slides along it.
+    """
+
+    parent: int
+    place: Array
+    first: int
+    axis: Array | None
+    turning: bool
+
+    @property
+    def columns(self) -> slice:
+        """Columns of its coordinates."""
+        return slice(self.first, self.first + (7 if self.axis is None else 1))
+
+
+class Tracks:
+    """The joints of a model, the world's first."""
+
+    def __init__(self, model: pin.Model) -> None:
+        self.model = model
+        self.joints: list[Track | None] = [None]
+        self.width = 0
+        for joint in range(1, model.njoints):
+            one = ONE_AXIS.match(model.joints[joint].shortname()) and model.joints[joint].nv == 1
+            axis, turning = joint_axis(model, joint) if one else (None, False)
+            place = pin.SE3ToXYZQUAT(model.jointPlacements[joint])
+            track = Track(int(model.parents[joint]), place, self.width, axis, turning)
+            self.joints.append(track)
+            self.width = track.columns.stop
+
+    def moving(self) -> list[tuple[int, Track]]:
+        """All but the world, with their numbers."""
+        return [(number, track) for number, track in enumerate(self.joints) if track is not None]
+
+    def coordinates(self, q: Array) -> Array:
+        """Coordinates of configurations, (n, nq) to (n, width)."""
+        found = np.empty((len(q), self.width))
+        for number, track in self.moving():
+            joint = self.model.joints[number]
+            part = q[:, joint.idx_q : joint.idx_q + joint.nq]
+            if track.axis is not None:
+                found[:, track.first] = part[:, 0] if joint.nq == 1 else np.arctan2(part[:, 1], part[:, 0])
+            elif joint.shortname() == "JointModelFreeFlyer":
+                found[:, track.columns] = part
+            else:
+                data = joint.createData()
+                for k, row in enumerate(q):
+                    joint.calc(data, row)
+                    found[k, track.columns] = pin.SE3ToXYZQUAT(pin.SE3(data.M))
+        return found
+
+    def near(self, coordinates: Array, others: Array) -> Array:
+        """The same places in coordinates next to others: whole turns and signs of quaternions are free."""
+        found = coordinates.copy()
+        for number, track in self.moving():
+            c = track.columns
+            if track.axis is None:
+                away = np.sum(found[:, c][:, 3:] * others[:, c][:, 3:], axis=1) < 0.0
+                found[away, c.start + 3 : c.stop] *= -1.0
+            elif track.turning and self.model.joints[number].nq == 2:
+                turns = np.round((others[:, c] - found[:, c]) / (2.0 * np.pi))
+                found[:, c] += 2.0 * np.pi * turns
+        return np.asarray(found)
+
+    def steady(self, coordinates: Array) -> Array:
+        """The same places with each frame's coordinates next to those of the frame before it."""
+        found = coordinates.copy()
+        for number, track in self.moving():
+            c = track.columns
+            if track.axis is None:
+                turned = np.sum(found[1:, c][:, 3:] * found[:-1, c][:, 3:], axis=1) < 0.0
+                found[1:, c.start + 3 : c.stop] *= np.cumprod(np.where(turned, -1.0, 1.0))[:, None]
+            elif track.turning and self.model.joints[number].nq == 2:
+                found[:, c] = np.unwrap(found[:, c], axis=0)
+        return np.asarray(found)
+
+    def placements(self, coordinates: Array) -> Array:
+        """Placement of each joint in the world as x, y, z, qx, qy, qz, qw, (n, njoints, 7)."""
+        world = np.zeros((len(coordinates), len(self.joints), 7))
+        world[:, 0, 6] = 1.0
+        for number, track in self.moving():
+            start = _after(world[:, track.parent], np.broadcast_to(track.place, (len(world), 7)))
+            values = coordinates[:, track.columns]
+            move = values
+            if track.axis is not None:
+                move = np.zeros((len(world), 7))
+                move[:, 6] = 1.0
+                if track.turning:
+                    move[:, 3:6], move[:, 6] = np.sin(values / 2.0) * track.axis, np.cos(values[:, 0] / 2.0)
+                else:
+                    move[:, :3] = values * track.axis
+            world[:, number] = _after(start, move)
+        return world
+
+    def reaches(self, poses: Array) -> Array:
+        """How far what a joint moves reaches from its origin at some placements [m], (njoints,)."""
+        levers = np.array([inertia.lever for inertia in self.model.inertias])
+        ends = poses[:, :3] + turned(poses[:, 3:], levers)
+        found = np.zeros(len(self.joints))
+        for frame in self.model.frames:
+            joint = frame.parentJoint
+            found[joint] = max(found[joint], float(np.linalg.norm(frame.placement.translation)))
+        for number in range(1, len(self.joints)):
+            above = number
+            while above:
+                away = np.linalg.norm([ends[number], poses[number, :3]] - poses[above, :3], axis=1).max()
+                found[above] = max(found[above], float(away))
+                above = int(self.model.parents[above])
+        return found
+
+    def distance(self, one: Array, other: Array, reach: Array) -> Array:
+        """How far apart two sets of coordinates place a point at most [m], (n,).
+
+        Args:
+            one: coordinates, (n, width).
+            other: coordinates, (n, width).
+            reach: as `reaches` gives it [m], (njoints,).
+        """
+        gap = np.abs(one - other)
+        total = np.zeros((len(gap), len(self.joints)))
+        for number, track in self.moving():
+            own = gap[:, track.columns]
+            if track.axis is None:
+                moved = np.linalg.norm(own[:, :3], axis=1) + 2.0 * reach[number] * np.linalg.norm(
+                    own[:, 3:], axis=1
+                )
+            else:
+                moved = own[:, 0] * (reach[number] if track.turning else 1.0)
+            total[:, number] = total[:, track.parent] + moved
+        return np.asarray(total.max(axis=1))
+
+
+def _after(first: Array, second: Array) -> Array:
+    """Placements one after the other, (n, 7) each."""
+    moved = first[:, :3] + turned(first[:, 3:], second[:, :3])
+    return np.column_stack([moved, _product(first[:, 3:], second[:, 3:])])
+
+
+def turned(quaternions: Array, vectors: Array) -> Array:
+    """Vectors (n, 3) turned by quaternions x, y, z, w, (n, 4)."""
+    axis, w = quaternions[:, :3], quaternions[:, 3:]
+    once = 2.0 * np.cross(axis, vectors)
+    return np.asarray(vectors + w * once + np.cross(axis, once))
+
+
+def _product(a: Array, b: Array) -> Array:
+    vector = a[:, 3:] * b[:, :3] + b[:, 3:] * a[:, :3] + np.cross(a[:, :3], b[:, :3])
+    return np.column_stack([vector, a[:, 3] * b[:, 3] - np.sum(a[:, :3] * b[:, :3], axis=1)])
+
+
+def slopes(times: Array, values: Array) -> tuple[Array, Array]:
+    """Rates of change at both ends of every interval, (n - 1, c) each, as the page blends frames.
+
+    Inside, that of the parabola through three frames; where two frames share a time, as at an impact, and at
+    the ends of the run, the one-sided rate of the parabola that ends there.
+    """
+    h = np.diff(times)[:, None]
+    chord = np.divide(np.diff(values, axis=0), h, out=np.zeros((len(h), values.shape[1])), where=h > 0.0)
+    left, right = chord.copy(), chord.copy()
+    inner = (h[:-1] > 0.0) & (h[1:] > 0.0)
+    whole = np.where(inner, h[:-1] + h[1:], 1.0)
+    middle = (chord[:-1] * h[1:] + chord[1:] * h[:-1]) / whole
+    right[:-1], left[1:] = np.where(inner, middle, chord[:-1]), np.where(inner, middle, chord[1:])
+    smooth = inner[:, 0]
+    starts, ends = np.append(False, smooth), np.append(smooth, False)
+    left = np.where((~starts & ends)[:, None], 2.0 * chord - right, left)
+    right = np.where((starts & ~ends)[:, None], 2.0 * chord - left, right)
+    return left, right
+
+
+def halfway(times: Array, values: Array) -> Array:
+    """Values in the middle of every interval, (n - 1, c): Hermite's cubic through values and `slopes`."""
+    left, right = slopes(times, values)
+    h = np.diff(times)[:, None]
+    return np.asarray((values[1:] + values[:-1]) / 2.0 + h * (left - right) / 8.0)

@@ -1,0 +1,85 @@
+"""Modes of elements and contacts over time, and the gaps of contacts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pin_nonideal.states.rows import rows_at
+from pin_nonideal.types import Array
+
+from .style import CLOSED, OPEN
+
+if TYPE_CHECKING:
+    from pin_nonideal.trajectory.trajectory import Trajectory
+
+# Gaps are taken at no more samples than this.
+MOST_GAPS = 5000
+
+Bands = list[tuple[float, float, int]]
+
+
+def mode_bands(t: Array, modes: NDArray[np.int8]) -> list[Bands]:
+    """Intervals of constant mode of each element, as (start [s], end [s], mode).
+
+    Args:
+        t: times [s], (nt,).
+        modes: +1 and -1 for slip, 0 for stick, (nt, n). A mode holds from its sample to the next.
+    """
+    bands = []
+    for column in np.asarray(modes).T:
+        starts = np.concatenate([[0], np.flatnonzero(np.diff(column)) + 1])
+        ends = np.append(starts[1:], len(t) - 1)
+        bands.append([(float(t[i]), float(t[j]), int(column[i])) for i, j in zip(starts, ends, strict=True)])
+    return bands
+
+
+def bands_of(run: Trajectory) -> list[tuple[str, Bands]]:
+    """Bands by name: of the elements that rub, and of the contacts without friction that open or close.
+
+    Contacts that touch nothing in the whole run have none: two boxes are 160 of them.
+
+    Args:
+        run: the run.
+    """
+    found: list[tuple[str, Bands]] = []
+    if run.modes is not None:
+        met = np.any(np.asarray(run.modes) != OPEN, axis=0)
+        struck = {str(event.element) for event in run.events}
+        named = zip(run.element_names, mode_bands(run.t, run.modes), met, strict=True)
+        found = [(name, bands) for name, bands, meets in named if meets or name in struck]
+    closed = getattr(run, "closed", None)
+    if closed is None:
+        return found
+    rubbing = {run.law_names[law] for law in run.element_laws}
+    for name, column in zip(run.scene.contact_names, np.asarray(closed).T, strict=True):
+        if name not in rubbing and column.any() and not column.all():
+            modes = np.where(column, CLOSED, OPEN).astype(np.int8)
+            found.append((name, mode_bands(run.t, modes[:, None])[0]))
+    return found
+
+
+def opens(run: Trajectory) -> bool:
+    """Whether a contact of the run was ever open.
+
+    Args:
+        run: the run.
+    """
+    closed = getattr(run, "closed", None)
+    return closed is not None and not np.asarray(closed).all()
+
+
+def gaps_of(run: Trajectory) -> tuple[Array, dict[str, Array]]:
+    """Times [s], (k,), and the gap of each contact there by name [m, rad], (k,).
+
+    Args:
+        run: the run.
+    """
+    t = np.asarray(run.t)
+    chosen = np.unique(np.linspace(0, len(t) - 1, min(len(t), MOST_GAPS)).astype(int))
+    runner = run.scene._compiled.program.runner()
+    residuals = np.array([rows_at(runner, run.q[k], run.v[k], float(t[k]))[2] for k in chosen])
+    slices = run.scene.constraint_slices
+    return t[chosen], {name: residuals[:, slices[name].stop - 1] for name in run.scene.contact_names}

@@ -1,0 +1,343 @@
+"""What a replay page carries of a run: one header in JSON and the typed arrays that it refers to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.types import Array, Table
+
+from .applied_forces import given_arrows
+from .binary import Payload, Shapes
+from .camera import link_length, treads, upward, view
+from .constraint_curves import Guide, guides_of
+from .contact_points import touches_of, touching_marks
+from .contact_surfaces import touched_of
+from .force_arrows import Arrow, arrows_of
+from .frames import Motion, sample
+from .friction_glyphs import Element, elements_of
+from .joint_tracks import Tracks
+from .markers import Mark, marks_of
+from .mode_timeline import bands_of
+from .resampling import between
+from .signal_list import collisions_of, inertia_box, signals_of
+from .signals import Chosen, Plot, plots_of, usual_plots, wanted
+from .stick_figure import sticks
+from .style import table
+from .visuals import LINK_COLORS, Visual, joint_axis, visuals_of
+
+if TYPE_CHECKING:
+    from pin_nonideal.scene.scene import Scene
+    from pin_nonideal.trajectory.trajectory import Trajectory
+
+# Of so many runs curves are plotted; all of them are drawn.
+MOST_PLOTTED = 8
+
+
+def packed_runs(
+    runs: Sequence[Trajectory],
+    names: Sequence[str],
+    fps: float | None,
+    title: str,
+    plots: Chosen | None,
+    forces: bool,
+) -> bytes:
+    """Everything that the page shows of a run, and of others as ghosts beside it.
+
+    Args:
+        runs: the run, and those that it is compared with.
+        names: of the runs.
+        fps: frames a second of simulated time; None for frames chosen by the motion.
+        title: heading of the page.
+        plots: what is plotted, as `signals.plots_of` takes it.
+        forces: whether arrows of forces are shown.
+    """
+    run, payload = runs[0], Payload()
+    scene, marks = run.scene, marks_of(run.scene)
+    motions = [sample(one, fps, share=len(runs)) for one in runs]
+    model, known = scene.model, [between(*pair) for pair in zip(runs, motions, strict=True)][:MOST_PLOTTED]
+    finer, motion = known[0]
+    ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
+    visuals, bare = _drawn(scene, motion, ends)
+    visuals = visuals + touched_of(finer, motion, visuals, upward(model))
+    guides = guides_of(finer, motion)
+    shapes = Shapes(payload)
+    looking = view(scene, motion, visuals, ends, np.vstack([np.zeros((0, 3)), *(g.points for g in guides)]))
+    drawn = shapes.add(visuals)
+    touches = touches_of(finer, motion)
+    arrows = arrows_of(finer, motion, touches, given_arrows(finer, motion, marks)) if forces else []
+    for number, spacing in treads(motion, visuals, _sliding_axes(model)).items():
+        drawn[number]["wrap"] = spacing
+    header = {
+        "title": title,
+        "subtitle": _subtitle(run),
+        "failure": getattr(run, "failure", None),
+        "facts": _facts(run, motion),
+        "looks": table(),
+        "times": payload.add(motion.times, "f8"),
+        "held": payload.add(motion.held, "u1") if motion.held.any() else None,
+        "joints": _joints(payload, model, motion),
+        "visuals": drawn,
+        "name": names[0],
+        "others": [
+            _other(payload, shapes, *other) for other in zip(runs[1:], motions[1:], names[1:], strict=True)
+        ],
+        "marks": [
+            _stored_mark(payload, motion, mark) for mark in [*marks, *touching_marks(touches, motion, marks)]
+        ],
+        "guides": [_stored_guide(payload, guide) for guide in guides],
+        "trails": [{"joint": j, "point": point} for j, point in _trails(model, guides, bare)],
+        "arrows": [_stored_arrow(payload, motion, arrow) for arrow in arrows],
+        "plots": _plots(payload, runs, [one for one, _ in known], names, plots),
+        "events": _events(payload, run),
+        "modes": _modes(payload, run),
+        "elements": [
+            _stored_element(payload, motion, element)
+            for element in elements_of(finer, motion, marks, touches)
+        ],
+        "view": _plain(looking),
+        "collisions": shapes.add(collisions_of(scene)),
+        "signals": [
+            {"label": s.label, "unit": s.unit, "t": payload.add(s.t, "f8"), "values": payload.add(s.values)}
+            for s in signals_of(run, finer)
+        ],
+    }
+    header["shapes"] = shapes.stored
+    return payload.bytes(header)
+
+
+def _drawn(scene: Scene, motion: Motion, ends: list[tuple[int, Array]]) -> tuple[list[Visual], bool]:
+    """What is drawn of a scene, for want of others its shapes for collisions, and whether it has none."""
+    visuals = visuals_of(scene.visual_model) if scene.visual_model is not None else []
+    visuals = visuals or [_colored(shape) for shape in collisions_of(scene)]
+    if visuals:
+        return visuals, False
+    return sticks(scene.model, ends, link_length(scene.model, ends, motion.size)), True
+
+
+def _colored(visual: Visual) -> Visual:
+    """A shape for collisions, which seldom has a color, in that of its link."""
+    return replace(visual, color=LINK_COLORS[visual.joint % len(LINK_COLORS)])
+
+
+def _other(payload: Payload, shapes: Shapes, run: Trajectory, motion: Motion, name: str) -> Table:
+    """A run as a ghost: its motion and its bodies."""
+    marks = marks_of(run.scene)
+    ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
+    visuals, _ = _drawn(run.scene, motion, ends)
+    return {
+        "name": name,
+        "times": payload.add(motion.times, "f8"),
+        "held": payload.add(motion.held, "u1") if motion.held.any() else None,
+        "joints": _joints(payload, run.scene.model, motion),
+        "visuals": shapes.add([visual for visual in visuals if visual.joint]),
+    }
+
+
+def _curves(run: Trajectory, finer: Trajectory, chosen: Chosen | None) -> list[Plot]:
+    """Plots of a run as it is between its samples, but for curves that were given at them."""
+    dense, items = (
+        getattr(run, "dense", None) is not None,
+        wanted("plots", usual_plots(run) if chosen is None else chosen),
+    )
+    smooth = {"q", "v", "energy", "gaps", *run.scene.model.names}  # all else runs straight between samples
+    return [
+        plot
+        for item in items
+        for plot in plots_of(finer if isinstance(item, str) and (dense or item in smooth) else run, [item])
+    ]
+
+
+def _plots(
+    payload: Payload,
+    runs: Sequence[Trajectory],
+    finer: Sequence[Trajectory],
+    names: Sequence[str],
+    chosen: Chosen | None,
+) -> list[Table]:
+    """Plots of the first run, with the curves of the others that have the same."""
+    each = [[plot.thinned() for plot in _curves(*pair, chosen)] for pair in zip(runs, finer, strict=False)]
+    found = []
+    for plot in each[0]:
+        stored = _stored_plot(payload, plot)
+        said = f"{len(each)} of {len(runs)} runs" if len(runs) > len(each) else ""
+        stored["note"] = " · ".join(filter(None, [plot.note, said]))
+        for number, others in enumerate(each[1:], 1):
+            for other in others:
+                if (other.title, other.unit) == (plot.title, plot.unit):
+                    stored["curves"] += _compared(payload, plot, other, number, names[number])
+        found.append(stored)
+    return found
+
+
+def _compared(payload: Payload, plot: Plot, other: Plot, number: int, name: str) -> list[Table]:
+    """Curves of another run that the first has as well."""
+    t, common = payload.add(other.t, "f8"), {k: v for k, v in other.curves.items() if k in plot.curves}
+    return [
+        {"label": f"{k}, {name}", "run": number, "of": k, "t": t, "values": payload.curve(v)}
+        for k, v in common.items()
+    ]
+
+
+def _sliding_axes(model: pin.Model) -> dict[int, Array]:
+    axes = {joint: joint_axis(model, joint) for joint in range(1, model.njoints)}
+    return {joint: axis for joint, (axis, turning) in axes.items() if axis is not None and not turning}
+
+
+def _joints(payload: Payload, model: pin.Model, motion: Motion) -> list[Table]:
+    """How each joint moves, the world first; coordinates that never change once."""
+    found: list[Table] = [{"name": str(model.names[0])}]
+    for number, track in Tracks(model).moving():
+        values = motion.coordinates[:, track.columns]
+        still = np.array_equal(values, np.broadcast_to(values[0], values.shape))
+        exact = float(np.abs(values).max(initial=0.0)) > 16.0  # beyond it 32 bits are too few
+        found.append(
+            {
+                "name": str(model.names[number]),
+                "parent": track.parent,
+                "place": track.place.tolist(),
+                "axis": None if track.axis is None else track.axis.tolist(),
+                "turning": track.turning,
+                "mass": float(model.inertias[number].mass),
+                "inertia": inertia_box(model.inertias[number]),
+                "lever": np.asarray(model.inertias[number].lever).tolist(),
+                "values": payload.add(values[:1] if still else values, "f8" if exact else "f4"),
+            }
+        )
+    return found
+
+
+def _trails(model: pin.Model, guides: list[Guide], bare: bool) -> list[tuple[int, list[float]]]:
+    """Points whose paths are drawn: those on guides, and the ends of a model without shapes."""
+    found = {guide.joint: guide.point.tolist() for guide in guides}
+    for joint in range(1, model.njoints) if bare else ():
+        if not len(model.children[joint]):
+            found.setdefault(joint, np.asarray(model.inertias[joint].lever).tolist())
+    return list(found.items())
+
+
+def _stored_plot(payload: Payload, plot: Plot) -> Table:
+    curves = [{"label": k, "values": payload.curve(v)} for k, v in plot.curves.items()]
+    return {
+        "title": plot.title,
+        "unit": plot.unit,
+        "note": plot.note,
+        "log": plot.log,
+        "t": payload.add(plot.t, "f8"),
+        "curves": curves,
+    }
+
+
+def _events(payload: Payload, run: Trajectory) -> Table:
+    """Times of the events with their kinds and elements by number."""
+    kinds = sorted({str(event.kind) for event in run.events})
+    elements = sorted({str(event.element) for event in run.events})
+    return {
+        "kinds": kinds,
+        "elements": elements,
+        "times": payload.add([float(event.time) for event in run.events], "f8"),
+        "kind": payload.add([kinds.index(str(event.kind)) for event in run.events], "u2"),
+        "element": payload.add([elements.index(str(event.element)) for event in run.events], "u2"),
+        "impulse": payload.add([float(np.linalg.norm(_impulse(event))) for event in run.events]),
+        "taken": payload.add([float(getattr(event, "energy_change", 0.0) or 0.0) for event in run.events]),
+    }
+
+
+def _impulse(event: Any) -> Array:
+    """Impulse of an impact, in the directions of the contact; zero of other events."""
+    given = getattr(event, "impulse", None)
+    return np.zeros(3) if given is None else np.asarray(given, dtype=float)
+
+
+def _plain(item: Any) -> Table:
+    """The fields of a dataclass, arrays as lists."""
+    return {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in vars(item).items()}
+
+
+def _stored_arrow(payload: Payload, motion: Motion, arrow: Arrow) -> Table:
+    """An arrow whose place is one that its joint carries, one for all frames where it stays there."""
+    stored = _plain(arrow)
+    stored["values"] = payload.add(arrow.values)
+    if arrow.origin is not None:
+        stored["origin"] = payload.add(_once(motion.local(arrow.joint, arrow.origin), motion.size))
+    return stored
+
+
+def _once(vectors: Array, size: float) -> Array:
+    """Vectors at all frames, (n, 3), or the one that they all are, (1, 3)."""
+    return vectors[:1] if np.abs(vectors - vectors[0]).max() < 1e-9 * size else vectors
+
+
+def _stored_mark(payload: Payload, motion: Motion, mark: Mark) -> Table:
+    stored = _plain(mark)
+    stored["path"] = None if mark.path is None else payload.add(_once(mark.path, motion.size))
+    stored["closed"] = None if mark.closed is None else payload.add(mark.closed, "u1")
+    return stored
+
+
+def _stored_element(payload: Payload, motion: Motion, element: Element) -> Table:
+    stored = _plain(element)
+    for key, size in (("point", motion.size), ("axis", 1.0)):
+        stored[key] = payload.add(_once(np.atleast_2d(getattr(element, key)), size))
+    for key in ("share", "normal"):
+        if stored[key] is not None:
+            stored[key] = payload.add(getattr(element, key))
+    return stored
+
+
+def _stored_guide(payload: Payload, guide: Guide) -> Table:
+    stored = _plain(guide)
+    for key in ("points", "shift", "normals"):
+        if stored[key] is not None:
+            stored[key] = payload.add(getattr(guide, key))
+    return stored
+
+
+def _modes(payload: Payload, run: Trajectory) -> list[Table]:
+    """Bands of the elements that stick or slip: starts and modes of their pieces, and the end of the last."""
+    found = []
+    for name, pieces in bands_of(run):
+        starts, modes = [piece[0] for piece in pieces], [piece[2] for piece in pieces]
+        found.append({"name": name, "starts": payload.add(starts, "f8"), "modes": payload.add(modes)})
+    return found
+
+
+def _subtitle(run: Trajectory) -> str:
+    model = run.scene.model
+    count = len(run.scene.constraint_slices)
+    words = [_counted(model.njoints - 1, "joint"), _counted(count, "constraint")]
+    if count:
+        words.append(f"violation below {_above(float(np.max(run.violation)))}")
+    return " · ".join(words)
+
+
+def _counted(count: int, word: str) -> str:
+    return f"{count or 'no'} {word}{'' if count == 1 else 's'}"
+
+
+def _above(value: float) -> str:
+    """A value rounded up to two digits."""
+    if not value > 0.0:
+        return "1e-16"
+    power = 10.0 ** (np.floor(np.log10(value)) - 1.0)
+    return f"{np.ceil(value / power) * power:.1e}"
+
+
+def _facts(run: Trajectory, motion: Motion) -> list[tuple[str, str]]:
+    """What the help dialog tells of a run."""
+    model = run.scene.model
+    frames = f"{len(motion.times)} frames"
+    if motion.held.any():
+        frames += f", {int(motion.held.sum())} of them still: the samples do not tell the motion between them"
+    facts = [
+        ("scene", str(run.scene.name)),
+        ("model", f"{model.name}, {model.njoints - 1} joints, nq {model.nq}, nv {model.nv}"),
+        ("time", f"{run.t[0]:g} to {run.t[-1]:g} s, {len(run.t)} samples, {frames}"),
+    ]
+    for key, value in vars(run.stats).items():
+        facts.append((str(key), f"{value:g}" if isinstance(value, float) else str(value)))
+    return [*facts, ("Pinocchio", str(pin.__version__))]

@@ -1,0 +1,84 @@
+"""A run between its samples: as its steps interpolate it where they were recorded, else along cubics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pin_nonideal.types import Array
+
+from .frames import LEAST_FRAMES, Motion, cubic
+
+if TYPE_CHECKING:
+    from pin_nonideal.trajectory.trajectory import Trajectory
+
+# Values of a run at its samples; dictionaries hold them by name.
+SAMPLED = ("violation", "violation_rate", "a", "tau", "F_ideal", "F_nonideal", "lam", "lam_ideal", "limits")
+NAMED = ("energy", "power", "law_forces", "reactions", "contact_forces")
+
+
+def between(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
+    """The run with the frames of its replay as samples, where its own are too few; else as it is.
+
+    With record "dense" all values come from the interpolants of the steps.  Without, q and v follow the cubic
+    that is drawn, kinetic and potential energy are those of q and v, and all else runs straight from sample
+    to sample.
+
+    Args:
+        run: the run.
+        motion: its motion.
+    """
+    if len(run.t) >= LEAST_FRAMES or len(motion.times) <= len(run.t):
+        return run, motion
+    inner = np.flatnonzero((motion.part > 0.0) & (motion.part < 1.0))
+    dense = None
+    if getattr(run, "dense", None) is not None and len(inner):
+        dense = run.at(motion.times[inner])
+
+    def at_frames(values: Array, exact: Any = None) -> Array:
+        found = motion.of(np.asarray(values, dtype=float))
+        if exact is not None:
+            found[inner] = exact
+        return found
+
+    values: dict[str, Any] = vars(run) | {
+        "t": motion.times,
+        "q": motion.q,
+        "v": _velocities(run, motion, inner),
+    }
+    for key in SAMPLED:
+        if getattr(run, key, None) is not None:
+            values[key] = at_frames(getattr(run, key), getattr(dense, key, None))
+    for key in NAMED:
+        parts = getattr(run, key, None)
+        if parts is not None:
+            exact = getattr(dense, key, None) or {}
+            values[key] = {name: at_frames(part, exact.get(name)) for name, part in parts.items()}
+    for key in ("modes", "closed"):  # they hold from a sample to the next
+        if getattr(run, key, None) is not None:
+            values[key] = np.asarray(getattr(run, key))[motion.before]
+    if dense is not None:
+        values["v"][inner] = dense.v
+    elif values.get("energy") and hasattr(run.scene, "energies"):
+        for k in inner:
+            for name, value in run.scene.energies(values["q"][k], values["v"][k]).items():
+                values["energy"][name][k] = value
+    found = type(run).__new__(type(run))  # not copied, for a copy drops a scene that does not travel
+    vars(found).update(values)
+    count = len(motion.times)
+    return found, replace(motion, before=np.arange(count), part=np.zeros(count))
+
+
+def _velocities(run: Trajectory, motion: Motion, inner: NDArray[np.intp]) -> Array:
+    """Velocities of the cubic at the frames between samples, those of the samples at the others, (n, nv)."""
+    found = motion.of(run.v)
+    for frame in inner:
+        k, s = int(motion.before[frame]), float(motion.part[frame])
+        xi, rate = cubic(run, k, s)
+        turn = pin.dIntegrate(run.scene.model, run.q[k], xi, pin.ArgumentPosition.ARG1)
+        found[frame] = turn @ rate
+    return found

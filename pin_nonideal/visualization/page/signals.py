@@ -1,0 +1,285 @@
+"""Curves, events and modes of a run, as the replay and the figures show them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.types import Array
+from pin_nonideal.validation import sequence
+
+from .coordinates import Coordinate, positions, velocities
+from .mode_timeline import gaps_of, opens
+from .visuals import joint_axis
+
+if TYPE_CHECKING:
+    from pin_nonideal.trajectory.trajectory import Trajectory
+
+
+# Plots by name, or by a title "what [unit]" and curves by label, (nt,) each.
+Chosen = str | Sequence[str | tuple[str, Mapping[str, Array]]]
+
+# Curves of one plot when joints are not chosen: as many as can be told apart.
+MAX_CURVES = 8
+# A plot of the replay keeps the extremes of every curve in so many intervals of time.
+INTERVALS = 600
+STORED_ENERGY = ("kinetic", "potential", "total")
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Curves on one axis.
+
+    Attributes:
+        title: what is shown.
+        unit: unit of all curves.
+        t: times [s], (k,).
+        curves: values by label, (k,) each.
+        log: whether the axis is logarithmic.
+        note: what the reader must know of the choice of curves.
+    """
+
+    title: str
+    unit: str
+    t: Array
+    curves: dict[str, Array]
+    log: bool = False
+    note: str = ""
+
+    def thinned(self, intervals: int = INTERVALS) -> Plot:
+        """The same plot with the extremes of each curve in some intervals of time, ends included."""
+        count = len(self.t)
+        if count <= 2 * intervals:
+            return self
+        starts = np.linspace(0, count, intervals, endpoint=False).astype(int)
+        kept = {0, count - 1}
+        for values in self.curves.values():
+            for start, piece in zip(starts, np.split(values, starts[1:]), strict=True):
+                kept.update((int(start + np.argmin(piece)), int(start + np.argmax(piece))))
+        index = np.array(sorted(kept))
+        return replace(self, t=self.t[index], curves={k: v[index] for k, v in self.curves.items()})
+
+
+def wanted(what: str, chosen: Any) -> list[Any]:
+    """Plots asked for, as a list of names and of pairs of a title and curves by label.
+
+    Args:
+        what: words for messages.
+        chosen: one name, or a list.
+
+    Raises:
+        InputError: something else.
+    """
+    items = [chosen] if isinstance(chosen, str) else list(sequence(what, chosen))
+    for item in items:
+        pair = isinstance(item, (list, tuple)) and len(item) == 2
+        if not (
+            isinstance(item, str) or (pair and isinstance(item[0], str) and isinstance(item[1], Mapping))
+        ):
+            raise InputError(
+                f"{what} must hold names, and pairs of a title and curves by label; got {item!r}"
+            )
+    return items
+
+
+def plots_of(run: Trajectory, chosen: Chosen | None) -> list[Plot]:
+    """Plots by name.
+
+    Args:
+        run: the run.
+        chosen: "energy", "work", "power", "violation", "reactions", "contacts" (normal forces), "gaps" (of
+            contacts that open), "tau", "q", "v", "a", the name of a joint (its position and its velocity), or
+            a pair of a title "what [unit]" and curves by label, (nt,) each. None: energy, gaps, violation,
+            reactions and q, as far as the run has them.
+
+    Raises:
+        UnknownNameError: no plot and no joint has that name.
+        InputError: the run did not record what a plot shows, a curve has a wrong length, or `chosen` is
+            something else.
+    """
+    plots: list[Plot] = []
+    for item in wanted("plots", usual_plots(run) if chosen is None else chosen):
+        plots += _plot(run, item) if isinstance(item, str) else [_given(run, *item)]
+    return plots
+
+
+def usual_plots(run: Trajectory) -> list[str]:
+    """Names of the plots of a replay when none are asked for.
+
+    Args:
+        run: the run.
+    """
+    return [name for name in ("energy", "gaps", "violation", "reactions", "q") if _recorded(run, name)]
+
+
+def _recorded(run: Trajectory, name: str) -> bool:
+    if name in ("energy", "work"):
+        return bool(run.energy)
+    if name == "violation":
+        return bool(run.scene.constraint_slices)
+    if name == "reactions":
+        return run.lam is not None and bool(run.scene.constraint_slices)
+    if name == "contacts":
+        return run.lam is not None and bool(run.scene.contacts)
+    if name == "gaps":
+        return opens(run)
+    if name in ("a", "tau", "power"):
+        return getattr(run, name, None) is not None
+    return True
+
+
+def _plot(run: Trajectory, name: str) -> list[Plot]:
+    """The plots of one name."""
+    model, t = run.scene.model, np.asarray(run.t)
+    names = ("energy", "work", "power", "violation", "reactions", "contacts", "gaps", "tau", "q", "v", "a")
+    joints = [str(joint) for joint in model.names[1:]]
+    if name not in names and name not in joints:
+        raise UnknownNameError(f'no plot and no joint "{name}"{nearest(name, [*names, *joints])}')
+    if not _recorded(run, name):
+        if name in ("violation", "reactions") and not run.scene.constraint_slices:
+            raise InputError(f'plot "{name}" needs a constraint, and this scene has none')
+        if name == "contacts" and not run.scene.contacts:
+            raise InputError('plot "contacts" needs a contact, and this scene has none')
+        if name == "gaps":
+            raise InputError('plot "gaps" needs a contact that opens, and this run has none')
+        record = {"a": "a", "tau": "tau", "power": "power"}.get(name, "energy")
+        record = "forces" if name in ("reactions", "contacts") else record
+        raise InputError(f'plot "{name}" must be recorded: pass record=("{record}",) to simulate')
+    energy = run.energy or {}
+    if name == "energy":
+        return [Plot("Energy", "J", t, {k: energy[k] for k in STORED_ENERGY})]
+    if name == "work":
+        return [Plot("Work", "J", t, {k: v for k, v in energy.items() if k not in STORED_ENERGY})]
+    if name == "violation":
+        return [Plot("Constraint violation", "m, rad", t, {"largest residual": run.violation}, log=True)]
+    if name == "reactions" and run.lam is not None:
+        size = {k: np.linalg.norm(run.lam[:, s], axis=1) for k, s in run.scene.constraint_slices.items()}
+        return [Plot("Reactions, |lam|", "N, N m", t, _largest(size), note=left_out(len(size)))]
+    if name == "power":
+        return [Plot("Power", "W", t, _largest(run.power or {}), note=left_out(len(run.power or {})))]
+    if name == "contacts" and run.lam is not None:
+        slices = list(run.scene.constraint_slices.items())[len(run.scene.constraints) :]
+        normal = {key: run.lam[:, rows.stop - 1] for key, rows in slices}
+        return [Plot("Normal force", "N", t, _largest(normal), note=left_out(len(normal)))]
+    if name == "gaps":
+        times, gaps = gaps_of(run)
+        return [Plot("Gaps", "m, rad", times, _largest(gaps), note=left_out(len(gaps)))]
+    if name == "tau":
+        return _torques(model, t, np.asarray(run.tau))
+    if name == "q":
+        return _by_unit("Position", t, positions(model, run.q))
+    if name == "v":
+        return _by_unit("Velocity", t, velocities(model, run.v))
+    if name == "a" and run.a is not None:
+        return _by_unit("Acceleration", t, velocities(model, run.a, "/s²"))
+    place = [c for c in positions(model, run.q) if c.joint == name]
+    rate = [c for c in velocities(model, run.v) if c.joint == name]
+    return _by_unit(name, t, place) + _by_unit(f"{name}, velocity", t, rate)
+
+
+def _torques(model: pin.Model, t: Array, tau: Array) -> list[Plot]:
+    """Torques and forces of the actuation in joints of one degree of freedom."""
+    found = []
+    for joint in range(1, model.njoints):
+        if model.joints[joint].nv == 1:
+            name, unit = str(model.names[joint]), "N m" if joint_axis(model, joint)[1] else "N"
+            found.append(Coordinate(name, name, unit, tau[:, model.joints[joint].idx_v]))
+    return _by_unit("Actuation", t, found)
+
+
+def _given(run: Trajectory, title: str, curves: Mapping[str, Array]) -> Plot:
+    """A plot of the user's own curves."""
+    what, _, unit = title.partition("[")
+    values = {}
+    for label, curve in curves.items():
+        where = f'curve "{label}" of plot "{title}"'
+        try:
+            given = np.asarray(curve)
+        except ValueError:  # lists of unequal length
+            given = np.asarray(None)
+        if given.dtype.kind not in "fiub":
+            raise InputError(f"{where} must hold numbers; got {curve!r}")
+        values[str(label)] = given.astype(np.float64)
+        if given.shape != (len(run.t),):
+            raise InputError(
+                f"{where} must have shape ({len(run.t)},), one value a sample; got {given.shape}"
+            )
+    return Plot(what.strip(), unit.strip(" ]"), np.asarray(run.t), values)
+
+
+def _by_unit(title: str, t: Array, coordinates: list[Coordinate]) -> list[Plot]:
+    """One plot for each unit, with the curves that move most."""
+    plots = []
+    for unit in dict.fromkeys(c.unit for c in coordinates):
+        every = {c.label: c.values for c in coordinates if c.unit == unit}
+        plots.append(Plot(title, unit, t, _largest(every), note=left_out(len(every))))
+    return plots
+
+
+def left_out(count: int) -> str:
+    """What a plot of so many curves says of those that it does not show.
+
+    Args:
+        count: of curves.
+    """
+    return f"{MAX_CURVES} of {count}, those that move most" if count > MAX_CURVES else ""
+
+
+def _largest(curves: dict[str, Array]) -> dict[str, Array]:
+    """The curves with the largest range, in the given order."""
+    rank = sorted(curves, key=lambda label: -float(np.ptp(curves[label])))[:MAX_CURVES]
+    return {label: values for label, values in curves.items() if label in rank}
+
+
+def several(run: Any, names: Sequence[str] | None, what: str) -> tuple[list[Trajectory], list[str]]:
+    """Runs and their names.
+
+    Args:
+        run: one run, or a list of them.
+        names: of several; None for numbers.
+        what: that shows them, for messages.
+
+    Raises:
+        InputError: there is none, one is no run or has no scene, or there are more or fewer names.
+    """
+    runs = list(run) if isinstance(run, (list, tuple)) else [run]
+    if not runs:
+        raise InputError(f"{what} shows at least one run; got none")
+    for one in runs:
+        check_scene(one, what)
+    if names is None:
+        return runs, [f"run {number + 1}" for number in range(len(runs))]
+    labels = [str(name) for name in sequence(f"{what}: names", names)]
+    if len(labels) != len(runs):
+        raise InputError(f"{what} of {len(runs)} runs needs as many names; got {len(labels)}")
+    return runs, labels
+
+
+def check_scene(run: Trajectory, what: str) -> None:
+    """Refuses what is no run, and a run without its scene.
+
+    Args:
+        run: the run.
+        what: what needs the scene, for the message.
+
+    Raises:
+        InputError: it is no run, or it has no scene, or one that does not fit.
+    """
+    if not all(hasattr(run, name) for name in ("t", "q", "v", "scene")):
+        raise InputError(f"{what} shows a Trajectory, what `simulate` returns; got {type(run).__name__}")
+    if run.scene is None:
+        raise InputError(
+            f"{what} needs the scene of the run, which a trajectory read from a file has not: "
+            "pass dataclasses.replace(run, scene=scene)"
+        )
+    sizes, model = (run.q.shape[1], run.v.shape[1]), run.scene.model
+    if sizes != (model.nq, model.nv):
+        raise InputError(
+            f'{what} needs the scene of the run: scene "{run.scene.name}" has nq {model.nq} and nv '
+            f"{model.nv}, the run has {sizes[0]} and {sizes[1]}"
+        )

@@ -1,0 +1,160 @@
+"""One quantity of a run over another: phase planes, friction over slip velocity and load, with its law."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.types import Array
+
+from .coordinates import positions, velocities
+from .signals import MAX_CURVES, left_out
+
+if TYPE_CHECKING:
+    from pin_nonideal.trajectory.trajectory import Trajectory
+
+KINDS = ("phase", "friction", "load")
+
+
+@dataclass(frozen=True)
+class Relation:
+    """Curves of one quantity over another.
+
+    Attributes:
+        title: what is shown.
+        x: label of the horizontal axis, with its unit.
+        y: label of the vertical axis, with its unit.
+        curves: pairs (x, y) by label, (nt,) each.
+        bounds: what the law allows at the samples, pairs (x, largest |y|) by label, (nt,) each.
+        note: what the reader must know of the choice of curves.
+    """
+
+    title: str
+    x: str
+    y: str
+    curves: dict[str, tuple[Array, Array]]
+    bounds: dict[str, tuple[Array, Array]] = field(default_factory=dict)
+    note: str = ""
+
+
+def is_relation(item: Any) -> bool:
+    """Whether a name asks for one: "phase", "friction" or "load", alone or before a name."""
+    return isinstance(item, str) and item.split(" ", 1)[0] in KINDS
+
+
+def relations_of(run: Trajectory, item: str) -> list[Relation]:
+    """The relations of one name.
+
+    Args:
+        run: the run.
+        item: "phase" of all joints, or "phase JOINT"; "friction" over slip velocity and "load" (friction over
+            what the bearing carries) of all laws in joints of one degree of freedom, or of one law by name.
+
+    Raises:
+        UnknownNameError: no joint or law has that name.
+        InputError: the run did not record it.
+    """
+    kind, _, name = item.partition(" ")
+    if kind == "phase":
+        return _phases(run, name)
+    return _frictions(run, name, over_load=kind == "load")
+
+
+def _phases(run: Trajectory, name: str) -> list[Relation]:
+    """Velocity over position, one plot for each unit."""
+    model = run.scene.model
+    names = [str(joint) for joint in model.names[1:]]
+    if name and name not in names:
+        raise UnknownNameError(f'plot "phase {name}": no joint "{name}"{nearest(name, names)}')
+    single = {str(joint) for joint in names if model.joints[model.getJointId(joint)].nv == 1}
+    rates = {item.joint: item.values for item in velocities(model, run.v) if item.joint in single}
+    found: dict[str, dict[str, tuple[Array, Array]]] = {}
+    for place in positions(model, run.q):
+        if place.joint in rates and name in ("", place.joint):
+            found.setdefault(place.unit, {})[place.joint] = (place.values, rates[place.joint])
+    if not found:
+        raise InputError('plot "phase" needs a joint of one degree of freedom, and here is none')
+    relations = []
+    for unit, curves in found.items():
+        rank = sorted(curves, key=lambda label: -float(np.ptp(curves[label][0])))[:MAX_CURVES]
+        kept = {label: pair for label, pair in curves.items() if label in rank}
+        title = "Phase plane" if len(kept) > 1 else next(iter(kept))
+        relations.append(
+            Relation(title, f"position [{unit}]", f"velocity [{unit}/s]", kept, note=left_out(len(curves)))
+        )
+    return relations
+
+
+def friction_joints(run: Trajectory) -> dict[str, int]:
+    """Laws that rub in a joint of one degree of freedom, with the index of the joint."""
+    model, found = run.scene.model, {}
+    names = {str(joint): index for index, joint in enumerate(model.names) if index}
+    for law in run.scene.laws:
+        index = names.get(str(getattr(law, "joint", "")))
+        if index is None or model.joints[index].nv != 1:
+            continue
+        label = getattr(law, "name", None) or f"{type(law).__name__}({law.joint})"
+        if label in run.law_names:
+            found[label] = index
+    return found
+
+
+def _frictions(run: Trajectory, name: str, over_load: bool) -> list[Relation]:
+    """Friction of laws in joints over the slip velocity, or over the load of the bearing."""
+    kind, known = "load" if over_load else "friction", friction_joints(run)
+    if name and name not in known:
+        raise UnknownNameError(
+            f'plot "{kind} {name}": no law "{name}" in a joint of one degree of freedom'
+            f"{nearest(name, list(known))}"
+        )
+    if not known:
+        raise InputError(f'plot "{kind}" needs a law in a joint of one degree of freedom, and here is none')
+    if run.law_forces is None:
+        raise InputError(f'plot "{kind}" must be recorded: pass record=("laws",) to simulate')
+    if over_load and run.reactions is None:
+        raise InputError('plot "load" must be recorded: pass record=("laws", "reactions") to simulate')
+    chosen = [name] if name else sorted(known, key=lambda law: -_spread(run, known[law]))[:MAX_CURVES]
+    by_unit: dict[str, Relation] = {}
+    for law in known if not name else chosen:
+        if law not in chosen:
+            continue
+        unit, x, label = _abscissa(run, known[law], over_load)
+        record = run.law(law)
+        force = np.asarray(record.force)[:, run.scene.model.joints[known[law]].idx_v]
+        place = by_unit.setdefault(unit, Relation("Friction", label, f"friction [{unit}]", {}, {}))
+        place.curves[law] = _broken(x, np.abs(force) if over_load else force, record.mode)
+        if record.limit is not None and record.limit.ndim == 1:
+            place.bounds[law] = (x, record.limit)
+    return list(by_unit.values())
+
+
+def _broken(x: Array, y: Array, mode: Any) -> tuple[Array, Array]:
+    """A curve with a gap wherever the mode changes: between stick and slip nothing leads across."""
+    if mode is None:
+        return x, y
+    at = np.flatnonzero(np.diff(np.asarray(mode).reshape(len(x), -1)[:, 0])) + 1
+    return np.insert(x, at, np.nan), np.insert(y, at, np.nan)
+
+
+def _spread(run: Trajectory, joint: int) -> float:
+    return float(np.ptp(run.v[:, run.scene.model.joints[joint].idx_v]))
+
+
+def _abscissa(run: Trajectory, joint: int, over_load: bool) -> tuple[str, Array, str]:
+    """Unit of the friction, what it is drawn over, and the label of that axis."""
+    from .visuals import joint_axis
+
+    axis, turning = joint_axis(run.scene.model, joint)
+    unit = "N m" if turning else "N"
+    if not over_load:
+        return (
+            unit,
+            run.v[:, run.scene.model.joints[joint].idx_v],
+            f"velocity [{'rad' if turning else 'm'}/s]",
+        )
+    force, along = run.reaction(str(run.scene.model.names[joint]))[:, :3], np.asarray(axis)
+    across = force - np.outer(force @ along, along)
+    return unit, np.linalg.norm(across, axis=1), "load across the axis [N]"

@@ -1,0 +1,298 @@
+"""Figures of runs: quantities over time or over each other, events and modes, for a screen or in print."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pin_nonideal.atomic_files import file_path, whole_file
+from pin_nonideal.errors import InputError, OutputError
+from pin_nonideal.visualization.page.figure_styles import Style
+from pin_nonideal.visualization.page.mode_timeline import bands_of, opens
+from pin_nonideal.visualization.page.signals import Plot, plots_of, several, wanted
+from pin_nonideal.visualization.page.style import MODES, UNKNOWN_MODE
+from pin_nonideal.visualization.page.xy_plots import Relation, friction_joints, is_relation, relations_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from pin_nonideal.trajectory.trajectory import Trajectory
+
+EVENT_STYLES = ((0, ()), (0, (4, 2)), (0, (1, 2)), (0, (4, 2, 1, 2)))
+# More events than this are drawn so thin that the curves stay visible; beyond the next, as their density.
+CROWD, CLOUD = 40, 400
+HATCHES = {1: "////", -1: "\\\\\\\\", 0: "", 2: "....", 3: "xxxx"}  # of modes in print
+
+
+def plot(
+    run: Trajectory | Sequence[Trajectory],
+    path: str | os.PathLike[str] | None = None,
+    what: str | Sequence[str | tuple[str, Mapping[str, NDArray[np.float64]]]] | None = None,
+    *,
+    ax: Axes | None = None,
+    columns: int | None = None,
+    title: str | None = None,
+    style: str | Mapping[str, Any] | None = None,
+    names: Sequence[str] | None = None,
+) -> Figure:
+    """Draws a run, or several in the same axes, one plot below the other, with the events marked.
+
+    Args:
+        run: what `simulate` returned, or a list of several.
+        path: file to write, in the format that its ending names (.png, .pdf, .svg); None writes none.
+        what: over time "q", "v", "a", "tau", "energy", "work", "power", "violation", "reactions", "contacts",
+            "gaps" (of contacts that open), "modes", names of joints, or pairs of a title "what [unit]" and
+            curves by label, (nt,) each; of one over another "phase", "phase JOINT" (velocity over position),
+            "friction", "friction LAW" (over slip velocity, with its limit) and "load", "load LAW" (friction
+            over what the bearing carries).  None: what suits the scene, as far as the run has it.
+        ax: matplotlib axes to draw one plot into, in place of a figure of its own.
+        columns: 1 or 2 columns of a printed page, 85 or 176 mm wide; None for a screen.
+        title: heading; None for the scene's name on a screen and none in print, "" for none.
+        style: "screen", "paper" (dashes and markers that survive gray, text that stays text in .svg and .pdf)
+            or matplotlib settings by name; None: "paper" with `columns`, else "screen".
+        names: names of several runs; their numbers when None.
+
+    Returns:
+        The matplotlib figure, to be changed, shown or saved.
+
+    Raises:
+        InputError: something asked for was not recorded, `what` is empty or no list of plots, `ax` is given
+            for several plots, or `columns`, `style`, `title` or `names` are none of the above.
+        UnknownNameError: a name in `what` is none of the above.
+        OutputError: the file cannot be written, or matplotlib has no such format.
+    """
+    import matplotlib as mpl
+
+    runs, labels = several(run, names, "a figure")
+    look = Style(columns, style)
+    if title is not None and not isinstance(title, str):
+        raise InputError(f"plot: title must be a string or None; got {title!r}")
+    drawn = _asked(runs, usual(runs) if what is None else what)
+    if ax is not None and len(drawn) != 1:
+        raise InputError(f"plot: ax takes one plot; what asks for {len(drawn)}")
+    settings: Any = look.settings
+    with mpl.rc_context(settings):
+        figure = _figure(runs, labels, drawn, look, ax)
+        heading = title if title is not None else ("" if look.print or ax is not None else runs[0].name)
+        if heading and ax is not None:
+            ax.set_title(heading)
+        elif heading:
+            figure.suptitle(heading, fontsize=12, fontweight="bold", x=0.01, ha="left")
+        if path is not None:
+            _save(figure, file_path("plot: path", path))
+    return figure
+
+
+def usual(runs: Sequence[Trajectory]) -> list[str]:
+    """What suits a scene, as far as its runs have it.
+
+    Args:
+        runs: of one scene.
+    """
+    first = runs[0]
+    found = ["q", "v", *(["energy"] if first.energy else [])]
+    if first.scene.contacts and first.lam is not None:
+        found.append("contacts")
+    if opens(first):
+        found.append("gaps")
+    if first.scene.constraint_slices:
+        found.append("violation")
+    if getattr(first, "law_forces", None) and friction_joints(first):
+        found.append("friction")
+    return found + (["modes"] if bands_of(first) else [])
+
+
+Drawn = tuple[str, list[Any]]
+
+
+def _asked(runs: Sequence[Trajectory], what: Any) -> list[Drawn]:
+    """Each plot as its kind and what each run gives to it."""
+    items = wanted("plot: what", what)
+    if not items:
+        raise InputError("plot: what must name at least one plot; got none")
+    found: list[Drawn] = []
+    for item in items:
+        if item == "modes":
+            if not bands_of(runs[0]):
+                raise InputError(
+                    'plot "modes" needs an element that sticks or slips, and this scene has none'
+                )
+            found += [("modes", [run]) for run in runs]
+            continue
+        over = is_relation(item) and item not in [str(name) for name in runs[0].scene.model.names]
+        each = [relations_of(run, item) if over else plots_of(run, [item]) for run in runs]
+        kind = "relation" if over else "time"
+        found += [(kind, list(parts)) for parts in zip(*each, strict=False)]
+    return found
+
+
+def _figure(
+    runs: Sequence[Trajectory], labels: Sequence[str], drawn: list[Drawn], look: Style, ax: Axes | None
+) -> Figure:
+    """All plots, those over time with one axis of time."""
+    from matplotlib.figure import Figure  # no pyplot: a program that draws to files needs no window system
+
+    if ax is not None:
+        figure, axes = ax.figure, [ax]
+    else:
+        heights = [_height(kind, parts, look) for kind, parts in drawn]
+        figure = Figure(figsize=(look.width, sum(heights) + 0.7), layout="constrained")
+        axes = list(figure.subplots(len(drawn), 1, squeeze=False, height_ratios=heights)[:, 0])
+    timed = [place for place, (kind, _) in zip(axes, drawn, strict=True) if kind != "relation"]
+    for place in timed[1:]:
+        place.sharex(timed[0])
+    for place, (kind, parts) in zip(axes, drawn, strict=True):
+        if kind == "modes":
+            _draw_modes(place, parts[0], look)
+        elif kind == "relation":
+            _draw_relation(place, parts, labels, look)
+        else:
+            _draw_plot(place, parts, labels, look)
+            if len(runs) == 1:
+                _mark_events(place, runs[0], look, place is timed[0])
+    if timed:
+        for place in timed[:-1]:
+            place.tick_params(labelbottom=False)
+        timed[-1].set_xlabel("time [s]")
+        timed[-1].set_xlim(*_limits(runs))
+    if ax is None:
+        figure.align_ylabels()
+    return figure  # type: ignore[return-value]
+
+
+def _height(kind: str, parts: list[Any], look: Style) -> float:
+    """Height of a plot [inch]."""
+    if kind == "modes":
+        return 0.4 + 0.22 * len(bands_of(parts[0]))
+    return look.height if kind == "time" else min(1.4 * look.height, 0.75 * look.width)
+
+
+def _limits(runs: Sequence[Trajectory]) -> tuple[float, float]:
+    """First and last time [s], apart also for a run of one sample."""
+    first, last = min(float(run.t[0]) for run in runs), max(float(run.t[-1]) for run in runs)
+    return (first, last) if last > first else (first - 0.5, first + 0.5)
+
+
+def _draw_plot(axes: Axes, parts: Sequence[Plot], labels: Sequence[str], look: Style) -> None:
+    """Curves over time, of all runs."""
+    for number, item in enumerate(parts):
+        for index, (label, values) in enumerate(item.curves.items()):
+            shown = np.where(values > 0.0, values, np.nan) if item.log else values
+            name = label if len(parts) == 1 else f"{label}, {labels[number]}"
+            axes.plot(item.t, shown, label=name, **look.line(index, len(item.t), number, len(parts)))
+    item = parts[0]
+    if item.log and any(np.any(values > 0.0) for values in item.curves.values()):
+        axes.set_yscale("log")
+    axes.set_ylabel(f"{item.title}\n[{item.unit}]" + (f"\n{item.note}" if item.note else ""))
+    _finish(axes, look)
+
+
+def _draw_relation(axes: Axes, parts: Sequence[Relation], labels: Sequence[str], look: Style) -> None:
+    """One quantity over another, of all runs, and what the law allows as points."""
+    for number, item in enumerate(parts):
+        for index, (label, (x, y)) in enumerate(item.curves.items()):
+            name = label if len(parts) == 1 else f"{label}, {labels[number]}"
+            line = look.line(index, len(x), number, len(parts))
+            axes.plot(x, y, label=name, **line)
+            if label in item.bounds:
+                at, most = item.bounds[label]
+                both = [most] if item.x.startswith("load") else [most, -most]
+                for bound in both:
+                    axes.plot(at, bound, ls="", marker=".", ms=2.0, color=line["color"], alpha=0.35)
+    if any(item.bounds for item in parts):
+        axes.plot([], [], ls="", marker=".", ms=3.0, color="#64748b", label="limit of the law")
+    axes.set_xlabel(parts[0].x)
+    axes.set_ylabel(parts[0].y + (f"\n{parts[0].note}" if parts[0].note else ""))
+    _finish(axes, look)
+
+
+def _finish(axes: Axes, look: Style) -> None:
+    axes.grid(color="#e2e8f0", lw=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(**look.legend())
+
+
+def _mark_events(axes: Axes, run: Trajectory, look: Style, legend: bool) -> None:
+    """A vertical line at each event, its style by the kind of event; of a cloud of them the density."""
+    kinds = list(dict.fromkeys(str(event.kind) for event in run.events))
+    if len(run.events) > CLOUD:
+        counts, edges = np.histogram([float(event.time) for event in run.events], bins=200)
+        shade = counts / counts.max()
+        colors = [(0.58, 0.64, 0.72, 0.6 * s) for s in shade]
+        low = axes.get_xaxis_transform()  # at the foot of the plot
+        axes.vlines((edges[1:] + edges[:-1]) / 2.0, 0.0, 0.06, colors, transform=low, lw=1.5)
+        if legend:
+            axes.plot([], [], color="#94a3b8", lw=3.0, label=f"{len(run.events)} events, by density")
+            axes.legend(**look.legend())
+        return
+    width = 0.8 if len(run.events) <= CROWD else 0.3
+    for event in run.events:
+        style = EVENT_STYLES[kinds.index(str(event.kind)) % len(EVENT_STYLES)]
+        axes.axvline(float(event.time), color="#cbd5e1", lw=width, ls=style, zorder=0.5)
+    if kinds and legend:
+        handles, names = axes.get_legend_handles_labels()
+        styles = [EVENT_STYLES[number % len(EVENT_STYLES)] for number in range(len(kinds))]
+        lines = [axes.plot([], [], color="#94a3b8", lw=1.2, ls=style)[0] for style in styles]
+        axes.legend([*handles, *lines], [*names, *kinds], **look.legend())
+
+
+def _draw_modes(axes: Axes, run: Trajectory, look: Style) -> None:
+    """A band for each element, colored by its mode."""
+    names, bands = [list(column) for column in zip(*bands_of(run), strict=True)]
+    present = [mode for mode in MODES if any(piece[2] == mode for pieces in bands for piece in pieces)]
+    for row, pieces in enumerate(bands):
+        if not look.print:
+            spans = [(start, end - start) for start, end, _ in pieces]
+            colors = [MODES.get(mode, UNKNOWN_MODE)[0] for _, _, mode in pieces]
+            axes.broken_barh(spans, (row - 0.35, 0.7), facecolors=colors)
+            continue
+        for mode in present:
+            spans = [(start, end - start) for start, end, which in pieces if which == mode]
+            axes.broken_barh(spans, (row - 0.35, 0.7), **_print_mode(mode))
+    axes.set_yticks(range(len(bands)), names)
+    axes.set_ylim(len(bands) - 0.5, -0.5)
+    axes.spines[["top", "right", "left"]].set_visible(False)
+    axes.tick_params(axis="y", length=0)
+    looks = [_print_mode(mode) if look.print else {"facecolor": MODES[mode][0]} for mode in present]
+    swatches = [axes.barh(0, 0, **one)[0] for one in looks]
+    axes.legend(swatches, [MODES[mode][1] for mode in present], **look.legend())
+
+
+def _print_mode(mode: int) -> dict[str, Any]:
+    return {"facecolor": MODES[mode][0], "hatch": HATCHES[mode], "edgecolor": "white", "linewidth": 0.0}
+
+
+def picture_format(path: Path) -> str:
+    """The format that the ending of a file names.
+
+    Args:
+        path: the file.
+
+    Raises:
+        OutputError: matplotlib writes no such format.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    known, ending = sorted(FigureCanvasAgg.get_supported_filetypes()), path.suffix.lower().lstrip(".")
+    if ending not in known:
+        raise OutputError(
+            f'cannot write a figure to "{path}": its ending must be one of {", ".join(known)}; got "{ending}"'
+        )
+    return ending
+
+
+def _save(figure: Figure, path: Path) -> None:
+    """The figure as a file, whole or not at all."""
+    picture = io.BytesIO()
+    figure.savefig(picture, format=picture_format(path), dpi=160)
+    with whole_file(path, "the figure") as stream:
+        stream.write(picture.getvalue())

@@ -1,0 +1,172 @@
+"""Pictures and videos of a replay from the command line: its page in a browser without a window."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import io
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from pin_nonideal.atomic_files import file_path, whole_file
+from pin_nonideal.errors import InputError, OutputError
+from pin_nonideal.trajectory.trajectory import Trajectory
+from pin_nonideal.validation import count, number, positive
+
+from .headless_browser import opened
+from .replay import ReplayPage, replay
+
+ENDINGS = (".png", ".gif", ".webm", ".mp4")
+CODECS = {
+    ".mp4": ["-c:v", "libx264", "-preset", "veryfast", "-movflags", "+faststart"],
+    ".webm": ["-c:v", "libvpx-vp9", "-deadline", "realtime", "-cpu-used", "6", "-crf", "30", "-b:v", "0"],
+}
+# Colors as players take them where a file says nothing: those of BT.709, of which black is 16 and white 235.
+COLORS = ["-vf", "scale=out_range=tv:out_color_matrix=bt709", "-pix_fmt", "yuv420p", "-color_range", "tv"]
+COLORS += ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"]
+LARGEST, MOST_PICTURES = 16384, 100_000  # pixels of a side that browsers draw; an hour at 25 a second
+LEAST_FPS = 0.01  # a GIF knows no longer picture
+AT_ONCE = 8_000_000  # pixels of the pictures that the browser is asked for at once
+# Leaves the view alone on the page, as large as the window.
+ALONE = """(() => {
+  const style = document.createElement("style");
+  style.textContent = "#dock, #tools, #forces, #heading { display: none !important }"
+    + "#stage { min-height: 0 }";
+  document.head.append(style);
+})()"""
+
+
+def render(
+    run: Trajectory,
+    path: str | os.PathLike[str],
+    *,
+    width: int = 960,
+    height: int = 540,
+    seconds: float = 6.0,
+    fps: float = 25.0,
+    time: float | None = None,
+    forces: bool = True,
+) -> Path:
+    """Renders the replay of a run to a picture or a video, with a Chromium or Chrome of the machine.
+
+    Args:
+        run: what `simulate` returned.
+        path: file to write: .png, .gif, .webm or .mp4, the last two by ffmpeg.
+        width: of the picture [pixels].
+        height: of the picture [pixels].
+        seconds: length of a video, in which the whole run is played [s].
+        fps: pictures a second of a video.
+        time: of a single picture [s]; a quarter of the run when None.
+        forces: False for a view without arrows.
+
+    Returns:
+        The path written.
+
+    Raises:
+        InputError: the size, the length or the rate is not positive, or the run cannot be replayed.
+        OutputError: the ending is none of these, no browser or no ffmpeg is found, or the file cannot be
+            written.
+    """
+    if not isinstance(run, Trajectory):
+        raise InputError(f"render: run must be a Trajectory; got {type(run).__name__}")
+    target = file_path("render: path", path)
+    ending = target.suffix.lower()
+    if ending not in ENDINGS:
+        raise OutputError(f'render: "{target}" must end in one of {", ".join(ENDINGS)}')
+    size = [
+        count(f"render: {what}", x, least=1, most=LARGEST)
+        for what, x in (("width", width), ("height", height))
+    ]
+    seconds, fps = positive("render: seconds", seconds), positive("render: fps", fps)
+    encoder = _ffmpeg(ending) if ending in CODECS else ""
+    start, length = float(run.t[0]), float(run.t[-1] - run.t[0])
+    if fps < LEAST_FPS:
+        raise InputError(f"render: fps must be at least {LEAST_FPS}; got {fps:g}")
+    if seconds * fps > MOST_PICTURES:
+        raise InputError(
+            f"render: seconds times fps must be at most {MOST_PICTURES} pictures; got {seconds * fps:g}"
+        )
+    frames = max(2, round(seconds * fps))
+    times = [start + length * k / (frames - 1) for k in range(frames)]
+    if ending == ".png":
+        times = [start + 0.25 * length if time is None else number("render: time", time)]
+    if ending in CODECS:
+        size = [x + x % 2 for x in size]  # both codecs halve the colors
+    page: ReplayPage = replay(run, forces=forces)
+    kind = "image/png" if ending in (".png", ".gif") else "image/jpeg"
+    with ThreadPoolExecutor(max_workers=1) as thread:  # a notebook has a loop of its own running in this one
+        pictures = thread.submit(asyncio.run, _pictures(page.text, size, times, kind)).result()
+    if ending in CODECS:
+        content = _video(pictures, ending, fps, encoder)
+    else:
+        content = pictures[0] if ending == ".png" else _gif(pictures, fps)
+    with whole_file(target, "the picture") as stream:
+        stream.write(content)
+    return target
+
+
+async def _pictures(text: str, size: list[int], times: list[float], kind: str) -> list[bytes]:
+    """The view of a page at some times, as files of that kind."""
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / "replay.html"
+        page.write_text(text, encoding="utf-8")
+        async with opened(Path(folder), page.as_uri() + "#paused", size) as ask:
+            await ask(ALONE)
+            await ask("new Promise((done) => setTimeout(done, 200))")
+            await ask("(replay.showForces(true), replay.resetView())")  # small pages begin without arrows
+            return [
+                base64.b64decode(one)
+                for part in _parts(times, size)
+                for one in await ask(f"replay.pictures({json.dumps(kind)}, {json.dumps(part)})")
+            ]
+
+
+def _parts(times: list[float], size: list[int]) -> list[list[float]]:
+    """Times of the pictures that are asked for together: the page shows nothing between them."""
+    together = max(1, AT_ONCE // (size[0] * size[1]))
+    return [times[k : k + together] for k in range(0, len(times), together)]
+
+
+def _gif(pictures: list[bytes], fps: float) -> bytes:
+    """Pictures as one that moves."""
+    from PIL import Image
+
+    frames = [Image.open(io.BytesIO(one)).convert("P", palette=Image.Palette.ADAPTIVE) for one in pictures]
+    out = io.BytesIO()
+    frames[0].save(
+        out, "GIF", save_all=True, append_images=frames[1:], duration=1000.0 / fps, loop=0, optimize=True
+    )
+    return out.getvalue()
+
+
+def _ffmpeg(ending: str) -> str:
+    """The ffmpeg on the path, or else that of imageio-ffmpeg."""
+    found = shutil.which("ffmpeg")
+    if found is None:
+        try:
+            from imageio_ffmpeg import get_ffmpeg_exe
+
+            found = get_ffmpeg_exe()
+        except (ImportError, RuntimeError):
+            raise OutputError(
+                f"render: {ending} needs ffmpeg on the path, or pip install 'pin-nonideal[video]'; "
+                "or write .gif instead"
+            ) from None
+    return str(found)
+
+
+def _video(pictures: list[bytes], ending: str, fps: float, encoder: str) -> bytes:
+    """Pictures as a video that ffmpeg encodes."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"video{ending}"
+        read = ["-y", "-loglevel", "error", "-f", "image2pipe", "-framerate", f"{fps:g}", "-i", "-"]
+        command = [encoder, *read, *CODECS[ending], *COLORS, str(path)]
+        done = subprocess.run(command, input=b"".join(pictures), capture_output=True, check=False)
+        if done.returncode:
+            raise OutputError(f"render: ffmpeg failed: {done.stderr.decode(errors='replace').strip()[-300:]}")
+        return path.read_bytes()
