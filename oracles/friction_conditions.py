@@ -37,7 +37,7 @@ class Conditions:
     """Friction force, limit and slip velocity of every element of a scene, at instants of its runs.
 
     Args:
-        scene: its laws, constraints and forces are of the kinds in tests/random_mechanisms.py.
+        scene: its laws, constraints and forces are of the kinds in tests/support/random_mechanisms.py.
         slips: name of each element to a function (data, v) -> its slip velocity.
         places: name of an element that is not all of its law in a joint or hinge, to that law's name and a
             function (instant, wrenches) -> what its load adds to the constant part of the limit.

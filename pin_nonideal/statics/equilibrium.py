@@ -9,11 +9,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pin_nonideal.validation import choice, count, number
 from pin_nonideal.errors import EquilibriumError, InputError, LoopClosureError
 from pin_nonideal.scene.scene import Scene
 from pin_nonideal.states.parsing import named_velocity
 from pin_nonideal.types import Array, State
+from pin_nonideal.validation import choice, count, number
 
 from .residual import AtRest, Balance, weight
 

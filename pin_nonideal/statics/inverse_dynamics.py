@@ -10,13 +10,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pin_nonideal.validation import array, number, sequence
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import FrictionConvergenceError, InputError
 from pin_nonideal.scene.scene import Scene
 from pin_nonideal.states.parsing import joint_named, named_configuration, named_velocity
 from pin_nonideal.states.rows import DEPENDENT, rows_at, shortest
 from pin_nonideal.types import Array, State
+from pin_nonideal.validation import array, number, sequence
 
 from .residual import AtRest, weight
 

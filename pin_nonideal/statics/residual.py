@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.scene.scene import Scene, program_of
-from pin_nonideal.states.scales import slides
 from pin_nonideal.states.rows import DEPENDENT, gap_rows, holonomic_rows, row_lengths, rows_at, shortest
+from pin_nonideal.states.scales import slides
 from pin_nonideal.types import Array
 
 

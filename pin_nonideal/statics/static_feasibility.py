@@ -8,14 +8,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from pin_nonideal.validation import number
-from pin_nonideal.description.constraints import Rolling
 from pin_nonideal.core_loader import core
+from pin_nonideal.description.constraints import Rolling
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene.scene import Scene, program_of
 from pin_nonideal.states.parsing import named_velocity
 from pin_nonideal.states.rows import DEPENDENT
 from pin_nonideal.types import Array, State
+from pin_nonideal.validation import number
 
 from .residual import AtRest, weight
 

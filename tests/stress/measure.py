@@ -8,7 +8,7 @@ import pinocchio as pin
 import pin_nonideal as pn
 from oracles.rods import rods
 
-from ..mechanisms import frame
+from ..support.mechanisms import frame
 
 
 def at_most(what, value, bound):

@@ -12,7 +12,7 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.errors import NonFiniteError, PinNonidealError
 
-from ..mechanisms import body, empty
+from ..support.mechanisms import body, empty
 from .measure import finite
 
 FEW = ["rolling_disk", "belt_oscillator", "loaded_joint"]

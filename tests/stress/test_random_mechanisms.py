@@ -12,7 +12,7 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.errors import PinNonidealError
 
-from ..random_trees import JOINTS, attach, place_of, state, tree
+from ..support.random_trees import JOINTS, attach, place_of, state, tree
 from .measure import finite
 
 FEW, MANY, BLOCK = 40, 10_000, 100

@@ -11,7 +11,7 @@ import pytest
 import pin_nonideal as pn
 from oracles.rods import rods
 
-from ..mechanisms import empty
+from ..support.mechanisms import empty
 from .measure import at_most, finite, ledger, linkage
 
 TIGHT = {"rtol": 1e-12, "atol": 1e-13}

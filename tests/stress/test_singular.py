@@ -10,7 +10,7 @@ import pin_nonideal as pn
 from oracles.rods import rods
 from pin_nonideal.errors import LoopClosureError, StepSizeError
 
-from ..mechanisms import body, empty, frame
+from ..support.mechanisms import body, empty, frame
 from .measure import at_most, ledger, linkage
 
 CLOSED = 1e-8

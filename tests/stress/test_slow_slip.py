@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull
 
 import pin_nonideal as pn
 
-from ..standing import balls, planar_state, plate
+from ..support.standing import balls, planar_state, plate
 from .measure import at_most, ledger
 
 long = pytest.mark.stress

@@ -9,7 +9,7 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, StepSizeError
 
-from ..mechanisms import body, empty, point_mass
+from ..support.mechanisms import body, empty, point_mass
 from .measure import at_most, finite, ledger, linkage
 
 long = pytest.mark.stress

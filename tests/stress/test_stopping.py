@@ -11,7 +11,7 @@ import pytest
 
 import pin_nonideal as pn
 
-from ..same_run import assert_same_run
+from ..support.same_run import assert_same_run
 
 long = pytest.mark.stress
 

@@ -9,8 +9,8 @@ import pinocchio as pin
 
 import pin_nonideal as pn
 
-from ..mechanisms import body, empty, frame, hinge
-from ..random_trees import attach, place_of, tree
+from .mechanisms import body, empty, frame, hinge
+from .random_trees import attach, place_of, tree
 
 ROD = np.diag([2e-4, 5e-3, 5e-3])
 

@@ -12,14 +12,14 @@ import pinocchio as pin
 import pin_nonideal as pn
 from pin_nonideal.description.actuation import EffortLimits, HoldPosition, SampledControl, Table
 
-from ..mechanisms import body, empty, frame
-from ..random_mechanisms import mechanism
-from ..random_places import places
-from ..random_trees import tree
-from ..row_cases import TREES
 from . import loops
 from .cases import Case, case_of
 from .loops import at
+from .mechanisms import body, empty, frame
+from .random_mechanisms import mechanism
+from .random_places import places
+from .random_trees import tree
+from .row_cases import TREES
 
 DURATIONS = {
     "andrews_squeezer": 0.005,

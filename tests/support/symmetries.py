@@ -12,9 +12,9 @@ import pinocchio as pin
 import pin_nonideal as pn
 from pin_nonideal.states.rows import holonomic_rows
 
-from ..random_trees import place_of
 from .cases import Carrier, Case, Maps
 from .models import Units, other_order, rebuilt
+from .random_trees import place_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,118 @@
+"""What the Markdown files show works: Python blocks compile, marked ones run, links lead somewhere.
+
+Marks are HTML comments right above a block: `runs` for a block that runs, after the ones before it in the
+same document, and `file: NAME` for the text of a file that they read.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from pin_nonideal.loading.load import load, robots
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+BLOCK = re.compile(
+    r"^(?:<!-- (?P<mark>[a-z:._ ]+) -->\n)?```(?P<language>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL
+)
+LINK = re.compile(r"\]\((?!https?:|mailto:|#)([^)#\s]+)")
+RUN_SECONDS = 120
+
+
+class Block(NamedTuple):
+    """A fenced block of a Markdown file: `mark` is the HTML comment right above it."""
+
+    document: str
+    line: int
+    mark: str
+    language: str
+    text: str
+
+
+def blocks() -> list[Block]:
+    found = []
+    for path in DOCUMENTS:
+        text = path.read_text(encoding="utf-8")
+        for match in BLOCK.finditer(text):
+            line = text.count("\n", 0, match.start()) + 1
+            found.append(Block(path.name, line, match["mark"] or "", match["language"], match["text"]))
+    return found
+
+
+PYTHON = [block for block in blocks() if block.language == "python"]
+RUNNABLE = [block for block in PYTHON if block.mark == "runs"]
+
+
+def name(block: Block) -> str:
+    return f"{block.document}:{block.line}"
+
+
+def test_there_are_blocks_to_check() -> None:
+    assert any(block.document == "README.md" for block in RUNNABLE)
+
+
+@pytest.mark.parametrize("block", PYTHON, ids=name)
+def test_python_block_compiles(block: Block) -> None:
+    compile(block.text, name(block), "exec")
+
+
+@pytest.mark.parametrize("document", sorted({block.document for block in RUNNABLE}))
+def test_marked_python_blocks_run(document: str, tmp_path: Path) -> None:
+    for block in blocks():
+        if block.document == document and block.mark.startswith("file: "):
+            (tmp_path / block.mark.removeprefix("file: ")).write_text(block.text, encoding="utf-8")
+    script = ""
+    for block in RUNNABLE:
+        if block.document == document:
+            # Line numbers of a traceback are those of the document: two lines for the mark and the fence.
+            script += "\n" * (block.line + 1 - script.count("\n")) + block.text
+    (tmp_path / "document.py").write_text(script, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "document.py"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=RUN_SECONDS,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_links_lead_to_files(path: Path) -> None:
+    broken = [
+        link for link in LINK.findall(path.read_text(encoding="utf-8")) if not (path.parent / link).exists()
+    ]
+    assert broken == []
+
+
+def test_the_folder_of_the_robots_page_loads(tmp_path: Path) -> None:
+    files = {(b.document, b.mark): b.text for b in blocks() if b.mark.startswith("file: ")}
+    (tmp_path / "robot.urdf").write_text(files["first_use.md", "file: linkage.urdf"], encoding="utf-8")
+    (tmp_path / "robot.yaml").write_text(files["robots.md", "file: robot.yaml"], encoding="utf-8")
+    scene = load(tmp_path)
+    assert [c.name for c in scene.constraints] == ["loop"]
+    assert [law.joint for law in scene.laws] == ["rocker_joint"]
+    assert len(scene.forces) == 1
+
+
+def test_every_robot_is_in_the_table() -> None:
+    text = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
+    assert [name for name, _ in robots() if f"| `{name}` |" not in text] == []
+
+
+def test_the_two_commands_of_the_readme_are_marked() -> None:
+    marks = [block.mark for block in blocks() if block.document == "README.md" and block.language == "sh"]
+    assert [mark for mark in marks if mark.startswith("command:")] == ["command: run", "command: test"]
+
+
+def test_contributing_has_five_commands() -> None:
+    commands = [b for b in blocks() if b.document == "CONTRIBUTING.md" and b.language == "sh"]
+    assert len(commands) == 5
+    assert all(len(block.text.splitlines()) == 1 for block in commands)

@@ -1,0 +1,77 @@
+"""The documentation site: its pages, their names and tables, and that it is built without a warning."""
+
+from __future__ import annotations
+
+import inspect
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import pin_nonideal as pn
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+# What a page may call on each: attributes of instances are not among those of the class.
+OWNERS = {"pn": pn, "scene": pn.Scene, "run": pn.Trajectory}
+INSTANCE = {"scene": {"model", "constraints", "laws", "forces", "contacts", "actuation", "name", "notes"}}
+INSTANCE["scene"] |= set(
+    re.findall(r"^        (\w+): ", inspect.getdoc(pn.Scene).replace("\n", "\n    "), re.M)
+)
+INSTANCE["run"] = set(pn.Trajectory.__dataclass_fields__)
+
+
+def text(page: str) -> str:
+    return (DOCS / page).read_text(encoding="utf-8")
+
+
+def test_the_reference_has_every_public_name() -> None:
+    rows = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", text("reference.md"), re.MULTILINE))
+    first = {
+        n: (inspect.getdoc(getattr(pn, n)) or "").split("\n\n")[0].replace("\n", " ") for n in pn.__all__
+    }
+    assert {name: words.replace("|", "\\|") for name, words in first.items()} == rows
+
+
+@pytest.mark.parametrize("page", sorted(path.name for path in DOCS.glob("*.md")))
+def test_names_on_pages_exist(page: str) -> None:
+    unknown = []
+    for owner, name in re.findall(r"\b(pn|scene|run)\.([a-zA-Z]\w*)", text(page)):
+        if not hasattr(OWNERS[owner], name) and name not in INSTANCE.get(owner, set()):
+            unknown.append(f"{owner}.{name}")
+    assert [name for name in unknown if not name.endswith((".html", ".npz", ".yaml"))] == []
+
+
+def test_worked_examples_are_short_and_checked() -> None:
+    blocks = re.findall(r"```python\n(.*?)```", text("worked_examples.md"), re.DOTALL)
+    assert len(blocks) == 5
+    assert all(len(block.splitlines()) < 60 for block in blocks)
+    assert all(block.count("\nassert ") >= 2 for block in blocks)
+
+
+def test_the_gallery_shows_every_robot() -> None:
+    shown = set(re.findall(r"stills/(\w+)\.jpg", text("gallery.md")))
+    assert {name for name, _ in pn.robots()} <= shown
+
+
+def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
+    pytest.importorskip("mkdocstrings", reason="the site takes pip install '.[docs]'")
+    command = [
+        sys.executable,
+        "-m",
+        "mkdocs",
+        "build",
+        "--strict",
+        "--quiet",
+        "--site-dir",
+        str(tmp_path / "site"),
+    ]
+    quiet = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, env=quiet)
+    assert done.returncode == 0, done.stderr
+    page = (tmp_path / "site" / "reference.html").read_text(encoding="utf-8")
+    assert [name for name in pn.__all__ if f'id="pin_nonideal.{name}"' not in page] == []
+    assert (tmp_path / "site" / "source" / "pin_nonideal" / "equation.py.txt").exists()

@@ -1,0 +1,52 @@
+"""Random mechanisms with friction in couplings, ball anchors and joints of several velocities.
+
+At every recorded instant the laws hold, by Pinocchio's inverse dynamics and closed forms.
+`pytest -m stress` runs all; PIN_NONIDEAL_MECHANISMS=10000 that many.
+"""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+
+import pin_nonideal as pn
+from oracles.friction_conditions import Conditions
+
+from ..support.random_places import places
+from ..support.seeds import seeds
+from .test_random_mechanisms import MOST_STEPS, assert_conditions, assert_ledger_closes
+
+DURATION = 0.3  # s: several events each
+DEEP = int(os.environ.get("PIN_NONIDEAL_MECHANISMS", "500"))
+QUICK = 32
+
+
+def check(seed):
+    m = places(seed)
+    run = pn.simulate(m.scene, DURATION, q=m.q, v=m.v, record=("a", "forces", "energy", "power"))
+    assert run.stats.steps < MOST_STEPS
+    assert_ledger_closes(m, run, rounding=1e-12)  # teeth stick by a row, to its rounding
+    conditions = Conditions(m.scene, m.slips, m.places)
+    at_events = np.flatnonzero(np.isin(run.t, [event.time for event in run.events]))[:40]
+    for i in sorted({*range(0, len(run.t), max(1, len(run.t) // 30)), *at_events, len(run.t) - 1}):
+        assert_conditions(m, run, i, conditions)
+
+
+# At rest the joints of seed 21 and the teeth between them share one load, and so decide each other's limits:
+# the search for modes ends in a FrictionParadoxError, as for one in ten of the stress seeds.
+# In seed 11 three elements that share a load stick, and what each carries is not unique: the search finds a
+# sharing that the one of least norm, by which limits are reported, does not hold to (docs/limits.md).
+SHARED = pytest.param(11, marks=pytest.mark.xfail(reason="limits by another sharing than holds", strict=True))
+
+
+@pytest.mark.parametrize("seed", [*seeds(sorted({*range(QUICK)} - {11, 21})), SHARED])
+def test_conditions(seed):
+    check(seed)
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("seed", range(QUICK, DEEP))
+def test_conditions_of_many(seed):
+    check(seed)

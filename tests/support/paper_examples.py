@@ -1,0 +1,18 @@
+"""The scripts examples/paper_*.py as modules: they hold the formulas that the paper prints."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+
+
+def example(name):
+    """The script examples/`name`.py, imported once."""
+    key = f"examples_{name}"
+    if key not in sys.modules:
+        path = Path(__file__).parents[2] / "examples" / f"{name}.py"
+        spec = importlib.util.spec_from_file_location(key, path)
+        sys.modules[key] = module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+    return sys.modules[key]
