@@ -147,7 +147,8 @@ void bind_batch(nb::module_& m) {
     m.def("rollout_arrays", &rollout_arrays, "program"_a, "q"_a, "v"_a, "options"_a, "threads"_a, "names"_a, "values"_a,
           nb::sig("def rollout_arrays(program: Program, q: NDArray[numpy.float64], v: NDArray[numpy.float64], "
                   "options: pin_nonideal.simulation.options.RunOptions, threads: int, "
-                  "names: Sequence[tuple[str, int, str]], values: NDArray[numpy.float64]) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], "
+                  "names: Sequence[tuple[str, int, str]], values: NDArray[numpy.float64]) "
+                  "-> tuple[NDArray[numpy.float64], NDArray[numpy.float64], "
                   "NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], "
                   "list[tuple[int, BaseException]]]"));
 }
