@@ -14,7 +14,7 @@ namespace pn {
 // Gains and pivots of the dofs of deep trees. Returns -1, or the dof whose pivot is not positive.
 int factorize_articulated(const Mechanism& m, BodyTerms& terms);
 
-// The sweeps of factor.hpp for the dofs of deep trees. Forces on bodies, about their reference points, add to x where
+// The sweeps of mass_factor.hpp for the dofs of deep trees. Forces on bodies, about their reference points, add to x where
 // they are given.
 void solve_R_articulated(const Mechanism& m, BodyTerms& terms, const Force* body, VecX& x);
 void solve_Rt_articulated(const Mechanism& m, BodyTerms& terms, const std::vector<int>& dofs, VecX& x);

@@ -1,5 +1,5 @@
 // The solver of contacts with Coulomb's friction: for accelerations, impacts and time stepping alike. Finds f of the
-// problem of cone_problem.hpp for any square W (of any rank, symmetric or not): Newton's method on the modes, from a
+// problem of cone/problem.hpp for any square W (of any rank, symmetric or not): Newton's method on the modes, from a
 // warm start or from nothing; where that does not come to rest, from the end of the central path, from elements that
 // give way a little and ever less, from problems with slip speeds held in turn, from forces that are relaxed element by
 // element, from no friction on, and from starts drawn by lot. Buffers grow to the largest problem met; a call that gets
