@@ -236,8 +236,8 @@ def of_run(case: Case, method: str, **more: Any) -> Answer:
         (e.time, e.kind, e.element, e.impulse)
         for r in runs
         for e in r.events
-        if e.kind in EVENTS
-        and (e.kind != "reverse" or sizes.get(e.element) == 1)  # others turn, fast or slowly
+        # Slip in several directions turns, fast or slowly.
+        if e.kind in EVENTS and (e.kind != "reverse" or sizes.get(e.element) == 1)
     ]
     strongest = max((np.abs(e[3]).max() for e in events if e[3] is not None), default=0.0)
     events = [e for e in events if e[3] is None or np.abs(e[3]).max() > LEAST_STRIKE * strongest]
