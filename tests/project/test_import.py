@@ -19,7 +19,7 @@ from pin_nonideal import core_loader as compiled
 AGAIN = "pip install 'pin==4.1.*' brings the Pinocchio that it needs"
 HEAVY = ["IPython", "joblib", "matplotlib", "meshcat", "scipy", "tqdm", "yaml"]
 # Of this package, what only some programs need: readers of robots, files of runs.
-LATER = ["pin_nonideal.loading.load", "pin_nonideal.trajectory.file"]
+LATER = ["pin_nonideal.loading", "pin_nonideal.trajectory.file"]
 
 
 def test_import_is_light() -> None:

@@ -19,12 +19,12 @@ import pin_nonideal as pn
 from pin_nonideal.description import actuation, constraints, contacts, forces, laws
 from pin_nonideal.description import time_functions as timefunctions
 
-from .support.answers import FUNCTIONS, RUNS, STATIC, Answer, ask, asks, differences
-from .support.cases import Case
-from .support.dimensions import factor
-from .support.known import KNOWN, Known
-from .support.scenes import kinds, random_cases
-from .support.symmetries import ALL, Image, mounted, unchanged
+from ..support.answers import FUNCTIONS, RUNS, STATIC, Answer, ask, asks, differences
+from ..support.cases import Case
+from ..support.dimensions import factor
+from ..support.known import KNOWN, Known
+from ..support.scenes import kinds, random_cases
+from ..support.symmetries import ALL, Image, mounted, unchanged
 
 SAMPLES = kinds() | random_cases(3)
 MANY = {name: make for name, make in random_cases(100).items() if name not in SAMPLES}

@@ -163,7 +163,9 @@ def test_an_interrupted_run_loses_nothing(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("pin_nonideal.simulation.progress_bar", lambda *_: contextlib.nullcontext(interrupt))
+        patch.setattr(
+            "pin_nonideal.simulation.simulate.progress_bar", lambda *_: contextlib.nullcontext(interrupt)
+        )
         with pytest.raises(RunInterrupted) as caught:
             pn.simulate(scene, 100.0, progress=True, checkpoint=path)
     stopped = caught.value.trajectory

@@ -16,8 +16,8 @@ from oracles.rows import rows
 from oracles.solutions import kkt_acceleration
 from pin_nonideal.errors import SingularMassError
 
-from ..scenarios.test_random_mechanisms import closures
 from ..support.random_trees import any_joint, state, tree
+from .test_random_mechanisms import closures
 
 FEW, MANY, BLOCK = 60, 10_000, 100
 # Sums of a few dozen products in another order.

@@ -114,7 +114,7 @@ def test_a_kill_loses_nothing_that_was_done(tmp_path, jobs):
     import sys
     sys.path.insert(0, {str(Path(__file__).parents[2])!r})
     import pin_nonideal as pn
-    from tests.test_sweep_store import pendulum
+    from tests.sweeps.test_sweep_store import pendulum
     parameters = pn.sweep_grid(mass=[1.0 + 0.1 * k for k in range(200)])
     pn.sweep(pendulum, parameters, 20.0, jobs={jobs}, store={str(store)!r})
     """

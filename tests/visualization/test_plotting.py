@@ -168,7 +168,7 @@ def test_drawing_needs_no_window_system() -> None:
         "import sys\n"
         "import pin_nonideal\n"
         "assert 'matplotlib' not in sys.modules\n"
-        "from tests.replay_runs import four_bar\n"
+        "from tests.support.replay_runs import four_bar\n"
         "pin_nonideal.plot(four_bar())\n"
         "print('matplotlib.pyplot' in sys.modules)\n"
     )

@@ -150,7 +150,7 @@ def test_a_missing_viewer_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
 def test_writing_a_replay_imports_neither_meshcat_nor_its_server() -> None:
     script = (
         "import sys\n"
-        "from tests.replay_runs import four_bar\n"
+        "from tests.support.replay_runs import four_bar\n"
         "from pin_nonideal.visualization.replay import replay\n"
         "replay(four_bar())\n"
         "print(sorted({'meshcat', 'zmq', 'tornado', 'umsgpack', 'matplotlib', 'scipy'} & set(sys.modules)))\n"
