@@ -84,10 +84,6 @@ def test_units_and_copies_of_rows_change_no_closure(seed: int) -> None:
             np.testing.assert_allclose(same, found, rtol=0.0, atol=CLOSE * (1.0 + np.abs(found).max()))
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="a row of a user's that rounding alone makes counts as independent where no row depends",
-)
 def test_rows_of_rounding_by_hand_alone_change_no_closure() -> None:
     """All three rows of a planar loop as functions: the one across the plane holds nothing."""
     scene = planar_loop(0)

@@ -11,7 +11,7 @@ namespace pn {
 inline bool any_object(PyObject*) { return true; }
 // Python's own, read later.
 class RunOptions : public nb::object {
-    NB_OBJECT_DEFAULT(RunOptions, nb::object, "pin_nonideal.runs.options.RunOptions", any_object)
+    NB_OBJECT_DEFAULT(RunOptions, nb::object, "pin_nonideal.simulation.options.RunOptions", any_object)
 };
 
 // A function of the user t, q, v -> number, the direction in which it counts, and how many of it end the run.
@@ -29,7 +29,7 @@ namespace nanobind::detail {
 // The one place that reads Python's RunOptions.
 template <>
 struct type_caster<pn::Options> {
-    NB_TYPE_CASTER(pn::Options, const_name("pin_nonideal.runs.options.RunOptions"))
+    NB_TYPE_CASTER(pn::Options, const_name("pin_nonideal.simulation.options.RunOptions"))
 
     bool from_python(handle from, uint32_t, cleanup_list*) noexcept {
         try {
