@@ -41,12 +41,6 @@ KNOWN: list[Known] = [
         functions="rest",
     ),
     Known(
-        "slip of a ball before a stick has the directions of the step's end",
-        ("ball loop 17", "cut in two", "simulate dop853"),
-        scenes="ball loop .*",
-        functions="simulate (dop853|dopri5|rk4)",
-    ),
-    Known(
         "time stepping of a contact that resists turning strikes otherwise where there are loops",
         ("touching PointContact", "an idle row", "simulate moreau"),
         scenes="touching .*",
