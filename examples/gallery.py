@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 import pin_nonideal as pn
-from pin_nonideal.loading.load import robots
 
 HERE = Path(__file__).resolve().parent
 RECORD = ("forces", "energy", "reactions")
@@ -92,7 +91,7 @@ def main(folder: str | Path = HERE.parent / "docs" / "gallery") -> None:
     target, begun = Path(folder), time.perf_counter()
     target.mkdir(parents=True, exist_ok=True)
     entries = [*paper_runs()]
-    entries += [(name, words, lambda name=name: robot_run(name)) for name, words in robots()]
+    entries += [(name, words, lambda name=name: robot_run(name)) for name, words in pn.robots()]
     cards = []
     for name, words, make in entries:
         run = make()

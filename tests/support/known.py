@@ -37,8 +37,20 @@ KNOWN: list[Known] = [
     Known(
         "reactions that elements at rest share are of least norm over forces and torques, see `rest`",
         ("places 2", "millimeters", "rest"),
-        scenes="(places|mechanism) .*",
+        scenes="(places|mechanism|ball loop) .*",
         functions="rest",
+    ),
+    Known(
+        "a fixed step that ends near a rest of slip in several directions ends it or not by rounding",
+        ("ball loop 1", "turned mount", "simulate rk4"),
+        scenes="ball loop .*",
+        functions="simulate (rk4|semi_implicit_euler)|stepper",
+    ),
+    Known(
+        "a ball's last stick before modes are not found is found or not by rounding",
+        ("ball loop 0", "milliseconds", "simulate dop853"),
+        scenes="ball loop .*",
+        functions="simulate (dop853|dopri5)",
     ),
     Known(
         "time stepping of a contact that resists turning strikes otherwise where there are loops",
