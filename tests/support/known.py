@@ -53,6 +53,13 @@ KNOWN: list[Known] = [
         functions="simulate (dop853|dopri5)",
     ),
     Known(
+        "two elements of friction on one freedom stick and slip in turn where they begin to slip",
+        ("robot worm_drive", "tonnes, kilometers, hours", "simulate dop853"),
+        scenes="robot worm_drive",
+        transformations="tonnes, kilometers, hours|milliseconds|a far contact",
+        functions="simulate .*|stepper|poses of a replay",
+    ),
+    Known(
         "time stepping of a contact that resists turning strikes otherwise where there are loops",
         ("touching PointContact", "an idle row", "simulate moreau"),
         scenes="touching .*",

@@ -563,7 +563,10 @@ def _(case: Case) -> Image | None:
         return None
     row = np.eye(model.nv)[model.joints[single[0]].idx_v]
     rub = pn.UserFriction(lambda t, q: row, lambda t, q, v, r: 0.0, name="added friction")
-    return replace(unchanged(case, laws=(*case.laws, rub)), as_steps_shorten=True)
+    # Where it slips along with another element either may be named for it.
+    return replace(
+        unchanged(case, laws=(*case.laws, rub)), as_steps_shorten=True, without=frozenset({"events"})
+    )
 
 
 @transformation("a body apart")
