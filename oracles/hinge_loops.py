@@ -110,7 +110,7 @@ class HingeLoop:
         return np.concatenate([axes, np.cross(points, axes)], axis=1).T
 
     def gap(self, q):
-        """Of the last body from the ground: a rotation vector, and a translation by the length, (6,)."""
+        """Gap of the last body from the ground: rotation vector, and translation over the length, (6,)."""
         R, x = (poses[-1] for poses in self.poses(q))
         return np.concatenate([pin.log3(R @ self.end[0]), (R @ self.end[1] + x) / self.length])
 
@@ -159,7 +159,7 @@ class HingeLoop:
         return t, dt, dc, ddc, w, dw, R[:-1], -solved(self.gap(q))
 
     def acceleration(self, q, v, damping=0.0):
-        """Of all hinges, (n,), under weight and torques -damping v of all hinges but the last [N m s]."""
+        """Accelerations of the hinges, (n,); damping acts on all hinges but the last [N m s]."""
         return self._rates(q, v, damping)[1]
 
     def _rates(self, q, v, damping):
@@ -173,7 +173,7 @@ class HingeLoop:
         return t * speed, t * (f - n * speed**2) / m + dt * speed**2, closing
 
     def velocity(self, q, speed):
-        """Of all hinges, the largest one at this speed."""
+        """Velocities of the hinges, (n,), the largest at this speed."""
         t = self.along(q)[0]
         return t * speed / np.abs(t).max()
 

@@ -1,8 +1,8 @@
 """A body on a rough ball pivot that swings until friction holds it, by equations of motion of its own.
 
 The friction torque of the pivot is -s w / |w| with s = constant + rub |f|, where f is the force of the pivot.
-SciPy's explicit Runge-Kutta method of order 8 follows the angular velocity w down to a speed far below what
-any sample resolves, and the rest of the way is a straight line.
+SciPy's explicit Runge-Kutta method of order 8 integrates the angular velocity w down to a speed below the
+resolution of any sample; the last stretch is a straight line.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class HungBody:
     rub: float
 
     def acceleration(self, turn: Rotation, w: np.ndarray) -> np.ndarray:
-        """Of the angular velocity in body axes [rad/s^2]."""
+        """Angular acceleration in body axes [rad/s^2]."""
         c, weight = self.center, turn.inv().apply(self.gravity)
         about_pivot = self.inertia + self.mass * (c @ c * np.eye(3) - np.outer(c, c))
         moment = self.mass * np.cross(c, weight) - np.cross(w, about_pivot @ w)
@@ -53,7 +53,7 @@ class HungBody:
         return free + s * slowing
 
     def rate(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Of a quaternion (x, y, z, w) and the angular velocity."""
+        """Derivatives of the quaternion (x, y, z, w) and the angular velocity."""
         (x, b, z, r), w = y[:4], y[4:]
         turns = np.array([[r, -z, b], [z, r, -x], [-b, x, r], [-x, -b, -z]])
         return np.concatenate([0.5 * turns @ w, self.acceleration(Rotation.from_quat(y[:4]), w)])

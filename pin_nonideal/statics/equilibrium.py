@@ -22,7 +22,7 @@ DIFFERENCE = 6e-6
 # Longest step [units, see `AtRest.units`], the shortest that still leads somewhere, and most of them.
 LONGEST, SHORTEST, MOST = 0.5, 1e-13, 300
 CLOSINGS = 20  # iterations to the place where a contact closes
-# What is left to the equilibrium by Newton's method when it counts as found [units].
+# Newton step at which an equilibrium counts as found [units].
 CLOSE = 1e-9
 # A motion has no stiffness where it is below this part of the forces in play along it over a unit of motion,
 # or below that part of the stiffnesses that cancel in it: the state is neutral that way.

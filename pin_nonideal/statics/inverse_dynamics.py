@@ -58,8 +58,8 @@ def inverse_dynamics(
 ) -> InverseDynamics:
     """Torques with which the scene accelerates by a: of least norm where several do.
 
-    Where forces drive beside torques, the norm takes them times an arm, the root mean radius of gyration of
-    the driven joints.
+    If both forces and torques drive, the norm multiplies forces by an arm: the root mean square radius of
+    gyration of the driven joints.
 
     free^T (M a - F - C - tau) = 0 along the motions `free` that the constraints allow, with tau on the
     actuated joints only and friction C of the very reactions that come with it; the scene's own actuation
@@ -129,7 +129,7 @@ def _bounds(bounds: Any, count: int) -> tuple[Array, Array]:
 
 
 def _allowed(rest: AtRest, q: Array, A: Array, b: Array, a: Array) -> Array:
-    """By how much each row of A a = b may be missed, beside its terms and what weight gives to it, (m,)."""
+    """Allowed residual of each row of A a = b: a part of its terms and of gravity's effect, (m,)."""
     falls = rest.scaled_rows(q, rest.root(q))[1] * weight(rest.scene)
     return np.asarray(FOLLOWS * (np.abs(A) @ np.abs(a) + np.abs(b) + falls + ROUNDING))
 
@@ -163,7 +163,7 @@ class _Torques:
         self.select = np.eye(len(v))[:, dofs]
         self.M = rest.mass(q)
         self.arms = rest.units(self.M, self.free, dofs)
-        # Of the torques in the metric of M^-1.
+        # Lengths of the unit torques in the metric of M^-1.
         self.lengths = np.sqrt(np.diag(np.linalg.inv(self.M))[dofs]) / self.arms
         self.modes, self.slipping = self._modes()
 

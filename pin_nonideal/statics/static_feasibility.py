@@ -92,14 +92,14 @@ class _Cones:
 
     Unknowns are lam (m), the friction forces (d) and an excess s by which every limit may be passed.  All of
     them are measured in the metric of M^-1, each over the greatest length of its row or element and over the
-    largest force in play, so that neither units nor the mount change what counts as rounding.
+    largest force in play, so that neither units nor the mount change the tolerances.
 
     Attributes:
         A: rows of constraints and contacts, (m, nv).
         parts: place of each element's forces among the unknowns.
-        balance: what the unknowns give along the directions that they reach, orthonormal ones, (r, m + d).
-        load: what they have to give there, (r,).
-        holds: whether nothing is left beside those directions.
+        balance: forces of the unknowns along an orthonormal basis of their span, (r, m + d).
+        load: forces that the unknowns must balance along that basis, (r,).
+        holds: whether all forces lie in the span of that basis.
     """
 
     def __init__(self, scene: Scene, at_rest: AtRest, q: Array) -> None:
@@ -160,7 +160,7 @@ class _Cones:
             modes = [
                 core.Mode.unloaded if mode == core.Mode.sticking and x == 0.0 else mode
                 for mode, x in zip(modes, stuck.limits, strict=True)
-            ]  # what has no limit holds nothing
+            ]  # an element whose limit is zero holds nothing
             lasts = modes != before
         return known, following
 

@@ -30,9 +30,9 @@ class DenseOutput:
         states: q, v, states of laws and work of the ledger at each point of each step, (n, points, size).
         modes: of the frictional elements over each step, (n, ne).
         directions: of their slip at each point of each step, (n, points, 3 ne), or without columns if every
-            element slips along one direction.  A step that did not seek them holds those of its end.
-        sought: of each element, whether its slip was too slow to tell its direction, so that the step sought
-            it, (n, ne).
+            element slips along one direction.  Steps that did not solve for them store the directions at
+            their end.
+        sought: whether each step solved for the direction of each element, as it does in slow slip, (n, ne).
         torque: held over each step, (n, nv), not a number where none is; (0, nv) where none ever is.
         moved: energy moved by projection up to the end of each step [J], (n,).
         options: what the run was asked for, a RunOptions.

@@ -66,7 +66,7 @@ class TestDescription:
 
 
 def structs() -> dict[str, str]:
-    """Name of each kind of row, and that in Python; of a template those that are made of it."""
+    """Name of each kind of row, and its name in Python; templates are listed by their instances."""
     found = {}
     for header in HEADERS:
         source = header.read_text()

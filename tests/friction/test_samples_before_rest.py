@@ -18,7 +18,7 @@ PARTS = np.array([0.05, 0.3, 0.6, 0.9, 0.99])  # of the step before the rest
 SPEED = 1e-7  # of the largest speed, by which a sample may be off
 INSTANT = 1e-8  # [s]
 SHORT = 1e-5  # of a step [s], below which no even grid has a time inside it
-# The direction of slip is as exact as the slip itself, and what it turns, forces and accelerations, no more.
+# The direction of slip is as exact as the slip itself; so are the forces and accelerations along it.
 CLEAR, FORCE = 1e-4, 1e-6  # parts of the largest speed and acceleration
 WORK = 1e-8  # part of the work of friction
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)

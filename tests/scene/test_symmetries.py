@@ -59,7 +59,7 @@ def asked(name: str, transformation: str) -> list[str]:
 
 
 def found(name: str, transformation: str, function: str) -> list[str]:
-    """How an image answers otherwise than its scene; a search that found nothing tells nothing."""
+    """Differences between the answers of an image and of its scene; failed searches are left out."""
     made, own = image(name, transformation), answer(name, function)
     assert made is not None
     if "EquilibriumError" in str(own.values.get("error")):

@@ -220,7 +220,7 @@ def test_rest_agrees_with_the_motion():
 
 
 def on_mount(scene, turn):
-    """A scene whose model and gravity are turned together; what it stands on is fixed to the model."""
+    """A scene whose model, gravity and ground are turned together."""
     model = scene.model.copy()
     for j in range(1, model.njoints):
         if model.parents[j] == 0:
@@ -268,7 +268,7 @@ def test_a_drive_that_accelerates_stands_still_in_statics():
 
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
 def test_least_torques_do_not_depend_on_the_unit_of_length(unit):
-    """A slide that lifts what a crank can lift as well: half of the work each, in any unit."""
+    """A slide and a crank that lift one load together: each does half of the work, in any unit."""
     model = pin.Model()
     model.addJoint(0, pin.JointModelRY(), pin.SE3.Identity(), "crank")
     model.appendBodyToJoint(1, pin.Inertia(1.0, np.zeros(3), unit**2 * np.eye(3)), pin.SE3.Identity())

@@ -1,4 +1,4 @@
-"""What public functions answer about a case, by name, and when two answers are the same."""
+"""Answers of the public functions about a case, by name, and their comparison."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OF_RUNS = 1e-6
 OF_SEARCHES = 1e-6
 # Some hundred steps of a method of first order that are taken otherwise.
 OF_FIRST_ORDER = 3e-2
-# Values below this part of what they would be of are rounding: gravity times a mass of 1 kg, and so on.
+# Values below this part of a reference value, such as gravity times a mass of 1 kg, are rounding.
 FLOORS = {"q": 0.1, "v": 0.1, "a": 10.0, "force": 1.0, "t": 0.1, "energy": 1.0, "number": 1.0, "rates": 1.0}
 LEAST_LOAD = 1e-3  # N m
 WALL = 10.0  # s, of one run
@@ -53,7 +53,7 @@ STATIC: set[str] = set()
 
 
 def function(name: str, *, run: bool = False, static: bool = False) -> Any:
-    """Registers what answers about a case."""
+    """Registers a function that answers about a case."""
 
     def register(f: Callable[[Case], Answer]) -> Callable[[Case], Answer]:
         FUNCTIONS[name] = f
@@ -150,13 +150,13 @@ def _(case: Case) -> Answer:
 
 
 def own_joints(model: pin.Model) -> list[str]:
-    """Joints of the case, those that an image adds left out."""
+    """Joints of the case, without joints that an image adds."""
     return [str(name) for name in model.names[1:] if name not in ("mount", "split", "added wheel")]
 
 
 @function("inverse_dynamics")
 def _(case: Case) -> Answer:
-    """Torques that give the accelerations of the states, and those that hold the start."""
+    """Torques for the accelerations of the states, and torques that hold the start."""
     scene, values = case.scene, {}
     for k, (q, v) in enumerate(case.states):
         a = scene.acceleration(q, v, t=case.t0)
@@ -170,7 +170,7 @@ def _(case: Case) -> Answer:
 
 @function("holding torques", static=True)
 def _(case: Case) -> Answer:
-    """Of each joint alone that can hold the start against all given forces, where friction gives nothing."""
+    """Torque of each joint that alone can hold the start against all given forces without friction."""
     scene, values = case.scene, {}
     model, q = scene.model, case.states[0][0]
     still = np.zeros(model.nv)
@@ -189,7 +189,7 @@ def _(case: Case) -> Answer:
 
 # --- Runs -----------------------------------------------------------------------------------------------
 
-# Of all events those of motion; of impacts those before bouncing is summed up to its end.
+# Events of motion; impacts until the remaining bounces are summed up.
 EVENTS, LEAST_STRIKE = ("stick", "slip", "reverse", "impact", "touch_down", "lift_off"), 1e-3
 RECORD = ("a", "forces", "energy")
 
@@ -292,7 +292,7 @@ def asks(name: str, case: Case) -> bool:
 
 
 def differences(one: Answer, other: Answer, image: Image, *, sharp: bool = True) -> list[str]:
-    """How the answer of an image, read back, differs from that of its case; empty where it is the same."""
+    """Differences between the answer of an image, read back, and that of its case; empty if none."""
     if ("error" in one.values) or ("error" in other.values):
         first, second = (a.values.get("error", (0, "an answer"))[1] for a in (one, other))
         same = first.partition(":")[0] == second.partition(":")[0]
@@ -405,7 +405,7 @@ def coupled(case: Case) -> bool:
 
 
 def said_of_all(image: Image, events: list[Any]) -> list[Any]:
-    """Events of the image, those of what it has beside its case among them."""
+    """Events of the image, events of added elements included."""
     maps = image.carrier.maps
     return [(maps.time_back(t), kind, element, impulse) for t, kind, element, impulse in events]
 

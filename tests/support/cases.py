@@ -158,7 +158,7 @@ def _off(case: Case) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
 
 @dataclass(frozen=True, eq=False)
 class Maps:
-    """Linear maps between the coordinates of a case and those of its image.
+    """Linear maps from the coordinates of a case to the coordinates of its image.
 
     With small moves d = P d' and d' = S d: q = Pq q', v = T P v', a = T^2 P a', and generalized forces
     F = S^T F'/E; q' = Sq q + more_q(t'), v' = S v/T + more_v(t').
@@ -184,7 +184,7 @@ class Maps:
 
     @classmethod
     def chosen(cls, old: pin.Model, new: pin.Model, joints: dict[int, int], **more: Any) -> Maps:
-        """Of a model that has the joints of another one in other places, and more of them."""
+        """Maps to a model that has the same joints at other indices, and further joints."""
         S, Sq = np.zeros((new.nv, old.nv)), np.zeros((new.nq, old.nq))
         for j, k in joints.items():
             if j:
@@ -413,7 +413,7 @@ class Carrier:
         return given if given is None else maps.force(given)
 
     def _gain(self, gain: Any) -> np.ndarray:
-        """Of each degree of freedom: a number acts on joints that have one."""
+        """One entry for each degree of freedom: a number acts on joints that have one."""
         if np.ndim(gain):
             return np.asarray(gain, dtype=float)
         model = self.case.model
@@ -466,7 +466,7 @@ def _times(factor: Any, value: Any) -> Any:
 
 
 def row_letters(model: pin.Model, d: Any) -> str:
-    """Which rows of a constraint or contact hold lengths; those of users are pure numbers."""
+    """Rows of a constraint or contact that hold lengths; rows of users are pure numbers."""
     if isinstance(d, (pn.UserConstraint, pn.UserContact)):
         return "1" * getattr(d, "size", 1)
     if isinstance(d, pn.JointCoupling):

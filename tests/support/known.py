@@ -1,4 +1,4 @@
-"""Limits that are documented, and defects that wait for other work: an entry leaves with what it names."""
+"""Documented limits and open defects; an entry is removed with its defect."""
 
 from __future__ import annotations
 

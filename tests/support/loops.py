@@ -97,7 +97,7 @@ def cardan(seed: int, driven: bool = True) -> pn.Scene:
     model = empty((0.0, 0.0, -9.81) if rng.random() < 0.5 else (0.0, 0.0, 0.0))
 
     def solid() -> dict[str, Any]:
-        """Of a cross or a shaft: light ones hang between heavy ones."""
+        """Inertia of a cross or a shaft: light bodies hang between heavy ones."""
         lever = (10.0 ** rng.uniform(-2.0, 0.0), 0.0, 0.0)
         return {
             "mass": 10.0 ** rng.uniform(-3.0, 1.0),

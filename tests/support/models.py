@@ -46,7 +46,7 @@ SI = Units()
 
 
 def letters(joint: Any) -> tuple[str, str]:
-    """Which coordinates of a joint are lengths: of its velocity, and of its configuration."""
+    """Coordinates of a joint that are lengths: of its velocity, and of its configuration."""
     kind = joint.shortname()
     if kind == "JointModelComposite":
         parts = [letters(part) for part in joint.extract().joints]

@@ -30,7 +30,7 @@ DURATIONS = {
     "panda_settling": 0.5,
     "rough_four_bar": 1.0,
 }
-FALLING = frozenset({"equilibrium"})  # what falls freely has none, and `equilibrium` looks for one for long
+FALLING = frozenset({"equilibrium"})  # a free body has no equilibrium, and the search for one takes long
 CUBE = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-0.2, 0.2)]
 RUBS: dict[str, Any] = {"mu": 0.5, "restitution": 0.3, "name": "it"}
 

@@ -26,7 +26,7 @@ class Image:
         of: the case that it was made of.
         carrier: of coordinates and rows.
         place: of the image's world in that of the case.
-        tolerance: what it costs in accuracy, a factor.
+        tolerance: factor on the tolerances.
         moving: whether nothing of it is at rest.
         as_steps_shorten: whether methods of first order give the same only as their steps shorten: beside a
             motion that accelerates, the position of a step's end misses h^2 a/2, and the projection that puts
@@ -90,7 +90,7 @@ ADDED = "added "  # begins the names of whatever an image has beside its case
 
 @dataclass(frozen=True, eq=False)
 class Transformation:
-    """What makes an image of a case.
+    """A transformation that makes an image of a case.
 
     Attributes:
         name: of the transformation.
@@ -117,7 +117,7 @@ def transformation(name: str, **more: Any) -> Callable[[Callable[[Case], Image |
 
 
 def then(first: Image, make: Callable[[Case], Image | None]) -> Image | None:
-    """The image of an image whose coordinates and names are those of its case."""
+    """The image of an image that keeps the coordinates and names of its case."""
     second = make(first.case)
     if second is None:
         return None
@@ -135,7 +135,7 @@ def unchanged(case: Case, **changes: Any) -> Image:
 
 
 def explicit(case: Case) -> Image:
-    """What stands in the world by default (planes, second frames) on frames of its own there."""
+    """Planes and second frames that are in the world by default, on frames of their own there."""
     model = case.model.copy()
     q0 = case.scene.q0
     known = {f.name for f in model.frames}
@@ -363,7 +363,7 @@ def by_hand(case: Case, scale: float) -> Image | None:
 def _writable(c: Any) -> bool:
     """Whether functions can say all of a constraint: its torques of resistance they cannot.
 
-    Of angles between frames the rate is the derivative of the residual on the constraint only, and functions
+    For angles between frames the rate is the derivative of the residual on the constraint only, and functions
     are checked elsewhere too.
     """
     resists = getattr(c, "torsional", 0.0) or getattr(c, "rolling", 0.0)
@@ -563,7 +563,7 @@ def _(case: Case) -> Image | None:
         return None
     row = np.eye(model.nv)[model.joints[single[0]].idx_v]
     rub = pn.UserFriction(lambda t, q: row, lambda t, q, v, r: 0.0, name="added friction")
-    # Where it slips along with another element either may be named for it.
+    # If two elements slip together, the event may name either.
     return replace(
         unchanged(case, laws=(*case.laws, rub)), as_steps_shorten=True, without=frozenset({"events"})
     )

@@ -12,11 +12,13 @@ import re
 import zipfile
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, LoadingError, OutputError
 
+from ..support.mechanisms import body, empty
 from ..support.refusals import refuses
 from ..support.same_run import assert_same_run
 
@@ -122,6 +124,22 @@ def test_a_file_gives_everything_back(run, tmp_path):
     assert back.name == "four_bar"
     assert back.scene.name == "four_bar"
     assert str(back) == str(run)
+
+
+def test_interpolants_of_an_earlier_version_come_back(tmp_path):
+    """These held one direction of slip a step, that of the step's end."""
+    model = empty()
+    body(model, 0, pin.JointModelSpherical(), "ball", 1.0, lever=(0.0, 0.0, -0.3), inertia=0.01 * np.eye(3))
+    scene = pn.Scene(model, laws=[pn.JointFriction("ball", coulomb=0.2)], v0=[1.0, 2.0, 0.5])
+    run = pn.simulate(scene, 0.5, record="dense")
+    with np.load(run.save(tmp_path / "new.npz")) as new:
+        arrays = dict(new)
+    del arrays["loose/dense/sought"]
+    arrays["loose/dense/directions"] = arrays["loose/dense/directions"][:, -1]
+    np.savez(tmp_path / "earlier.npz", **arrays)
+    back, times = pn.Trajectory.load(tmp_path / "earlier.npz", scene), np.linspace(0.0, 0.5, 33)
+    np.testing.assert_allclose(back.at(times).q, run.at(times).q, rtol=0.0, atol=1e-15)
+    assert not back.dense.sought.any()
 
 
 def test_events_and_states_of_laws_come_back(tmp_path):

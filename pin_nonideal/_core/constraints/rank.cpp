@@ -34,11 +34,11 @@ void decide_rows(const Mechanism& m, Terms& terms, const std::vector<Block>& blo
     for (int i : s.blocks) {
         const Block& block = blocks[i];
         double* length = s.scale.data() + block.row;
-        const bool lasts = is_lasting(block), kept = lasts && keeps_length(block, values[i]);
+        const bool lasts = is_lasting(block), keeps = lasts && keeps_length(block, values[i]);
         if (lasts) greatest_lengths(m, terms, block, block.kept, values[i], length);
         else present_lengths(block, B, length);
         for (size_t k = 0; k < block.kept.size(); ++k) {
-            if (kept) length[k] = std::max(length[k], std::sqrt(s.longest[block.row + k]));
+            if (keeps) length[k] = std::max(length[k], std::sqrt(s.longest[block.row + k]));
             length[k] = length[k] > 0.0 ? 1.0 / length[k] : 1.0;
         }
     }

@@ -98,8 +98,8 @@ void EventLocator::correct_end_to(double size) {
 
 // Slip of several directions turns as it comes to rest. The component across the final direction vanishes as a power
 // 1 + k of the component along it, with any k > 0, which no polynomial follows to the end. At the instant at which the
-// component along has vanished, the slip that is left is an error of the step. So is what its own estimate says: the step
-// was taken again, with stages at other times than those of the step that was accepted.
+// component along has vanished, the slip that is left is an error of the step. The error estimate counts as well, since
+// the stages of the step taken again lie at other times than those of the accepted step.
 bool EventLocator::misses_rest(const Watch& watch) const {
     if (watch.kind != Watch::Kind::slip || p.frictions[watch.index].dim == 1) return false;
     if (!stepper_.method.adaptive() || stepper_.method.outside()) return false;

@@ -1,7 +1,7 @@
 // Where an event lies inside a step.
 //
 // The search on the interpolant gives the first guess of the instant; the step is then taken again up to there, so that an
-// event is as accurate as a step, and its end moved by what the margin is there. Toward a rest of slip in several
+// event is as accurate as a step, and its end is moved by the remaining margin. Toward a rest of slip in several
 // directions a step that does not reach it within the tolerance ends before it, and a shorter one follows.
 #pragma once
 

@@ -22,8 +22,8 @@ private:
     std::vector<double> places_, weights_;  // of the points
 };
 
-// States inside steps, each with what its step held, and for each element the direction of its slip and whether the step
-// sought it. Without elements of several directions the vectors of directions are empty.
+// States inside steps, each with the modes and torques of its step, and for each element the direction of slip and whether
+// the step solved for it. Without elements of several directions the vectors of directions are empty.
 struct InsideStates {
     std::vector<double> t, moved;
     std::vector<VecX> y, torque, directions;
