@@ -1,0 +1,210 @@
+"""Sentences of comments, docstrings and pages, and the counts that the style of CONTRIBUTING.md bounds.
+
+`python tests/support/prose.py FOLDER_OR_FILE...` prints the counts of each and the sentences to rewrite.
+"""
+
+import ast
+import io
+import re
+import sys
+import tokenize
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+MIN_WORDS = 4  # shorter pieces are labels
+OPENERS = ("what", "where", "of", "those")
+WORD = re.compile(r"[A-Za-z][A-Za-z'’-]*")
+CODE_SPAN = re.compile(r"``[^`]*``|`[^`]*`")
+SENTENCE_END = re.compile(r"(?<=[.!?])\s+(?=[`\"'(]*[A-Za-z])")
+FIELD = re.compile(r"^\s*[*]{0,2}[\w., *`=\[\]|]+(\(.*?\))?: ")  # "q: configuration (nq,)" of a docstring
+SUFFIXES = {".py", ".hpp", ".cpp", ".js", ".css", ".md"}
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """One sentence with the line at which its paragraph begins."""
+
+    path: Path
+    line: int
+    text: str
+
+    @property
+    def words(self) -> list[str]:
+        """Words of the sentence in lower case, without spans of code."""
+        return [word.lower() for word in WORD.findall(CODE_SPAN.sub(" ", self.text))]
+
+    @property
+    def has_what(self) -> bool:
+        """Check if the sentence has the word "what"."""
+        return "what" in self.words
+
+    @property
+    def has_opener(self) -> bool:
+        """Check if the sentence opens with a word that stands for a noun."""
+        return self.text.lstrip("`\"'(*_ ").split(" ", 1)[0].lower() in OPENERS
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Numbers of sentences: all, with a "what", with an opener that stands for a noun."""
+
+    sentences: int
+    whats: int
+    openers: int
+
+    @property
+    def whats_per_100(self) -> float:
+        """Sentences with a "what" per 100."""
+        return 100 * self.whats / max(self.sentences, 1)
+
+    @property
+    def openers_percent(self) -> float:
+        """Percentage of sentences with an opener that stands for a noun."""
+        return 100 * self.openers / max(self.sentences, 1)
+
+
+def sentences_of(path: Path) -> list[Sentence]:
+    """Sentences of the comments and docstrings of a source, or of the text of a page."""
+    text = path.read_text()
+    if path.suffix == ".py":
+        blocks = [*_docstrings(text), *_python_comments(text)]
+    elif path.suffix == ".md":
+        blocks = list(_paragraphs(text))
+    else:
+        blocks = list(_c_comments(text))
+    found = [
+        Sentence(path, line, piece)
+        for line, block in blocks
+        for piece in SENTENCE_END.split(" ".join(block.split()))
+    ]
+    return [sentence for sentence in found if len(sentence.words) >= MIN_WORDS]
+
+
+def count(sentences: list[Sentence]) -> Counts:
+    """Counts of a list of sentences."""
+    return Counts(
+        len(sentences), sum(s.has_what for s in sentences), sum(s.has_opener for s in sentences)
+    )
+
+
+def sources_below(root: Path) -> list[Path]:
+    """Files with comments or text below a folder, or the file itself."""
+    if root.is_file():
+        return [root]
+    return sorted(
+        path
+        for path in root.rglob("*")
+        if path.suffix in SUFFIXES and "vendor" not in path.parts and not path.name.endswith(".min.js")
+    )
+
+
+def _docstrings(text: str) -> Iterator[tuple[int, str]]:
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, documented) and (string := ast.get_docstring(node)):
+            first = node.body[0].lineno
+            for offset, block in _blocks(string.splitlines()):
+                yield first + offset, block
+
+
+def _python_comments(text: str) -> Iterator[tuple[int, str]]:
+    lines: dict[int, str] = {}
+    alone = set()
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type == tokenize.COMMENT:
+            lines[token.start[0]] = token.string.lstrip("#!: ")
+            if not token.line[: token.start[1]].strip():
+                alone.add(token.start[0])
+    yield from _joined(lines, alone)
+
+
+def _c_comments(text: str) -> Iterator[tuple[int, str]]:
+    lines: dict[int, str] = {}
+    alone = set()
+    for number, line in enumerate(text.splitlines(), 1):
+        match = re.search(r"(?:^|[\s;{}(),])//+[/<!]*\s?(.*)$", line)
+        if match and not re.search(r"https?:$", line[: match.start() + 7]):
+            lines[number] = match.group(1)
+            if not line[: match.start()].strip():
+                alone.add(number)
+    yield from _joined(lines, alone)
+    for match in re.finditer(r"/\*(.*?)\*/", text, re.DOTALL):
+        first = text.count("\n", 0, match.start()) + 1
+        block = [re.sub(r"^\s*\*+", "", line) for line in match.group(1).splitlines()]
+        for offset, piece in _blocks(block):
+            yield first + offset, piece
+
+
+def _joined(lines: dict[int, str], alone: set[int]) -> Iterator[tuple[int, str]]:
+    """Comments of consecutive lines joined, where each line after the first holds nothing else."""
+    block: list[str] = []
+    start = previous = -1
+    for number, line in sorted(lines.items()):
+        if not (block and number == previous + 1 and number in alone and line.strip()):
+            if block:
+                yield start, " ".join(block)
+            block, start = [], number
+        block.append(line)
+        previous = number
+    if block:
+        yield start, " ".join(block)
+
+
+def _blocks(lines: list[str]) -> Iterator[tuple[int, str]]:
+    """Paragraphs of a docstring, each argument one of its own."""
+    block: list[str] = []
+    start = 0
+    for number, line in enumerate(lines):
+        if block and (not line.strip() or FIELD.match(line) or line.lstrip().startswith(("- ", "* "))):
+            yield start, " ".join(block)
+            block = []
+        if line.strip():
+            if not block:
+                start = number
+                line = FIELD.sub("", line, count=1) or line
+            block.append(line.strip().lstrip("-* "))
+    if block:
+        yield start, " ".join(block)
+
+
+def _paragraphs(text: str) -> Iterator[tuple[int, str]]:
+    """Paragraphs, items and cells of a Markdown page, without code, formulas and comments."""
+    fenced = False
+    block: list[str] = []
+    start = 0
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.lstrip().startswith(("```", "$$")):
+            fenced = not fenced
+        starts = fenced or not line.strip() or line.lstrip().startswith(("- ", "* ", "#", "|", "<", "```", "$$"))
+        if starts and block:
+            yield start, " ".join(block)
+            block = []
+        if fenced or line.lstrip().startswith(("```", "$$", "<")):
+            continue
+        if line.lstrip().startswith("|"):
+            for cell in line.strip().strip("|").split("|"):
+                yield number, cell
+        elif line.strip():
+            start = start if block else number
+            block.append(line.strip().lstrip("-*# "))
+    if block:
+        yield start, " ".join(block)
+
+
+def main(arguments: list[str]) -> None:
+    """Print the counts of each folder or file and the sentences that the style does not allow."""
+    for argument in arguments:
+        found = [s for path in sources_below(Path(argument)) for s in sentences_of(path)]
+        counts = count(found)
+        print(
+            f"{argument}: {counts.sentences} sentences, {counts.whats_per_100:.1f} what per 100,"
+            f" {counts.openers_percent:.1f} % openers"
+        )
+        for sentence in found:
+            if sentence.has_what or sentence.has_opener:
+                print(f"  {sentence.path}:{sentence.line}: {sentence.text}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
