@@ -20,6 +20,7 @@ from .description.forces import *
 from .description.laws import *
 from .description.time_functions import constant, polynomial, sinusoid, spline
 from .equation import Solution, solve
+from .equation_details import SolutionDetails, solve_details
 from .errors import (
     DivergenceError,
     EquilibriumError,
@@ -164,6 +165,7 @@ __all__ = [
     "simulate",
     "sinusoid",
     "solve",
+    "solve_details",
     "spline",
     "sweep",
     "sweep_grid",

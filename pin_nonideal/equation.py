@@ -106,10 +106,10 @@ def solve(
 
     Source: Eqs. (3)-(7), (39), (40).
     """
-    M, R, F, A, b, C = _checked(M, F, A, b, C)
+    M, R, F, A, b, C = checked_problem(M, F, A, b, C)
     mass_scale = np.sqrt(np.diag(M))  # makes the coordinates' units alike: metres, radians
     with np.errstate(over="ignore", invalid="ignore"):
-        row_scale, chosen, E = _independent_rows(A / mass_scale)
+        row_scale, chosen, E = independent_rows(A / mass_scale)
         A_k, b_k, rank = A[chosen], b[chosen], len(chosen)  # A = E A_k: redundant rows left out
         R_inverse = _solve_lower(R, np.eye(len(R)))
         B = A_k @ R_inverse.T  # Eq. (7)
@@ -146,7 +146,7 @@ def solve(
     return Solution(total, F_ideal, F_nonideal, lam, rank)
 
 
-def _independent_rows(A: Array) -> tuple[Array, list[int], Array]:
+def independent_rows(A: Array) -> tuple[Array, list[int], Array]:
     """Rows of A that span all of its rows, by Gram-Schmidt with pivoting on rows of unit length.
 
     Deciding on A instead of B = A R^-T keeps the condition of M out of the decision: both have the same rank.
@@ -235,7 +235,7 @@ def _check_consistent(
     )
 
 
-def _checked(
+def checked_problem(
     M: ArrayLike, F: ArrayLike, A: ArrayLike | None, b: ArrayLike | None, C: ArrayLike | None
 ) -> tuple[Array, Array, Array, Array, Array, Array]:
     """The arguments of `solve` as arrays of fitting shapes, absent ones filled in, with the factor R of M."""
