@@ -217,17 +217,23 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
         return false;
     };
     const bool many = std::count(question.rest.begin(), question.rest.end(), char(1)) >= may_share;
+    std::optional<RestingMotion> answer;
     if (many && question.breaking.empty()) {
-        const std::optional<RestingMotion> answer = together();
+        answer = together();
         if (answer && answer->shared && answer->slides() && decides_alone(*answer)) return;
         if (answer && answer->shared) return close(answer->closed, &*answer);
     }
     try {
         close(question.rest, nullptr);
+        // The loads of redundant rows do not show whether all friction that holds is within its cones.
+        if (!w.now.rows.redundant || !sticks_anywhere(w)) return;
+        if (!answer) answer = together();
+        if (answer) return close(answer->closed, &*answer);
+        return close(question.rest, nullptr);
     } catch (const Failure& failure) {
         const bool undecided = failure.kind == Failure::Kind::not_converged;
         if (!undecided && !(many && failure.kind == Failure::Kind::paradox)) throw;
-        const std::optional<RestingMotion> answer = together();
+        answer = together();
         if (!answer || !(undecided || answer->shared)) throw;
         close(answer->closed, &*answer);
     }

@@ -149,10 +149,23 @@ struct RestingProblem {
         return true;
     }
 
+    bool moves() const { return (w0 + W * f).cwiseAbs().maxCoeff() > none * in_play(); }
+
+    // Rest is preferred to motion if both are possible.
+    bool hold(ConeComplementarity& solver) {
+        if (std::find(slides.begin(), slides.end(), char(1)) != slides.end()) return false;
+        VecX holding(f.size());
+        if (!solver.hold(W, w0, cones, holding)) return false;
+        f = holding;
+        return true;
+    }
+
     bool solve_cones(bool warm, bool& shared) {
         ConeComplementarity solver;
         for (int round = 0; round < most_releases; ++round) {
-            if (solver.solve(W, w0, cones, warm || round > 0, f) != ConeStatus::solved) return false;
+            const bool solved = solver.solve(W, w0, cones, warm || round > 0, f) == ConeStatus::solved;
+            if (round == 0 && !warm && (!solved || moves()) && hold(solver)) break;
+            if (!solved) return false;
             if (!release()) break;
         }
         shared = !solver.unique_shares();

@@ -13,6 +13,7 @@ using ConeKind = ConeElement::Kind;
 
 constexpr double solved = 1e-11;     // error that is a solution
 constexpr double no_force = 1e10;    // forces beyond this, in the problem's units, only squeeze
+constexpr double held = 1e-7;        // part of the largest w0 that the end of the central path leaves of none
 constexpr double evened = 1e-13;     // the same of even shares
 constexpr int few_steps = 3, first_steps = 20, more_steps = 30;
 constexpr int most_turns = 30, most_rounds = 40, sweeps = 40, most_starts = 100;
@@ -58,6 +59,31 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
     if (found) return ConeStatus::solved;
     if (certificate_.size() > 0) certificate_ = problem_.scale().cwiseProduct(certificate_).eval();
     return status;
+}
+
+bool ConeComplementarity::hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
+                               const std::vector<ConeElement>& elements, Eigen::Ref<VecX> f) {
+    problem_.pose(W, w0, elements);
+    grown_ = problem_;
+    grown_.associated = true;
+    auto x = even_.vector(problem_.n), w = w_.vector(problem_.n);
+    x.setZero();
+    path_.follow(grown_, x, ConePath::Slip::stands);
+    if (!x.allFinite()) return false;
+    problem_.respond(x, w);
+    if (w.cwiseAbs().maxCoeff() > held) return false;
+    if (!polish(x, more_steps)) return false;
+    problem_.respond(x, w);
+    if (w.cwiseAbs().maxCoeff() > held) return false;
+    unique_shares_ = newton_.regular();
+    auto even = f_.vector(problem_.n);
+    even = x;
+    if (!unique_shares_ && shares_.even_out(problem_, even) &&
+        newton_.solve(problem_, even, few_steps) <= std::max(evened, error_))
+        x = even;
+    tidy(x);
+    f = problem_.force_unit() * problem_.scale().cwiseProduct(x);
+    return true;
 }
 
 // Newton's method from where f is; f stays unless that is a solution.

@@ -28,6 +28,10 @@ public:
     ConeStatus solve(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
                      const std::vector<ConeElement>& elements, bool warm, Eigen::Ref<VecX> f,
                      bool may_keep_shares = false);
+    // Computes forces within their cones that cancel w0. Returns false if there are none: the convex program of the
+    // associated law has w = 0 as its only solution exactly if such forces exist.
+    bool hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
+              const std::vector<ConeElement>& elements, Eigen::Ref<VecX> f);
     static ConeResiduals residuals(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
                                    const std::vector<ConeElement>& elements, const Eigen::Ref<const VecX>& f);
 
