@@ -226,7 +226,7 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
     try {
         close(question.rest, nullptr);
         // The loads of redundant rows do not show whether all friction that holds is within its cones.
-        if (!w.now.rows.redundant || !sticks_anywhere(w)) return;
+        if (!w.now.rows.redundant || !w.state.sticks_anywhere()) return;
         if (!answer) answer = together();
         if (answer) return close(answer->closed, &*answer);
         return close(question.rest, nullptr);

@@ -279,12 +279,8 @@ static double dependent_residual(const Program& p, const Workspace& w) {
     return largest;
 }
 
-static bool sticks_anywhere(const Workspace& w) {
-    return std::find(w.state.mode.begin(), w.state.mode.end(), sticking) != w.state.mode.end();
-}
-
 bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
-    if (!w.now.rows.redundant || !p.gaps.empty() || sticks_anywhere(w)) return false;
+    if (!w.now.rows.redundant || !p.gaps.empty() || w.state.sticks_anywhere()) return false;
     const int rank = static_cast<int>(std::count(w.now.rows.active.begin(), w.now.rows.active.end(), char(1)));
     bool moved = false;
     const auto is_open = [&] { return dependent_residual(p, w) > creeping_gap * scene_size(p, w); };
@@ -297,7 +293,7 @@ bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, c
 }
 
 bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
-    if (!w.now.rows.redundant || !sticks_anywhere(w)) return false;
+    if (!w.now.rows.redundant || !w.state.sticks_anywhere()) return false;
     if (dependent_residual(p, w) <= creeping_gap * scene_size(p, w)) return false;
     const std::vector<Mode> modes = w.state.mode;
     std::vector<Mode> released = modes;
@@ -401,7 +397,7 @@ void remove_normal_move(const Program& p, Workspace& w, Eigen::Ref<VecX> move) {
 
 void choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
     if (w.now.rows.blocks.empty() || !w.now.rows.orthogonal) return;
-    if (!p.gaps.empty() || sticks_anywhere(w)) return choose_rows(p, w);
+    if (!p.gaps.empty() || w.state.sticks_anywhere()) return choose_rows(p, w);
     const VecX start = q;
     for (double tolerance : tolerances_near) {
         choose_rows(p, w, tolerance);

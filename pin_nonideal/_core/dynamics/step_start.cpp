@@ -20,10 +20,6 @@ constexpr double dependence_growth = 10.0;
 // up to this part of their forces, they hold nothing; it is sought in steps of this factor.
 constexpr double stopped_part = 1e-9, most_unheld = 1e-3, unheld_growth = 3.0;
 
-static bool sticks_anywhere(const Workspace& w) {
-    return std::count(w.state.mode.begin(), w.state.mode.end(), sticking) > 0;
-}
-
 // Length of x in the metric of M, of the part that the rows see.
 static double scaled_length(const Program& p, Workspace& w, const VecX& x) {
     VecX& scaled = w.scratch.scaled;
@@ -49,7 +45,7 @@ static double fastest_turn(const Workspace& w) {
 static double unseen(const Program& p, Workspace& w, const VecX& v) {
     const double speed = scaled_length(p, w, v);
     const double turning = consistency_tolerance * background * speed * fastest_turn(w);
-    if (!sticks_anywhere(w)) return turning;
+    if (!w.state.sticks_anywhere()) return turning;
     return turning + dependence_growth * w.state.rank_tolerance *
                          (scaled_length(p, w, w.now.a) + speed * v.cwiseAbs().maxCoeff());
 }
@@ -88,7 +84,7 @@ static int contradicting_block(const Program& p, Workspace& w, const VecX& v, do
 }
 
 static void choose_rows_anew(const Program& p, Workspace& w, int most = INT_MAX) {
-    choose_rows(p, w, sticks_anywhere(w) ? w.state.rank_tolerance : rank_tolerance, most);
+    choose_rows(p, w, w.state.sticks_anywhere() ? w.state.rank_tolerance : rank_tolerance, most);
     ++w.counters.factorizations;
 }
 
@@ -149,7 +145,7 @@ static double part_stopped(const Program& p, Workspace& w, double t, const VecX&
 }
 
 void keep_moving(const Program& p, Workspace& w, double t, const VecX& v) {
-    if (!w.now.rows.redundant || !sticks_anywhere(w) || v.cwiseAbs().maxCoeff() <= immobile_speed) return;
+    if (!w.now.rows.redundant || !w.state.sticks_anywhere() || v.cwiseAbs().maxCoeff() <= immobile_speed) return;
     const auto choose = [&](double tolerance) {
         w.state.rank_tolerance = tolerance;
         choose_rows_anew(p, w);

@@ -2,6 +2,7 @@
 // last evaluation found, Scratch means nothing after the call that wrote it.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -44,6 +45,8 @@ struct RunState {
     Uniqueness unique = Uniqueness::shown;  // of the motion in these modes, as decided last
     double growth = 0.0;                    // bound on that of the implicit reaction equation there
     int steps_since = never_decided;        // then
+
+    bool sticks_anywhere() const { return std::find(mode.begin(), mode.end(), sticking) != mode.end(); }
 };
 
 // What joints, anchors and contacts carry in the motion at hand (dynamics/reactions.hpp).
