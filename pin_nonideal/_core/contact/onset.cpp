@@ -229,30 +229,55 @@ void RestingMotion::answer(const Program& p, Workspace& w, ModeQuestion& questio
     question.answered = true;
 }
 
-std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                                            const ClosingQuestion& question) {
+namespace {
+
+// Calls act(problem) with the contacts of `question.rest` as a cone problem; the workspace is as before afterwards. Returns
+// false if they are no cone problem, or if other rows allow no motion.
+template <class Act>
+bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ClosingQuestion& question,
+                  const Act& act) {
     std::vector<int> gaps;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i)
         if (question.rest[i]) gaps.push_back(i);
-    if (gaps.empty() || !fits(p)) return std::nullopt;
+    if (gaps.empty() || !fits(p)) return false;
     const RunState before = w.state;
-    RestingMotion out{std::vector<char>(p.gaps.size(), 0), std::vector<Mode>(p.frictions.size(), unloaded),
-                      std::vector<Vec3>(p.frictions.size(), Vec3::Zero()), {}};
-    out.friction = out.direction;
     bool found = false;
     try {
         release_contacts(p, w, t, q, v, question.rest);
         RestingProblem problem(p, w, v, gaps, question, before);
-        found = problem.solve(out.shared);
-        if (found) problem.read(out);
-    } catch (const Failure& failure) {  // what other rows say is found again, and told, by those who ask for the motion
+        found = act(problem);
+    } catch (const Failure& failure) {  // the callers evaluate the motion and report failures of other rows
         if (failure.kind == Failure::Kind::interrupted) throw;
     }
     set_closed(p, w, before.closed);
     set_modes(p, w, before.mode);
     w.state = before;
+    return found;
+}
+
+}  // namespace
+
+std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                                            const ClosingQuestion& question) {
+    RestingMotion out{std::vector<char>(p.gaps.size(), 0), std::vector<Mode>(p.frictions.size(), unloaded),
+                      std::vector<Vec3>(p.frictions.size(), Vec3::Zero()), {}};
+    out.friction = out.direction;
+    const bool found = with_problem(p, w, t, q, v, question, [&](RestingProblem& problem) {
+        if (!problem.solve(out.shared)) return false;
+        problem.read(out);
+        return true;
+    });
     if (!found) return std::nullopt;
     return out;
+}
+
+bool closed_contacts_hold(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    ClosingQuestion question;
+    question.rest = w.state.closed;
+    return with_problem(p, w, t, q, v, question, [](RestingProblem& problem) {
+        ConeComplementarity solver;
+        return problem.hold(solver);
+    });
 }
 
 }  // namespace pn

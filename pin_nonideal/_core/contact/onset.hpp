@@ -34,4 +34,8 @@ struct ClosingQuestion {
 std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                                             const ClosingQuestion& question);
 
+// Returns true if forces within the cones of all closed contacts hold them at (t, q, v). Returns false if one of them
+// slides, or if other laws depend on loads too.
+bool closed_contacts_hold(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
+
 }  // namespace pn

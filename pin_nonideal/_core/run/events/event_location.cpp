@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "contact/onset.hpp"
 #include "contact/queries.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
@@ -213,8 +214,10 @@ std::optional<double> EventLocator::release_rate(double t, const VecX& y, const 
     set_modes(p, w, modes);
     w.state.slip_direction = directions;
     w.state.last_direction = last_directions;
+    // Contacts hold as long as any forces within their cones do, not only those of minimum norm.
+    const bool hold = rate > noise && !p.gaps.empty() && closed_contacts_hold(p, w, t, system_.q, system_.v);
     begin_step(p, w, t, system_.q, system_.v);
-    if (rate <= noise) return std::nullopt;  // what the others hold does not move, whatever its force
+    if (rate <= noise || hold) return std::nullopt;  // what the others hold does not move, whatever its force
     return rate;
 }
 

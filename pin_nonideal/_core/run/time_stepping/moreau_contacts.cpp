@@ -12,6 +12,7 @@
 #include "dynamics/acceleration.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/problem.hpp"
+#include "friction/stick_slip.hpp"
 #include "run/time_stepping/moreau.hpp"
 #include "tree/mass_factor.hpp"
 #include "tree/lie_group.hpp"
@@ -312,6 +313,16 @@ void MoreauContacts::measure_from_middles(double sign) {
     }
 }
 
+// Rest goes on if forces within all cones hold it. Returns whether they do, with these forces in place of others.
+bool MoreauContacts::keep_rest(bool solved) {
+    const int n = static_cast<int>(rows_.size());
+    const auto W = W_.topLeftCorner(n, n);
+    w1_.head(n) = w0_.head(n);
+    w1_.head(n).noalias() += W * f_.head(n);
+    const bool moves = w1_.head(n).cwiseAbs().maxCoeff() > limit_rounding * w0_.head(n).cwiseAbs().maxCoeff();
+    return (!solved || moves) && solver_.hold(W, w0_.head(n), cones_, f_.head(n));
+}
+
 void MoreauContacts::solve(double t) {
     const int n = static_cast<int>(rows_.size());
     const auto W = W_.topLeftCorner(n, n);
@@ -322,9 +333,10 @@ void MoreauContacts::solve(double t) {
         if (limits_settle(t) && pass > 0) break;
         if (pass == load_passes) throw Failure(Failure::Kind::not_converged, t);
         measure_from_middles(1.0);
-        const ConeStatus status = solver_.solve(W, w0_.head(n), cones_, true, f_.head(n), true);
+        bool solved = solver_.solve(W, w0_.head(n), cones_, true, f_.head(n), true) == ConeStatus::solved;
+        if (v0_.cwiseAbs().maxCoeff() <= rest_speed) solved = keep_rest(solved) || solved;
         measure_from_middles(-1.0);
-        if (status != ConeStatus::solved) throw Failure(Failure::Kind::not_converged, t);
+        if (!solved) throw Failure(Failure::Kind::not_converged, t);
         ++w.counters.iterations;
     }
     if (n == 0) apply();

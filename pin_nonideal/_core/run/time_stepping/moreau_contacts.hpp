@@ -46,6 +46,7 @@ private:
     void respond();
     void measure_free();
     void measure_from_middles(double sign);
+    bool keep_rest(bool solved);
     void solve(double t);
     void apply();
     bool limits_settle(double t);
