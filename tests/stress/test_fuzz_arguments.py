@@ -221,8 +221,9 @@ def test_steppers(scene, examples):
     for_all(check, st.data(), examples=examples)
 
 
+@pytest.mark.parametrize("solve", [pn.solve, pn.solve_details])
 @few_and_many
-def test_plain_arrays(examples):
+def test_plain_arrays(solve, examples):
     good = {
         "M": [np.eye(3)],
         "F": [np.ones(3)],
@@ -231,7 +232,7 @@ def test_plain_arrays(examples):
         "C": [np.ones(3)],
     }
     for_all(
-        lambda data: result_or_named_error(lambda: pn.solve(**drawn(data, pn.solve, good))),
+        lambda data: result_or_named_error(lambda: solve(**drawn(data, solve, good))),
         st.data(),
         examples=examples,
     )
@@ -382,7 +383,7 @@ def test_render(scene, examples, tmp_path, monkeypatch):
 def test_the_public_names_are_all_drawn():
     """A new public function is fuzzed, or is one of these."""
     drawn_by_lot = {x.__name__ for x in (*DESCRIPTIONS, *TIMES, *STATICS)}
-    drawn_by_lot |= {"simulate", "rollout", "solve", "Scene", "load", "resume", "replay", "plot", "sweep"}
+    drawn_by_lot |= {"simulate", "rollout", "solve", "solve_details", "Scene", "load", "resume", "replay", "plot", "sweep"}
     drawn_by_lot |= {
         "cone_complementarity",
         "geometry_contacts",

@@ -1,0 +1,36 @@
+"""Bodies rest exactly if forces within Coulomb's cones hold them, however many contacts share a load."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pin_nonideal as pn
+from oracles.admissible_rest import may_rest
+from tests.support import wedged
+from tests.support.seeds import seeds
+
+STILL = 1e-6  # [m/s^2, rad/s^2]: motion that is slower than this is rounding
+DURATION = 0.05  # [s]
+
+families = pytest.mark.parametrize("family", wedged.FAMILIES, ids=lambda family: family.__name__)
+
+
+@families
+@pytest.mark.parametrize("seed", seeds(range(1000), count=40))
+def test_solve(family, seed):
+    case = family(seed)
+    admissible = may_rest(case.touches, case.centers, case.loads)
+    a = case.scene.solve(*case.scene.initial_state()).a
+    assert admissible is None or admissible == (np.abs(a).max() <= STILL)
+
+
+@families
+@pytest.mark.parametrize("method", ["dop853", "dopri5", "rk4", "semi_implicit_euler", "moreau"])
+@pytest.mark.parametrize("seed", seeds(range(200), count=2))
+def test_runs_from_rest(family, method, seed):
+    case = family(seed)
+    admissible = may_rest(case.touches, case.centers, case.loads)
+    options = {} if method.startswith("dop") else {"dt": 1e-3}
+    run = pn.simulate(case.scene, DURATION, method=method, max_wall=20.0, progress=False, **options)
+    assert admissible is None or admissible == (np.abs(run.v[-1]).max() <= STILL * DURATION)
