@@ -74,7 +74,7 @@ bool ConeComplementarity::hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref
     if (w.cwiseAbs().maxCoeff() > held) return false;
     if (!polish(x, more_steps)) return false;
     problem_.respond(x, w);
-    if (w.cwiseAbs().maxCoeff() > held) return false;
+    if (w.cwiseAbs().maxCoeff() > solved) return false;
     unique_shares_ = newton_.regular();
     auto even = f_.vector(problem_.n);
     even = x;
