@@ -14,6 +14,7 @@ using ConeKind = ConeElement::Kind;
 constexpr double solved = 1e-11;     // error that is a solution
 constexpr double no_force = 1e10;    // forces beyond this, in the problem's units, only squeeze
 constexpr double held = 1e-7;        // part of the largest w0 that the end of the central path leaves of none
+constexpr double still = 1e-12;       // part of the largest w0 that is rest
 constexpr double evened = 1e-13;     // the same of even shares
 constexpr int few_steps = 3, first_steps = 20, more_steps = 30;
 constexpr int most_turns = 30, most_rounds = 40, sweeps = 40, most_starts = 100;
@@ -74,7 +75,7 @@ bool ConeComplementarity::hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref
     if (w.cwiseAbs().maxCoeff() > held) return false;
     if (!polish(x, more_steps)) return false;
     problem_.respond(x, w);
-    if (w.cwiseAbs().maxCoeff() > solved) return false;
+    if (w.cwiseAbs().maxCoeff() > still) return false;
     unique_shares_ = newton_.regular();
     auto even = f_.vector(problem_.n);
     even = x;
