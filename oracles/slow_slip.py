@@ -151,8 +151,13 @@ class Plate:
         return np.column_stack([v[0] - v[2] * feet[:, 1], v[1] + v[2] * feet[:, 0]])
 
     def excess(self, t):
-        """Least part of the limits by which some foot passes its own while all rest, and the forces."""
+        """Least part of the limits by which some foot passes its own while all rest, and the forces.
+
+        Kept feet have the loads of least norm; feet that cannot pull have any that hold.
+        """
         feet, force, moment = self.given(t, 0.0)
+        if not self.pulls:
+            return self.excess_of_any_loads(feet, force, moment)
         n = len(feet)
         balance = np.zeros((3, 2 * n))
         balance[0, ::2] = balance[1, 1::2] = 1.0
@@ -183,6 +188,38 @@ class Plate:
         if found.x[-1] > 1.0:  # worse than where it began, or that was no start
             found = min(found, search(2.0 * found.x[-1]), key=lambda one: one.x[-1])
         return found.x[-1], size * found.x[:-1].reshape(n, 2)
+
+    def excess_of_any_loads(self, feet, force, moment):
+        """The least s with |f| <= mu N + s of each foot, over all loads N >= 0 that balance the plate, and f."""
+        n = len(feet)
+        size = self.mass * GRAVITY
+        friction, loads = np.zeros((6, 2 * n)), np.zeros((6, n))
+        friction[0, ::2] = friction[1, 1::2] = loads[2] = 1.0
+        friction[3, 1::2], friction[4, ::2] = -feet[:, 2], feet[:, 2]
+        friction[5, ::2], friction[5, 1::2] = -feet[:, 1], feet[:, 0]
+        loads[3], loads[4] = feet[:, 1], -feet[:, 0]
+        balance = np.hstack([friction, loads, np.zeros((6, 1))])
+        given = np.concatenate([force, moment]) / size
+
+        def margins(x):
+            f, limits = x[: 2 * n].reshape(n, 2), self.mu * x[2 * n : -1] + x[-1]
+            return np.concatenate([limits * np.abs(limits) - (f**2).sum(axis=1), x[2 * n : -1]])
+
+        def search(slack):
+            return minimize(
+                lambda x: x[-1],
+                np.append(-np.linalg.pinv(balance[:, :-1]) @ given, slack),
+                jac=lambda x: np.eye(len(x))[-1],
+                constraints=[
+                    {"type": "eq", "fun": lambda x: balance @ x + given},
+                    {"type": "ineq", "fun": margins},
+                ],
+                method="SLSQP",
+                options={"ftol": DISTANCE, "maxiter": 500},
+            )
+
+        found = min((search(slack) for slack in (0.1, 1.0)), key=lambda one: one.x[-1])
+        return found.x[-1] / self.mu, size * found.x[: 2 * n].reshape(n, 2)
 
     def give_way(self, latest):
         """The instant at which no forces within the limits hold the plate any more."""
