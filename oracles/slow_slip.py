@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 GRAVITY = 9.81
 FIRST_SPEED = 1e-9  # of slip, along the direction in which it begins
 DISTANCE = 1e-11  # of the search for forces within the limits
+HELD = 1e-9  # part of the weight that forces found may leave unbalanced
 AT_LIMIT = 1e-5  # part of a limit by which a foot holds that does not slip
 BEGINS = (
     1e-3  # part of a limit by which a foot holds that begins to slip: limits are tried beside the true ones
@@ -218,12 +219,16 @@ class Plate:
                 options={"ftol": DISTANCE, "maxiter": 500},
             )
 
-        found = min((search(slack) for slack in (0.1, 1.0)), key=lambda one: one.x[-1])
+        ends = [search(slack) for slack in (0.1, 1.0, 10.0)]
+        balanced = [one for one in ends if np.abs(balance @ one.x + given).max() <= HELD and one.success]
+        if not balanced:  # the plate tips over
+            return np.inf, np.zeros((n, 2))
+        found = min(balanced, key=lambda one: one.x[-1])
         return found.x[-1] / self.mu, size * found.x[: 2 * n].reshape(n, 2)
 
     def give_way(self, latest):
         """The instant at which no forces within the limits hold the plate any more."""
-        return brentq(lambda t: self.excess(t)[0], 0.0, latest, xtol=1e-12)
+        return brentq(lambda t: min(self.excess(t)[0], 1.0), 0.0, latest, xtol=1e-12)
 
     def onset(self, start):
         """Directions in which feet begin to slip when the plate gives way; not a number where one holds."""
