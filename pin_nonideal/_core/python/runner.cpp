@@ -14,6 +14,7 @@
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/friction_limit.hpp"
+#include "dynamics/reported_loads.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/stick_slip.hpp"
 #include "python/buffers.hpp"
@@ -109,6 +110,7 @@ Instant Runner::solve(const Array& q_in, const Array& v_in, double t, const std:
     const Frozen stands_still(w->now, frozen);
     choose_modes(t, modes);
     const Uniqueness unique = w->now.several ? Uniqueness::several : w->state.unique;
+    const ReportedLoads loads(*p, *w);
     Instant out;
     for (size_t e = 0; e < p->frictions.size(); ++e) {
         const int element = static_cast<int>(e);

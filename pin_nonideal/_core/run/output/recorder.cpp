@@ -4,6 +4,7 @@
 #include "dynamics/power.hpp"
 #include "dynamics/reactions.hpp"
 #include "dynamics/friction_limit.hpp"
+#include "dynamics/reported_loads.hpp"
 
 namespace pn {
 
@@ -89,6 +90,8 @@ void Recorder::sample(double t, const VecX& y, const Jumps& jumps, bool evaluate
         powers(p, w, system.v, power_.data());
         append(out.power, power_);
     }
+    std::optional<ReportedLoads> loads;
+    if (options.laws || options.reactions || options.forces) loads.emplace(p, w);
     if (options.laws) record_laws(t);
     if (options.reactions) record_reactions();
     if (options.energy) {

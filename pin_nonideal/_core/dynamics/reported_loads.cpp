@@ -1,0 +1,102 @@
+#include "dynamics/reported_loads.hpp"
+
+#include <cmath>
+
+#include "complementarity/cone/minimum_norm.hpp"
+#include "constraints/redundancy.hpp"
+#include "math/decompositions.hpp"
+
+namespace pn {
+
+namespace {
+
+// Part of a unit vector of multipliers that exert no force below which a row takes no part in it.
+constexpr double min_part = 1e-9;
+// Part of its limit by which friction may leave its cone by rounding.
+constexpr double cone_rounding = 1e-9;
+
+// Rows of the contacts that stick, as a cone problem whose w is zero for all multipliers with the force of those at hand.
+struct Shares {
+    std::vector<int> rows;
+    std::vector<ConeElement> cones;
+    bool outside = false;  // a contact pulls, or its friction is beyond its limit
+    bool known = true;     // a friction element other than a contact shares the load
+
+    Shares(const Program& p, const Workspace& w, const VecX& lam, const MatX& free) {
+        std::vector<char> taken(p.layout.rows, 0);
+        for (size_t i = 0; i < p.gaps.size(); ++i) {
+            const Block& normal = p.blocks[p.gaps[i].block];
+            if (!w.state.closed[i] || normal.kept.empty()) continue;
+            add_contact(p, w, lam, p.gaps[i], taken);
+        }
+        for (int row = 0; row < p.layout.rows; ++row) {
+            if (taken[row] || !(free.row(row).norm() > min_part)) continue;
+            known &= row < p.constraint_rows();
+            rows.push_back(row);
+            cones.push_back({ConeElement::Kind::equality, 1, 0.0});
+        }
+    }
+
+    void add_contact(const Program& p, const Workspace& w, const VecX& lam, const Gap& gap, std::vector<char>& taken) {
+        const int e = gap.sliding;
+        const bool sticks = e >= 0 && w.state.mode[e] == sticking;
+        const int dim = sticks ? static_cast<int>(p.blocks[p.frictions[e].block].kept.size()) : 0;
+        const double mu = sticks ? p.frictions[e].holding_limit(p.frictions[e].mu) : 0.0;
+        rows.push_back(p.blocks[gap.block].row);
+        for (int k = 0; k < dim; ++k) rows.push_back(p.blocks[p.frictions[e].block].row + k);
+        for (int k = 0; k <= dim; ++k) taken[rows[rows.size() - 1 - k]] = 1;
+        cones.push_back(ConeElement::contact(1 + dim, mu));
+        double friction = 0.0;
+        for (int k = 0; k < dim; ++k) friction = std::hypot(friction, lam[rows[rows.size() - 1 - k]]);
+        const double load = lam[p.blocks[gap.block].row];
+        outside |= load < 0.0 || friction > mu * load * (1.0 + cone_rounding);
+    }
+};
+
+bool all_stick(const Program& p, const Workspace& w) {
+    bool stick = w.state.sticks_anywhere();
+    for (size_t e = 0; e < p.frictions.size(); ++e)
+        stick &= !slips(w.state.mode[e]) || p.frictions[e].mu == 0.0;
+    return stick;
+}
+
+}  // namespace
+
+ReportedLoads::ReportedLoads(const Program& p, Workspace& w) : w_(w) {
+    if (p.gaps.empty() || !w.now.rows.redundant || !all_stick(p, w)) return;
+    const VecX lam = reactions(p, w).lam;
+    const MatX free = free_multipliers(p.layout, p.blocks, w.now.B, p.described, w.now.rows);
+    const Shares shares(p, w, lam, free);
+    if (!shares.outside || !shares.known) return;
+
+    const int n = static_cast<int>(shares.rows.size());
+    MatX Z(n, free.cols());
+    VecX of_rows(n);
+    for (int k = 0; k < n; ++k) {
+        Z.row(k) = free.row(shares.rows[k]);
+        of_rows[k] = lam[shares.rows[k]];
+    }
+    const MatX S = Z.transpose() * Z;
+    Cholesky factor;
+    factor.compute(S);
+    const MatX Q = factor.solve_lower(Z.transpose()).transpose();
+    const MatX W = MatX::Identity(n, n) - Q * Q.transpose();  // zero for multipliers that exert no force
+    ConeProblem problem;
+    problem.pose(W, VecX(-W * of_rows), shares.cones);
+    VecX f = of_rows.cwiseQuotient(problem.scale()) / problem.force_unit();
+    ConeShares shortest;
+    if (!shortest.even_out(problem, f)) return;
+    f = problem.force_unit() * problem.scale().cwiseProduct(f);
+    least_norm_ = lam;
+    Reactions& r = w.now.reactions;
+    for (int k = 0; k < n; ++k) r.lam[shares.rows[k]] = f[k];
+    r.swept = false;
+}
+
+ReportedLoads::~ReportedLoads() {
+    if (least_norm_.size() == 0) return;
+    w_.now.reactions.lam = least_norm_;
+    w_.now.reactions.swept = false;
+}
+
+}  // namespace pn

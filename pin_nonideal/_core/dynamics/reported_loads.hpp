@@ -1,0 +1,23 @@
+// Loads of redundant contacts at rest, as solutions and records report them.
+#pragma once
+
+#include "dynamics/reactions.hpp"
+
+namespace pn {
+
+// While it exists, the multipliers of redundant contacts that all stick are the shortest ones within Coulomb's cones that
+// exert the same force. Multipliers of least norm alone may leave a cone, although others hold the contacts at rest. The
+// multipliers stay if a contact slides, since its friction follows the load of least norm, or if no others are found.
+class ReportedLoads {
+public:
+    ReportedLoads(const Program& p, Workspace& w);
+    ~ReportedLoads();
+    ReportedLoads(const ReportedLoads&) = delete;
+    ReportedLoads& operator=(const ReportedLoads&) = delete;
+
+private:
+    Workspace& w_;
+    VecX least_norm_;  // empty if the multipliers stayed
+};
+
+}  // namespace pn
