@@ -191,7 +191,7 @@ class Plate:
         return found.x[-1], size * found.x[:-1].reshape(n, 2)
 
     def excess_of_any_loads(self, feet, force, moment):
-        """The least s with |f| <= mu N + s of each foot, over all loads N >= 0 that balance the plate, and f."""
+        """The least s with |f| <= mu N + s of each foot over all loads N >= 0 in balance, and f."""
         n = len(feet)
         size = self.mass * GRAVITY
         friction, loads = np.zeros((6, 2 * n)), np.zeros((6, n))

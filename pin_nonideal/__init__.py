@@ -139,6 +139,7 @@ __all__ = [
     "Scene",
     "SingularMassError",
     "Solution",
+    "SolutionDetails",
     "Stats",
     "StepSizeError",
     "Stepper",

@@ -1,7 +1,7 @@
 """The quantities from which the paper builds Eq. (40), on plain arrays.
 
-`solve` computes accelerations and forces by the shortest way.  `solve_details` returns, beside them, the matrices that
-the paper writes on the way: the symmetric root of M, B, V, J and the generalized inverse of B.
+`solve` computes accelerations and forces by the shortest way.  `solve_details` returns the matrices of the
+paper beside them: the symmetric root of M, B, V, J and the generalized inverse of B.
 
 Source: F. E. Udwadia, R. E. Kalaba, P. Phohomsiri, "Mechanical systems with nonideal constraints: explicit
 equations without the use of generalized inverses", J. Appl. Mech. 71 (2004).
@@ -66,8 +66,8 @@ def solve_details(
 ) -> SolutionDetails:
     """Acceleration and forces of Eq. (40) with the matrices that the paper builds them from.
 
-    The acceleration, forces and multipliers are those of `solve`. Use `solve` where only these are needed: it forms
-    neither the symmetric root nor J.
+    The acceleration, forces and multipliers are those of `solve`, which is faster: it forms neither the
+    symmetric root nor J.
 
     Args:
         M: mass matrix, (n, n), symmetric and positive definite; its condition may reach 1e12.
@@ -102,7 +102,9 @@ def solve_details(
     Q, T = np.linalg.qr(B[chosen].T, mode="complete")  # the Gram-Schmidt of Eqs. (12)-(14): B[chosen]^T = Q T
     V = Q[:, k:]
     # B = E T^T Q_k^T with E of full column rank, so that B^+ = Q_k T^-T E^+.
-    B_pinv = Q[:, :k] @ np.linalg.solve(T[:k].T, np.linalg.pinv(E)) if k else np.zeros(B.T.shape)  # Eqs. (41)-(46)
+    B_pinv = np.zeros(B.T.shape)
+    if k:
+        B_pinv = Q[:, :k] @ np.linalg.solve(T[:k].T, np.linalg.pinv(E))  # Eqs. (41)-(46)
     J = B_pinv @ B_pinv.T + V @ V.T  # Eq. (33): the inverse of B^T B on the rows, of V V^T beside them
     return SolutionDetails(
         a_free=np.linalg.solve(R.T, np.linalg.solve(R, F)),  # Eq. (1)

@@ -14,7 +14,7 @@ from pin_nonideal.errors import InputError, LoadingError
 from pin_nonideal.loading.load import load
 from pin_nonideal.loading.yaml.robot import check_keys
 from pin_nonideal.loading.yaml.subset import plain_yaml
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.statics.equilibrium import equilibrium
 from pin_nonideal.sweeps.grid import sweep_grid, sweep_samples
 from pin_nonideal.sweeps.store import Sweep
@@ -132,7 +132,7 @@ def rest_robot(scene: Scene, q0: Any, as_json: bool) -> int:
         as_json: as JSON, for programs.
     """
     found = equilibrium(scene, q0)
-    places = scene._compiled.joints
+    places = compiled_scene(scene).joints
     values = {p.name: found.q[p.q_first : p.q_first + p.nq].tolist() for p in places}
     if as_json:
         told = {"q": values, "stable": found.stable, "left": found.left, "rates": found.rates.real.tolist()}

@@ -22,7 +22,8 @@ from pin_nonideal.loading.urdf.xml import listed
 from pin_nonideal.loading.yaml.assembly import scene_arguments
 from pin_nonideal.loading.yaml.initial_state import Start, held_start
 from pin_nonideal.loading.yaml.robot import MODEL_KEYS, check_keys, optional_string, read_yaml
-from pin_nonideal.scene.scene import Scene, loaded
+from pin_nonideal.scene.scene import Scene, with_origin
+from pin_nonideal.states.held import Held
 from pin_nonideal.types import Table
 from pin_nonideal.validation import choice, flag, positive, sequence
 
@@ -107,8 +108,8 @@ def load(
         arguments.update(model=parts.model, constraints=parts.constraints, q0=parts.q)
         arguments["notes"] = (*scene.notes, parts.note)
         scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
-    scene._held = held_start(found.robot, found.table, q0, v0)
-    return _with_origin(scene, _origin(text, given), found)
+    held = held_start(found.robot, found.table, q0, v0)
+    return _with_origin(scene, _origin(text, given), found, held)
 
 
 def _use_limits(arguments: Table, used: bool) -> None:
@@ -155,13 +156,16 @@ class ShapesOf:
         return getattr(load_again(self.origin), self.kind)
 
 
-def _with_origin(scene: Scene, origin: Table | None, found: Found) -> Scene:
-    """The scene that knows what it was loaded from."""
+def _with_origin(scene: Scene, origin: Table | None, found: Found, held: Held) -> Scene:
+    """The scene with its origin, the name and parameters that `load` was called with."""
+    sources = None
     if origin is not None:
         kinds = {"visual_model": found.robot.visual, "collision_model": found.robot.collision}
-        sources = [ShapesOf(origin, kind) if shapes is not None else None for kind, shapes in kinds.items()]
-        scene._shape_sources = (sources[0], sources[1])
-    return loaded(scene, origin, found.robot.contact_friction)
+        visual, collision = (
+            ShapesOf(origin, kind) if shapes is not None else None for kind, shapes in kinds.items()
+        )
+        sources = visual, collision
+    return with_origin(scene, origin, shapes=sources, friction=found.robot.contact_friction, held=held)
 
 
 class Found(NamedTuple):

@@ -7,6 +7,7 @@ import pickle
 from typing import Any
 
 from pin_nonideal.errors import InputError
+from pin_nonideal.states.held import Held
 from pin_nonideal.states.joint_order import file_order, remember_order
 from pin_nonideal.types import Table
 from pin_nonideal.validation import label
@@ -25,22 +26,29 @@ class Packed:
         self.content = content
 
 
-def parts_of(scene: Any) -> Table:
-    """What a scene was made of, as it is now.
+def parts_of(scene: Any, source: Any, shapes: tuple[Any, Any], held: Held) -> Table:
+    """Parts of which a scene was made, as they are now.
 
     Args:
         scene: the Scene.
+        source: its Origin.
+        shapes: for display and for collisions, or the functions that read them.
+        held: entries of the initial state that were named.
     """
-    shapes = scene._shape_sources or (scene._visual, scene._collision)
     made = {
         key: getattr(scene, key)
         for key in (*LISTS, "actuation", "name", "source", "licence", "terms", "impact")
     }
-    made |= {"q0": scene.q0, "v0": scene.v0, "assembly_tolerance": scene._assembly_tolerance}
+    made |= {"q0": scene.q0, "v0": scene.v0, "assembly_tolerance": source.assembly_tolerance}
     made |= {"visual_model": shapes[0], "collision_model": shapes[1]}
-    later = {"notes": list(scene.notes), "contact_friction": scene.contact_friction}
-    later |= {"_origin": scene._origin, "_shape_sources": scene._shape_sources, "_held": scene._held}
-    return {"model": scene.model, "made": made, "later": later, "order": file_order(scene.model)}
+    later = {"table": source.table, "shapes": source.shapes, "friction": scene.contact_friction, "held": held}
+    return {
+        "model": scene.model,
+        "made": made,
+        "notes": list(scene.notes),
+        "later": later,
+        "order": file_order(scene.model),
+    }
 
 
 def rebuilt(kind: type, parts: Table) -> Any:
@@ -54,22 +62,22 @@ def rebuilt(kind: type, parts: Table) -> Any:
     if parts["order"] is not None:
         remember_order(parts["model"], parts["order"])
     scene = kind(parts["model"], **made)
-    for key, value in parts["later"].items():
-        setattr(scene, key, value)
+    scene.notes[:] = parts["notes"]
+    scene.__setstate__(parts["later"])
     return scene
 
 
-def copied(scene: Any, memo: dict[int, Any]) -> Any:
+def copied(scene: Any, parts: Table, memo: dict[int, Any]) -> Any:
     """A scene of its own, with a model of its own; functions are the same.
 
     Args:
         scene: the Scene.
+        parts: of `parts_of`.
         memo: of `copy.deepcopy`.
     """
-    parts = parts_of(scene)
     shapes = {key: parts["made"].pop(key) for key in ("visual_model", "collision_model")}
     parts["made"] = copy.deepcopy(parts["made"], memo) | shapes  # meshes are shared, and nobody changes them
-    parts["later"] = copy.deepcopy(parts["later"], memo)
+    parts |= {key: copy.deepcopy(parts[key], memo) for key in ("notes", "later")}
     return rebuilt(type(scene), parts | {"model": scene.model.copy()})
 
 

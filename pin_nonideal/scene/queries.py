@@ -1,97 +1,58 @@
-"""Numbers and tables that users ask a scene for, as thin calls on what the core has."""
+"""Matrices, forces and energies of a scene at one state."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from pin_nonideal.compilation.summary import Description, describe
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.errors import UnknownNameError, nearest
 from pin_nonideal.states.rows import rows_at
 from pin_nonideal.types import Array, State
 from pin_nonideal.validation import number
 
-if TYPE_CHECKING:
-    from pin_nonideal.compilation.compiled_scene import CompiledScene
-    from pin_nonideal.core_loader import core
+from .evaluation import Evaluator
+from .state import SceneStates
 
 
-class Tables:
-    """What a Scene can be asked for beside its motion."""
+class Queries:
+    """Evaluates terms of the equation of motion; the closed initial state stands in for a missing one.
 
-    if TYPE_CHECKING:
-        name: str
-        _compiled: CompiledScene
-        _runner: core.Runner
+    Args:
+        compiled: the compiled scene.
+        states: its states.
+        evaluator: evaluates it.
+        name: of the scene, for messages.
+    """
 
-        def _configuration(self, q: State, what: str) -> Array: ...
-        def _velocity(self, v: State, what: str) -> Array: ...
+    def __init__(self, compiled: CompiledScene, states: SceneStates, evaluator: Evaluator, name: str) -> None:
+        self._compiled, self._states, self._name = compiled, states, name
+        self._runner = evaluator.runner
+        self._nv = int(compiled.model.nv)
 
-        initial_state: Callable[[], tuple[Array, Array]]
+    def mass_matrix(self, q: State | None) -> Array:
+        """M(q) of the tree, without constraints, (nv, nv)."""
+        return self._runner.terms(self._at(q), np.zeros(self._nv))[0].reshape(self._nv, self._nv)
 
-    def describe(self) -> Description:
-        """Joints with order, limits, friction and damping; rows of constraints and contacts; laws; forces.
-
-        Printed, it is a text of tables; `to_dict()` gives plain values.
-        """
-        return describe(self._compiled, self.name)
-
-    def mass_matrix(self, q: State | None = None) -> Array:
-        """M(q) of the tree, without constraints, (nv, nv).
-
-        Args:
-            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
-        """
-        at = self._at(q)
-        nv = self._compiled.model.nv
-        return self._runner.terms(at, np.zeros(nv))[0].reshape(nv, nv)
-
-    def bias_forces(self, q: State | None = None, v: State | None = None) -> Array:
-        """Coriolis, centrifugal and gravity forces b of M a + b = tau, (nv,); Pinocchio's nonLinearEffects.
-
-        Args:
-            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
-            v: velocity, (nv,) or by joint name; zero when None.
-        """
+    def bias_forces(self, q: State | None, v: State | None) -> Array:
+        """Coriolis, centrifugal and gravity forces, (nv,)."""
         return self._runner.terms(self._at(q), self._speed(v))[1]
 
-    def jacobian(self, name: str, q: State | None = None, t: float = 0.0) -> Array:
-        """Rows A of one constraint or contact, A a = b, in the order and scale of `lam`, (rows, nv).
-
-        Rows that can never act are among them.
-
-        Args:
-            name: of the constraint or contact.
-            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
-            t: time [s].
-
-        Raises:
-            UnknownNameError: there is none of that name.
-        """
+    def jacobian(self, name: str, q: State | None, t: float) -> Array:
+        """Rows of one constraint or contact, (rows, nv)."""
         slices = self._compiled.slices
         if name not in slices:
             raise UnknownNameError(
-                f'no constraint or contact "{name}" in scene "{self.name}"{nearest(name, slices)}'
+                f'no constraint or contact "{name}" in scene "{self._name}"{nearest(name, slices)}'
             )
-        at = self._at(q)
-        return rows_at(self._runner, at, np.zeros(self._compiled.model.nv), number("t", t))[0][slices[name]]
+        return rows_at(self._runner, self._at(q), np.zeros(self._nv), number("t", t))[0][slices[name]]
 
-    def energies(self, q: State | None = None, v: State | None = None) -> dict[str, float]:
-        """Energy by name [J]: "kinetic", "potential" (of gravity, zero at the world's origin), and "total".
-
-        That of springs is work of given forces in the ledger of a run, and no part of it.
-
-        Args:
-            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
-            v: velocity, (nv,) or by joint name; zero when None.
-        """
+    def energies(self, q: State | None, v: State | None) -> dict[str, float]:
+        """Kinetic, potential and total energy [J], by name."""
         kinetic, potential = self._runner.energies(self._at(q), self._speed(v))
         return {"kinetic": kinetic, "potential": potential, "total": kinetic + potential}
 
     def _at(self, q: State | None) -> Array:
-        return self.initial_state()[0] if q is None else self._configuration(q, "q")
+        return self._states.closed_initial()[0] if q is None else self._states.configuration(q, "q")
 
     def _speed(self, v: State | None) -> Array:
-        return np.zeros(self._compiled.model.nv) if v is None else self._velocity(v, "v")
+        return np.zeros(self._nv) if v is None else self._states.velocity(v, "v")

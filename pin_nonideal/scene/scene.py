@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from dataclasses import dataclass
+from typing import Any, Literal, overload
 
-import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
@@ -13,6 +13,7 @@ from pin_nonideal.compilation.analysis import check_model
 from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.compilation.lowering import Descriptions
 from pin_nonideal.compilation.report import report
+from pin_nonideal.compilation.summary import Description, describe
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import Actuation
 from pin_nonideal.description.contacts import Contact
@@ -22,31 +23,40 @@ from pin_nonideal.equation import Solution
 from pin_nonideal.errors import InputError
 from pin_nonideal.geometry.from_model import GeometryContact, with_geometry
 from pin_nonideal.states.held import Held
-from pin_nonideal.states.joint_layout import unit_parts
 from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
-from pin_nonideal.states.parsing import named_configuration, named_coordinates, named_entries
 from pin_nonideal.states.report import ProjectionReport
 from pin_nonideal.types import Array, GeometryModel, Model, State, Table
-from pin_nonideal.validation import array, choice, nonnegative, number, optional_text, sequence
+from pin_nonideal.validation import choice, nonnegative, number, optional_text, sequence
 
 from .copying import copied, packed, parts_of, rebuilt
-from .queries import Tables
-from .shapes import Geometry
-from .state import States
-from .stepping import Steps
+from .evaluation import Evaluator
+from .queries import Queries
+from .shapes import SceneShapes
+from .state import InitialState, SceneStates
+from .stepping import SceneStepper, Stepper
 
-Rest = ParamSpec("Rest")
-Result = TypeVar("Result")
-
-# What to do where laws and dynamics allow several motions.
-SEVERAL = ("error", "continue")
 TERMS = tuple(provider.name for provider in core.Provider)
 IMPACTS = tuple(law.name for law in core.ImpactLaw)
 # What the core has taken when a scene was made.
 TAKEN = ("model", "constraints", "laws", "contacts", "forces", "actuation", "terms", "impact", "q0", "v0")
 
 
-class Scene(States, Geometry, Tables, Steps):
+@dataclass(frozen=True)
+class Origin:
+    """Source of a scene, so that it can be made again.
+
+    Attributes:
+        table: name and parameters for `load`, or None.
+        shapes: functions that read the shapes for display and for collisions again, or None.
+        assembly_tolerance: of the scene [m or rad].
+    """
+
+    table: Table | None
+    shapes: tuple[Any, Any] | None
+    assembly_tolerance: float
+
+
+class Scene:
     """A Pinocchio model with constraints, laws, contacts, forces and actuation.
 
     Everything is checked when the scene is made; rows that can never act are found then and left out.
@@ -87,6 +97,8 @@ class Scene(States, Geometry, Tables, Steps):
         InconsistentConstraintsError: rows that vanish ask for an acceleration.
 
     Attributes:
+        q0: initial configuration, (nq,), read-only: loops are closed and frames are held from it.
+        v0: initial velocity, (nv,), read-only.
         constraint_slices: rows of `lam` of each constraint and contact, by name.
         anchor_frames: (name, frame id, frame id or None) of what joins two frames.
         contact_names: names of the contacts, in the order of `closed`; the stops of a JointLimit one by one.
@@ -120,11 +132,8 @@ class Scene(States, Geometry, Tables, Steps):
     ) -> None:
         if not isinstance(model, pin.Model):
             raise InputError(f"Scene: model must be a pinocchio.Model; got {type(model).__name__}")
-        for what, geometry in (("visual_model", visual_model), ("collision_model", collision_model)):
-            if not (geometry is None or callable(geometry) or isinstance(geometry, pin.GeometryModel)):
-                raise InputError(
-                    f"Scene: {what} must be a pinocchio.GeometryModel; got {type(geometry).__name__}"
-                )
+        self.notes = list(sequence("notes", notes))
+        self._shapes = SceneShapes(visual_model, collision_model, self.notes)
         self.model = model
         self.name = optional_text("Scene: name", name) or model.name or "scene"
         self.constraints, self.laws = sequence("constraints", constraints), sequence("laws", laws)
@@ -132,49 +141,37 @@ class Scene(States, Geometry, Tables, Steps):
         self.forces = sequence("forces", forces)
         self.actuation, self.terms = actuation, choice("Scene: terms", terms, TERMS)
         self.impact = choice("Scene: impact", impact, IMPACTS)
-        self._visual, self._collision = visual_model, collision_model
         self.contact_friction: dict[str, tuple[float, float, float]] = {}
-        self.notes = list(sequence("notes", notes))
         self.source, self.licence = (
             optional_text(f"Scene: {what}", value)
             for what, value in (("source", source), ("licence", licence))
         )
         check_model(model)
-        self._unit_parts = tuple(unit_parts(model))
-        self._q0: Array = pin.neutral(model)
-        self._v0: Array = np.zeros(model.nv)
-        if q0 is not None:
-            self._q0 = named_configuration(model, q0, self._q0, "q0", self._unit_parts)
-        if v0 is not None:
-            self._v0 = self._velocity(v0, "v0")
-        self._held = Held(named_coordinates(model, q0), named_entries(model, v0))
-        for state in (self._q0, self._v0):
-            state.setflags(write=False)
-        said = Descriptions(
+        initial = InitialState(model, q0, v0)
+        self.q0, self.v0 = initial.q, initial.v
+        spec = Descriptions(
             self.constraints, self.contacts, self.laws, self.forces, actuation, terms, self.impact
         )
         tolerance = nonnegative("Scene: assembly_tolerance", assembly_tolerance)
-        self._compiled = CompiledScene(model, self.q0, said, tolerance, q0 is not None)
-        if q0 is not None:
-            self._compiled.check_functions(self.q0, self.v0, 0.0)
-        self.constraint_slices, self.anchor_frames = self._compiled.slices, self._compiled.anchors
-        self.contact_names = self._compiled.contact_names
-        self.element_names = self._compiled.program.element_names
-        self.law_names = self._compiled.program.law_names
-        self.dropped = self._compiled.dropped
-        if self._compiled.unprojected:
-            names = ", ".join(f'"{n}"' for n in self._compiled.unprojected)
+        compiled = CompiledScene(model, initial.q, spec, tolerance, initial.is_given)
+        if initial.is_given:
+            compiled.check_functions(initial.q, initial.v, 0.0)
+        self.constraint_slices, self.anchor_frames = compiled.slices, compiled.anchors
+        self.contact_names = compiled.contact_names
+        self.element_names = compiled.program.element_names
+        self.law_names = compiled.program.law_names
+        self.dropped = compiled.dropped
+        if compiled.unprojected:
+            names = ", ".join(f'"{n}"' for n in compiled.unprojected)
             self.notes.append(
                 f"{names}: no residual and no rate, so drift of these rows cannot be projected away"
             )
-        self._runner = self._compiled.program.runner()
-        self._steps: dict[tuple[str, float], core.SteppedRun] = {}  # by method and length
-        self._nv = int(model.nv)
-        self._closed: tuple[Array, Array, ProjectionReport] | None = None
-        self._told: list[str] | None = None
-        self._origin: Table | None = None  # what `load` made the scene from
-        self._shape_sources: tuple[Any, Any] | None = None  # what reads its shapes again
-        self._assembly_tolerance = tolerance
+        self._origin = Origin(None, None, tolerance)
+        self._states = SceneStates(compiled, initial, self.name)
+        self._evaluator = Evaluator(compiled, self._states)
+        self._queries = Queries(compiled, self._states, self._evaluator, self.name)
+        self._stepper = SceneStepper(compiled, self._states, self._evaluator)
+        self._compiled = compiled
 
     def __setattr__(self, key: str, value: Any) -> None:
         if key in TAKEN and "_compiled" in self.__dict__:
@@ -185,16 +182,85 @@ class Scene(States, Geometry, Tables, Steps):
         super().__setattr__(key, value)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return rebuilt, (type(self), packed(parts_of(self), self.name))
+        return rebuilt, (type(self), packed(self._parts(), self.name))
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Scene:
-        return copied(self, memo)  # type: ignore[no-any-return]
+        return copied(self, self._parts(), memo)  # type: ignore[no-any-return]
+
+    def _parts(self) -> Table:
+        return parts_of(self, self._origin, self._origin.shapes or self._shapes.sources, self._states.held)
+
+    def __setstate__(self, later: Table) -> None:
+        self._origin = Origin(later["table"], later["shapes"], self._origin.assembly_tolerance)
+        self.contact_friction, self._states.held = later["friction"], later["held"]
 
     def __repr__(self) -> str:
         return (
             f'<Scene "{self.name}": nv {self.model.nv}, {len(self.constraints)} constraints, '
             f"{len(self.laws)} laws, {len(self.contacts)} contacts>"
         )
+
+    # --- states ---------------------------------------------------------------------------------------------
+
+    def initial_state(self) -> tuple[Array, Array]:
+        """The scene's initial state with its loops closed.
+
+        Returns:
+            q (nq,), v (nv,).
+
+        Raises:
+            LoopClosureError: the loops cannot be closed.
+            InputError: a coordinate is too large to move.
+        """
+        q, v, _ = self._states.closed_initial()
+        return q, v
+
+    @overload
+    def project(
+        self,
+        q: State | None = None,
+        v: State | None = None,
+        t: float = 0.0,
+        *,
+        report: Literal[False] = False,
+    ) -> tuple[Array, Array]: ...
+    @overload
+    def project(
+        self, q: State | None = None, v: State | None = None, t: float = 0.0, *, report: Literal[True]
+    ) -> tuple[Array, Array, ProjectionReport]: ...
+    def project(
+        self, q: State | None = None, v: State | None = None, t: float = 0.0, *, report: bool = False
+    ) -> tuple[Array, Array] | tuple[Array, Array, ProjectionReport]:
+        """Nearest consistent state: phi(q, t) = 0, A v + phi_t = 0, and no contact inside its plane.
+
+        Of all configurations that satisfy the constraints it is that with the least d^T M(q) d, where d is
+        the move from q in tangent coordinates and M(q) the mass matrix there; of all velocities, that with
+        the least d^T M d.  Units, scales of rows and copies of constraints change nothing.  Where the move is
+        long the nearest of the closures found from several starts is taken; the report tells whether it is
+        known to be the nearest.  Closures in gimbal lock (M nearly singular) are taken only where no other is
+        found.
+
+        Args:
+            q: configuration, (nq,) or by joint name; the scene's initial one when None.
+            v: velocity, (nv,) or by joint name; the scene's initial one when None.  Entries of q and v that
+                are named are held, and the others follow; where the constraints leave no such configuration
+                but one within a thousandth of a radian or of the mechanism's length, named entries are taken
+                for rounded numbers, and move there.
+            t: time [s].
+            report: also returns how far q and v moved, a `ProjectionReport`.
+
+        Returns:
+            q (nq,), v (nv,), and with `report` the report.
+
+        Raises:
+            LoopClosureError: the constraints cannot be met from here; `gaps` names each gap.
+            InputError: wrong shapes or numbers, named entries that the constraints do not allow together,
+                a contact that starts deep inside its plane or has no short way out of it, or a coordinate
+                where floating-point numbers are more than a millimeter or milliradian apart.
+        """
+        wanted = choice("report", report, (True, False))
+        found = self._states.project(q, v, number("t", t))
+        return found if wanted else found[:2]
 
     # --- one instant ----------------------------------------------------------------------------------------
 
@@ -228,22 +294,8 @@ class Scene(States, Geometry, Tables, Steps):
             InputError: wrong shapes or numbers.
             InconsistentConstraintsError, FrictionParadoxError, SingularMassError: there is no solution.
         """
-        self._runner.continues = choice("solve: several", several, SEVERAL) == "continue"
-        given = None
-        if modes is not None:
-            asked = np.asarray(modes, dtype=object)
-            opens = any(getattr(contact, "unilateral", True) for contact in self.contacts)
-            known = [int(mode) for mode in core.Mode if opens or mode is not core.Mode.unloaded]
-            if asked.shape != (len(self.element_names),) or not np.isin(asked, known).all():
-                raise InputError(
-                    f"modes must hold {len(self.element_names)} numbers out of "
-                    f"{', '.join(map(str, known))}; got {modes}"
-                )
-            given = [core.Mode(int(m)) for m in asked]
-        now = self._call(self._runner.solve, q, v, t, tau, given)
-        used = np.array(now.modes, dtype=np.int8)
-        closed = np.array(now.closed, dtype=bool)
-        return Solution(now.a, now.F_ideal, now.F_nonideal, now.lam, now.rank, used, now.unique, closed)
+        unilateral = any(getattr(contact, "unilateral", True) for contact in self.contacts)
+        return self._evaluator.solve(q, v, t, tau, modes, several, unilateral)
 
     def acceleration(
         self,
@@ -270,63 +322,200 @@ class Scene(States, Geometry, Tables, Steps):
             InputError: wrong shapes or numbers.
             InconsistentConstraintsError, FrictionParadoxError, SingularMassError: there is no solution.
         """
-        self._require_unchanged()
-        if self._compiled.unchecked:
-            self._checked_at(q, v, t)
-        a = np.empty(self._nv)
-        self._runner.continues = choice("acceleration: several", several, SEVERAL) == "continue"
-        try:  # arrays of the right shape go straight to the core, which checks sizes, lengths and finiteness
-            self._runner.acceleration(q, v, t, tau, a)
-        except (TypeError, ValueError, core.CoreFailure):
-            self._call(self._runner.acceleration, q, v, t, tau, a)
-        return a
+        return self._evaluator.acceleration(q, v, tau, t, several)
 
-    def _call(
+    # --- terms ----------------------------------------------------------------------------------------------
+
+    def describe(self) -> Description:
+        """Joints with order, limits, friction and damping; rows of constraints and contacts; laws; forces.
+
+        Printed, it is a text of tables; `to_dict()` gives plain values.
+        """
+        return describe(self._compiled, self.name)
+
+    def mass_matrix(self, q: State | None = None) -> Array:
+        """M(q) of the tree, without constraints, (nv, nv).
+
+        Args:
+            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
+        """
+        return self._queries.mass_matrix(q)
+
+    def bias_forces(self, q: State | None = None, v: State | None = None) -> Array:
+        """Coriolis, centrifugal and gravity forces b of M a + b = tau, (nv,); Pinocchio's nonLinearEffects.
+
+        Args:
+            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
+            v: velocity, (nv,) or by joint name; zero when None.
+        """
+        return self._queries.bias_forces(q, v)
+
+    def jacobian(self, name: str, q: State | None = None, t: float = 0.0) -> Array:
+        """Rows A of one constraint or contact, A a = b, in the order and scale of `lam`, (rows, nv).
+
+        Rows that can never act are among them.
+
+        Args:
+            name: of the constraint or contact.
+            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
+            t: time [s].
+
+        Raises:
+            UnknownNameError: there is none of that name.
+        """
+        return self._queries.jacobian(name, q, t)
+
+    def energies(self, q: State | None = None, v: State | None = None) -> dict[str, float]:
+        """Energy by name [J]: "kinetic", "potential" (of gravity, zero at the world's origin), and "total".
+
+        That of springs is work of given forces in the ledger of a run, and no part of it.
+
+        Args:
+            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
+            v: velocity, (nv,) or by joint name; zero when None.
+        """
+        return self._queries.energies(q, v)
+
+    # --- steps ----------------------------------------------------------------------------------------------
+
+    def step(
         self,
-        function: Callable[Concatenate[Array, Array, float, Array | None, Rest], Result],
         q: State,
         v: State,
-        t: float,
         tau: ArrayLike | None,
-        *rest: Rest.args,
-        **named: Rest.kwargs,
-    ) -> Result:
-        q_in, v_in = self._configuration(q, "q"), self._velocity(v, "v")
-        self._checked_at(q_in, v_in, t)
-        torque = None if tau is None else np.array(array("tau", tau, (self.model.nv,)))
-        try:
-            return function(q_in, v_in, number("t", t), torque, *rest, **named)
-        except core.CoreFailure as failure:
-            raise self._compiled.named(failure) from None
+        dt: float,
+        *,
+        t: float = 0.0,
+        method: str = "semi_implicit_euler",
+    ) -> tuple[Array, Array]:
+        """One step of a method from any state, for controllers and learning loops.
+
+        It is what `simulate(scene, dt, q, v, method=method, dt=dt)` ends with, events of friction and
+        contacts inside the step included.
+
+        Args:
+            q: configuration on the constraints, (nq,) or by joint name.
+            v: velocity on them, (nv,) or by joint name.
+            tau: joint torques, (nv,) [N m or N]; those of the scene's actuation when None.
+            dt: length of the step [s].
+            t: time at its start [s].
+            method: one of the core's with a fixed step: "semi_implicit_euler", "rk4" or "moreau".
+
+        Returns:
+            q (nq,) and v (nv,) at its end.
+
+        Raises:
+            InputError: an argument does not fit.
+            RunError: the run stops inside the step.
+        """
+        return self._stepper.step(q, v, tau, dt, t, method)
+
+    def stepper(
+        self,
+        period: float,
+        q: State | None = None,
+        v: State | None = None,
+        *,
+        t0: float = 0.0,
+        tau: ArrayLike | None = None,
+        method: str = "semi_implicit_euler",
+        dt: float | None = None,
+        rtol: float | None = None,
+        atol: float | None = None,
+    ) -> Stepper:
+        """A run that is taken period by period, with torques of one's own, and keeps its state between them.
+
+        Args:
+            period: length of time of each call of `Stepper.step` [s].
+            q: initial configuration, (nq,) or by joint name, put onto the constraints; the scene's when None.
+            v: initial velocity, (nv,) or by joint name; the scene's when None.
+            t0: initial time [s].
+            tau: joint torques in place of the scene's actuation from the start on, (nv,), or None.
+            method: one of the core's: adaptive, or with a fixed step.
+            dt: step of methods with a fixed step [s], a whole number of them in the period; the period when
+                None.
+            rtol: relative tolerance of adaptive methods, 1e-8 when None.
+            atol: absolute tolerance, 1e-10 when None.
+
+        Returns:
+            The Stepper, at its initial state.
+
+        Raises:
+            InputError: an argument does not fit.
+            RunError: there is no motion from there.
+        """
+        return self._stepper.stepper(period, q, v, t0, tau, method, dt, rtol, atol)
+
+    # --- shapes ---------------------------------------------------------------------------------------------
+
+    @property
+    def visual_model(self) -> GeometryModel | None:
+        """pinocchio.GeometryModel for the replay, or None; meshes of a file are read when first asked for."""
+        return self._shapes.visual
+
+    @property
+    def collision_model(self) -> GeometryModel | None:
+        """pinocchio.GeometryModel for collisions, or None; meshes are read when first asked for."""
+        return self._shapes.collision
+
+    # --- text -----------------------------------------------------------------------------------------------
 
     def report(self) -> str:
         """What the scene is made of: joints, constraints, rows, rank, mobility, and what was left out."""
         q, v = self.initial_state()
-        self._runner.solve(q, v, 0.0, modes=[core.Mode.slip_plus] * len(self.element_names))
-        notes = [f"note: {n}" for n in (*self.notes, *self._start_notes())]
+        rank = self._evaluator.rank(q, v)
+        notes = [f"note: {n}" for n in (*self.notes, *self._states.start_notes())]
         credits = {"source": self.source, "licence": self.licence}
         notes += [f"{key}: {value}" for key, value in credits.items() if value]
-        return report(self._compiled, self.name, self._runner.rank, notes)
+        return report(self._compiled, self.name, rank, notes)
 
 
-def program_of(scene: Scene) -> core.Program:
+def compiled_scene(scene: Scene) -> CompiledScene:
     """The scene as the core knows it.
 
     Args:
         scene: the scene.
     """
-    return scene._compiled.program
+    return scene._compiled
 
 
-def loaded(
-    scene: Scene, origin: Table | None, friction: dict[str, tuple[float, float, float]] | None = None
-) -> Scene:
-    """The scene, which remembers what `load` made it from, so that `resume` can load it again.
+def scene_states(scene: Scene) -> SceneStates:
+    """States of a scene.
 
     Args:
-        scene: as loaded.
-        origin: name and parameters, or None when a file cannot hold them.
-        friction: coefficients of the file's collision geometry.
+        scene: the scene.
     """
-    scene._origin, scene.contact_friction = origin, friction or {}
+    return scene._states
+
+
+def scene_origin(scene: Scene) -> Origin:
+    """Origin of a scene.
+
+    Args:
+        scene: the scene.
+    """
+    return scene._origin
+
+
+def with_origin(
+    scene: Scene,
+    table: Table | None,
+    *,
+    shapes: tuple[Any, Any] | None = None,
+    friction: dict[str, tuple[float, float, float]] | None = None,
+    held: Held | None = None,
+) -> Scene:
+    """The scene with its origin, from which `resume` and other processes make it again.
+
+    Args:
+        scene: as made.
+        table: name and parameters for `load`, or None if a file cannot hold them.
+        shapes: functions that read its shapes again.
+        friction: coefficients of the file's collision geometry.
+        held: entries of the initial state that were named.
+    """
+    scene._origin = Origin(table, shapes, scene._origin.assembly_tolerance)
+    scene.contact_friction = friction or {}
+    if held is not None:
+        scene._states.held = held
     return scene

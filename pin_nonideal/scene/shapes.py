@@ -9,32 +9,47 @@ import pinocchio as pin
 from pin_nonideal.errors import InputError
 from pin_nonideal.types import GeometryModel
 
+ShapeSource = GeometryModel | Callable[[], GeometryModel] | None
 
-class Geometry:
+
+class SceneShapes:
     """Shapes for display and for collisions.
 
-    Attributes:
-        notes: remarks of the loader; grow where shapes that are read at last have some.
+    Args:
+        visual: shapes for display, or a function that makes them.
+        collision: shapes for collisions, or such a function.
+        notes: notes of the scene; remarks of a function are appended.
+
+    Raises:
+        InputError: a shape is neither a pinocchio.GeometryModel nor a function.
     """
 
-    notes: list[str]
-    _visual: GeometryModel | Callable[[], GeometryModel] | None
-    _collision: GeometryModel | Callable[[], GeometryModel] | None
+    def __init__(self, visual: ShapeSource, collision: ShapeSource, notes: list[str]) -> None:
+        for what, shapes in (("visual_model", visual), ("collision_model", collision)):
+            if not (shapes is None or callable(shapes) or isinstance(shapes, pin.GeometryModel)):
+                raise InputError(
+                    f"Scene: {what} must be a pinocchio.GeometryModel; got {type(shapes).__name__}"
+                )
+        self._visual, self._collision, self._notes = visual, collision, notes
 
     @property
-    def visual_model(self) -> GeometryModel | None:
-        """pinocchio.GeometryModel for the replay, or None; meshes of a file are read when first asked for."""
+    def sources(self) -> tuple[ShapeSource, ShapeSource]:
+        """Shapes for display and for collisions as they are now: read, or as functions."""
+        return self._visual, self._collision
+
+    @property
+    def visual(self) -> GeometryModel | None:
+        """Shapes for display, read at the first call."""
         self._visual = self._read(self._visual)
         return self._visual
 
     @property
-    def collision_model(self) -> GeometryModel | None:
-        """pinocchio.GeometryModel for collisions, or None; meshes are read when first asked for."""
+    def collision(self) -> GeometryModel | None:
+        """Shapes for collisions, read at the first call."""
         self._collision = self._read(self._collision)
         return self._collision
 
-    def _read(self, shapes: GeometryModel | Callable[[], GeometryModel] | None) -> GeometryModel | None:
-        """The geometry itself, made now where only the means to make it were given."""
+    def _read(self, shapes: ShapeSource) -> GeometryModel | None:
         if not callable(shapes):
             return shapes
         geometry = shapes()
@@ -43,5 +58,5 @@ class Geometry:
                 "Scene: what makes a geometry must return a pinocchio.GeometryModel; "
                 f"got {type(geometry).__name__}"
             )
-        self.notes += [note for note in getattr(shapes, "notes", ()) if note not in self.notes]
+        self._notes += [note for note in getattr(shapes, "notes", ()) if note not in self._notes]
         return geometry

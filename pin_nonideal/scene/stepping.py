@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError
 from pin_nonideal.types import Array, State
 from pin_nonideal.validation import array, choice, nonnegative, number, positive
 
-if TYPE_CHECKING:
-    from pin_nonideal.compilation.compiled_scene import CompiledScene
+from .evaluation import Evaluator
+from .state import SceneStates
 
 # The core's own methods, and those of them that take steps of a fixed length.
 STEPPING = tuple(method.name for method in core.methods() if not method.outside)
@@ -121,95 +122,50 @@ class Stepper:
             raise InputError("Stepper: the run has stopped; begin anew with reset(q, v)")
 
 
-class Steps:
-    """What a Scene does for loops of one's own."""
+class SceneStepper:
+    """Takes steps of a scene.
 
-    if TYPE_CHECKING:
-        _compiled: CompiledScene
-        _steps: dict[tuple[str, float], core.SteppedRun]
-        _call: Callable[..., Any]
-        _require_unchanged: Callable[[], None]
-        _checked_at: Callable[[State, State, float], None]
-        project: Callable[..., Any]
+    Args:
+        compiled: the compiled scene.
+        states: its states.
+        evaluator: evaluates it.
+    """
+
+    def __init__(self, compiled: CompiledScene, states: SceneStates, evaluator: Evaluator) -> None:
+        self._compiled, self._states, self._evaluator = compiled, states, evaluator
+        self._runs: dict[tuple[str, float], core.SteppedRun] = {}  # by method and length
 
     def step(
-        self,
-        q: State,
-        v: State,
-        tau: ArrayLike | None,
-        dt: float,
-        *,
-        t: float = 0.0,
-        method: str = "semi_implicit_euler",
+        self, q: State, v: State, tau: ArrayLike | None, dt: float, t: float, method: str
     ) -> tuple[Array, Array]:
-        """One step of a method from any state, for controllers and learning loops.
-
-        It is what `simulate(scene, dt, q, v, method=method, dt=dt)` ends with, events of friction and
-        contacts inside the step included.
-
-        Args:
-            q: configuration on the constraints, (nq,) or by joint name.
-            v: velocity on them, (nv,) or by joint name.
-            tau: joint torques, (nv,) [N m or N]; those of the scene's actuation when None.
-            dt: length of the step [s].
-            t: time at its start [s].
-            method: one of the core's with a fixed step: "semi_implicit_euler", "rk4" or "moreau".
-
-        Returns:
-            q (nq,) and v (nv,) at its end.
-
-        Raises:
-            InputError: an argument does not fit.
-            RunError: the run stops inside the step.
-        """
-        self._require_unchanged()
+        """One step of a method from any state, see `Scene.step`."""
+        self._states.require_unchanged()
         known = isinstance(dt, float) and isinstance(method, str)
-        run = self._steps.get((method, dt)) if known else None
+        run = self._runs.get((method, dt)) if known else None
         if run is None:
             choice("step: method", method, FIXED)
             length = positive("step: dt", dt)
-            run = self._steps[method, length] = self._new_run(method, length, length, RTOL, ATOL)
+            run = self._runs[method, length] = self._new_run(method, length, length, RTOL, ATOL)
         if self._compiled.unchecked:
-            self._checked_at(q, v, t)
+            self._states.check_functions_at(q, v, t)
         try:  # arrays of the right shape go straight to the core, which checks sizes, lengths and finiteness
             return run.step(q, v, t, tau)
         except (TypeError, ValueError, core.CoreFailure):
-            return self._call(run.step, q, v, t, tau)  # type: ignore[no-any-return]
+            return self._evaluator.call(run.step, q, v, t, tau)
 
     def stepper(
         self,
         period: float,
-        q: State | None = None,
-        v: State | None = None,
-        *,
-        t0: float = 0.0,
-        tau: ArrayLike | None = None,
-        method: str = "semi_implicit_euler",
-        dt: float | None = None,
-        rtol: float | None = None,
-        atol: float | None = None,
+        q: State | None,
+        v: State | None,
+        t0: float,
+        tau: ArrayLike | None,
+        method: str,
+        dt: float | None,
+        rtol: float | None,
+        atol: float | None,
     ) -> Stepper:
-        """A run that is taken period by period, with torques of one's own, and keeps its state between them.
-
-        Args:
-            period: length of time of each call of `Stepper.step` [s].
-            q: initial configuration, (nq,) or by joint name, put onto the constraints; the scene's when None.
-            v: initial velocity, (nv,) or by joint name; the scene's when None.
-            t0: initial time [s].
-            tau: joint torques in place of the scene's actuation from the start on, (nv,), or None.
-            method: one of the core's: adaptive, or with a fixed step.
-            dt: step of methods with a fixed step [s], a whole number of them in the period; the period when
-                None.
-            rtol: relative tolerance of adaptive methods, 1e-8 when None.
-            atol: absolute tolerance, 1e-10 when None.
-
-        Returns:
-            The Stepper, at its initial state.
-
-        Raises:
-            InputError: an argument does not fit.
-            RunError: there is no motion from there.
-        """
+        """A run that is taken period by period, see `Scene.stepper`."""
         choice("stepper: method", method, STEPPING)
         length = positive("stepper: period", period)
         if dt is not None and method not in FIXED:
@@ -228,7 +184,7 @@ class Steps:
         )
         made = Stepper(self._new_run(method, length, size, *tolerances), self._compiled)
         begin = number("stepper: t0", t0)
-        at, speed = self.project(q, v, begin)
+        at, speed, _ = self._states.project(q, v, begin)
         made.reset(at, speed, begin, tau)
         return made
 

@@ -24,7 +24,7 @@ from pin_nonideal.compilation.lowering import lower
 from pin_nonideal.compilation.resolver import Resolution
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError, LoadingError, OutputError
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, compiled_scene, scene_origin
 from pin_nonideal.trajectory.file import UNREADABLE
 from pin_nonideal.types import Table
 from pin_nonideal.validation import nonnegative
@@ -94,7 +94,7 @@ class Saver:
             "format": FORMAT,
             "version": _version(),
             "scene": scene.name,
-            "origin": scene._origin,
+            "origin": scene_origin(scene).table,
             "fingerprint": fingerprint(scene),
             "options": {**vars(options), "atol": options.atol.tolist()},
             "interval": self.interval,
@@ -179,7 +179,7 @@ def fingerprint(scene: Scene) -> str:
     """
     digest = hashlib.sha256((scene.model.saveToString() + scene.terms).encode())
     transcript: Any = _Transcript(core.Builder(scene.model), digest)
-    lower(scene._compiled.said, transcript, Resolution(scene.model, scene.q0))
+    lower(compiled_scene(scene).said, transcript, Resolution(scene.model, scene.q0))
     return digest.hexdigest()
 
 

@@ -25,7 +25,7 @@ from pin_nonideal.description.constraints import (
 )
 from pin_nonideal.description.forces import JointSpring, SpringDamper, Wrench
 from pin_nonideal.description.laws import Drag, JointFriction, SigmoidFriction
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, compiled_scene, scene_origin
 from pin_nonideal.types import Model
 
 Indices = NDArray[np.intp]
@@ -69,7 +69,7 @@ def components(scene: Scene) -> list[Component]:
 
 
 def _components(scene: Scene) -> list[Component]:
-    model, program = scene.model, scene._compiled.program
+    model, program = scene.model, compiled_scene(scene).program
     held = scene.actuation
     by_position = isinstance(held, HoldPosition) and np.ndim(held.kp) == 0 and np.ndim(held.kd) == 0
     said = [*scene.constraints, *scene.laws, *scene.forces]
@@ -142,11 +142,11 @@ def _component(
         v0=scene.v0[v],
         name=scene.name,
         terms=scene.terms,
-        assembly_tolerance=scene._assembly_tolerance,
+        assembly_tolerance=scene_origin(scene).assembly_tolerance,
     )
     elements = [scene.element_names.index(name) for name in alone.element_names]
-    powers = scene._compiled.program.power_names
-    works = [powers.index(name) for name in alone._compiled.program.power_names]
+    powers = compiled_scene(scene).program.power_names
+    works = [powers.index(name) for name in compiled_scene(alone).program.power_names]
     return Component(alone, q, v, np.array(elements, dtype=np.intp), np.array(works, dtype=np.intp))
 
 

@@ -13,7 +13,7 @@ from typing import Any, cast
 import numpy as np
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array
 
 from .components import Component, components
@@ -46,7 +46,7 @@ def run_together(scene: Scene, q0: Array, v0: Array, options: RunOptions, **more
     try:
         runner = idle.pop()
     except IndexError:  # the first run, or others are under way
-        runner = scene._compiled.program.runner()
+        runner = compiled_scene(scene).program.runner()
     outcome = runner.simulate(q0, v0, options, **more)
     idle.append(runner)
     return outcome
@@ -101,14 +101,14 @@ def roll_apart(
     for part in parts:
         states = (np.ascontiguousarray(q0[:, part.q]), np.ascontiguousarray(v0[:, part.v]))
         own = _options_of(part, options, v0.shape[1])
-        program = part.scene._compiled.program
+        program = compiled_scene(part.scene).program
         of_parts.append(core.rollout(program, *states, own, threads, [], np.zeros((len(q0), 0))))
     results: list[core.Outcome | None] = []
     for k, outcomes in enumerate(zip(*of_parts, strict=True)):
         if all(one is not None and one.stopped is None for one in outcomes):
             results.append(joined_outcome(scene, parts, cast(list[core.Outcome], outcomes), options))
         else:  # together, which tells what stops them
-            program = scene._compiled.program
+            program = compiled_scene(scene).program
             results += core.rollout(program, q0[k : k + 1], v0[k : k + 1], options, 1, [], np.zeros((1, 0)))
     return results
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.trajectory.dense_output import DenseOutput, dense_output, inside_steps
 from pin_nonideal.types import Array
 
@@ -85,7 +85,7 @@ def _motion(scene: Scene, parts: Sequence[Component], dense: Sequence[DenseOutpu
     """
     nq, nv, ne = scene.model.nq, scene.model.nv, len(scene.element_names)
     work = dense[0].states.shape[2] - parts[0].q.size - parts[0].v.size if dense else 0
-    columns = len(scene._compiled.program.power_names) if work else 0
+    columns = len(compiled_scene(scene).program.power_names) if work else 0
     # A row for each coordinate, in which times stand one after the other, as each component fills them.
     states, moved = np.zeros((nq + nv + columns, t.size)), np.zeros(t.size)
     modes, sought = np.zeros((2, ne, t.size), dtype=np.int8)
@@ -122,7 +122,7 @@ def _samples(
     moved: Array,
 ) -> dict[str, Any]:
     """The samples as the core has them: evaluated where more than the state of a tree is asked for."""
-    program, (nq, nv) = scene._compiled.program, (scene.model.nq, scene.model.nv)
+    program, (nq, nv) = compiled_scene(scene).program, (scene.model.nq, scene.model.nv)
     asked = (
         options.a,
         options.tau,

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import SampledControl, asked_by
 from pin_nonideal.errors import InputError
-from pin_nonideal.scene.scene import SEVERAL, Scene
+from pin_nonideal.scene.evaluation import SEVERAL
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array
 from pin_nonideal.validation import array, choice, count, flag, label, nonnegative, number, positive, sequence
 
@@ -135,12 +136,12 @@ def run_options(
             )
     elif dt is not None:
         raise InputError(f'simulate: method "{method}" chooses its own steps; leave dt out, or set output_dt')
-    if opening := scene._compiled.opening_names:
+    if opening := compiled_scene(scene).opening_names:
         _check_opening(method, record, opening[0])
     nv = scene.model.nv
     if nv == 0:
         raise InputError(f'simulate: "{scene.name}" has no joint that moves; there is nothing to simulate')
-    tolerance = np.full(2 * nv + scene._compiled.program.states, DEFAULT_ATOL)
+    tolerance = np.full(2 * nv + compiled_scene(scene).program.states, DEFAULT_ATOL)
     if atol is not None:
         if np.asarray(atol, dtype=object).ndim == 0:
             tolerance[:] = nonnegative("simulate: atol", atol)

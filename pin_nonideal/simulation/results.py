@@ -18,7 +18,7 @@ from pin_nonideal.errors import (
     RunInterrupted,
     UserFunctionError,
 )
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.rows import gap_rows, rows_at
 from pin_nonideal.trajectory.dense_output import dense_output
 from pin_nonideal.trajectory.outcome import outcome_fields, outcome_stats
@@ -64,7 +64,7 @@ def finish(
         return Trajectory(**fields(), stats=stats)
 
     # A time step may enter a contact, which the next one finds; a loop that opens ends the steps by itself.
-    enters = options.method == "moreau" and bool(scene._compiled.opening_names)
+    enters = options.method == "moreau" and bool(compiled_scene(scene).opening_names)
     if (
         not enters
         and outcome.largest_violation > LEFT
@@ -79,7 +79,7 @@ def finish(
     last = float(trajectory.t[-1]) if len(trajectory) else options.t0
     cause: BaseException | None = None
     if isinstance(stopped, core.CoreFailure):
-        error = scene._compiled.named(stopped)
+        error = compiled_scene(scene).named(stopped)
         error.args = (f"{error}{_fixed_step_hint(error, options)}; {KEPT}", *error.args[1:])
     elif isinstance(stopped, KeyboardInterrupt):
         error = RunInterrupted(f"the run was interrupted at t = {last:.4g} s; {KEPT}", time=last)
@@ -116,9 +116,9 @@ def _opened(scene: Scene, trajectory: Trajectory) -> LoopClosureError:
     """A run has left its constraints, as it must when a drive pulls a loop apart; with the samples before."""
     k = int((trajectory.violation > LEFT).argmax())
     t = float(trajectory.t[k])
-    runner = scene._compiled.program.runner()
+    runner = compiled_scene(scene).program.runner()
     residual = rows_at(runner, trajectory.q[k], trajectory.v[k], t)[2]
-    left = np.where(gap_rows(scene._compiled.program), np.maximum(-residual, 0.0), np.abs(residual))
+    left = np.where(gap_rows(compiled_scene(scene).program), np.maximum(-residual, 0.0), np.abs(residual))
     gaps = {key: float(left[rows].max()) for key, rows in scene.constraint_slices.items()}
     stopped = opened(max(gaps, key=lambda key: gaps[key]), gaps, t, f"; {KEPT}")
     stopped.trajectory = _stopped(trajectory.first(k), stopped)

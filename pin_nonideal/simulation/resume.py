@@ -8,7 +8,7 @@ import time
 from pin_nonideal.atomic_files import file_path
 from pin_nonideal.errors import InputError, LoadingError
 from pin_nonideal.loading.load import load
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.validation import choice
 
@@ -70,7 +70,7 @@ def resume(
     begin = time.perf_counter()
     try:
         with progress_bar(progress, options) as tick:
-            runner = scene._compiled.program.runner()
+            runner = compiled_scene(scene).program.runner()
             outcome = runner.resume(held.state, options, tick=tick, save=saver, save_interval=saver.interval)
     except ValueError as error:
         raise LoadingError(f'"{source}" is damaged: {error}') from error

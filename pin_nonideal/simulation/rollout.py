@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pin_nonideal.compilation.parameter_overrides import RunNumbers, run_numbers
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError, PinNonidealError, RunError, RunInterrupted
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, compiled_scene, scene_states
 from pin_nonideal.states.joint_layout import require_resolved
 from pin_nonideal.types import Array
 from pin_nonideal.validation import array, choice, count
@@ -100,7 +100,7 @@ def rollout(
         raise InputError(f'rollout: method must be one of the core\'s; "{method}" runs in SciPy')
     if parameters and options.dense:
         raise InputError('rollout: record "dense" goes without parameters; take output_dt for more samples')
-    numbers = run_numbers(scene._compiled, parameters or {}, len(starts_q))
+    numbers = run_numbers(compiled_scene(scene), parameters or {}, len(starts_q))
     if choice("rollout: as_arrays", as_arrays, (True, False)):
         return _arrays(scene, starts_q, starts_v, numbers, options, threads, keep, record)
     results = _run(scene, starts_q, starts_v, numbers, options, threads)
@@ -148,14 +148,13 @@ def _arrays(
     """The runs as arrays."""
     if len(record):
         raise InputError("rollout: as_arrays records states alone; leave record out, or as_arrays")
-    if scene._unit_parts:
-        q = np.array([scene._configuration(one, "q") for one in q]).reshape(q.shape)
+    q = scene_states(scene).with_unit_parts(q)
     require_resolved(scene.model, q)
     if len(q):
-        scene._compiled.check_functions(q[0], v[0], options.t0)
-    on, v_on, opened = scene._compiled.projection.nearest_of_each(q, v, options.t0, threads, numbers)
+        compiled_scene(scene).check_functions(q[0], v[0], options.t0)
+    on, v_on, opened = compiled_scene(scene).projection.nearest_of_each(q, v, options.t0, threads, numbers)
     for i, failure in opened.items():
-        error = scene._compiled.named(failure) if isinstance(failure, core.CoreFailure) else failure
+        error = compiled_scene(scene).named(failure) if isinstance(failure, core.CoreFailure) else failure
         if isinstance(error, RunError):
             error.index = i
         raise error
@@ -176,9 +175,8 @@ def _run(
 ) -> list[Any]:
     """A Trajectory of each run, or what stopped it."""
     begin = time.perf_counter()
-    compiled = scene._compiled
-    if scene._unit_parts:
-        q = np.array([scene._configuration(one, "q") for one in q]).reshape(q.shape)
+    compiled, states = compiled_scene(scene), scene_states(scene)
+    q = states.with_unit_parts(q)
     require_resolved(scene.model, q)
     if len(q):
         compiled.check_functions(q[0], v[0], options.t0)
@@ -199,7 +197,7 @@ def _run(
         if outcome is None:  # not begun when an interrupt ended all
             continue
         try:
-            moved = scene._moved(q[i], on[i]) + scene._followed(v[i], v_on[i])
+            moved = states.configuration_notes(q[i], on[i]) + states.velocity_notes(v[i], v_on[i])
             results[i] = finish(scene, outcome, outcome.stopped, options, wall, moved)
         except PinNonidealError as error:
             results[i] = error

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pin_nonideal.compilation.parameter_overrides import RunNumbers
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import LoopClosureError, PinNonidealError, RunInterrupted, UserFunctionError
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array
 
 from .decoupled import roll_apart, stepped_apart
@@ -73,7 +73,7 @@ def run_arrays(
         options: of all runs.
         threads: number of native threads.
     """
-    n, compiled = len(q0), scene._compiled
+    n, compiled = len(q0), compiled_scene(scene)
     parts = [] if numbers.names else stepped_apart(scene, options)
     if parts:
         outcomes = [one for one in roll_apart(scene, parts, q0, v0, options, threads) if one is not None]
@@ -119,7 +119,7 @@ def _failures(
     failures: dict[int, PinNonidealError] = {}
     for i, cause in stopped.items():
         if isinstance(cause, core.CoreFailure):
-            failures[i] = scene._compiled.named(cause)
+            failures[i] = compiled_scene(scene).named(cause)
         elif isinstance(cause, PinNonidealError):
             failures[i] = cause
         elif isinstance(cause, KeyboardInterrupt):

@@ -19,7 +19,7 @@ import numpy as np
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import SampledControl, asked_by
 from pin_nonideal.errors import InputError, RunError, StepSizeError
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array
 
 from .events import Watched
@@ -40,7 +40,7 @@ class _Run:
         self, scene: Scene, options: RunOptions, tick: Tick | None, events: Sequence[Watched]
     ) -> None:
         self.model, self.options = scene.model, options
-        self.core = core.FollowedRun(scene._compiled.program, options, tick, list(events))
+        self.core = core.FollowedRun(compiled_scene(scene).program, options, tick, list(events))
         self.failure: core.CoreFailure | None = None
 
     def rate(self, t: float, y: Array) -> Array:

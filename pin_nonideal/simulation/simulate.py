@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from pin_nonideal.compilation.error_context import stiff_hint
 from pin_nonideal.errors import InputError
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, compiled_scene, scene_states
 from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.types import State
 from pin_nonideal.validation import choice
@@ -119,7 +119,9 @@ def simulate(
         scene.project(q, v, options.t0) if (q is not None or v is not None or t0) else scene.initial_state()
     )
     own = q is None and v is None and not t0
-    moved, followed = ([], scene._start_notes()) if own else (scene._moved(q, q0), scene._followed(v, v0))
+    states = scene_states(scene)
+    moved = [] if own else states.configuration_notes(q, q0)
+    followed = states.start_notes() if own else states.velocity_notes(v, v0)
     notes = moved + followed
     for given, told in ((q, moved), (v, followed)):
         if told and given is not None and not isinstance(given, Mapping):
@@ -133,7 +135,7 @@ def simulate(
 
         saver = Saver(checkpoint, scene, options, checkpoint_interval, notes=notes)
     hints: list[str] = []
-    explicit_only = scene._compiled.explicit_only
+    explicit_only = compiled_scene(scene).explicit_only
 
     def hint(at: float, dof: int, rate: float, decays: bool) -> None:
         hints.append(f"from t = {at:.4g} s on {stiff_hint(scene.model, dof, rate, decays, explicit_only)}")

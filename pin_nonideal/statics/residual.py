@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.scene.scene import Scene, program_of
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.rows import DEPENDENT, gap_rows, holonomic_rows, row_lengths, rows_at, shortest
 from pin_nonideal.states.scales import slides
 from pin_nonideal.types import Array
@@ -57,13 +57,13 @@ class AtRest:
 
     def __init__(self, scene: Scene, tau: Array | None, t: float, q: Array) -> None:
         self.scene, self.tau, self.t = scene, tau, t
-        self.program = program_of(scene)
+        self.program = compiled_scene(scene).program
         self.runner = self.program.runner()
         self.still = np.zeros(scene.model.nv)
         self._slides = slides(scene.model)
         self._smooth = [core.Mode.unloaded] * len(scene.element_names)
         self.gaps = gap_rows(self.program)
-        self.touching = TOUCHING * max(1.0, scene._compiled.projection.length)
+        self.touching = TOUCHING * max(1.0, compiled_scene(scene).projection.length)
         self.begin(q)
 
     def begin(self, q: Array) -> None:
@@ -244,4 +244,4 @@ def restricts_velocity_only(scene: Scene) -> bool:
     Args:
         scene: the scene.
     """
-    return not bool(holonomic_rows(program_of(scene)).all())
+    return not bool(holonomic_rows(compiled_scene(scene).program).all())

@@ -11,7 +11,7 @@ import numpy as np
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import Rolling
 from pin_nonideal.errors import InputError
-from pin_nonideal.scene.scene import Scene, program_of
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.parsing import named_velocity
 from pin_nonideal.states.rows import DEPENDENT
 from pin_nonideal.types import Array, State
@@ -103,7 +103,7 @@ class _Cones:
     """
 
     def __init__(self, scene: Scene, at_rest: AtRest, q: Array) -> None:
-        self.sizes = list(program_of(scene).element_sizes)
+        self.sizes = list(compiled_scene(scene).program.element_sizes)
         root = at_rest.root(q)
         self.A, reach, rows = at_rest.scaled_rows(q, root)
         _, lengths, D = at_rest.directions(q)
@@ -118,7 +118,7 @@ class _Cones:
         self.count = m + int(ends[-1])
         self.lengths = np.concatenate([reach, lengths])
         self.lengths[self.lengths == 0.0] = 1.0
-        self.contacts = [first for first, _, contact in scene._compiled.rows.values() if contact]
+        self.contacts = [first for first, _, contact in compiled_scene(scene).rows.values() if contact]
         limits = known * np.array([self.lengths[part.start] for part in self.parts])
         scaled, acting = (
             np.vstack([rows, D / self.lengths[m:, None]]),

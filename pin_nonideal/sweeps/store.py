@@ -17,7 +17,7 @@ from pin_nonideal.atomic_files import file_path
 from pin_nonideal.errors import InputError, LoadingError, OutputError, RunError
 from pin_nonideal.scene.scene import Scene
 from pin_nonideal.trajectory.file import read_from
-from pin_nonideal.trajectory.trajectory import Trajectory
+from pin_nonideal.trajectory.trajectory import Trajectory, restored
 from pin_nonideal.types import Table
 
 from .pack import SUFFIX, archive_of, runs_in
@@ -108,7 +108,7 @@ class Sweep(Sequence[Trajectory]):
             content = archive_of(self.folder, place)
         except OSError as error:
             raise LoadingError(f'cannot read run {k} from "{path}": {error.strerror or error}') from error
-        return Trajectory._made(*read_from(io.BytesIO(content), path), path, scene)
+        return restored(*read_from(io.BytesIO(content), path), path, scene)
 
     def __iter__(self) -> Iterator[Trajectory]:
         return (self[k] for k in range(len(self)))

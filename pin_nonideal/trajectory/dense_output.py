@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError
-from pin_nonideal.scene.scene import Scene, program_of
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array, Table
 
 from .outcome import outcome_fields
@@ -82,7 +82,7 @@ class DenseOutput:
             late = t.max() if len(self) and self.times[0, 0] <= t.min() else t.min()
             raise InputError(f"at: t must lie in the run, which took {span}; got {late:g} s")
         sizes = (self.states.shape[2], self.modes.shape[1], len(self.torque) and self.torque.shape[1])
-        program, nv = program_of(scene), scene.model.nv
+        program, nv = compiled_scene(scene).program, scene.model.nv
         work = len(program.power_names) if self.options.energy else 0
         known = (scene.model.nq + nv + program.states + work, len(program.element_names))
         if sizes[:2] != known or sizes[2] not in (0, nv):

@@ -17,7 +17,7 @@ import numpy as np
 from pin_nonideal.atomic_files import file_path, mode_of, whole_file
 from pin_nonideal.errors import LoadingError, PinNonidealError
 from pin_nonideal.loading.load import load_again
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, compiled_scene, scene_origin
 from pin_nonideal.states.joint_layout import JointPlace
 from pin_nonideal.types import Table
 
@@ -92,7 +92,7 @@ def _arrays(run: Any) -> Table:
         "failure": run.failure,
         "events": [_listed(e) for e in run.events],
         "stats": vars(run.stats),
-        "origin": None if run.scene is None else run.scene._origin,
+        "origin": None if run.scene is None else scene_origin(run.scene).table,
     }
     header |= {key: getattr(run, key) for key in (*LISTS, "joints", "rows")}
     header |= {group: None if table is None else list(table) for group, table in tables.items()}
@@ -183,7 +183,7 @@ def fits(scene: Scene, joints: Sequence[JointPlace], rows: Table) -> bool:
         joints: of the run.
         rows: of the run.
     """
-    return scene._compiled.joints == list(joints) and scene._compiled.rows == rows
+    return compiled_scene(scene).joints == list(joints) and compiled_scene(scene).rows == rows
 
 
 def scene_again(origin: Any, joints: Sequence[JointPlace], rows: Table, notes: list[str]) -> Scene | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from pin_nonideal.compilation.error_context import joint_of
 from pin_nonideal.core_loader import core
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array, Table
 
 from .records import LEDGER, Event, Stats
@@ -44,7 +44,7 @@ def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any) -> Table:
         outcome: of the core.
         options: what was asked for, a RunOptions.
     """
-    t, nq, nv, program = outcome.t, scene.q0.size, scene.v0.size, scene._compiled.program
+    t, nq, nv, program = outcome.t, scene.q0.size, scene.v0.size, compiled_scene(scene).program
     nt = len(t)
     fields: Table = {}
     if options.a:
@@ -67,7 +67,7 @@ def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any) -> Table:
         power = outcome.power.reshape(nt, len(columns))
         fields["power"] = dict(zip(columns, power.T, strict=True))
     if options.energy:
-        jumps = ["impacts"] if scene._compiled.opening_names else []
+        jumps = ["impacts"] if compiled_scene(scene).opening_names else []
         fields["energy"] = _ledger([*columns, *jumps], outcome.energy)
     if scene.contact_names:
         fields["closed"] = outcome.closed.reshape(nt, len(scene.contact_names)).astype(bool)
@@ -87,8 +87,8 @@ def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any) -> Table:
         element_names=list(elements),
         element_laws=list(program.element_laws),
         law_names=list(program.law_names),
-        joints=scene._compiled.joints,
-        rows=scene._compiled.rows,
+        joints=compiled_scene(scene).joints,
+        rows=compiled_scene(scene).rows,
         name=scene.name,
         **fields,
     )
@@ -96,7 +96,7 @@ def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any) -> Table:
 
 def _of_laws(scene: Scene, outcome: core.Outcome) -> Table:
     """Forces of the laws on the degrees of freedom that each acts on, and limits of the elements."""
-    program, nt = scene._compiled.program, len(outcome.t)
+    program, nt = compiled_scene(scene).program, len(outcome.t)
     supports = program.law_supports
     ends = np.cumsum([len(dofs) for dofs in supports])
     parts = np.split(outcome.law_forces.reshape(nt, int(ends[-1]) if len(ends) else 0), ends[:-1], axis=1)
@@ -110,7 +110,7 @@ def _of_laws(scene: Scene, outcome: core.Outcome) -> Table:
 
 def _contact_forces(scene: Scene, outcome: core.Outcome) -> dict[str, Array]:
     """Force of each contact between two frames, in world axes."""
-    program = scene._compiled.program
+    program = compiled_scene(scene).program
     names = [program.constraints[block].name for block in program.framed_contacts]
     forces = outcome.contact_forces.reshape(len(outcome.t), len(names), 3)
     return {name: forces[:, k] for k, name in enumerate(names)}
@@ -118,7 +118,7 @@ def _contact_forces(scene: Scene, outcome: core.Outcome) -> dict[str, Array]:
 
 def _reactions(scene: Scene, outcome: core.Outcome) -> dict[str, Array]:
     """Wrenches of joints, then of anchors and contacts, in their own axes and in world axes."""
-    program = scene._compiled.program
+    program = compiled_scene(scene).program
     joints = [str(name) for name in scene.model.names][1:]
     names = [*joints, *(program.constraints[block].name for block in program.reaction_blocks)]
     wrenches = outcome.reactions.reshape(len(outcome.t), len(names), 12)
@@ -134,9 +134,9 @@ def _event(scene: Scene, event: core.Event, functions: Sequence[str]) -> Event:
         return Event(event.time, event.kind.name, str(joint))
     if not event.of_contact and event.kind is not core.EventKind.jump:
         # A cluster of events without any friction is one of contacts.
-        names = scene.element_names or scene._compiled.opening_names
+        names = scene.element_names or compiled_scene(scene).opening_names
         return Event(event.time, event.kind.name, names[event.element])
-    name = scene._compiled.program.constraints[event.element].name
+    name = compiled_scene(scene).program.constraints[event.element].name
     if event.kind not in (core.EventKind.impact, core.EventKind.jump):
         return Event(event.time, event.kind.name, name)
     change = event.energy_change

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from pin_nonideal.errors import InputError
 from pin_nonideal.lazy_fields import MadeLater
-from pin_nonideal.scene.copying import packed, parts_of
 from pin_nonideal.scene.scene import Scene
 from pin_nonideal.states.joint_layout import JointPlace
 from pin_nonideal.types import Array, Table
@@ -119,7 +118,7 @@ class Trajectory(MadeLater, ByName):
         # With its scene, where that can travel.
         try:
             if self.scene is not None:
-                packed(parts_of(self.scene), self.scene.name)
+                self.scene.__reduce__()
         except InputError:
             return {**self.__dict__, "scene": None}
         return vars(self)
@@ -248,20 +247,7 @@ class Trajectory(MadeLater, ByName):
         """
         from .file import read
 
-        return cls._made(*read(path), path, scene)
-
-    @classmethod
-    def _made(cls, fields: Table, origin: Any, path: Any, scene: Scene | str | None) -> Trajectory:
-        """The trajectory of what a file holds, with a scene as `load` is asked for one."""
-        from .file import fits, scene_again
-
-        run = cls(**fields)
-        if scene == "source":
-            return dataclasses.replace(run, scene=scene_again(origin, run.joints, run.rows, run.notes))
-        if scene is not None and not (isinstance(scene, Scene) and fits(scene, run.joints, run.rows)):
-            name = scene.name if isinstance(scene, Scene) else scene
-            raise InputError(f'Trajectory.load: the scene "{name}" is not the one of the run in "{path}"')
-        return dataclasses.replace(run, scene=scene)
+        return restored(*read(path), path, scene)
 
 
 _DEFAULTS: Table = {}
@@ -278,3 +264,27 @@ def with_defaults(fields: Table) -> Table:
     """All fields of a Trajectory but its counters: those given, and of all others the defaults."""
     made = {name: make() for name, make in _MAKERS.items() if name not in fields}
     return {**_DEFAULTS, **made, **fields}
+
+
+def restored(fields: Table, origin: Any, path: Any, scene: Scene | str | None) -> Trajectory:
+    """Trajectory of the content of a file, with its scene.
+
+    Args:
+        fields: of the trajectory.
+        origin: name and parameters for `load`, or None.
+        path: of the file, for messages.
+        scene: as for `Trajectory.load`.
+
+    Raises:
+        InputError: the scene is not the one of the run.
+        LoadingError: the scene cannot be loaded again.
+    """
+    from .file import fits, scene_again
+
+    run = Trajectory(**fields)
+    if scene == "source":
+        return dataclasses.replace(run, scene=scene_again(origin, run.joints, run.rows, run.notes))
+    if scene is not None and not (isinstance(scene, Scene) and fits(scene, run.joints, run.rows)):
+        name = scene.name if isinstance(scene, Scene) else scene
+        raise InputError(f'Trajectory.load: the scene "{name}" is not the one of the run in "{path}"')
+    return dataclasses.replace(run, scene=scene)

@@ -12,6 +12,7 @@ from tests.support.seeds import seeds
 
 STILL = 1e-6  # [m/s^2, rad/s^2]: motion that is slower than this is rounding
 DURATION = 0.05  # [s]
+ROUNDING = 1e-8  # part of the weight: least squares of nearly dependent rows
 
 families = pytest.mark.parametrize("family", wedged.FAMILIES, ids=lambda family: family.__name__)
 
@@ -34,3 +35,28 @@ def test_runs_from_rest(family, method, seed):
     options = {} if method.startswith("dop") else {"dt": 1e-3}
     run = pn.simulate(case.scene, DURATION, method=method, max_wall=20.0, progress=False, **options)
     assert admissible is None or admissible == (np.abs(run.v[-1]).max() <= STILL * DURATION)
+
+
+@families
+@pytest.mark.parametrize("method", ["dop853", "moreau"])
+@pytest.mark.parametrize("seed", seeds(range(200), count=5))
+def test_recorded_forces_at_rest_lie_within_the_cones_and_hold_the_bodies(family, method, seed):
+    case = family(seed)
+    options = {} if method.startswith("dop") else {"dt": 1e-3}
+    run = pn.simulate(case.scene, 3e-3, method=method, record="forces", progress=False, **options)
+    if np.abs(run.v).max() > 0.0:
+        return
+    held = -case.loads.reshape(-1, 6)
+    size = np.abs(held).max()
+    for forces in zip(*run.contact_forces.values(), strict=True):
+        balance = np.zeros_like(held)
+        for touch, force in zip(case.touches, forces, strict=True):
+            normal = force @ touch.normal
+            friction = np.linalg.norm(force - normal * touch.normal)
+            assert normal >= -ROUNDING * size
+            assert friction <= touch.mu * normal + ROUNDING * size
+            for body, sign in ((touch.first, 1.0), (touch.second, -1.0)):
+                if body >= 0:
+                    arm = touch.point - case.centers[body]
+                    balance[body] += sign * np.append(force, np.cross(arm, force))
+        assert np.abs(balance - held).max() <= ROUNDING * size

@@ -48,7 +48,7 @@ def test_forces_and_acceleration_are_those_of_solve(drawn):
 
 
 def test_blocks_of_the_inverse_of_the_normal_matrix(drawn):
-    """Eqs. (20)-(24): [[P, J], [J, S]] with P = J (I + E), S = J (I + D) inverts the normal matrix of Eq. (15)."""
+    """Eqs. (20)-(24): [[P, J], [J, S]] with P = J (I + E), S = J (I + D) inverts that of Eq. (15)."""
     M, F, A, b, C = drawn
     d = pn.solve_details(M, F, A, b, C)
     n = len(M)

@@ -383,9 +383,21 @@ def test_render(scene, examples, tmp_path, monkeypatch):
 def test_the_public_names_are_all_drawn():
     """A new public function is fuzzed, or is one of these."""
     drawn_by_lot = {x.__name__ for x in (*DESCRIPTIONS, *TIMES, *STATICS)}
-    drawn_by_lot |= {"simulate", "rollout", "solve", "solve_details", "Scene", "load", "resume", "replay", "plot", "sweep"}
+    drawn_by_lot |= {
+        "simulate",
+        "rollout",
+        "solve",
+        "solve_details",
+        "Scene",
+        "load",
+        "resume",
+        "replay",
+        "plot",
+        "sweep",
+    }
     drawn_by_lot |= {
         "cone_complementarity",
+        "solve_details",
         "geometry_contacts",
         "sweep_grid",
         "sweep_samples",

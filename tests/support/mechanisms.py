@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 import pin_nonideal as pn
+from pin_nonideal.scene.scene import scene_states
 
 GRAVITY = 9.81
 # Step control at which runs of a hundred steps stay well within 1e-10 of their closed forms.
@@ -100,5 +101,5 @@ def again(scene, **changes):
     names = ("constraints", "laws", "contacts", "forces", "actuation", "q0", "v0", "name", "terms")
     made = pn.Scene(scene.model, **{**{name: getattr(scene, name) for name in names}, **changes})
     if not {"q0", "v0"} & set(changes):
-        made._held = scene._held
+        scene_states(made).held = scene_states(scene).held
     return made

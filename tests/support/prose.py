@@ -83,9 +83,7 @@ def sentences_of(path: Path) -> list[Sentence]:
 
 def count(sentences: list[Sentence]) -> Counts:
     """Counts of a list of sentences."""
-    return Counts(
-        len(sentences), sum(s.has_what for s in sentences), sum(s.has_opener for s in sentences)
-    )
+    return Counts(len(sentences), sum(s.has_what for s in sentences), sum(s.has_opener for s in sentences))
 
 
 def sources_below(root: Path) -> list[Path]:
@@ -176,7 +174,9 @@ def _paragraphs(text: str) -> Iterator[tuple[int, str]]:
     for number, line in enumerate(text.splitlines(), 1):
         if line.lstrip().startswith(("```", "$$")):
             fenced = not fenced
-        starts = fenced or not line.strip() or line.lstrip().startswith(("- ", "* ", "#", "|", "<", "```", "$$"))
+        starts = (
+            fenced or not line.strip() or line.lstrip().startswith(("- ", "* ", "#", "|", "<", "```", "$$"))
+        )
         if starts and block:
             yield start, " ".join(block)
             block = []

@@ -166,13 +166,15 @@ def balls(rng, flat, count):
                 apart = [np.linalg.norm(x - centers[k]) - radii[k] - radius for k in below]
                 return [*apart, x[1]] if flat else apart
 
-            start = np.mean([centers[k] for k in below], axis=0) + [0.0, 0.0, 1.5 * radius]
+            start = np.mean([centers[k] for k in below], axis=0) + np.array([0.0, 0.0, 1.5 * radius])
             center, _, found, _ = fsolve(gaps, start, full_output=True, xtol=1e-15)
             if found != 1 or center[2] < 1.02 * radius or np.abs(gaps(center)).max() > 1e-13:
                 continue
         else:
             center = np.array([rng.uniform(-0.3, 0.3), 0.0 if flat else rng.uniform(-0.3, 0.3), radius])
-        clear = [np.linalg.norm(center - c) >= r + radius - 1e-12 for c, r in zip(centers, radii, strict=True)]
+        clear = [
+            np.linalg.norm(center - c) >= r + radius - 1e-12 for c, r in zip(centers, radii, strict=True)
+        ]
         if all(clear):
             radii.append(radius)
             centers.append(center)

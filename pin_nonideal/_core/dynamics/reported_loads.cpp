@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "complementarity/cone/minimum_norm.hpp"
+#include "complementarity/cone/solver.hpp"
 #include "constraints/redundancy.hpp"
 #include "math/decompositions.hpp"
 
@@ -81,12 +81,8 @@ ReportedLoads::ReportedLoads(const Program& p, Workspace& w) : w_(w) {
     factor.compute(S);
     const MatX Q = factor.solve_lower(Z.transpose()).transpose();
     const MatX W = MatX::Identity(n, n) - Q * Q.transpose();  // zero for multipliers that exert no force
-    ConeProblem problem;
-    problem.pose(W, VecX(-W * of_rows), shares.cones);
-    VecX f = of_rows.cwiseQuotient(problem.scale()) / problem.force_unit();
-    ConeShares shortest;
-    if (!shortest.even_out(problem, f)) return;
-    f = problem.force_unit() * problem.scale().cwiseProduct(f);
+    VecX f(n);
+    if (!ConeComplementarity().hold(W, -W * of_rows, shares.cones, f)) return;
     least_norm_ = lam;
     Reactions& r = w.now.reactions;
     for (int k = 0; k < n; ++k) r.lam[shares.rows[k]] = f[k];

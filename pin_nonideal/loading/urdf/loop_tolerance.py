@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import FrameAnchor, JointCoupling, PointAnchor
-from pin_nonideal.scene.scene import Scene, program_of
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
 from pin_nonideal.states.projection import nearest_closure
 from pin_nonideal.states.rows import rows_at
@@ -60,7 +60,7 @@ def relaxed(scene: Scene, tolerance: float) -> Relaxed | None:
         tolerance: to which lengths and angles of the loops are given [m or rad].
     """
     constraints = list(scene.constraints)
-    program = program_of(scene)
+    program = compiled_scene(scene).program
     holonomic = all(holds for c in program.constraints for holds in c.holonomic)
     looped = [isinstance(c, (PointAnchor, JointCoupling, FrameAnchor)) for c in constraints]
     if (
@@ -77,7 +77,7 @@ def relaxed(scene: Scene, tolerance: float) -> Relaxed | None:
     if welds:
         split = [part for c in constraints for part in (welds.get(id(c), (c,)))]
         scene = Scene(model, constraints=split, q0=scene.q0, assembly_tolerance=tolerance)
-        program = program_of(scene)
+        program = compiled_scene(scene).program
         kept, q, gap, nearly = _independent_rows(scene, program, tolerance)
         if kept is None:
             return Relaxed(model, constraints, scene.q0, nearly) if nearly else None

@@ -15,6 +15,7 @@ import pinocchio as pin
 
 from pin_nonideal.description.constraints import UserConstraint
 from pin_nonideal.errors import PinNonidealError
+from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.states.kinematics import joint_placements
 from pin_nonideal.states.rows import holonomic_rows, rows_at
 from pin_nonideal.types import Array
@@ -85,7 +86,7 @@ class _Tracer:
     def __init__(self, run: Trajectory, motion: Motion, name: str) -> None:
         self.run, self.motion, self.name = run, motion, name
         self.model = run.scene.model
-        program = run.scene._compiled.program
+        program = compiled_scene(run.scene).program
         self.runner, self.rows = program.runner(), run.scene.constraint_slices[name]
         self.holonomic = bool(holonomic_rows(program)[self.rows].all())
         self.joint, self.local = 0, np.zeros(3)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.states.kinematics import frame_on_joint
 from pin_nonideal.types import Array
 
@@ -56,7 +57,7 @@ def touches_of(run: Trajectory, motion: Motion) -> list[Touch]:
         run: the run.
         motion: its motion.
     """
-    compiled = run.scene._compiled
+    compiled = compiled_scene(run.scene)
     names = [compiled.program.constraints[block].name for block in compiled.program.framed_contacts]
     struck = {str(event.element) for event in run.events}
     closed = {name: _closed(run, name) for name in names}
@@ -84,14 +85,14 @@ def _pressing_lines(run: Trajectory, motion: Motion, chosen: list[int]) -> Array
     """A point of the line along which each contact presses, and its normal, at each frame, (n, k, 6)."""
     if not chosen:
         return np.zeros((len(motion.times), 0, 6))
-    runner, still = run.scene._compiled.program.runner(), np.zeros(run.scene.model.nv)
+    runner, still = compiled_scene(run.scene).program.runner(), np.zeros(run.scene.model.nv)
     states = zip(motion.q, motion.times, strict=True)
     return np.array([runner.pressing_lines(q, still, float(t)).reshape(-1, 6)[chosen] for q, t in states])
 
 
 def _touch(run: Trajectory, name: str, line: Array, closed: NDArray[np.bool_]) -> Touch:
     """A contact on its line: the surface of what has a radius lies so far from the point of its row."""
-    item: Any = run.scene._compiled.described[name]
+    item: Any = compiled_scene(run.scene).described[name]
     frames = (item.frame, item.plane) if hasattr(item, "plane") else (item.frame1, item.frame2)
     joint, other = (0 if frame is None else frame_on_joint(run.scene.model, frame)[0] for frame in frames)
     radius = getattr(item, "radius1", getattr(item, "radius", 0.0))

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from pin_nonideal.description.contacts import JointLimit
 from pin_nonideal.description.contacts.round import CapsuleContact, SphereContact, segments
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.kinematics import frame_on_joint
 from pin_nonideal.types import Array
 from pin_nonideal.validation import axis_triad, unit_axis
@@ -18,7 +19,6 @@ from .frames import Motion
 from .visuals import LINK_COLORS, Color, Shape, Visual, joint_axis
 
 if TYPE_CHECKING:
-    from pin_nonideal.scene.scene import Scene
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 # A patch reaches so far beyond what touches it, and so far at most from where that is mostly, in sizes.
@@ -154,7 +154,7 @@ def _stops(run: Trajectory, motion: Motion) -> list[Visual]:
     found = []
     model = run.scene.model
     limits = {"lower": model.lowerPositionLimit, "upper": model.upperPositionLimit}
-    for name, item in run.scene._compiled.described.items():
+    for name, item in compiled_scene(run.scene).described.items():
         if isinstance(item, JointLimit) and name in struck:
             joint, end = model.getJointId(item.joint), name.rpartition(" ")[2]
             given = getattr(item, end)

@@ -18,6 +18,7 @@ import pinocchio as pin
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.contacts import UserContact
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.rows import rows_at
 from pin_nonideal.types import Array
 from pin_nonideal.validation import axis_triad, unit_axis
@@ -28,7 +29,6 @@ from .markers import Side, constraints_of, side_of, sides_of
 from .visuals import joint_axis
 
 if TYPE_CHECKING:
-    from pin_nonideal.scene.scene import Scene
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 
@@ -146,7 +146,7 @@ def _reaction(
 
 def _opening_the_gap(run: Trajectory, motion: Motion, name: str, lam: Array) -> list[Arrow]:
     """The generalized force A^T lam on a gap of the user's, at the joints."""
-    scene, runner = run.scene, run.scene._compiled.program.runner()
+    scene, runner = run.scene, compiled_scene(run.scene).program.runner()
     states = zip(motion.q, motion.of(run.v), motion.times, lam, strict=True)
     rows = scene.constraint_slices[name]
     force = np.array([rows_at(runner, q, v, float(t))[0][rows].T @ own for q, v, t, own in states])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.contacts import PointContact
 from pin_nonideal.description.forces import SpringDamper
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.kinematics import frame_on_joint, joint_placements
 from pin_nonideal.types import Array
 
 from .frames import Motion
-
-if TYPE_CHECKING:
-    from pin_nonideal.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ def constraints_of(scene: Scene) -> list[tuple[str, Any, core.Shown]]:
     Args:
         scene: the scene.
     """
-    compiled = scene._compiled
+    compiled = compiled_scene(scene)
     shown = {c.name: c.shown for c in compiled.program.constraints}
     return [(name, compiled.described[name], shown[name]) for name in scene.constraint_slices]
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.states.rows import rows_at
 from pin_nonideal.types import Array
 
@@ -79,7 +80,7 @@ def gaps_of(run: Trajectory) -> tuple[Array, dict[str, Array]]:
     """
     t = np.asarray(run.t)
     chosen = np.unique(np.linspace(0, len(t) - 1, min(len(t), MOST_GAPS)).astype(int))
-    runner = run.scene._compiled.program.runner()
+    runner = compiled_scene(run.scene).program.runner()
     residuals = np.array([rows_at(runner, run.q[k], run.v[k], float(t[k]))[2] for k in chosen])
     slices = run.scene.constraint_slices
     return t[chosen], {name: residuals[:, slices[name].stop - 1] for name in run.scene.contact_names}

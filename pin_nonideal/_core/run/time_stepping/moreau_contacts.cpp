@@ -352,8 +352,8 @@ void MoreauContacts::solve(double t) {
     w.counters.dissipation = std::max(w.counters.dissipation, r.dissipation);
 }
 
-// Velocity at the step's end, which contacts stay closed, and the modes: what stays below its limit sticks. Whether a
-// force is below it by what is rounding beside the others only the slip tells.
+// Computes the velocity at the step's end, the closed contacts and the modes. An element sticks if its force stays below
+// its limit, or if its slip is zero.
 void MoreauContacts::end_velocity() {
     const int n = static_cast<int>(rows_.size());
     v1_ = v0_ + h_ * w.now.a;
@@ -374,7 +374,7 @@ void MoreauContacts::end_velocity() {
         const double limit = cones_[e].bound * (head ? f_[at] : 1.0);
         const double size = dim == 1 ? std::abs(f_[at + head] - part.middle) : f_.segment(at + head, dim).norm();
         const bool rests = w1_.segment(at + head, dim).norm() <= still;
-        const bool held = limit - size > clear || (rests && (limit <= clear || size < limit * (1.0 - limit_rounding)));
+        const bool held = limit - size > clear || rests;
         const bool forward = dim > 1 || (dim > 0 && w1_[at + head] > 0.0);
         modes_[part.element] = held && dim > 0 ? sticking : forward ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[part.element].block];
