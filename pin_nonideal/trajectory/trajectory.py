@@ -20,15 +20,15 @@ from pin_nonideal.states.joint_layout import JointPlace
 from pin_nonideal.types import Array, Table
 from pin_nonideal.validation import array
 
-from .by_name import ByName
+from .by_name import force_of, frame_record, joint_record, law_record, reaction_of
 from .columns import columns
 from .dense_output import DenseOutput
-from .records import Event, Sample, Stats, UserEventRecord
+from .records import Event, FrameRecord, JointRecord, LawRecord, Sample, Stats, UserEventRecord
 from .summary import summary
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(MadeLater, ByName):
+class Trajectory(MadeLater):
     """Samples of a run; what was not recorded is None.
 
     Attributes:
@@ -144,6 +144,80 @@ class Trajectory(MadeLater, ByName):
         within it; what belongs to no joint goes by its field alone.
         """
         return columns(self)
+
+    def joint(self, name: str) -> JointRecord:
+        """What one joint did.
+
+        Args:
+            name: of a joint; "base" is the only floating one.
+
+        Returns:
+            Its record; what was not recorded is None.
+
+        Raises:
+            UnknownNameError: there is no such joint.
+        """
+        return joint_record(self, name)
+
+    def frame(self, name: str) -> FrameRecord:
+        """How one frame moved: its placement and velocity in the world, from the kinematics of the tree.
+
+        Args:
+            name: of a frame or joint of the model.
+
+        Raises:
+            InputError: the run does not know its scene, which has the model.
+            UnknownNameError: there is no such frame.
+        """
+        return frame_record(self, name)
+
+    def force(self, name: str) -> Array:
+        """What one constraint or contact exerts.
+
+        Args:
+            name: of a constraint or contact of the scene.
+
+        Returns:
+            Multipliers of a constraint's rows in M a = F + C + A^T lam, (nt, rows), those of an anchor the
+            force on the body of frame1 in the axes of frame2 [N; N m]; record "forces".  Of a contact the
+            force on the body of its frame in world axes [N], friction included, (nt, 3); record "reactions".
+
+        Raises:
+            InputError: it was not recorded.
+            UnknownNameError: there is no such constraint or contact.
+        """
+        return force_of(self, name)
+
+    def law(self, name: str) -> LawRecord:
+        """What one law did.
+
+        Args:
+            name: of a law of the scene, or of a contact that rubs.
+
+        Returns:
+            Its record; what was not recorded is None.
+
+        Raises:
+            UnknownNameError: there is no such law.
+        """
+        return law_record(self, name)
+
+    def reaction(self, name: str, axes: str = "own") -> Array:
+        """What a joint, an anchor or a contact carries, all forces in it included: [force; moment], (nt, 6).
+
+        A joint's is exerted on the body that it moves, about its origin; it contains the drive and the
+        friction of the joint.  That of an anchor or contact is exerted on the body of frame1, about the
+        origin of frame1; it contains the friction of its laws.
+
+        Args:
+            name: of a joint of the model, or of an anchor or contact, which goes before a joint of its name.
+            axes: "own", the joint frame's or those of frame2, or "world".
+
+        Raises:
+            InputError: the run did not record "reactions", or `axes` is neither.
+            UnknownNameError: nothing of that name carries a wrench.
+        """
+        return reaction_of(self, name, axes)
 
     def to_dataframe(self) -> Any:
         """The `columns` as a pandas.DataFrame, one row a sample, with the time as its index.

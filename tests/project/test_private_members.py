@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).parents[2] / "pin_nonideal"
-# Of libraries that offer no other way: the frames of the interpreter, argparse's options of a command, and xacro's search for packages.
+# Of libraries that offer no other way: the interpreter's frames, argparse's options of a command, xacro's
+# search for packages.
 OF_LIBRARIES = {"_getframe", "_actions", "_SubParsersAction", "_eval_find"}
 OF_NAMED_TUPLES = {"_replace", "_asdict", "_fields"}
 
