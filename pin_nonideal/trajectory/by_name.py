@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +14,8 @@ from pin_nonideal.validation import choice
 
 from .records import FrameRecord, JointRecord, LawRecord, angles
 
-if TYPE_CHECKING:
-    from .trajectory import Trajectory
 
-
-def joint_record(run: Trajectory, name: str) -> JointRecord:
+def joint_record(run: Any, name: str) -> JointRecord:
     """Record of one joint, see `Trajectory.joint`."""
     floating = [place for place in run.joints if place.kind == "JointModelFreeFlyer"]
     known = {"base": floating[0]} if len(floating) == 1 else {}
@@ -37,7 +34,7 @@ def joint_record(run: Trajectory, name: str) -> JointRecord:
     return JointRecord(place.name, *parts)  # type: ignore[arg-type]
 
 
-def frame_record(run: Trajectory, name: str) -> FrameRecord:
+def frame_record(run: Any, name: str) -> FrameRecord:
     """Record of one frame, see `Trajectory.frame`."""
     if run.scene is None:
         raise InputError(f'frame("{name}") needs the scene of the run, which this one has lost')
@@ -48,19 +45,21 @@ def frame_record(run: Trajectory, name: str) -> FrameRecord:
     return FrameRecord(name, *frame_motion(model, name, run.q, run.v))
 
 
-def force_of(run: Trajectory, name: str) -> Array:
+def force_of(run: Any, name: str) -> Array:
     """Force of one constraint or contact, see `Trajectory.force`."""
     if name not in run.rows:
         raise UnknownNameError(f'no constraint or contact "{name}" in this run{nearest(name, run.rows)}')
     first, end, contact = run.rows[name]
     if contact:
-        return reaction_of(run, name, "world")[:, :3]
+        force: Array = reaction_of(run, name, "world")[:, :3]
+        return force
     if run.lam is None:
         raise InputError(f'force("{name}") needs a run with record="forces"')
-    return run.lam[:, first:end]
+    multipliers: Array = run.lam[:, first:end]
+    return multipliers
 
 
-def law_record(run: Trajectory, name: str) -> LawRecord:
+def law_record(run: Any, name: str) -> LawRecord:
     """Record of one law, see `Trajectory.law`."""
     if name not in run.law_names:
         raise UnknownNameError(f'no law "{name}" in this run{nearest(name, run.law_names)}')
@@ -78,11 +77,12 @@ def law_record(run: Trajectory, name: str) -> LawRecord:
     return LawRecord(name, force, power, limit, mode)
 
 
-def reaction_of(run: Trajectory, name: str, axes: str) -> Array:
+def reaction_of(run: Any, name: str, axes: str) -> Array:
     """Wrench of a joint, anchor or contact, see `Trajectory.reaction`."""
     if run.reactions is None:
         raise InputError(f'reaction("{name}") needs a run with record="reactions"')
     if name not in run.reactions:
         raise UnknownNameError(f'no joint, anchor or contact "{name}"{nearest(name, run.reactions)}')
     begin = 6 * ("own", "world").index(choice("reaction: axes", axes, ("own", "world")))
-    return run.reactions[name][:, begin : begin + 6]
+    wrench: Array = run.reactions[name][:, begin : begin + 6]
+    return wrench
