@@ -7,7 +7,7 @@ message.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
 from typing import Any
 
@@ -32,6 +32,18 @@ def label(description: Any) -> str:
     kind = type(description).__name__
     name = getattr(description, "name", None)
     return f'{kind} "{name}"' if isinstance(name, str) and name else kind
+
+
+def by_name(value: Any) -> dict[Any, Any] | None:
+    """Entries by name of a mapping, a pandas Series or a pandas DataFrame; None of anything else.
+
+    Args:
+        value: any object.
+    """
+    if isinstance(value, Mapping):
+        return dict(value)
+    is_pandas = type(value).__module__.split(".")[0] == "pandas" and hasattr(value, "items")
+    return dict(value.items()) if is_pandas else None
 
 
 def number(what: str, value: object) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import singledispatch
 from typing import Any
 
@@ -11,9 +12,9 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import EffortLimits, HoldPosition, SampledControl, Table
 from pin_nonideal.description.forces import JointSpring, SpringDamper, UserForce, Wrench
 from pin_nonideal.errors import InputError
-from pin_nonideal.states.joint_layout import configuration
+from pin_nonideal.states.parsing import named_configuration, named_joint_samples, named_joint_values
 from pin_nonideal.types import Array, Model
-from pin_nonideal.validation import array
+from pin_nonideal.validation import by_name
 
 from .callbacks import checked
 from .resolver import Resolution, words
@@ -83,27 +84,39 @@ def lower_actuation(u: Any, out: core.Builder, where: Resolution) -> None:
         least, most = _efforts(u, model)
         out.limit_effort(least=least, most=most)
     elif isinstance(u, SampledControl):
-        out.set_sampled_torque(checked(u.function, f"{words(u)}: function", (nv,)), u.period)
+        who = f"{words(u)}: function"
+        out.set_sampled_torque(checked(_torques_of(u.function, model, who), who, (nv,)), u.period)
     elif isinstance(u, HoldPosition):
-        q = where.q0 if u.q is None else configuration(model, u.q, f"{words(u)}: q")
+        q = where.q0 if u.q is None else named_configuration(model, u.q, where.q0, f"{words(u)}: q")
         kp, kd = _gains(u, "kp", model), _gains(u, "kd", model)
         out.set_hold_position(kp=kp, kd=kd, q=np.ascontiguousarray(q))
     elif isinstance(u, Table):
-        times, values = np.asarray(u.times), np.asarray(u.values)
-        if values.shape[1] != nv:
-            raise InputError(f"{words(u)}: values must have {nv} columns (nv); got {values.shape[1]}")
+        times = np.asarray(u.times)
+        values = named_joint_samples(model, u.values, times.size, f"{words(u)}: values")
         out.set_torque_table(times.tolist(), np.ascontiguousarray(values))
     elif callable(u):
-        out.set_torque_function(checked(u, "actuation", (nv,)))
+        out.set_torque_function(checked(_torques_of(u, model, "actuation"), "actuation", (nv,)))
     else:
-        out.set_constant_torque(tau=np.ascontiguousarray(array("actuation", u, (nv,))))
+        out.set_constant_torque(tau=named_joint_values(model, u, "actuation"))
+
+
+def _torques_of(function: Callable[..., Any], model: Model, who: str) -> Callable[..., Any]:
+    """A function of torques that may return them by joint name."""
+
+    def torques(*arguments: Any) -> Any:
+        tau = function(*arguments)
+        return named_joint_values(model, tau, who) if by_name(tau) is not None else tau
+
+    return torques
 
 
 def _efforts(u: EffortLimits, model: Model) -> tuple[Array, Array]:
     """Least and most effort of every degree of freedom, infinite where it has no limit."""
     if u.effort is not None:
-        shape = () if np.ndim(u.effort) == 0 else (model.nv,)
-        most = np.full(model.nv, array(f"{words(u)}: effort", u.effort, shape))
+        if isinstance(u.effort, float):
+            most = np.full(model.nv, u.effort)
+        else:
+            most = named_joint_values(model, u.effort, f"{words(u)}: effort", others=np.inf)
         return -most, most
     least, most = model.lowerEffortLimit.copy(), model.upperEffortLimit.copy()
     unstated = least >= most
@@ -115,13 +128,13 @@ def _efforts(u: EffortLimits, model: Model) -> tuple[Array, Array]:
 def _gains(u: HoldPosition, key: str, model: Model) -> Array:
     """A gain for every degree of freedom; a number acts on joints of one degree of freedom."""
     gain, who = getattr(u, key), f"{words(u)}: {key}"
-    if np.ndim(gain) == 0:
+    if isinstance(gain, float):
         single = np.zeros(model.nv)
         for joint in list(model.joints)[1:]:
             if joint.nv == 1:
                 single[joint.idx_v] = float(gain)
         return single
-    full: Array = array(who, gain, (model.nv,)).copy()
+    full = named_joint_values(model, gain, who)
     if key == "kp":
         for index, joint in list(enumerate(model.joints))[1:]:
             part = full[joint.idx_v : joint.idx_v + joint.nv]

@@ -1,20 +1,21 @@
 """Torques tau that drive a scene, in generalized coordinates (shape nv).
 
-A scene takes one of: nothing, a constant array, a function (t, q, v) -> tau evaluated at every evaluation, or
-one of the descriptions below.
+A scene takes one of: nothing, constant torques, a function (t, q, v) -> tau evaluated at every evaluation, or
+one of the descriptions below.  Torques are arrays (nv,) or tables by joint name, those of functions too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pin_nonideal.errors import InputError
-from pin_nonideal.types import Array
-from pin_nonideal.validation import array, function, label, optional_text, positive
+from pin_nonideal.types import Array, State
+from pin_nonideal.validation import array, by_name, function, label, optional_text, positive
 
 __all__ = [
     "EffortLimits",
@@ -23,7 +24,7 @@ __all__ = [
     "Table",
 ]
 
-Gain = float | Sequence[float] | NDArray[np.float64]
+Gain = float | Sequence[float] | NDArray[np.float64] | Mapping[str, ArrayLike]
 
 
 @dataclass(frozen=True)
@@ -56,27 +57,25 @@ class HoldPosition:
     joints of one degree of freedom only.
 
     Args:
-        kp: stiffness [N m/rad or N/m], a number or an array of shape (nv,), not negative.
-        kd: damping [N m s/rad or N s/m], a number or an array of shape (nv,), not negative.
-        q: configuration to hold, shape (nq,); None for the scene's initial one.
+        kp: stiffness [N m/rad or N/m], not negative: a number, an array of shape (nv,), or by joint name,
+            zero for the others.
+        kd: damping [N m s/rad or N s/m], not negative, as kp.
+        q: configuration to hold, shape (nq,) or by joint name, the others as in the scene's initial one; None
+            for the scene's initial one.
         name: used in messages and results.
     """
 
     kp: Gain
     kd: Gain
-    q: Sequence[float] | NDArray[np.float64] | None = None
+    q: State | None = None
     name: str | None = None
 
     def __post_init__(self) -> None:
         optional_text("HoldPosition: name", self.name)
         who = label(self)
         for key in ("kp", "kd"):
-            gain = np.asarray(getattr(self, key), dtype=object)
-            checked = array(f"{who}: {key}", getattr(self, key), () if gain.ndim == 0 else (None,))
-            if (checked < 0.0).any():
-                raise InputError(f"{who}: {key} must not be negative; got {float(checked.min()):g}")
-            object.__setattr__(self, key, float(checked) if checked.ndim == 0 else checked)
-        if self.q is not None:
+            object.__setattr__(self, key, _nonnegative(f"{who}: {key}", getattr(self, key)))
+        if self.q is not None and by_name(self.q) is None:
             object.__setattr__(self, "q", array(f"{who}: q", self.q, (None,)))
 
 
@@ -86,12 +85,13 @@ class Table:
 
     Args:
         times: increasing [s], shape (nt,) with nt >= 1.
-        values: torques, shape (nt, nv) [N m or N].
+        values: torques [N m or N], shape (nt, nv), or by joint name, shape (nt,) or (nt, n) for a joint of n
+            degrees of freedom: a dict or a pandas DataFrame. Joints that are left out have no torque.
         name: used in messages and results.
     """
 
     times: Sequence[float] | NDArray[np.float64]
-    values: Sequence[Sequence[float]] | NDArray[np.float64]
+    values: Sequence[Sequence[float]] | NDArray[np.float64] | Mapping[str, ArrayLike]
     name: str | None = None
 
     def __post_init__(self) -> None:
@@ -108,7 +108,17 @@ class Table:
                 f"times[{i}] = {times[i]:g}"
             )
         object.__setattr__(self, "times", times)
-        object.__setattr__(self, "values", array(f"{who}: values", self.values, (times.size, None)))
+        samples = by_name(self.values)
+        if samples is None:
+            checked: Array | dict[str, Array] = array(f"{who}: values", self.values, (times.size, None))
+        else:
+            checked = {
+                name: array(
+                    f'{who}: values of "{name}"', x, (times.size,) if np.ndim(x) < 2 else (times.size, None)
+                )
+                for name, x in samples.items()
+            }
+        object.__setattr__(self, "values", checked)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,9 +131,10 @@ class EffortLimits:
 
     Args:
         actuation: what asks for torques u: any other actuation.
-        effort: most of each dof [N m or N], a number or an array of shape (nv,), not negative; None for the
-            model's own limits (`lowerEffortLimit`, `upperEffortLimit`: those of the file), of which infinite
-            ones and the zeros of joints that state none are none.
+        effort: largest torque [N m or N], not negative: a number, an array of shape (nv,), or by joint name,
+            without limit for the others; None for the model's own limits (`lowerEffortLimit`,
+            `upperEffortLimit`: those of the file), of which infinite ones and the zeros of joints that state
+            none are none.
         name: used in messages and results.
     """
 
@@ -138,16 +149,30 @@ class EffortLimits:
             kind = "None" if self.actuation is None else "EffortLimits"
             raise InputError(f"{who}: actuation must ask for torques without limits of its own; got {kind}")
         if self.effort is not None:
-            shape = () if np.ndim(np.asarray(self.effort, dtype=object)) == 0 else (None,)
-            most = array(f"{who}: effort", self.effort, shape)
-            if (most < 0.0).any():
-                raise InputError(f"{who}: effort must not be negative; got {float(most.min()):g}")
-            object.__setattr__(self, "effort", float(most) if most.ndim == 0 else most)
+            object.__setattr__(self, "effort", _nonnegative(f"{who}: effort", self.effort))
 
 
 Actuation = (
-    EffortLimits | SampledControl | HoldPosition | Table | Callable[..., object] | Sequence[float] | Array
+    EffortLimits
+    | SampledControl
+    | HoldPosition
+    | Table
+    | Callable[..., object]
+    | Sequence[float]
+    | Array
+    | Mapping[str, ArrayLike]
 )
+
+
+def _nonnegative(what: str, value: Any) -> float | Array | dict[str, Array]:
+    """A number, an array or a table by joint name of numbers that are not negative."""
+    table = by_name(value)
+    if table is not None:
+        return {name: np.asarray(_nonnegative(f'{what} of "{name}"', x)) for name, x in table.items()}
+    checked = array(what, value, () if np.asarray(value, dtype=object).ndim == 0 else (None,))
+    if (checked < 0.0).any():
+        raise InputError(f"{what} must not be negative; got {float(checked.min()):g}")
+    return float(checked) if checked.ndim == 0 else checked
 
 
 def asked_by(actuation: Actuation | None) -> Actuation | None:

@@ -12,8 +12,9 @@ from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.core_loader import core
 from pin_nonideal.equation import Solution
 from pin_nonideal.errors import InputError
+from pin_nonideal.states.parsing import named_joint_values
 from pin_nonideal.types import Array, State
-from pin_nonideal.validation import array, choice, number
+from pin_nonideal.validation import choice, number
 
 from .state import SceneStates
 
@@ -120,7 +121,7 @@ class Evaluator:
         """Result of a function of the core at a state that is checked here."""
         q_in, v_in = self._states.configuration(q, "q"), self._states.velocity(v, "v")
         self._states.check_functions_at(q_in, v_in, t)
-        torque = None if tau is None else np.array(array("tau", tau, (self._nv,)))
+        torque = None if tau is None else named_joint_values(self._compiled.model, tau, "tau")
         try:
             return function(q_in, v_in, number("t", t), torque, *rest, **named)
         except core.CoreFailure as failure:

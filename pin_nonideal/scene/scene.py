@@ -68,8 +68,8 @@ class Scene:
         laws: descriptions of `description.laws`.
         contacts: descriptions of `description.contacts`.
         forces: descriptions of `description.forces`.
-        actuation: None, a constant torque (nv,), a function (t, q, v) -> tau, or a description of
-            `pin_nonideal.description.actuation`.
+        actuation: None, constant torques, (nv,) or by joint name, a function (t, q, v) -> tau, or a
+            description of `pin_nonideal.description.actuation`.
         q0: initial configuration; the neutral one when None.  Frames held to the world are held where they
             are here.  Here and wherever a configuration is taken it is an array (nq,), a table by joint name,
             {"crank": 1.0, "base": {"xyz": [0, 0, 1], "rpy": [0, 0, 1.57]}}, which leaves the others as they
@@ -280,7 +280,7 @@ class Scene:
             q: configuration, (nq,) or by joint name.
             v: velocity, (nv,) or by joint name.
             t: time [s].
-            tau: joint torques instead of the scene's actuation, (nv,).
+            tau: joint torques instead of the scene's actuation, (nv,) or by joint name.
             modes: mode of each frictional element, +1, -1 or 0, and 2 without friction, as of a contact that
                 is open; by velocity and complementarity when None.
             several: what to do where the laws allow several motions: "error", or "continue" with the one of
@@ -311,7 +311,7 @@ class Scene:
         Args:
             q: configuration, (nq,) or by joint name.
             v: velocity, (nv,) or by joint name.
-            tau: joint torques instead of the scene's actuation, (nv,).
+            tau: joint torques instead of the scene's actuation, (nv,) or by joint name.
             t: time [s].
             several: "error" or "continue" where the laws allow several motions, as in `solve`.
 
@@ -396,7 +396,7 @@ class Scene:
         Args:
             q: configuration on the constraints, (nq,) or by joint name.
             v: velocity on them, (nv,) or by joint name.
-            tau: joint torques, (nv,) [N m or N]; those of the scene's actuation when None.
+            tau: joint torques, (nv,) or by joint name [N m or N]; those of the scene's actuation when None.
             dt: length of the step [s].
             t: time at its start [s].
             method: one of the core's with a fixed step: "semi_implicit_euler", "rk4" or "moreau".
@@ -430,7 +430,8 @@ class Scene:
             q: initial configuration, (nq,) or by joint name, put onto the constraints; the scene's when None.
             v: initial velocity, (nv,) or by joint name; the scene's when None.
             t0: initial time [s].
-            tau: joint torques in place of the scene's actuation from the start on, (nv,), or None.
+            tau: joint torques in place of the scene's actuation from the start on, (nv,) or by joint name, or
+                None.
             method: one of the core's: adaptive, or with a fixed step.
             dt: step of methods with a fixed step [s], a whole number of them in the period; the period when
                 None.

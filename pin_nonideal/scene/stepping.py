@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError
+from pin_nonideal.states.parsing import named_joint_values
 from pin_nonideal.types import Array, State
 from pin_nonideal.validation import array, choice, nonnegative, number, positive
 
@@ -107,7 +108,7 @@ class Stepper:
         try:
             act(tau)
         except (TypeError, ValueError):
-            torque = None if tau is None else array("Stepper: tau", tau, (self._compiled.model.nv,))
+            torque = None if tau is None else named_joint_values(self._compiled.model, tau, "Stepper: tau")
             try:
                 act(None if torque is None else np.ascontiguousarray(torque))
             except ValueError as error:

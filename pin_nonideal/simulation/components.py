@@ -26,6 +26,7 @@ from pin_nonideal.description.constraints import (
 from pin_nonideal.description.forces import JointSpring, SpringDamper, Wrench
 from pin_nonideal.description.laws import Drag, JointFriction, SigmoidFriction
 from pin_nonideal.scene.scene import Scene, compiled_scene, scene_origin
+from pin_nonideal.states.parsing import named_configuration
 from pin_nonideal.types import Model
 
 Indices = NDArray[np.intp]
@@ -71,7 +72,7 @@ def components(scene: Scene) -> list[Component]:
 def _components(scene: Scene) -> list[Component]:
     model, program = scene.model, compiled_scene(scene).program
     held = scene.actuation
-    by_position = isinstance(held, HoldPosition) and np.ndim(held.kp) == 0 and np.ndim(held.kd) == 0
+    by_position = isinstance(held, HoldPosition) and isinstance(held.kp, float) and isinstance(held.kd, float)
     said = [*scene.constraints, *scene.laws, *scene.forces]
     whole = (
         not scene.element_names
@@ -131,7 +132,7 @@ def _component(
     mine = [one for one, each in zip(said, own, strict=True) if each == of]
     held = scene.actuation
     if isinstance(held, HoldPosition) and held.q is not None:
-        held = replace(held, q=np.asarray(held.q)[q])
+        held = replace(held, q=named_configuration(scene.model, held.q, scene.q0, "q")[q])
     alone = Scene(
         model,
         constraints=[one for one in mine if any(one is each for each in scene.constraints)],

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.types import Array, Model, State
-from pin_nonideal.validation import array, number
+from pin_nonideal.validation import array, by_name, number
 
 from .joint_layout import CIRCLES, configuration, unit_parts
 from .joint_order import tell_order
@@ -122,6 +122,65 @@ def named_velocity(model: Model, given: State, base: Array, what: str) -> Array:
         first, size = model.idx_vs[j], model.nvs[j]
         v[first : first + size] = _values(model, j, 1, value, v[first : first + size], f'{what} of "{name}"')
     return v
+
+
+def named_joint_values(model: Model, given: Any, what: str, others: float = 0.0) -> Array:
+    """Values of the degrees of freedom from numbers or by joint name, (nv,): torques, gains, limits.
+
+    A table (a mapping or a pandas Series) holds, by joint name, one number for all degrees of freedom of the
+    joint, or a number for each.
+
+    Args:
+        model: pinocchio.Model.
+        given: array (nv,), or a table by joint name.
+        what: words for messages.
+        others: value of the joints that a table leaves out.
+
+    Raises:
+        InputError: wrong shape, or not finite.
+        UnknownNameError: there is no such joint.
+    """
+    table = by_name(given)
+    if table is None:
+        return np.array(array(what, given, (model.nv,)))
+    values = np.full(model.nv, others)
+    for name, value in table.items():
+        j = joint_named(model, name, what)
+        size, words = model.nvs[j], f'{what} of "{name}"'
+        if isinstance(value, Mapping):
+            part = _values(model, j, 1, value, np.full(size, others), words)
+        else:
+            part = array(words, value, () if np.ndim(value) == 0 else (size,))
+        values[model.idx_vs[j] : model.idx_vs[j] + size] = part
+    return values
+
+
+def named_joint_samples(model: Model, given: Any, count: int, what: str) -> Array:
+    """Samples of the degrees of freedom from an array or by joint name, (nt, nv); zero for joints left out.
+
+    Args:
+        model: pinocchio.Model.
+        given: array (nt, nv), or by joint name samples (nt,) or (nt, n) of a joint of n degrees of freedom.
+        count: nt.
+        what: words for messages.
+
+    Raises:
+        InputError: wrong shape, or not finite.
+        UnknownNameError: there is no such joint.
+    """
+    table = by_name(given)
+    if table is None:
+        values = array(what, given, (count, None))
+        if values.shape[1] != model.nv:
+            raise InputError(f"{what} must have {model.nv} columns (nv); got {values.shape[1]}")
+        return values
+    values = np.zeros((count, model.nv))
+    for name, samples in table.items():
+        j = joint_named(model, name, what)
+        size, words = model.nvs[j], f'{what} of "{name}"'
+        part = array(words, samples, (count,) if np.ndim(samples) == 1 and size == 1 else (count, size))
+        values[:, model.idx_vs[j] : model.idx_vs[j] + size] = part.reshape(count, size)
+    return values
 
 
 def named_entries(model: Model, given: State | None) -> NDArray[np.bool_] | None:

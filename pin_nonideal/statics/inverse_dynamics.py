@@ -13,10 +13,15 @@ from numpy.typing import NDArray
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import FrictionConvergenceError, InputError
 from pin_nonideal.scene.scene import Scene
-from pin_nonideal.states.parsing import joint_named, named_configuration, named_velocity
+from pin_nonideal.states.parsing import (
+    joint_named,
+    named_configuration,
+    named_joint_values,
+    named_velocity,
+)
 from pin_nonideal.states.rows import DEPENDENT, rows_at, shortest
 from pin_nonideal.types import Array, State
-from pin_nonideal.validation import array, number, sequence
+from pin_nonideal.validation import array, by_name, number, sequence
 
 from .residual import AtRest, weight
 
@@ -72,7 +77,8 @@ def inverse_dynamics(
         v: velocity, (nv,) or by joint name.
         a: acceleration, (nv,) or by joint name (zero for the others); it must follow the constraints.
         actuated: names of the joints that are driven; all when None.
-        bounds: least and largest torques, numbers or arrays of the actuated degrees of freedom.
+        bounds: least and largest torques: numbers, arrays of the actuated degrees of freedom, or by joint
+            name, without bound for the others.
         t: time [s].
 
     Returns:
@@ -91,7 +97,7 @@ def inverse_dynamics(
     wanted = named_velocity(model, a, still, "inverse_dynamics: a")
     time = number("inverse_dynamics: t", t)
     dofs = _driven(scene, actuated)
-    limits = None if bounds is None else _bounds(bounds, len(dofs))
+    limits = None if bounds is None else _bounds(scene, bounds, dofs)
     rest = AtRest(scene, still, time, at)
     A, b, _, rate = rows_at(rest.runner, at, speed, time)
     if len(A):
@@ -114,15 +120,20 @@ def _driven(scene: Scene, actuated: Sequence[str] | None) -> list[int]:
     return [int(scene.model.idx_vs[j]) + k for j in joints for k in range(scene.model.nvs[j])]
 
 
-def _bounds(bounds: Any, count: int) -> tuple[Array, Array]:
+def _bounds(scene: Scene, bounds: Any, dofs: list[int]) -> tuple[Array, Array]:
+    """Least and largest torque of each actuated degree of freedom."""
     if not isinstance(bounds, (tuple, list)) or len(bounds) != 2:
         raise InputError(f"inverse_dynamics: bounds must be a pair (least, largest); got {bounds!r}")
-    least, largest = (
-        np.full(count, float(array(f"bounds[{k}]", x, ())))
-        if np.ndim(x) == 0
-        else array(f"bounds[{k}]", x, (count,))
-        for k, x in enumerate(bounds)
-    )
+
+    def bound(k: int, others: float) -> Array:
+        given, what = bounds[k], f"bounds[{k}]"
+        if by_name(given) is not None:
+            return named_joint_values(scene.model, given, what, others)[dofs]
+        if np.ndim(given) == 0:
+            return np.full(len(dofs), float(array(what, given, ())))
+        return array(what, given, (len(dofs),))
+
+    least, largest = bound(0, -np.inf), bound(1, np.inf)
     if not (least < largest).all():
         raise InputError("inverse_dynamics: bounds must leave room: each least torque below the largest")
     return least, largest

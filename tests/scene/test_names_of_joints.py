@@ -1,0 +1,166 @@
+"""Torques, gains, limits and bounds may be given by joint name wherever a vector of joints is taken."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import pin_nonideal as pn
+
+TIMES = np.array([0.0, 0.1, 0.3])
+
+
+def model():
+    """A floating base that carries an elbow and a ball joint."""
+    model = pin.Model()
+    inertia = pin.Inertia(1.0, np.array([0.1, 0.0, -0.2]), 0.1 * np.eye(3))
+    parent = 0
+    for name, joint in (
+        ("root", pin.JointModelFreeFlyer()),
+        ("elbow", pin.JointModelRY()),
+        ("ball", pin.JointModelSpherical()),
+        ("slide", pin.JointModelPZ()),
+    ):
+        parent = model.addJoint(parent, joint, pin.SE3(np.eye(3), np.array([0.0, 0.1, -0.3])), name)
+        model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+    return model
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return model()
+
+
+BY_NAME = {"elbow": 1.5, "ball": [0.1, 0.2, 0.3], "base": {"linear": [0.0, 0.0, 4.0]}}
+AS_ARRAY = np.array([0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 1.5, 0.1, 0.2, 0.3, 0.0])
+
+
+def last(scene, **options):
+    run = pn.simulate(scene, 0.3, progress=False, **options)
+    return run.q[-1], run.v[-1]
+
+
+def assert_same(one, other):
+    for a, b in zip(one, other, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize(
+    ("named", "plain"),
+    [
+        (BY_NAME, AS_ARRAY),
+        (lambda t, q, v: {"elbow": 2.0 * t}, lambda t, q, v: [*np.zeros(6), 2.0 * t, 0.0, 0.0, 0.0, 0.0]),
+        (
+            pn.SampledControl(lambda t, q, v: {"slide": 1.0 + t}, 0.01),
+            pn.SampledControl(lambda t, q, v: [*np.zeros(10), 1.0 + t], 0.01),
+        ),
+        (
+            pn.HoldPosition({"elbow": 20.0, "slide": 30.0}, {"elbow": 1.0}, q={"elbow": 0.4}),
+            pn.HoldPosition(
+                [*np.zeros(6), 20.0, 0.0, 0.0, 0.0, 30.0],
+                [*np.zeros(6), 1.0, 0.0, 0.0, 0.0, 0.0],
+                q=[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.4, 0.0, 0.0, 0.0, 1.0, 0.0],
+            ),
+        ),
+        (
+            pn.Table(TIMES, {"elbow": [0.0, 1.0, 2.0], "ball": np.outer(TIMES, [1.0, 2.0, 3.0])}),
+            pn.Table(
+                TIMES,
+                np.column_stack(
+                    [np.zeros((3, 6)), [0.0, 1.0, 2.0], np.outer(TIMES, [1.0, 2.0, 3.0]), np.zeros(3)]
+                ),
+            ),
+        ),
+        (
+            pn.EffortLimits(AS_ARRAY, {"elbow": 0.7, "ball": [0.05, 0.1, 1.0]}),
+            np.array([0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 0.7, 0.05, 0.1, 0.3, 0.0]),
+        ),
+    ],
+    ids=["constant", "function", "sampled", "hold", "table", "effort"],
+)
+def test_actuation(robot, named, plain):
+    one, other = (pn.Scene(robot, actuation=actuation) for actuation in (named, plain))
+    for a, b in zip(last(one), last(other), strict=True):
+        np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-12)
+
+
+def test_torques_of_single_evaluations_and_steps(robot):
+    scene = pn.Scene(robot)
+    q, v = scene.initial_state()
+    assert_same([scene.solve(q, v, tau=BY_NAME).a], [scene.solve(q, v, tau=AS_ARRAY).a])
+    assert_same([scene.acceleration(q, v, BY_NAME)], [scene.acceleration(q, v, AS_ARRAY)])
+    assert_same(scene.step(q, v, BY_NAME, 1e-3), scene.step(q, v, AS_ARRAY, 1e-3))
+    one, other = scene.stepper(0.01, tau=BY_NAME), scene.stepper(0.01, tau=AS_ARRAY)
+    assert_same(one.step(), other.step())
+    assert_same(one.step({"slide": 1.0}), other.step([*np.zeros(10), 1.0]))
+
+
+def test_bounds_of_inverse_dynamics():
+    scene = pn.load("four_bar")
+    q, _ = scene.initial_state()
+    still = np.zeros(3)
+    pair = {"crank_joint": -50.0}, {"crank_joint": 50.0}
+    by_name = pn.inverse_dynamics(scene, q, still, still, actuated=["crank_joint"], bounds=pair)
+    plain = pn.inverse_dynamics(scene, q, still, still, actuated=["crank_joint"], bounds=([-50.0], [50.0]))
+    np.testing.assert_array_equal(by_name.tau, plain.tau)
+
+
+def test_a_series_and_a_frame_of_pandas_are_tables():
+    """pandas is not needed: a stand-in of its module has the same items."""
+
+    class Series:
+        def __init__(self, entries):
+            self.entries = entries
+
+        def items(self):
+            return self.entries.items()
+
+    Series.__module__ = "pandas.core.series"
+    scene = pn.load("loaded_joint")
+    joint = str(scene.model.names[1])
+    q, v = scene.initial_state()
+    np.testing.assert_array_equal(
+        scene.solve(q, v, tau=Series({joint: 0.3})).a, scene.solve(q, v, tau=[0.3]).a
+    )
+    table = pn.Table([0.0, 1.0], Series({joint: [0.0, 1.0]}))
+    np.testing.assert_array_equal(table.values[joint], [0.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda m: pn.Scene(m, actuation={"elbo": 1.0}), 'actuation: no joint "elbo"; nearest: "elbow"'),
+        (
+            lambda m: pn.Scene(m, actuation=pn.Table([0.0], {"slid": [1.0]})),
+            'Table: values: no joint "slid"; nearest: "slide"',
+        ),
+        (
+            lambda m: pn.Scene(m, actuation=pn.HoldPosition({"bal": 1.0}, 0.0)),
+            'HoldPosition: kp: no joint "bal"; nearest: "ball"',
+        ),
+        (
+            lambda m: pn.Scene(m, actuation={"ball": [1.0, 2.0]}),
+            'actuation of "ball" must have shape (3,); got shape (2,)',
+        ),
+        (
+            lambda m: pn.HoldPosition({"elbow": -1.0}, 0.0),
+            'HoldPosition: kp of "elbow" must not be negative; got -1',
+        ),
+        (
+            lambda m: pn.Table([0.0, 1.0], {"elbow": [1.0]}),
+            'Table: values of "elbow" must have shape (2,); got shape (1,)',
+        ),
+    ],
+)
+def test_errors_name_the_nearest_joint(robot, make, message):
+    with pytest.raises((pn.InputError, pn.UnknownNameError)) as error:
+        make(robot)
+    assert message in str(error.value)
+
+
+def test_namespace_is_no_table():
+    with pytest.raises(pn.InputError, match="actuation"):
+        pn.Scene(model(), actuation=SimpleNamespace(elbow=1.0))
