@@ -34,8 +34,8 @@ void evaluate_gap(const Program& p, Workspace& w, double t, const VecX& v, int g
 // Evaluate the rows of any block for given placements and velocities.
 void evaluate_block(const Program& p, Workspace& w, double t, const VecX& v, int block);
 
-// Largest residual and rate over all rows of all descriptions at the state last evaluated; of contacts that may open
-// the depth, and the rate of closed ones. Open ones that are known to be so are passed over: `sure`, by gap.
+// Compute the largest residual and rate over all described rows at the state last evaluated. A contact that may open
+// contributes its penetration, and its rate only if it is closed. `sure` marks the open gaps (by index) to skip.
 void violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity,
                 const std::vector<char>* sure = nullptr);
 

@@ -44,10 +44,10 @@ struct HoldingForce {
     bool is_within(double slack) const { return force.norm() <= limit * (1.0 + slack); }
 };
 HoldingForce holding_force(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
-// The bound of its friction force that a sticking element is nearest to, the limit of one that slips, none of others.
+// Nearest bound of the friction force of a sticking element, limit of a slipping element, zero without load.
 double limit_at_hand(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
-// Adds the force of a slipping element, for the limit in the workspace, to a generalized force; or those of all whose
-// load comes from these reactions (`loaded`: from any).
+// Add the force of a slipping element, for the limit in the workspace, to a generalized force. add_slip_forces adds the
+// forces of all slipping elements, with (`loaded`) or without a load from reactions.
 void add_slip_force(const Program& p, Workspace& w, int element, VecX& C);
 void add_slip_forces(const Program& p, Workspace& w, bool loaded, VecX& C);
 

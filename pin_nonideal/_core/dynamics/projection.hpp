@@ -23,8 +23,8 @@ constexpr double immobile_speed = 1e-8;
 // Below this speed [rad/s or m/s] rows change only by rounding over a step of time stepping.
 constexpr double slow_speed = 1e-5;
 
-// A larger gap than this part of the scene's size that projection leaves has opened for good: after every step it comes
-// down to rounding, in singular positions too.
+// A gap above this fraction of the scene's size after projection is a failure. Projection closes gaps to rounding after
+// every step, in singular positions too.
 constexpr double open_gap = 1e-9;
 
 // Gaps above this fraction of the scene's size in dependent rows are closed by projection, which may move sticking
