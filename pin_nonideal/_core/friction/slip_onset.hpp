@@ -13,9 +13,9 @@ constexpr double no_acceleration = 1e-12;  // rounding relative to the scale of 
 
 // Modes to compute: modes of moving elements are known, the other elements are at rest along their directions.
 struct ModeQuestion {
-    std::vector<Mode> modes;  // of all elements; entries of elements at rest are ignored
+    std::vector<Mode> modes;  // by element; entries of elements at rest are ignored
     std::vector<int> at_rest;
-    // elements at rest that reached their limit: they slip at the limit even with zero acceleration
+    // Elements at rest that just reached their limit: they slip at the limit even with zero acceleration.
     std::vector<int> breaking;
     bool answered = false;      // `modes` belong to a motion solved with all contacts
     std::vector<Vec3> near;     // friction of all elements in a nearby motion, if known

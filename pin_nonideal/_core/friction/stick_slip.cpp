@@ -287,7 +287,8 @@ struct Search {
         if (!take_only_choice(p, w, t, q, v, question)) throw Failure(Failure::Kind::not_converged, t, list);
     }
 
-    // Check if the iteration may have lowered a limit too early: an element that slips in one iterate gets its kinetic limit.
+    // Check if the iteration may have lowered a limit too early: an element that slips in one iterate gets its kinetic
+    // limit.
     bool released_early(const std::vector<Mode>& modes) const {
         return std::any_of(list.begin(), list.end(), [&](int e) {
             const Friction& friction = p.frictions[e];
