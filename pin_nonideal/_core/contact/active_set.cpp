@@ -21,7 +21,7 @@ using Choice = std::vector<char>;  // closed flag by gap
 constexpr int most_enumerated = 12;
 // Limit of the enumeration if slip directions must be consistent too. Without consistency a motion to integrate exists.
 constexpr int most_aligned = 8;
-// A body would close a wider gap [m or rad] within `touching_time` only at superluminal speed.
+// No body closes a wider gap [m or rad] within `touching_time`: its speed would exceed the speed of light.
 constexpr double sure_gap = 1e-3;
 // Minimum number of contacts that can share a load in several ways.
 constexpr int may_share = 3;

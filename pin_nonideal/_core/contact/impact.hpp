@@ -1,5 +1,9 @@
 // Impacts: velocities jump when gaps close. With impulses P of all touching contacts, their velocities after the impact
-// are u+ = u- + W P, where W is the Delassus matrix under loops and prescribed motions. Newton's law of restitution:
+// are u+ = u- + W P. W is the Delassus matrix under loops and prescribed motions.
+//
+// Newton's law of restitution: 0 <= P_n, u_n+ + e u_n- >= 0 complementary, and P_t in Coulomb's cone against u_t+.
+// Poisson's law: the first phase stops the approach (e = 0, impulses C). In the second phase every contact gives e C_n,
+// or more to prevent penetration, with friction in the corresponding cone.
 #pragma once
 
 #include "dynamics/workspace.hpp"
@@ -11,7 +15,7 @@ struct Impact {
     std::vector<Vec3> impulse;    // impulse of each gap: along the normal, then along the slip directions
     std::vector<double> work;     // work of each gap
     VecX v_minus, v_plus;
-    double energy_change = 0.0;   // total kinetic energy, including work of moving constraints
+    double energy_change = 0.0;   // change of the total kinetic energy, including work of moving constraints
 };
 
 // Impulses below this fraction of the largest impulse of an impact are rounding.
@@ -27,6 +31,3 @@ Impact strike(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, 
               bool bounces = true);
 
 }  // namespace pn
-// <= P_n, u_n+ + e u_n- >= 0 complementary, and P_t in Coulomb's cone against u_t+. Poisson's law: the first phase
-// stops the approach (e = 0, impulses C). In the second phase every contact gives e C_n, or more to prevent
-// penetration, with friction in the corresponding cone.

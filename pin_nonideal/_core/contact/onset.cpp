@@ -41,7 +41,7 @@ struct RestingProblem {
     const RunState& before;
     ContactRows rows;
     std::vector<char> slides;            // contacts with a known slip direction
-    std::vector<ConeElement> cones;      // cones of the contacts; slipping contacts have only a normal row
+    std::vector<ConeElement> cones;      // cones of the contacts (slipping contacts: normal row only)
     std::vector<int> first;              // first row of each in the problem
     MatX drag;                           // friction of slipping contacts along all rows, per unknown
     MatX W, dragging;  // accelerations of the problem's rows for a unit of each unknown, and for its friction

@@ -1,4 +1,4 @@
-// Evaluation of Eq. (40) at one state: kinematics and rows, M and its factor, given forces, laws, acceleration.
+// Evaluation of Eq. (40) at one state: kinematics, rows, M and its factor, given forces, laws, acceleration.
 #pragma once
 
 #include "dynamics/workspace.hpp"

@@ -58,7 +58,7 @@ struct Program {
 
     std::vector<GivenForce> forces;
     Actuation actuation;
-    VecX least_effort, most_effort;      // limits of the actuators, by dof; empty if unlimited
+    VecX least_effort, most_effort;      // limits of the actuators, by dof (empty if unlimited)
 
     // Flags that skip computations that the scene does not need.
     bool has_laws() const { return !frictions.empty() || !laws.empty(); }

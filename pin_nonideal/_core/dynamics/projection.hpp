@@ -41,8 +41,7 @@ void learn_third_order(Workspace& w, double h);
 // The projections return false if nothing had to move.
 // Project q. The workspace must hold factors near (t, q) and is configured there on return. Only a user's own rows read
 // v. `configured`: the workspace is already configured at (t, q). `keeps_factors`: if the old factors are accurate
-// enough, keep them for a velocity projection only; M and the rows are those of q.
-// that is to be projected and no more; M and the rows are those of q.
+// enough, keep them for a velocity projection only. M and the rows are those of q.
 bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v, bool configured = false,
                       bool keeps_factors = false);
 // Close the gaps of rows that count as dependent. Active rows that become short over a step magnify the residuals of

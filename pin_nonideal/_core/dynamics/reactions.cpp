@@ -62,7 +62,7 @@ static void sweep_tree(const Mechanism& m, const Evaluation& now, Reactions& r) 
     }
 }
 
-// Contacts with a smaller entry in a unit null-space vector of the multipliers do not take part in it.
+// A contact with a smaller row in the orthonormal null-space basis of the multipliers does not share loads.
 static constexpr double takes_part = 1e-9;
 // Maximum number of load-sharing contacts for which all zero-load sets are tried.
 static constexpr size_t most_sharing = 6;

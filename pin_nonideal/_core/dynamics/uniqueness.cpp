@@ -13,7 +13,7 @@ namespace {
 constexpr double difference = 1e-7;      // relative to the unknowns' size: square root of the rounding, with a margin
 constexpr double least_size = 1e-300;    // size if all unknowns are zero
 constexpr int newton_limit = 30;
-constexpr int most_mixed = 6;            // maximum number of laws for all combinations of branches; else one law at a time
+constexpr int most_mixed = 6;            // more laws mirror one branch at a time instead of all combinations
 constexpr double same_solution = 1e-9;   // relative residual at which a point is a solution
 constexpr double other_solution = 1e-6;  // relative distance beyond which two solutions differ
 constexpr double near_motion = 1e-6;     // tolerance between solutions of the arrays and motions, relative to the unknowns

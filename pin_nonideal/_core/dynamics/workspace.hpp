@@ -26,7 +26,7 @@ constexpr int never_decided = 1 << 30;
 // Data that the next step needs from earlier steps, besides the state (q, v) and the choice of independent rows.
 struct RunState {
     Modes mode;
-    std::vector<char> closed;  // closed contacts, by gap; change them by set_closed only
+    std::vector<char> closed;  // closed contacts, by gap (change them by set_closed only)
     // Slip directions of elements with two or three directions: at the step's start, and the last well-defined one.
     std::vector<Vec3> slip_direction, last_direction;
     std::vector<char> lingers;  // keeps its slip mode at rest: only rounding decides the direction
@@ -55,7 +55,7 @@ struct Reactions {
     // is frozen, loads are linear in the motion, and tension is possible.
     std::vector<char> unloaded;
     bool holds_unloaded = false;
-    VecX lam;              // by kept row; minimum norm among redundant rows
+    VecX lam;              // by kept row, minimum norm among redundant rows
     std::vector<Force> body;  // external forces on each body, later the sums of its subtree
     std::vector<Motion> motion;
     std::vector<Force> momentum;
@@ -80,7 +80,7 @@ struct Evaluation {
     std::vector<char> selected;          // closed flags by gap, at the last selection of rows
     std::vector<int> loaded, slipping;   // elements with load (sticking or slipping), and slipping elements
     std::vector<double> A, B;
-    RowSystem rows, ideal_rows;  // ideal: of the constraints without sticking elements; IdealMotion swaps them in
+    RowSystem rows, ideal_rows;  // ideal: of the constraints without sticking elements (see IdealMotion)
     VecX b, lam;  // by kept row
     VecX closing_lam;  // multipliers of the last closing move of the position
     bool has_closing = false;  // closing_lam may be nonzero

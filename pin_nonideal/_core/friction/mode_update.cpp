@@ -13,7 +13,7 @@ namespace {
 // could stop the whole motion. A relative change of the velocity above this value is a change of the motion.
 constexpr double least_speed = 1e-6;
 constexpr double slack = 1e-9;  // rounding relative to the limit, or to the scale of accelerations
-constexpr int rounds = 6;       // rounds that change modes with violated conditions; afterwards the full problem is solved
+constexpr int rounds = 6;       // rounds of mode changes before the full problem is solved
 
 // Change the modes whose conditions fail in the current motion. An element past its limit slips, and an element driven
 // against its slip sticks. Return the number of changes. Return nothing if one motion does not decide, for elements of

@@ -14,7 +14,7 @@ constexpr double slow = 1e-6;      // accelerations below this fraction are slip
 
 struct Beginning {
     VecX force, slip;   // along its directions: force relative to the middle of its limits, slip direction at onset
-    bool slides, told;  // its acceleration exceeds rounding; its slip direction is known
+    bool slides, told;  // acceleration above rounding, slip direction known
     bool breaks;        // was sticking until now and is at its limit
 };
 

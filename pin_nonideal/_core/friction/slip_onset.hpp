@@ -13,7 +13,7 @@ constexpr double no_acceleration = 1e-12;  // rounding relative to the scale of 
 
 // Modes to compute: modes of moving elements are known, the other elements are at rest along their directions.
 struct ModeQuestion {
-    std::vector<Mode> modes;  // by element; entries of elements at rest are ignored
+    std::vector<Mode> modes;  // by element, ignored for elements at rest
     std::vector<int> at_rest;
     // Elements at rest that just reached their limit: they slip at the limit even with zero acceleration.
     std::vector<int> breaking;

@@ -47,7 +47,7 @@ struct Search {
     void apply(const std::vector<Mode>& modes, bool limits_known) {
         set_modes(p, w, modes);
         w.state.warm = limits_known;
-        if (limits_known) {  // unique among the motions of these modes; other solutions do not start from rest
+        if (limits_known) {  // other solutions of these modes do not start from rest
             w.state.unique = Uniqueness::shown;
             w.state.growth = 1.0;
             w.state.steps_since = -1;

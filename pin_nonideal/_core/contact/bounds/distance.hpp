@@ -13,7 +13,8 @@ namespace pn {
 // Two segments, or a point, segment or disk and a box or another solid, at one instant.
 struct Separation {
     std::array<Vec3, 8> apart;  // from the ends or corners of the second body to those of the first
-    // number of corners; 0 for other solids: offset of centers, axes of the solid, first's half segment or disk axis
+    // Number of corners. Other solids have none: `apart` is then the offset of the centers, the three axes of the solid,
+    // and the half segment or disk axis of the first body.
     int corners = 0;
     Vec3 normal;                // from the nearest point of the second body to that of the first
     double radius = 0.0;        // sum of both radii
