@@ -1,5 +1,5 @@
-// Depenetration after a step if not all closed contacts can lie on their planes. An example is a tilted landing can:
-// its rim and points of its face touch, and the rim is set back from the face.
+// Depenetration after a step if not all closed contacts can lie on their planes. An example is a can that lands tilted:
+// its rim is set back from points of its face.
 #pragma once
 
 #include "dynamics/workspace.hpp"
@@ -12,10 +12,10 @@ double longest_single_move(const Program& p, const Workspace& w);
 // are nearly parallel.
 bool strays_from_planes(const Program& p, Workspace& w, double longest_single);
 
-// Move q by the least move in the metric of M to a position that satisfies the constraints, with gap >= 0 complementary
-// to compressive multipliers. Contacts that do not touch there open. If no such position is found, q is only projected
-// onto the constraints, and contacts off their planes open. The workspace ends configured at q with the rows that are
-// independent there. Return true if rows were chosen.
+// Move q by the least move in the metric of M to a position that satisfies the constraints. Gaps there are nonnegative
+// and complementary to compressive multipliers. Contacts that do not touch there open. If no such position is found, q
+// is only projected onto the constraints, and contacts off their planes open. The workspace ends configured at q with
+// the rows that are independent there. Return true if rows were chosen.
 bool move_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 
 }  // namespace pn

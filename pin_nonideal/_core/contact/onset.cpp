@@ -20,8 +20,8 @@ constexpr int most_releases = 4;    // rounds that set kinetic limits of slippin
 constexpr int most_turns = 100;     // maximum iterations of loads and their friction
 constexpr double settled = 1e-13;   // rounding of the loads' change, relative to the largest acceleration
 
-// Check if the cone problem applies: all friction is sliding of contacts, grows from zero with the load, and no user
-// law depends on reactions.
+// Check if the cone problem applies. All friction must be sliding of contacts that grows from zero with the load. No
+// user law may depend on reactions.
 bool fits(const Program& p) {
     bool only_cones = true;
     each_law<UserLaw>(p.laws, [&](const UserLaw& law) { only_cones &= law.reaction == Reaction::none; });

@@ -128,7 +128,7 @@ void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v) {
     if (!p.blocks.empty()) move_rows(p, w, t, v);
 }
 
-// Check if closed contacts balance the load: then an acceleration a is rounding if M a is below the rounding of its
+// Check if closed contacts balance the load. The acceleration a is then rounding: M a is below the rounding of the
 // summed forces.
 static bool is_balanced(const Program& p, Workspace& w) {
     if (w.now.touching.empty() || p.moves_in_time) return false;

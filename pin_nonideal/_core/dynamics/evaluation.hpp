@@ -25,8 +25,9 @@ void place_rows(const Program& p, Workspace& w, double t, const VecX& v);
 void evaluate_rows(const Program& p, Workspace& w, double t, const VecX& v);
 void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 
-// Row of an open or closed gap: residual for given placements (measure), rate and bias for given velocities (move),
-// both (follow), and both with A (evaluate). A user's function computes all of them at once.
+// Evaluate the row of an open or closed gap. measure_gap computes the residual for given placements. move_gap computes
+// rate and bias for given velocities. follow_gap computes both, and evaluate_gap also A. A user's function computes all
+// of them at once.
 void measure_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
 void move_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
 void follow_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);

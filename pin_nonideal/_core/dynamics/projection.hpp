@@ -11,8 +11,8 @@ constexpr double projection_floor = 2e-14;
 // A pivot of the rows' unit-diagonal factor below this value is near a singular position. The pivot is the squared sine
 // of the angle between the nearest row and the other rows.
 constexpr double near_singular = 2.5e-3;
-// A step of the iteration that keeps more than this fraction of an earlier step carries no information about the change
-// of the rows since their factorization.
+// Maximum fraction of an earlier step that an iteration step may keep. Steps above it carry no information about the
+// change of the rows since their factorization.
 constexpr double broyden_limit = 0.3;
 // A step with an expected residual below this fraction of rounding is not evaluated separately.
 constexpr double trusted_part = 0.5;
@@ -38,7 +38,8 @@ void follow_constraints(const Program& p, Workspace& w, double h, VecX& move);
 // Update the multipliers of h^3 after the projection at the end of such a step.
 void learn_third_order(Workspace& w, double h);
 
-// The projections return false if nothing had to move.
+// Each of the following projections returns false if nothing had to move.
+//
 // Project q. The workspace must hold factors near (t, q) and is configured there on return. Only a user's own rows read
 // v. `configured`: the workspace is already configured at (t, q). `keeps_factors`: if the old factors are accurate
 // enough, keep them for a velocity projection only. M and the rows are those of q.
@@ -53,8 +54,9 @@ bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, c
 bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 // Project v. The workspace must be configured at (t, q).
 bool project_velocity(const Program& p, Workspace& w, double t, VecX& v);
-// Check if q and v satisfy all rows in use, dependent rows included, for a state too slow to leave the rows by more
-// than rounding over a step. No factorization. If only sticking elements hold a dof, set its velocity to exactly zero.
+// Check if q and v satisfy all rows in use, dependent rows included, without factorization. Return false if the state
+// moves fast enough to leave the rows by more than rounding over a step. Set the velocity of locked dofs, and of a dof
+// that a sticking row holds alone, to exactly zero.
 bool keeps_to_rows(const Program& p, Workspace& w, double t, const VecX& q, VecX& v);
 // Check if q and v satisfy the constraints within the tolerances of projection. Evaluates rows and rates without
 // factorization.
@@ -64,8 +66,8 @@ bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 // Project q and v and evaluate the result.
 void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 
-// Remove the part of a small change of the velocity, or of a small move, that a projection would remove, by the factors
-// in the workspace. Nonholonomic rows bind velocities only, so projection of a position ignores them.
+// Remove the part of a small change of the velocity or position that a projection would remove. Uses the factors in the
+// workspace. Nonholonomic rows bind velocities only, so projection of a position ignores them.
 void remove_normal_velocity(const Program& p, Workspace& w, Eigen::Ref<VecX> change);
 void remove_normal_move(const Program& p, Workspace& w, Eigen::Ref<VecX> move);
 

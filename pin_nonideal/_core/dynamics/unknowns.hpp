@@ -37,7 +37,7 @@ struct Unknowns {
     // Rounding of the image due to shared loads. A nearly unloaded contact has its load from the same sums as loaded
     // contacts.
     double rounding() const;
-    // Check if a solution of the arrays solves y = g(y): no unilateral contact has tension, and shared loads are
+    // Check if a solution of the arrays solves y = g(y). Then no unilateral contact has tension, and shared loads are
     // consistent with the frozen zero-load set.
     bool is_motion(const VecX& y);
 };

@@ -1,5 +1,5 @@
 // Coupled friction problem of some elements. With their forces f as unknowns, slip accelerations are alpha = alpha0 + W
-// f, where W is the Delassus matrix of their directions under the constraints in use.
+// f. W is the Delassus matrix of the elements' directions under the constraints in use.
 #pragma once
 
 #include "dynamics/workspace.hpp"

@@ -1,5 +1,5 @@
-// Proof that two round bodies stay apart between two instants. If their corners are beyond a plane at both instants,
-// and accelerations are bounded, no points can meet in between, whichever points are nearest.
+// Proof that two round bodies stay apart between two instants. Their corners are beyond a plane at both instants, and
+// accelerations are bounded. Then no points can meet in between, whichever points are nearest.
 #pragma once
 
 #include <algorithm>
@@ -13,8 +13,8 @@ namespace pn {
 // Two segments, or a point, segment or disk and a box or another solid, at one instant.
 struct Separation {
     std::array<Vec3, 8> apart;  // from the ends or corners of the second body to those of the first
-    // Number of corners. Other solids have none: `apart` is then the offset of the centers, the three axes of the solid,
-    // and the half segment or disk axis of the first body.
+    // Number of corners. Other solids have none. `apart` then holds the offset of the centers, the three axes of the
+    // solid, and the half segment or disk axis of the first body.
     int corners = 0;
     Vec3 normal;                // from the nearest point of the second body to that of the first
     double radius = 0.0;        // sum of both radii

@@ -8,8 +8,8 @@
 
 namespace pn {
 
-// Travel data that lasts from step to step. Travel is in meters of any contact point of a body, in the joint's own unit
-// for a joint, and in radians for rotation.
+// Travel data that lasts from step to step. Travel of a body is in meters, of any of its contact points. Travel of a
+// joint is in the joint's unit, and rotation in radians.
 struct Ways {
     std::vector<double> body, joint, turn;  // by joint: travel of its body, of the joint, rotation of its body
     double scene = 0.0;                     // sum over the steps of the largest body travel
@@ -35,9 +35,9 @@ public:
     explicit WayBound(const Program& p);
 
     void size(Ways& ways) const;
-    // Compute the travel of joints, and the upper bound of the scene's travel, over a step of length h with the largest
-    // |v| of each dof. The bodies are at one end of the step. `sum_up` computes the travel of bodies, total and over the
-    // step.
+    // Compute the travel of joints and the upper bound of the scene's travel over a step of length h. `speed` is the
+    // largest |v| of each dof. The bodies are at one end of the step. `sum_up` computes the travel of bodies, total and
+    // over the step.
     void step(const Terms& terms, const VecX& speed, double h, Ways& ways) const;
     void sum_up(Ways& ways) const;
 
