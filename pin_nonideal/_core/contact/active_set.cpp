@@ -15,19 +15,19 @@ namespace pn {
 
 namespace {
 
-using Choice = std::vector<char>;  // of closed gaps
+using Choice = std::vector<char>;  // closed flag by gap
 
-// All choices of so many contacts are looked through where steps from one to the next do not lead to the right one.
+// Enumerate all active sets up to this many contacts if pivoting fails.
 constexpr int most_enumerated = 12;
-// The same of those in which what begins to slip goes its way: without, there is a motion to go on by.
+// Limit of the enumeration if slip directions must be consistent too. Without consistency a motion to integrate exists.
 constexpr int most_aligned = 8;
-// What would close a wider gap [m or rad] within `touching_time` outruns light.
+// No body closes a wider gap [m or rad] within `touching_time`: its speed would exceed the speed of light.
 constexpr double sure_gap = 1e-3;
-// Contacts of which some may share a load in several ways.
+// Minimum number of contacts that can share a load in several ways.
 constexpr int may_share = 3;
 
-// Part of the accelerations in play below which slip begins so slowly that they do not tell its way, and by how much
-// another way differs.
+// Slip accelerations below `slow`, relative to the scale of accelerations, do not define a direction. `astray` is the
+// allowed deviation of the direction (1 - cosine).
 constexpr double slow = 1e-4, astray = 1e-6;
 
 }  // namespace
@@ -54,7 +54,7 @@ bool goes_its_way(const Program& p, Workspace& w, const VecX& v) {
 
 namespace {
 
-// The choices tried at one state, as the right one is sought.
+// Active sets tried at one state.
 struct Search {
     const Program& p;
     Workspace& w;
@@ -63,12 +63,12 @@ struct Search {
     const Choice& rest;
     const std::function<void(const RestingMotion*)>& find_modes;
     const RestingMotion* together = nullptr;
-    bool aligned = false;  // what begins to slip is asked to go its way
+    bool aligned = false;  // slip onset must oppose friction
     std::vector<Choice> tried;
-    std::optional<Failure> failure;  // of the first choice that had no motion
+    std::optional<Failure> failure;  // failure of the first active set without a motion
 
-    // The next choice: this one where its motion keeps all conditions, else with one contact more or less; nothing
-    // where it has no motion.
+    // Return the next active set: the same one if its motion satisfies all conditions, else with one contact more or
+    // less. Return nothing if the set has no motion.
     std::optional<Choice> better(const Choice& choice) {
         tried.push_back(choice);
         set_closed(p, w, choice);
@@ -87,7 +87,7 @@ struct Search {
         return next;
     }
 
-    // Of the contacts left open the one that would go through its plane fastest, or -1.
+    // Return the open contact with the fastest relative approach acceleration, or -1.
     int approaching(const Choice& choice) {
         int found = -1;
         double most = 1.0;
@@ -104,7 +104,7 @@ struct Search {
 
     bool is_new(const Choice& choice) const { return std::find(tried.begin(), tried.end(), choice) == tried.end(); }
 
-    // From one choice to the next until one keeps all conditions.
+    // Pivot from one active set to the next until one satisfies all conditions.
     bool walk(Choice choice) {
         while (is_new(choice)) {
             const std::optional<Choice> next = better(choice);
@@ -115,7 +115,7 @@ struct Search {
         return false;
     }
 
-    // All choices, those with the most closed first.
+    // Try all active sets, largest sets first.
     bool enumerate() {
         std::vector<int> list;
         for (int i = 0; i < static_cast<int>(rest.size()); ++i)
@@ -180,8 +180,8 @@ const Touching& TouchingKnown::at(const Program& p, Workspace& w, double t, cons
     return found_;
 }
 
-// Contacts that share their load are decided together; else one by one, which tells whether the motion is the only one,
-// and together where that does not end.
+// Contacts that share a load are decided together. Other contacts are decided one by one, which tests uniqueness, and
+// together if this does not converge.
 void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                     const ClosingQuestion& question, const std::function<void(const RestingMotion*)>& find_modes) {
     const RunState before = w.state;
@@ -202,7 +202,7 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
         if (search.failure) throw *search.failure;
         throw Failure(Failure::Kind::not_converged, t);
     };
-    // What slides, or begins to, rubs by the shares of loads that friction follows, and which cones do not.
+    // Load shares of slipping contacts follow friction, unlike those of the cone problem.
     const auto decides_alone = [&](RestingMotion near) {
         near.is_near = true;
         try {

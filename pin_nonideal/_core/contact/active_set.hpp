@@ -1,5 +1,5 @@
-// Which contacts that touch stay closed: their loads press, and what opens moves apart. All that rest on each other are
-// closed unless their loads cannot press; where several choices would do, the one with the most of them closed.
+// Active set of contacts: closed contacts have compressive loads, and open contacts separate. All resting contacts are
+// closed if their loads can be compressive. Among several valid active sets the largest is selected.
 #pragma once
 
 #include <functional>
@@ -8,22 +8,22 @@
 
 namespace pn {
 
-// Gaps narrower than this [m or rad], or closed within this time [s], touch.
+// Gaps narrower than this [m or rad], or closing within this time [s], touch.
 constexpr double touching_width = 1e-12, touching_time = 1e-12;
-// At the start of a run gaps up to this part of the scene's size touch.
+// At the start of a run, gaps up to this fraction of the scene's size touch.
 constexpr double starting_width = 1e-10;
 
-// What contacts do at a state: they touch and rest on each other, or strike, or are apart.
+// Contact state: touching contacts, resting contacts, and impacts.
 struct Touching {
     std::vector<char> touch, rest;
     bool strikes = false;
-    bool lands = false;  // one of those that strike is open as yet
+    bool lands = false;  // some impact is at an open contact
 };
-// By the widths and rates of the gaps at (t, q, v): those that are closed, or so narrow, touch; of those that coincide one
-// does for all.
+// Find touching contacts from the widths and rates of the gaps at (t, q, v): closed gaps and narrow gaps. Coincident
+// gaps count once.
 Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts);
 
-// As found last: asked again where nothing has changed, it needs no look at the gaps.
+// Caches the touching contacts of the last state.
 class TouchingKnown {
 public:
     const Touching& at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts);
@@ -36,13 +36,13 @@ private:
     Touching found_;
 };
 
-// Whether all that begins to slip from rest goes against its friction. Where a contact would have to pull the others may
-// rub in ways that are none of theirs, and hide it.
+// Check if all slip that begins from rest opposes its friction. If one contact would need tension, other contacts may
+// hide it with friction that violates their own law.
 bool goes_its_way(const Program& p, Workspace& w, const VecX& v);
 
-// Closes contacts out of those that rest at (t, q, v). `find_modes` finds what sticks and slips for those closed, or takes
-// it from the motion of all of them together where there is one, and leaves the workspace with the motion at v. Where no
-// other is found it is one in which some of what begins to slip does not go its way yet, as steps make it do.
+// Select the closed contacts among those at rest at (t, q, v). `find_modes` computes the stick-slip modes for closed
+// contacts, or takes them from the joint motion of all contacts if given. The workspace ends with the motion at v. If
+// no consistent solution exists, some slip directions are not consistent yet, and integration corrects them.
 void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                     const ClosingQuestion& question, const std::function<void(const RestingMotion*)>& find_modes);
 

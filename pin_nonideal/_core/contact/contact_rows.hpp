@@ -1,4 +1,4 @@
-// The rows of contacts that touch, free to move: what forces along their normals and directions of slip do together.
+// Rows of touching contacts without constraint: coupled response to normal and friction forces.
 #pragma once
 
 #include "dynamics/workspace.hpp"
@@ -6,27 +6,27 @@
 
 namespace pn {
 
-// Contacts that touch are rows that move but hold nothing, and without friction; `touching` by gap.
+// Evaluate touching contacts as rows without constraint forces and friction. `touching` is by gap.
 void free_contacts(const Program& p, Workspace& w, const std::vector<char>& touching);
-// The same, with the motion at (t, q, v) then.
+// Do the same and compute the motion at (t, q, v).
 void release_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                       const std::vector<char>& touching);
 
-// Rows of some contacts, each its normal and then its directions of slip: what forces along them do, and how fast they
-// move.
+// Rows of some contacts, each with its normal and then its slip directions: response to forces along them, and
+// velocities.
 struct ContactRows {
     const Program& p;
     Workspace& w;
     const std::vector<int>& gaps;
     std::vector<ConeElement> cones;
-    std::vector<int> first;  // row of each
-    MatX W, response;        // of the rows' velocities, and of v, to a unit of each force or percussion
-    VecX velocity;           // of the rows
+    std::vector<int> first;  // first row of each contact
+    MatX W, response;        // velocities of the rows, and v, for a unit of each force or impulse
+    VecX velocity;           // velocities of the rows
 
-    // Of these gaps, which are free; of their normals alone where they do not rub.
+    // Set up the rows of these unconstrained gaps. Without `rub`, only their normals.
     ContactRows(const Program& p, Workspace& w, const std::vector<int>& gaps, bool rub = true);
 
-    // Calls act(row of W, block, kept row of it).
+    // Call act(row of W, block, kept row of the block).
     template <class Act>
     void each_row(const Act& act) const {
         for (size_t i = 0; i < gaps.size(); ++i) {
@@ -36,7 +36,7 @@ struct ContactRows {
         }
     }
 
-    // What a change of v adds to the velocities of the rows.
+    // Change of the rows' velocities due to a change of v.
     VecX change(const VecX& dv) const;
 
     auto of(const VecX& x, size_t i) const { return x.segment(first[i], cones[i].dim); }

@@ -16,9 +16,9 @@ namespace pn {
 
 namespace {
 
-// A move of as many times the longest that one contact alone asks for is no way out of all of them.
+// Moves longer than this many times the longest single-contact move do not resolve all penetrations.
 constexpr double far = 10.0;
-constexpr int most_steps = 20;  // of which each leaves a small part of what the one before has
+constexpr int most_steps = 20;  // Newton-like steps, each much shorter than the last one
 
 VecX widths(const Program& p, Workspace& w, double t, const VecX& v, const std::vector<int>& gaps) {
     VecX out(gaps.size());
@@ -75,7 +75,7 @@ bool move_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) 
         const VecX from = q;
         retract(p.mechanism, from.data(), step.data(), q.data());
     }
-    if (!outside) {  // the next step finds them inside, and stops what enters
+    if (!outside) {  // the next step detects the penetration and stops the approach
         q = start;
         begin_rows(p, w, t, q, v);
         project_position(p, w, t, q, v, true);

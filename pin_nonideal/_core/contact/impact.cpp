@@ -14,10 +14,10 @@ namespace pn {
 
 namespace {
 
-// Part of the largest response to a percussion that is none, and of the speed that is rounding of a velocity.
+// Rounding of responses relative to the largest response to an impulse, and of velocities relative to the speed.
 constexpr double no_response = 1e-12, velocity_rounding = 1e-14;
 
-// Bodies are driven into each other, or no percussions were found.
+// Throw a failure: constraints drive bodies into each other, or the impulse solver failed.
 [[noreturn]] void refuse(const Program& p, double t, const std::vector<int>& gaps, ConeStatus status) {
     if (status == ConeStatus::failed) throw Failure(Failure::Kind::not_converged, t);
     std::vector<int> blocks;
@@ -25,18 +25,18 @@ constexpr double no_response = 1e-12, velocity_rounding = 1e-14;
     throw Failure(Failure::Kind::inconsistent, t, blocks);
 }
 
-// Percussions of contacts, and of boxes of dry friction after them, that answer the velocities w0.
+// Solve for the impulses of contacts, and of dry-friction boxes after them, for the velocities w0.
 VecX percussions(const ContactRows& rows, double t, const MatX& W, const VecX& w0,
                  const std::vector<ConeElement>& elements) {
     VecX P = VecX::Zero(w0.size());
     ConeComplementarity solver;
-    solver.share_alike(rows.gaps.size() > 1);  // a face that lands strikes with all its corners
+    solver.share_alike(rows.gaps.size() > 1);  // a landing face distributes its impulse over all corners
     const ConeStatus status = solver.solve(W, w0, elements, false, P);
     if (status != ConeStatus::solved) refuse(rows.p, t, rows.gaps, status);
     return P;
 }
 
-// Newton's law of restitution: gaps open with e times the rate at which they closed.
+// Newton's law of restitution: gaps open with e times their closing rate.
 VecX newton(const ContactRows& rows, double t, VecX w0) {
     for (size_t i = 0; i < rows.gaps.size(); ++i) {
         double& approach = w0[rows.first[i]];
@@ -45,9 +45,9 @@ VecX newton(const ContactRows& rows, double t, VecX w0) {
     return percussions(rows, t, rows.W, w0, rows.cones);
 }
 
-// Poisson's: after the impulses that stop the approach each contact gives e times its own again, and more only where it
-// would be entered. The friction of what it gives has a known limit: a box beside the cone of what comes on top, along
-// the same directions.
+// Poisson's law of restitution. After the impulses that stop the approach, each contact gives e times its own impulse.
+// It gives more only to prevent penetration. Friction of the restitution impulse has a known limit: a box along the
+// directions of the cone for the additional impulse.
 VecX poisson(const ContactRows& rows, double t, const VecX& velocity) {
     VecX P = percussions(rows, t, rows.W, velocity, rows.cones);
     std::vector<ConeElement> elements = rows.cones;
@@ -78,8 +78,8 @@ VecX poisson(const ContactRows& rows, double t, const VecX& velocity) {
     return P;
 }
 
-// Velocities that no percussion can change are zero but for rounding, where constraints or other contacts hold them:
-// what is left of them would let contacts slip that stick.
+// Zero the rounding of velocities that no impulse can change, because constraints or other contacts hold them. Such
+// rounding would let sticking contacts slip.
 void clean(const ContactRows& rows, double speed, VecX& w0) {
     const Spectrum modes = symmetric_spectrum(rows.W);
     const VecX& response = modes.values;
@@ -111,8 +111,8 @@ Impact strike(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, 
     v += dv;
     out.v_plus = v;
     out.energy_change = kinetic_energy(p.mechanism, w.now.terms, v) - before;
-    // Of the velocities as they are: where large percussions do little, W P is another by rounding, and the works would not
-    // add up to the change of energy.
+    // Use the actual velocities: if large impulses have small effects, rounding of W P would violate the energy
+    // balance.
     const VecX mean = rows.velocity + 0.5 * rows.change(dv);
     for (size_t i = 0; i < out.gaps.size(); ++i) {
         Vec3 impulse = Vec3::Zero();
@@ -120,7 +120,7 @@ Impact strike(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, 
         out.impulse.push_back(impulse);
         out.work.push_back(rows.of(P, i).dot(rows.of(mean, i)));
     }
-    set_closed(p, w, touching);  // and their rows count again
+    set_closed(p, w, touching);  // restores their rows
     return out;
 }
 

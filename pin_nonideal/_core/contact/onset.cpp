@@ -13,14 +13,15 @@ namespace pn {
 
 namespace {
 
-constexpr double none = 1e-12;      // part of the accelerations in play that is none
-constexpr double at_limit = 1e-9;   // part of its limit by which a force may miss it
-constexpr double breaking_by = 1e-6;  // part of a limit by which what has just come to it is past it
-constexpr int most_releases = 4;    // rounds in which what slips gets its kinetic limit
-constexpr int most_turns = 100;     // of loads and the friction that they cause
-constexpr double settled = 1e-13;   // change of the loads, as part of the largest, that is rounding
+constexpr double none = 1e-12;      // rounding relative to the scale of accelerations
+constexpr double at_limit = 1e-9;   // rounding relative to the limit of a force
+constexpr double breaking_by = 1e-6;  // relative reduction of the limit of elements that just reached it
+constexpr int most_releases = 4;    // rounds that set kinetic limits of slipping contacts
+constexpr int most_turns = 100;     // maximum iterations of loads and their friction
+constexpr double settled = 1e-13;   // rounding of the loads' change, relative to the largest acceleration
 
-// Friction that is not the sliding of contacts, or does not grow from zero with their loads, is no matter of cones.
+// Check if the cone problem applies. All friction must be sliding of contacts that grows from zero with the load. No
+// user law may depend on reactions.
 bool fits(const Program& p) {
     bool only_cones = true;
     each_law<UserLaw>(p.laws, [&](const UserLaw& law) { only_cones &= law.reaction == Reaction::none; });
@@ -39,11 +40,11 @@ struct RestingProblem {
     const ClosingQuestion& question;
     const RunState& before;
     ContactRows rows;
-    std::vector<char> slides;            // contacts whose slip is known
-    std::vector<ConeElement> cones;      // their cones, those that slide with a row for the normal alone
-    std::vector<int> first;              // row of each in the problem
-    MatX drag;                           // friction along all rows by unknown, of contacts that slide
-    MatX W, dragging;                    // accelerations of the problem's rows to a unit of each unknown, and to its drag
+    std::vector<char> slides;            // contacts with a known slip direction
+    std::vector<ConeElement> cones;      // cones of the contacts (slipping contacts: normal row only)
+    std::vector<int> first;              // first row of each in the problem
+    MatX drag;                           // friction of slipping contacts along all rows, per unknown
+    MatX W, dragging;  // accelerations of the problem's rows for a unit of each unknown, and for its friction
     VecX w0, f;
 
     RestingProblem(const Program& program, Workspace& workspace, const VecX& velocity, const std::vector<int>& gaps,
@@ -77,7 +78,7 @@ struct RestingProblem {
         f.setZero(n);
     }
 
-    // Of all rows those of the problem.
+    // Select the rows of the problem from all rows.
     MatX chosen(const MatX& of_all) const {
         const int n = cones.empty() ? 0 : first.back() + cones.back().dim;
         MatX out(n, of_all.cols());
@@ -99,7 +100,7 @@ struct RestingProblem {
         return friction.holding_limit(friction.mu) * (breaks ? 1.0 - breaking_by : 1.0);
     }
 
-    // Of the rows, without forces.
+    // Accelerations of the rows without contact forces.
     VecX accelerations() {
         VecX out = VecX::Zero(rows.W.rows());
         rows.each_row([&](int at, int block, int k) {
@@ -111,13 +112,14 @@ struct RestingProblem {
 
     double in_play() const { return w0.cwiseAbs().maxCoeff() + (W.cwiseAbs() * f.cwiseAbs()).maxCoeff(); }
 
-    // Of contacts that share a load one may carry none but rounding.
+    // Check if the friction of a contact is at its limit. A contact that shares a load may have a load of rounding
+    // only.
     bool at_its_limit(size_t i) const {
         const double most = cones[i].bound * f[first[i]], rounding = none * f.cwiseAbs().maxCoeff();
         return f.segment(first[i] + 1, cones[i].dim - 1).norm() >= most * (1.0 - at_limit) - rounding;
     }
 
-    // What slips from rest has its kinetic limit from then on. Returns whether something just did.
+    // Set the kinetic limit of contacts that slip from rest. Return true if any limit changed.
     bool release() {
         const VecX a = w0 + W * f;
         bool any = false;
@@ -172,7 +174,8 @@ struct RestingProblem {
         return true;
     }
 
-    // Loads are shared as if friction were given: the one that they cause. False where that does not come to rest.
+    // Distribute loads as if friction was given, and iterate with the friction that they cause. Return false without
+    // convergence.
     bool take_turns(const VecX& free) {
         bool shared = false;
         for (int turn = 0; turn < most_turns; ++turn) {
@@ -201,7 +204,7 @@ struct RestingProblem {
             for (int k = 1; k < cones[i].dim; ++k) out.friction[e][k - 1] = f[first[i] + k];
             const auto slip = a.segment(first[i] + 1, cones[i].dim - 1);
             if (cones[i].dim == 1 || !at_its_limit(i) || !(slip.norm() > least)) continue;
-            // Where slip begins slowly its force tells the way better than what is left of an acceleration.
+            // At a slow slip onset the force defines the direction more accurately than the acceleration.
             const VecX friction = f.segment(first[i] + 1, slip.size());
             const bool tells = friction.norm() > none * f.cwiseAbs().maxCoeff();
             const VecX way = tells ? VecX(-friction.normalized()) : VecX(slip.normalized());
@@ -246,7 +249,7 @@ bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const
         release_contacts(p, w, t, q, v, question.rest);
         RestingProblem problem(p, w, v, gaps, question, before);
         found = act(problem);
-    } catch (const Failure& failure) {  // the callers evaluate the motion and report failures of other rows
+    } catch (const Failure& failure) {  // the caller's own evaluation reports failures of other rows
         if (failure.kind == Failure::Kind::interrupted) throw;
     }
     set_closed(p, w, before.closed);

@@ -1,6 +1,7 @@
-// What contacts that rest on each other begin to do, all at once. With the forces f of their normals and of friction as
-// unknowns, the accelerations of gaps and slips are w = w0 + W f, and the laws of Signorini and Coulomb between them are
-// a cone problem (friction/cone_problem.hpp): which contacts lift, which slip and where to, however many share a load.
+// Onset of motion of contacts at rest, for all contacts together. With normal and friction forces f as unknowns, the
+// accelerations of gaps and slips are w = w0 + W f. The laws of Signorini and Coulomb give a cone problem
+// (complementarity/cone/problem.hpp). Its solution shows the lifting contacts and the slip directions, even for shared
+// loads.
 #pragma once
 
 #include <optional>
@@ -10,27 +11,27 @@
 namespace pn {
 
 struct RestingMotion {
-    std::vector<char> closed;     // of all gaps
-    std::vector<Mode> modes;      // of all elements
-    std::vector<Vec3> direction;  // of the slip of those that begin to slip
-    std::vector<Vec3> friction;   // of each element, along its directions
-    bool shared = false;          // contacts share their load in several ways
-    bool is_near = false;         // not the motion that is asked for, but one from which to look for it
+    std::vector<char> closed;     // by gap
+    std::vector<Mode> modes;      // by element
+    std::vector<Vec3> direction;  // slip direction at onset, by element
+    std::vector<Vec3> friction;   // friction of each element, along its directions
+    bool shared = false;          // contacts are hyperstatic
+    bool is_near = false;         // only an initial guess for the search of the motion
 
-    bool slides() const;  // some slip already, or begin to
-    // The modes of elements at rest, with the directions in which they begin to slip; of a near one its friction.
+    bool slides() const;  // some contact slips or begins to slip
+    // Set the modes of elements at rest and their slip directions at onset. An initial guess sets its friction only.
     void answer(const Program& p, Workspace& w, ModeQuestion& question) const;
 };
 
 struct ClosingQuestion {
-    std::vector<char> rest;     // contacts that rest on each other
-    int opening = -1;           // of them the one whose load has just come down to zero
-    int arrived = -1;           // the element that has just come to rest or to its limit
-    std::vector<int> breaking;  // elements that stuck until now and have just come to their limit: they slip
-    bool struck = false;        // what stuck may move: its velocity tells
+    std::vector<char> rest;     // contacts at rest on each other
+    int opening = -1;           // contact of `rest` whose load just reached zero
+    int arrived = -1;           // element that just came to rest or reached its limit
+    std::vector<int> breaking;  // elements that stuck and just reached their limit: they slip
+    bool struck = false;        // after an impact the velocity decides if a sticking element slips
 };
-// Of the contacts that rest at (t, q, v). Nothing where other laws depend on loads too, or no motion was found. The modes
-// in the workspace stay.
+// Solve for the motion of the contacts at rest at (t, q, v). Return nothing if other laws depend on loads too, or if no
+// motion was found. The modes in the workspace are restored.
 std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                                             const ClosingQuestion& question);
 

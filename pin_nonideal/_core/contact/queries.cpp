@@ -8,12 +8,12 @@
 
 namespace pn {
 
-// Part of the terms of a sum that rounding may leave of it.
+// Rounding of a sum, relative to the sum of the magnitudes of its terms.
 constexpr double sum_rounding = 1e-12;
-// By which lines and points of one place differ: a part of the distance from the origin, or the sine of an angle.
+// Tolerance of coincident lines and points: relative distance from the origin, or sine of an angle.
 constexpr double one_place = 1e-12;
 
-// The rate's own rate, and the size of its terms.
+// Gap acceleration, and the sum of the magnitudes of its terms.
 static std::pair<double, double> rate_of_rate(const Program& p, const Workspace& w, int gap) {
     const Block& block = p.blocks[p.gaps[gap].block];
     const double drift = w.now.values[p.gaps[gap].block].drift[block.kept[0]];
@@ -37,7 +37,7 @@ namespace {
 
 struct Line { Vec3 point, along; };
 
-// Of a geometric row as a force on the body with the higher number.
+// Line of action of a geometric row, as a force on the body with the higher number.
 Line line_of(const Program& p, const Workspace& w, int block, int row) {
     const Wrench& unit = w.now.values[block].wrench[row];
     return {unit.point, p.blocks[block].joint1 > p.blocks[block].joint2 ? unit.force : -unit.force};
@@ -51,7 +51,7 @@ bool rubs_the_same(const Friction& a, const Friction& b) {
            a.stribeck_velocity == b.stribeck_velocity && a.dim == b.dim && !a.user_limit && !b.user_limit;
 }
 
-// The numbers of a program may differ by run.
+// Check if friction and restitution are equal. Parameters of a program may differ between runs.
 bool rub_and_bounce_the_same(const Program& p, const Gap& a, const Gap& b) {
     return a.restitution == b.restitution && (a.sliding < 0) == (b.sliding < 0) &&
            std::equal(a.elements.begin(), a.elements.end(), b.elements.begin(), b.elements.end(), [&](int e, int other) {
@@ -98,7 +98,7 @@ double load(const Program& p, Workspace& w, int gap) {
 }
 
 double load_rounding(const Program& p, const Workspace& w, int gap) {
-    const double scale = w.now.rows.scale[p.blocks[p.gaps[gap].block].row];  // square: mass that the row moves
+    const double scale = w.now.rows.scale[p.blocks[p.gaps[gap].block].row];  // squared: mass that the row moves
     return sum_rounding * scale * scale * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
 }
 

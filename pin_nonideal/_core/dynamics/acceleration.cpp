@@ -4,8 +4,8 @@
 
 namespace pn {
 
-// Pivots of M that differ by more than RowSystem::refine tells cost the row equations as many digits; these passes give
-// them back.
+// Pivots of M that differ by more than RowSystem::refine allows reduce the accuracy of the row equations. These
+// refinement passes restore it.
 constexpr int refinement_passes = 2;
 
 void scale_rows(const Program& p, Workspace& w) {
@@ -21,7 +21,7 @@ void choose_rows(const Program& p, Workspace& w, double tolerance, int most) {
     factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
 }
 
-// r := b - A x, or b - B x with the scaled rows, for the rows in use.
+// Compute r := b - A x, or b - B x with the scaled rows, for the rows in use.
 static PN_INLINE void row_residuals(const Program& p, const Evaluation& now, const std::vector<double>& rows, const VecX& x,
                           const VecX& b, VecX& r) {
     for (int i : now.rows.blocks) {
@@ -31,7 +31,7 @@ static PN_INLINE void row_residuals(const Program& p, const Evaluation& now, con
     }
 }
 
-// Takes x as R^-1 (F + C).
+// Add B^T lam to x = R^-1 (F + C).
 static PN_INLINE void follow_rows(const Program& p, Workspace& w, VecX& x, const VecX& b, VecX& lam) {
     Evaluation& now = w.now;
     if (now.rows.blocks.empty()) return;
@@ -53,14 +53,14 @@ double solve_scaled(const Program& p, Workspace& w, VecX& x, const Force* body, 
     return free;
 }
 
-// x, a force, becomes the acceleration under it and the constraints A a = b; lam are their multipliers.
+// Turn the force x into the acceleration under x and the constraints A a = b. Also compute their multipliers lam.
 static PN_INLINE void constrained_solve(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b,
                                         VecX& lam) {
     solve_scaled_motion(p, w, x, body, b, lam);
     solve_Rt(p.mechanism, w.now.terms, x);  // without rows a = M^-1 F, Eq. (1)
 }
 
-// What the forces and multipliers leave of M a: in w.scratch.scaled_free, and of the bodies of deep trees in body_residual.
+// Compute force + A^T lam - M a in w.scratch.scaled_free. Bodies of deep trees have their part in body_residual.
 static void force_residual(const Program& p, Workspace& w, const VecX& force, const Force* body, const VecX& a,
                            const VecX& lam) {
     Evaluation& now = w.now;
@@ -89,7 +89,7 @@ void solve_acceleration(const Program& p, Workspace& w, const VecX& force, const
     a = force;
     constrained_solve(p, w, a, body ? body->data() : nullptr, b, lam);
     if (now.rows.blocks.empty() || !now.rows.refine) return;
-    for (int pass = 0; pass < refinement_passes; ++pass) {  // their residual is solved for again
+    for (int pass = 0; pass < refinement_passes; ++pass) {  // each pass solves for the residual of the last one
         force_residual(p, w, force, body ? body->data() : nullptr, a, lam);
         row_residuals(p, now, now.A, a, b, scratch.residual);
         constrained_solve(p, w, scratch.scaled_free, scratch.body_residual.data(), scratch.residual, scratch.lam_step);
@@ -131,7 +131,7 @@ const VecX& holding_forces(const Program& p, Workspace& w) {
     now.holding -= now.F + now.C;
     w.scratch.work.setZero();
     for (int i : now.rows.blocks) add_transpose(p.blocks[i], now.A, now.lam, w.scratch.work);
-    now.holding -= w.scratch.work;  // F_c = M a - F, Eq. (4), less what the rows and laws give
+    now.holding -= w.scratch.work;  // F_c = M a - F, Eq. (4), minus the forces of rows and laws
     return now.holding;
 }
 

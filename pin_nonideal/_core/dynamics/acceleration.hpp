@@ -10,21 +10,21 @@ namespace pn {
 
 // B = A R^-T of the rows in use.
 void scale_rows(const Program& p, Workspace& w);
-// An independent choice of the required rows, `most` at most, and its factor.
+// Choose at most `most` independent rows among the required ones and factor them.
 void choose_rows(const Program& p, Workspace& w, double tolerance = rank_tolerance, int most = INT_MAX);
 
-// x, a force, becomes a_s, the acceleration scaled by R; lam are the multipliers.
-// Returns the square of what it would be without rows.
+// Turn the force x into a_s, the acceleration scaled by R, and compute the multipliers lam. Return |a_s'|^2, the
+// squared length of the result without rows.
 double solve_scaled(const Program& p, Workspace& w, VecX& x, const Force* body, const VecX& b, VecX& lam);
-// Acceleration and multipliers under a generalized force and right-hand side b, by the factors in the workspace; refined
-// where light bodies spoil them. `body` adds forces on the bodies of deep trees.
+// Compute acceleration and multipliers for a generalized force and right-hand side b with the factors in the workspace.
+// Light bodies trigger iterative refinement. `body` adds forces on the bodies of deep trees.
 void solve_acceleration(const Program& p, Workspace& w, const VecX& force, const VecX& b, VecX& a, VecX& lam,
                         const std::vector<Force>* body = nullptr);
-// Those of the motion at hand, under its own F, and C where the laws act: w.now.a and w.now.lam under its own b, or others.
+// Solve the current motion for F, plus C if `with_laws`: w.now.a and w.now.lam for w.now.b, or the given b, a and lam.
 void solve_motion(const Program& p, Workspace& w, bool with_laws);
 void solve_motion(const Program& p, Workspace& w, bool with_laws, const VecX& b, VecX& a, VecX& lam);
 
-// Whether sticking elements and constraints leave no freedom at all: then nothing moves, exactly.
+// Check if sticking elements and constraints remove all degrees of freedom. Such a mechanism is exactly at rest.
 bool is_immobile(const Program& p, const Workspace& w);
 // Forces M a - F - C - A^T lam that hold the locked dofs, for the motion in the workspace.
 const VecX& holding_forces(const Program& p, Workspace& w);

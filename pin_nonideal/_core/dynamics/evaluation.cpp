@@ -10,15 +10,15 @@
 
 namespace pn {
 
-// Pivots of M that differ by more than this (bodies of very unequal mass, or massless ones) cost the row equations
-// the same factor in accuracy, which refinement gives back.
+// Pivots of M that differ by more than this factor reduce the accuracy of the row equations by the same factor. Causes
+// are bodies of very unequal mass or without mass. Refinement restores the accuracy.
 constexpr double refined_pivot_ratio = 1e6;
-// A configuration that gives a larger inertia [kg m^2] has run away.
+// A configuration with a larger inertia [kg m^2] has diverged.
 constexpr double runaway_inertia = 1e30;
 
-// Part of gravity's acceleration that rounding leaves where forces balance.
+// Rounding of balanced forces, relative to the acceleration of gravity.
 constexpr double balance_rounding = 1e-14;
-// Part of the terms of a sum that rounding may leave of it.
+// Rounding of a sum, relative to the sum of the magnitudes of its terms.
 constexpr double sum_rounding = 1e-13;
 
 static void factor_mass(const Program& p, Workspace& w, double t) {
@@ -38,7 +38,7 @@ void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q,
         if (i < p.constraints) evaluate(p.blocks[i].kind, state, Part::residual, w.now.values[i]);
 }
 
-// Residuals and A, Eq. (3); and the users' own b.
+// Compute residuals and A, Eq. (3), and users' own b.
 void place_rows(const Program& p, Workspace& w, double t, const VecX& v) {
     if (w.now.awake.empty()) return;
     const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
@@ -52,7 +52,7 @@ void place_rows(const Program& p, Workspace& w, double t, const VecX& v) {
     }
 }
 
-// Rates and b, Eq. (3).
+// Compute rates and b, Eq. (3).
 static void move_rows(const Program& p, Workspace& w, double t, const VecX& v) {
     if (w.now.awake.empty()) return;
     const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
@@ -103,7 +103,7 @@ void configure_velocity(const Program& p, Workspace& w, double t, const VecX& v)
     if (!p.affine_rates) factor_placed_rows(p, w, t, v);
 }
 
-// F as the solution takes it: in deep trees the bias and the given forces on bodies are wrenches.
+// Split F for the solution: in deep trees the bias and the given forces on bodies are wrenches.
 static void place_wrenches(const Program& p, Workspace& w) {
     Evaluation& now = w.now;
     now.joint_F = now.F;
@@ -128,8 +128,8 @@ void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v) {
     if (!p.blocks.empty()) move_rows(p, w, t, v);
 }
 
-// Where closed contacts carry the weight, accelerations of rounding are none: M a below the rounding of the forces that
-// add up to it.
+// Check if closed contacts balance the load. The acceleration a is then rounding: M a is below the rounding of the
+// summed forces.
 static bool is_balanced(const Program& p, Workspace& w) {
     if (w.now.touching.empty() || p.moves_in_time) return false;
     if (w.now.a.cwiseAbs().maxCoeff() <= balance_rounding * p.mechanism.gravity.norm()) return true;
@@ -145,7 +145,7 @@ static bool is_balanced(const Program& p, Workspace& w) {
     return (left.cwiseAbs().array() <= sum_rounding * size.array()).all();
 }
 
-// What laws leave where none acts.
+// Set the results of the laws if no law acts.
 static void leave_laws(Workspace& w) {
     std::fill_n(w.now.C.data(), w.now.C.size(), 0.0);
     std::fill_n(w.now.C_smooth.data(), w.now.C_smooth.size(), 0.0);
@@ -209,7 +209,7 @@ void move_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) 
     evaluate(p.blocks[i].kind, state, Part::motion, w.now.values[i]);
 }
 
-// A contact violates where its gap is negative; that of an open one is looked at here only.
+// Penetrations of all gaps and rates of closed ones. Open gaps are measured here.
 static void gap_violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity,
                            const std::vector<char>* sure) {
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {

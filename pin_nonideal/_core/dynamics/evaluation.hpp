@@ -1,4 +1,4 @@
-// Evaluation of Eq. (40) at one state: kinematics and rows, M and its factor, given forces, laws, acceleration.
+// Evaluation of Eq. (40) at one state: kinematics, rows, M and its factor, given forces, laws, acceleration.
 #pragma once
 
 #include "dynamics/workspace.hpp"
@@ -8,34 +8,35 @@ namespace pn {
 // Acceleration a and multipliers lam at (t, q, v) for the modes and active rows in the workspace.
 void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 
-// The part of it that the configuration decides: placements, M and the rows, with their factors. A user's own A may
-// depend on v; where it does, a change of v has it taken anew.
+// Compute all terms that depend on the configuration: placements, M and the rows, with their factors. A user's own A
+// may depend on v. Then a change of v evaluates A again (configure_velocity).
 void configure(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// Placements, M and the rows alone; their factors stay.
+// Compute placements, M and the rows without their factors.
 void place(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 void configure_velocity(const Program& p, Workspace& w, double t, const VecX& v);
-// The rest, which needs the velocity: bias and given forces F, and b; then C, a and lam.
+// Compute all terms that depend on the velocity: bias and given forces F and b, then C, a and lam.
 void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v);
 void solve_dynamics(const Program& p, Workspace& w, double t, const VecX& v);
 
-// Kinematics and rows alone; rows of bodies in their places, without their motion; rows of bodies in motion; residuals of
-// the constraints, and no more than they need.
+// Update kinematics and rows. The other functions update rows for given placements, rows for given placements and
+// velocities, and residuals of the constraints only.
 void update_kinematics(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 void place_rows(const Program& p, Workspace& w, double t, const VecX& v);
 void evaluate_rows(const Program& p, Workspace& w, double t, const VecX& v);
 void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 
-// The row of a gap, open or closed: its residual, for bodies that are placed; its rate and drift, for bodies in motion;
-// both; and these with A. A function of the user's gives them all at once.
+// Evaluate the row of an open or closed gap. measure_gap computes the residual for given placements. move_gap computes
+// rate and bias for given velocities. follow_gap computes both, and evaluate_gap also A. A user's function computes all
+// of them at once.
 void measure_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
 void move_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
 void follow_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
 void evaluate_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
-// Of any block, for bodies in motion.
+// Evaluate the rows of any block for given placements and velocities.
 void evaluate_block(const Program& p, Workspace& w, double t, const VecX& v, int block);
 
-// Largest residual and rate over all rows of all descriptions at the state last evaluated; of contacts that may open
-// the depth, and the rate of closed ones. Open ones that are known to be so are passed over: `sure`, by gap.
+// Compute the largest residual and rate over all described rows at the state last evaluated. A contact that may open
+// contributes its penetration, and its rate only if it is closed. `sure` marks the open gaps (by index) to skip.
 void violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity,
                 const std::vector<char>* sure = nullptr);
 

@@ -1,4 +1,4 @@
-// Why an evaluation or a run cannot go on: a value at the door, where the package's exceptions are made of it.
+// Reason why an evaluation or a run failed. The bindings convert it to the exceptions of the package.
 #pragma once
 
 #include <exception>
@@ -16,9 +16,9 @@ struct Failure : std::exception {
     };
     Kind kind;
     double time = 0.0;
-    std::vector<int> elements;  // dofs, blocks or frictions, as the kind says
+    std::vector<int> elements;  // dofs, blocks or frictions, depending on the kind
     double value = 0.0;         // residual, gap, determinant, rate or number of steps
-    // Of a paradox: what is shown, and of several motions two, the limits of the elements and the acceleration of each.
+    // Solutions of a paradox. Two of several solutions are stored: limits of the elements, and accelerations.
     enum class Solutions { not_told, none, several } solutions = Solutions::not_told;
     std::vector<VecX> limits, accelerations;
     Failure(Kind k, double t, std::vector<int> e = {}, double x = 0.0)

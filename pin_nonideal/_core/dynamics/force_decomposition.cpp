@@ -50,9 +50,10 @@ void split_forces(const Program& p, Workspace& w, Split& out) {
     for (size_t i = 0; i < p.blocks.size(); ++i) {
         if (!w.now.rows.block_used[i]) continue;
         const bool constraint = static_cast<int>(i) < p.constraints;
-        add_transpose(p.blocks[i], w.now.A, shared, constraint ? total : out.C);  // C holds what sticks as well
+        // C includes the forces of sticking elements
+        add_transpose(p.blocks[i], w.now.A, shared, constraint ? total : out.C);
     }
-    VecX left_over = VecX::Zero(nv);  // of the multipliers, by the shares; what locks a dof carries that as well
+    VecX left_over = VecX::Zero(nv);  // forces of lam minus shared multipliers, which locked dofs carry
     for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.A, lam - shared, left_over);
     for (int dof = 0; dof < nv; ++dof)
         if (w.now.terms.locked[dof]) out.C[dof] += holding_forces(p, w)[dof] + left_over[dof];

@@ -1,12 +1,12 @@
-// Eq. (39): what the constraints alone would exert, and what the nonideal forces add to it.
+// Decomposition of Eq. (39): force of the ideal constraints, and contribution of the nonideal forces.
 #pragma once
 
 #include "dynamics/workspace.hpp"
 
 namespace pn {
 
-// The motion of the ideal constraints: without C, and without what sticks. The workspace holds it, with its factors,
-// while this object lives; then the factors are again those of the modes, and a and lam are left to the caller.
+// Motion of the ideal constraints, without C and without sticking elements. The workspace holds this motion and its
+// factors during the lifetime of the object. The destructor restores the factors of the modes, but not a and lam.
 class IdealMotion {
 public:
     IdealMotion(const Program& p, Workspace& w);
@@ -23,7 +23,7 @@ private:
 struct Split {
     VecX F_ideal, F_nonideal, C, lam, lam_ideal;  // multipliers by row of the descriptions
 };
-// Ideal and nonideal part of the force of constraint at the state last evaluated.
+// Compute the ideal and nonideal part of the constraint force at the state last evaluated.
 void split_forces(const Program& p, Workspace& w, Split& out);
 
 }  // namespace pn

@@ -47,7 +47,7 @@ SlipLimits load_limits(const Program& p, Workspace& w, const Friction& f, double
     if (f.load == Friction::Load::user) return f.user_limit(p, t, q, v, w);
     double limit = f.constant;
     if (f.load == Friction::Load::none) return limit;
-    // Stages beyond the instant at which a contact opens see a force that pulls: friction goes through zero with it.
+    // Stages past the opening of a contact have a tensile normal force. Friction changes sign with it.
     if (f.gap >= 0) return limit + f.mu * p.described.share(f.row, reactions(p, w).lam);
     for (const Vec3& vector : vectors_of_load(p, w, f)) limit += vector.norm();
     return limit;
@@ -59,7 +59,7 @@ double slip_along_mode(const Program& p, const Workspace& w, int e) {
     return f.dim == 1 ? w.state.mode[e] * u[0] : u.dot(w.state.slip_direction[e]);
 }
 
-// Rates of the slip velocities in the motion at hand.
+// Slip accelerations of an element in the current motion.
 static Vec3 slip_acceleration(const Program& p, Workspace& w, const Friction& f) {
     const Block& block = p.blocks[f.block];
     Vec3 rate = Vec3::Zero();
@@ -84,7 +84,7 @@ std::pair<double, double> slip_toward_rest(const Program& p, Workspace& w, int e
     if (f.dim == 1) return {along, slip_rate_along_mode(p, w, e)};
     const Vec3 u = slip_velocity(w.now, f);
     const double size = u.norm();
-    // What is too slow to tell a direction goes along the one that is remembered.
+    // Slip too slow to have a direction uses the stored direction.
     const bool slow = size <= directed_speed * (1.0 + w.now.speed);
     if (slow || 2.0 * along * along > size * size) return {along, slip_rate_along_mode(p, w, e)};
     return {size, slip_acceleration(p, w, f).dot(u) / size};
@@ -145,7 +145,7 @@ static Vec3 force_direction(const Program& p, Workspace& w, int e) {
     const Vec3 u = slip_velocity(w.now, f);
     const double speed = u.norm();
     if (speed > directed_speed * (1.0 + w.now.speed))
-        // Past a reversal inside a step the direction goes on as it was, so that the step sees a smooth law.
+        // Past a reversal inside a step the direction stays the same, so that the step integrates a smooth law.
         w.state.last_direction[e] = u.dot(w.state.slip_direction[e]) >= 0.0 ? Vec3(u / speed) : Vec3(-u / speed);
     return -w.state.last_direction[e];
 }

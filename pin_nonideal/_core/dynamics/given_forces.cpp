@@ -17,7 +17,7 @@ struct Apply {
     double t;
     const VecX &q, &v;
 
-    // Force at a world point of a body, and couple.
+    // Apply a force at a world point of a body, and a couple.
     void push(int joint, const Vec3& point, const Vec3& force, const Vec3& couple) const {
         if (joint == 0) return;
         w.now.body_force[joint] += Force{force, couple + (point - w.now.terms.body[joint].ref).cross(force)};
@@ -114,7 +114,7 @@ void given_forces(const Program& p, Workspace& w, double t, const VecX& q, const
     for (const GivenForce& f : p.forces) std::visit(apply, f);
     if (!p.mechanism.deep_dofs.empty()) w.now.joint_external = w.now.external;
     if (!p.has_body_forces) return;
-    // From the leaves to the root: each joint feels the forces on its subtree.
+    // Propagate from the leaves to the root: each joint carries the forces on its subtree.
     std::copy(w.now.body_force.begin(), w.now.body_force.end(), w.scratch.subtree_force.begin());
     for (int i = static_cast<int>(p.mechanism.joints.size()) - 1; i > 0; --i) {
         const Joint& j = p.mechanism.joints[i];

@@ -14,29 +14,30 @@ namespace pn {
 namespace {
 
 constexpr double reaction_tolerance = 4e-15;  // relative change of y that counts as rounding
-constexpr double newton_tolerance = 3.2e-14;  // the same behind a linear solve
-constexpr double stalled = 1e-12;             // Newton's error that no longer falls is rounding where it is below this
-constexpr double slow_change = 1e-13;         // a change that contracts slowly is followed where it is above this
-constexpr double good_contraction = 0.25;     // slower fixed points go to Newton's method
+constexpr double newton_tolerance = 3.2e-14;  // the same after a linear solve
+constexpr double stalled = 1e-12;             // Newton error below this that no longer falls is rounding
+constexpr double slow_change = 1e-13;         // slowly contracting changes above this are iterated further
+constexpr double good_contraction = 0.25;     // slower fixed-point iterations switch to Newton's method
 constexpr int fixed_point_limit = 30, newton_limit = 30;
-// The growth of the equation below which a proof of uniqueness is kept for as many steps as there are unknowns, and these
-// at least: it costs about one motion a step then. Over so short a time no growth comes from here to one.
+// Growth of the equation below which a uniqueness proof stays valid for max(n, kept_steps) steps. The proof then costs
+// about one motion per step. The growth does not rise from this value to one in so short a time.
 constexpr double safe_growth = 0.5;
 constexpr int kept_steps = 4;
-constexpr int most_pieces = 30;  // of the loads that contacts share, one solution each
-constexpr double least_part = 0x1p-10;  // of the way to a solution of another piece
-constexpr double least_gain = 0.1;      // of the error that a step to the solution takes away if all is one piece
+constexpr int most_pieces = 30;  // maximum number of zero-load sets to try, one solution each
+constexpr double least_part = 0x1p-10;  // smallest fraction of the step to a solution of another zero-load set
+constexpr double least_gain = 0.1;      // required relative decrease of the error, per fraction of that step
 
 struct Implicit : Unknowns {
     using Unknowns::Unknowns;
 
     bool is_due() const {
         const RunState& state = w.state;
-        if (state.unique == Uniqueness::not_shown) return state.steps_since == never_decided;  // it was tried in vain
+        // the proof has already failed
+        if (state.unique == Uniqueness::not_shown) return state.steps_since == never_decided;
         return state.steps_since >= (state.growth < safe_growth ? std::max(n, kept_steps) : 1);
     }
 
-    // Whether the equation contracts, with y its solution; the motion is then again that of y.
+    // Check if the equation contracts near its solution y. If so, restore the motion of y.
     bool contracts(const VecX& y) {
         ReactionEquation& arrays = w.scratch.equation;
         const HeldPiece piece(p, w);
@@ -53,8 +54,8 @@ struct Implicit : Unknowns {
         return true;
     }
 
-    // Piece after piece of the loads, until a solution lies in its own. One that lies in another piece is gone to as far as
-    // that makes the equation better met: else two pieces might send to one another for ever.
+    // Solve for one zero-load set after the other until a solution is consistent with its own set. The step to another
+    // solution is damped until the error decreases, because two sets could alternate forever.
     void solve_pieces(VecX& y) {
         VecX g(n);
         const VecX start = y;
@@ -80,7 +81,8 @@ struct Implicit : Unknowns {
         image(y, g);
     }
 
-    // Back from y towards `from` until the error there is less than before; false where it nowhere is.
+    // Backtrack from y toward `from` until the error is smaller than before. Return false if no point has a smaller
+    // error.
     bool approach(const VecX& from, double& error, VecX& y, VecX& g) {
         const VecX way = y - from;
         for (double part = 1.0; part >= least_part; part *= 0.5) {
@@ -94,7 +96,7 @@ struct Implicit : Unknowns {
         return false;
     }
 
-    // The equation as arrays, its solution near y, and whether that is the only one.
+    // Assemble the equation as arrays, solve it near y, and check if the solution is unique.
     void solve_bearings(VecX& y) {
         ReactionEquation& arrays = w.scratch.equation;
         ReactionNewton& newton = w.scratch.newton;
@@ -107,7 +109,7 @@ struct Implicit : Unknowns {
         if (!regular || is_due()) decide(*this, arrays, before, y, solved);
         w.now.determinant = newton.factorize(arrays, y);
         double last = std::numeric_limits<double>::infinity();
-        for (int it = 0; it < newton_limit; ++it) {  // what rounding left in the arrays
+        for (int it = 0; it < newton_limit; ++it) {  // removes the rounding of the arrays
             image(y, newton.image);
             newton.residual = newton.image - y;
             const double error = newton.residual.cwiseAbs().maxCoeff();
@@ -118,7 +120,7 @@ struct Implicit : Unknowns {
         }
     }
 
-    // With functions of the user's among the unknowns.
+    // Solve with user functions among the unknowns.
     void solve_laws(VecX& y) {
         VecX g(n);
         double size = 0.0, last = std::numeric_limits<double>::infinity();
@@ -137,14 +139,15 @@ struct Implicit : Unknowns {
             }
             last = error;
             const VecX step = pn::solve(MatX::Identity(n, n) - J, residual);
-            if (!step.allFinite()) throw Failure(Failure::Kind::paradox, t, elements(), 0.0);  // between one and none
+            // singular: limit between one solution and none
+            if (!step.allFinite()) throw Failure(Failure::Kind::paradox, t, elements(), 0.0);
             y += step;
         }
         w.now.determinant = least_determinant(*this, J);
         throw Failure(Failure::Kind::paradox, t, elements(), w.now.determinant);
     }
 
-    // Fixed-point steps from the solution before; false where they contract slowly.
+    // Iterate the fixed point from the previous solution. Return false if it contracts slowly.
     bool iterate() {
         VecX &y = w.scratch.unknown, &g = w.scratch.image;
         auto yn = y.head(n);
@@ -161,7 +164,7 @@ struct Implicit : Unknowns {
             if (change <= reaction_tolerance * size) return true;
             if (it > 1 && change > good_contraction * last && change > slow_change * size + rounding()) return false;
             if (it > 1 && change >= last) return true;  // rounding
-            // The next change would be below rounding: the motion just found needs one more pass and no check.
+            // The next change would be below rounding: compute the motion once more without a check.
             if (it > 0 && change * (change / last) <= reaction_tolerance * size) {
                 set(g);
                 motion();
@@ -172,7 +175,7 @@ struct Implicit : Unknowns {
         return false;
     }
 
-    // Places of the unknowns among those of all elements and laws, which a warm start keeps.
+    // Map the unknowns to their positions in the warm start, which stores all elements and laws.
     template <class Exchange>
     void exchange(const Exchange& swap) const {
         const int elements = static_cast<int>(p.frictions.size()), nv = p.mechanism.nv;
@@ -185,7 +188,7 @@ struct Implicit : Unknowns {
         VecX &kept = w.state.unknown, &y = w.scratch.unknown;
         y.setZero();
         if (w.state.warm) exchange([&](int k, int place, int count) { y.segment(k, count) = kept.segment(place, count); });
-        w.state.warm = false;  // what a failure leaves is no start for the next evaluation
+        w.state.warm = false;  // the state after a failure is no initial guess
         if (!iterate() || (bearings && is_due() && !contracts(y))) {
             VecX& solution = w.scratch.solution;
             solution = y.head(n);
@@ -202,7 +205,7 @@ struct Implicit : Unknowns {
 
 }  // namespace
 
-// Loads that the ideal motion gives, as the paper's Example (c) takes them; their laws are then known.
+// Compute loads from the ideal motion, as in Example (c) of the paper. The laws with these loads are then known.
 static void ideal_loads(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     bool asked = false;
     for (const Friction& f : p.frictions) asked |= f.reaction == Reaction::ideal;
@@ -233,7 +236,7 @@ void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, co
         if (!act) w.state.unique = Uniqueness::shown;
         return;
     }
-    w.now.base_C = known;  // C that does not change while the reactions are sought
+    w.now.base_C = known;  // C that stays constant during the iteration
     ideal_loads(p, w, t, q, v);
     Implicit implicit{p, w, t, q, v};
     if (implicit.n == 0) implicit.motion();

@@ -1,25 +1,25 @@
-// The motion together with the laws that its reactions load: C depends on the reactions, which depend on C.
+// Motion coupled with load-dependent laws: C depends on the reactions, and the reactions depend on C.
 //
-// Unknown y: the limits of slipping frictions and the forces of user laws. Given y the motion follows from the
-// factors at hand, the motion gives the loads, and the loads give an image g(y). A fixed point is iterated while it
-// contracts well; else Newton's method solves y = g(y). det(I - dg/dy) tells whether the solution is the only one.
+// The unknown y holds the limits of slipping frictions and the forces of user laws. The current factors give the motion
+// for y. The motion gives the loads, and the loads give an image g(y). Fixed-point iteration solves y = g(y) if it
+// contracts well, else Newton's method. det(I - dg/dy) tests the uniqueness of the solution.
 #pragma once
 
 #include "dynamics/workspace.hpp"
 
 namespace pn {
 
-// Whether any law acts: friction of contacts does not where all are open.
+// Check if any law acts. Friction of contacts does not act if all contacts are open.
 inline bool laws_act(const Program& p, const Workspace& w) {
     return p.has_laws() && (!p.rubs_while_closed || !w.now.touching.empty());
 }
 
-// C of all that reads no reactions, slipping friction of constant limits among it, into w.now.C_smooth.
+// Compute C of all laws that read no reactions, including slipping friction of constant limits: w.now.C_smooth.
 void find_known_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// C, a and lam for the forces F, what is known of C (the laws that read no reactions), and the laws that do.
+// Compute C, a and lam for the forces F. `known` is C of the laws that read no reactions.
 void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const VecX& known);
-// The same where what slips rubs as it did in the step of time stepping that has led here, by its percussions over its
-// length; with the workspace as a failure of the above has left it.
+// Compute the same with friction limits from the last time step: its impulses divided by its length. The workspace must
+// be in the state that a failure of solve_with_laws left.
 void solve_with_step_friction(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 
 }  // namespace pn

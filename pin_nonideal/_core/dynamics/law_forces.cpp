@@ -6,7 +6,7 @@ namespace pn {
 
 namespace {
 
-// Forces as generalized ones, and the rates of the laws' states where they are required.
+// Collects forces as generalized forces, and rates of the laws' states if required.
 struct GeneralizedForce {
     const Program& p;
     const Evaluation& now;
@@ -26,7 +26,7 @@ struct GeneralizedForce {
     void on_state(int state, double rate) { if (dz) (*dz)[state] = rate; }
 };
 
-// Forces on bodies, about their reference points. What acts within a joint of the tree is none.
+// Collects forces on bodies about their reference points. A force inside a tree joint does not count.
 struct BodyForces {
     const Program& p;
     const Evaluation& now;
@@ -43,7 +43,7 @@ struct BodyForces {
     void on_state(int, double) {}
 };
 
-// Dofs on which something may act.
+// Collects the dofs on which a law may act.
 struct ActedOn {
     const Program& p;
     std::vector<char>& dofs;

@@ -22,7 +22,7 @@ NumberPlace member(T& of, const NumberName& name, Members<T> members) {
     refuse(name);
 }
 
-// The one of a kind that was added as number `index`; sorting by kind keeps their order.
+// Return item number `index` of a kind. Sorting by kind keeps the order of insertion.
 template <class Kind, class Several>
 Kind& nth(Several& several, const NumberName& name) {
     int k = name.index;

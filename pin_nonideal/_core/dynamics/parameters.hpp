@@ -1,4 +1,4 @@
-// Numbers of a program that every run of a batch may have for itself.
+// Numbers of a program that may differ between the runs of a batch.
 #pragma once
 
 #include <string>
@@ -8,16 +8,16 @@
 
 namespace pn {
 
-// A number by its name: the call of the builder that made what it belongs to, which of these calls, and the argument.
-// A "body" is named by its joint, with "mass", "com" and the columns "inertia x", "inertia y" and "inertia z"; "gravity"
-// stands for itself.
+// Name of a number: call of the builder that made its owner, index of this call, and argument. A "body" is named by its
+// joint, with "mass", "com" and the columns "inertia x", "inertia y" and "inertia z". "gravity" has no owner.
 struct NumberName {
     std::string call;
     int index;
     std::string argument;
 };
 
-// The numbers of that name, `size` of them from `at` on; throws std::invalid_argument where a run can have none.
+// Location of the numbers with a name: `size` numbers from `at`. find_number throws std::invalid_argument if a run
+// cannot set them.
 struct NumberPlace {
     double* at;
     int size;

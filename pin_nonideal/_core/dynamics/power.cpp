@@ -17,7 +17,7 @@ std::vector<std::string> power_names(const Program& p) {
     return names;
 }
 
-// Of each law, without what sticks, which has no power.
+// Compute C of each law without sticking forces, which have no power.
 static void moving_law_forces(const Program& p, Workspace& w, const VecX& v, std::vector<VecX>& force) {
     for (VecX& each : force) each.setZero();
     add_forces_by_law(p, w, v, force);

@@ -1,4 +1,4 @@
-// Forces of the laws and power of all forces at the evaluation in the workspace: what the ledger integrates.
+// Forces of the laws and power of all forces at the evaluation in the workspace. The ledger integrates the power.
 #pragma once
 
 #include <iterator>
@@ -9,13 +9,13 @@
 
 namespace pn {
 
-// Columns: these, and from there on each law.
+// Columns: these powers, then one for each law.
 constexpr const char* scene_powers[] = {"actuation", "forces", "constraints"};
 constexpr int constraint_power = 2;
 constexpr int first_law_power = std::size(scene_powers);
 int power_count(const Program& p);
 std::vector<std::string> power_names(const Program& p);
-// C of each law, what sticks by it included; they add up to C of the split.
+// Compute C of each law, sticking forces included. Their sum is C of the decomposition.
 void law_forces(const Program& p, Workspace& w, const VecX& v, std::vector<VecX>& force);
 void powers(const Program& p, Workspace& w, const VecX& v, double* out);
 

@@ -12,7 +12,7 @@ Program& Program::operator=(const Program&) = default;
 Program& Program::operator=(Program&&) noexcept = default;
 Program::~Program() = default;
 
-// Numbers the law's states after those of the laws before.
+// Number the law's states after those of the previous laws.
 template <class L>
 static void number_states(Program& p, L& law) {
     if constexpr (std::is_same_v<L, UserLaw>) law.index = p.user_laws++;
@@ -25,7 +25,7 @@ void Program::add(Law law) {
     laws.push_back(std::move(law));
 }
 
-// Rows of descriptions by the kept rows that stand for them.
+// Map rows of descriptions to kept rows.
 static void number_descriptions(Program& p) {
     int next = p.user_rows;
     for (size_t i = p.constraints; i < p.blocks.size(); ++i) {
@@ -45,7 +45,7 @@ static void number_descriptions(Program& p) {
     p.described.finish(p.layout.rows);
 }
 
-// What a gap measures, as numbers; none where it says more than numbers, as a solid or a function does.
+// Geometry of a gap as a list of numbers. `told` is false for kinds with other data, such as solids or functions.
 class GapNumbers {
 public:
     GapNumbers(const Program& p, const Gap& gap) {
@@ -108,7 +108,7 @@ void Program::finish() {
     for (int dof = 0; dof < mechanism.nv; ++dof)
         if (reached[dof]) constrained_dofs.push_back(dof);
     number_descriptions(*this);
-    // A contact whose normal nothing moves along carries nothing and never pulls.
+    // A contact without mobility along its normal has no load and never opens.
     const auto normal = [&](int block) { return blocks[block].user_row + pressing_row(blocks[block].kind); };
     const auto bare = [&](int block) { return described.rows[normal(block)].kept < 0; };
     contacts.erase(std::remove_if(contacts.begin(), contacts.end(), bare), contacts.end());
@@ -123,7 +123,7 @@ void Program::finish() {
         f.gap = f.anchor >= first_gap ? f.anchor - first_gap : -1;
         if (f.gap < 0) continue;
         gaps[f.gap].elements.push_back(static_cast<int>(e));
-        // What resists spinning and rolling has a kind of its own.
+        // Spinning and rolling resistance have their own row kind.
         if (!std::holds_alternative<TurnSlipRows>(blocks[f.block].kind)) gaps[f.gap].sliding = static_cast<int>(e);
     }
     find_alike(*this);
@@ -135,7 +135,7 @@ void Program::finish() {
     for (const Friction& f : frictions) needs_reactions |= f.reaction != Reaction::none;
     rubs_while_closed = laws.empty() && std::all_of(frictions.begin(), frictions.end(),
                                                     [](const Friction& f) { return f.gap >= 0; });
-    // Kinds stand together, so that the order of their descriptions decides no sum.
+    // Group laws by kind, so that the order of their descriptions does not affect rounding.
     std::stable_sort(laws.begin(), laws.end(), [](const Law& a, const Law& b) { return a.index() < b.index(); });
     each_law<UserLaw>(laws, [&](const UserLaw& law) { needs_reactions |= law.reaction != Reaction::none; });
     bool by_differences = false;

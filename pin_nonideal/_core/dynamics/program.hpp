@@ -13,16 +13,16 @@
 
 namespace pn {
 
-// A contact that may open: its gap is a row as long as it is closed.
+// Unilateral contact: its gap is a row while the contact is closed.
 struct Gap {
     int block = 0;
     double restitution = 0.0;
-    std::vector<int> elements;  // of friction there
-    int sliding = -1;           // of them the one along its plane, whose forces lie in Coulomb's cone
-    int alike = -1;             // the first gap that measures the same, or itself
+    std::vector<int> elements;  // friction elements of the contact
+    int sliding = -1;           // sliding element along the contact plane, with forces in Coulomb's cone
+    int alike = -1;             // first gap with the same geometry, or the gap itself
 };
 
-// What restitution e of a contact means in an impact: of rates of its gap, or of impulses.
+// Meaning of the restitution e of a contact in an impact: ratio of gap rates (Newton) or of impulses (Poisson).
 enum class ImpactLaw { newton, poisson };
 
 struct Program {
@@ -36,65 +36,65 @@ struct Program {
 
     Mechanism mechanism;
     std::vector<Block> blocks;  // constraints first, then gaps, then directions of friction
-    int constraints = 0;        // number of blocks of constraints and contacts, gaps among them
+    int constraints = 0;        // number of blocks of constraints and contacts, including gaps
     int first_gap = 0;          // block of the first gap
     std::vector<Gap> gaps;
     ImpactLaw impact_law = ImpactLaw::newton;
     std::vector<int> all_contacts;  // blocks of all contacts, in the order of their descriptions
-    std::vector<int> contacts;  // blocks of contacts that are kept and of wheels, whose normal force should press
-    std::vector<int> pressing;  // the rows of these forces, among those of all descriptions
+    std::vector<int> contacts;  // blocks of kept contacts and of wheels, which need a compressive normal force
+    std::vector<int> pressing;  // rows of these forces, among those of all descriptions
     int user_rows = 0;          // rows of all constraint descriptions
     struct Copy { int row, first; double factor; };
-    std::vector<Copy> copies;   // rows of descriptions that are not kept because they are multiples of others
+    std::vector<Copy> copies;   // described rows that are multiples of other rows and not kept
     DescribedRows described;
     RowLayout layout;
-    size_t entries = 0;         // of A and B
+    size_t entries = 0;         // number of entries of A and B
 
     std::vector<std::string> law_names;
     std::vector<Friction> frictions;
     std::vector<Law> laws;
     int user_laws = 0;
-    int states = 0;  // of all laws
+    int states = 0;  // number of states of all laws
 
     std::vector<GivenForce> forces;
     Actuation actuation;
-    VecX least_effort, most_effort;      // of the drives, by dof; empty where they give what is asked
+    VecX least_effort, most_effort;      // limits of the actuators, by dof (empty if unlimited)
 
-    // What the scene does not need is not computed.
+    // Flags that skip computations that the scene does not need.
     bool has_laws() const { return !frictions.empty() || !laws.empty(); }
     bool limits_effort() const { return least_effort.size() > 0; }
     bool needs_reactions = false;        // some law reads them
-    bool rubs_while_closed = false;      // no law acts but friction of contacts that may open
+    bool rubs_while_closed = false;      // the only laws are frictions of unilateral contacts
     bool driven = false;                 // forces or actuation
     bool has_body_forces = false;        // given forces that act on bodies
-    bool moves_in_time = false;          // some constraint moves by itself
-    bool driven_exactly = false;         // some does, and all rates are derivatives to rounding, not differences
-    std::vector<double> breaks;          // times at which functions of time break, as they know them, ascending
-    bool searches_breaks = false;        // some function of time is the user's and does not tell its breaks
-    bool asks_functions = false;         // of the user's, for forces that may change while nothing moves
+    bool moves_in_time = false;          // some constraint depends on time
+    bool driven_exactly = false;         // some constraint does, and all rates are exact derivatives, not differences
+    std::vector<double> breaks;          // known break times of the functions of time, ascending
+    bool searches_breaks = false;        // some user function of time does not declare its breaks
+    bool asks_functions = false;         // user functions may change the forces while nothing moves
     bool affine_rates = true;            // the rate of every row is A(q, t) v + phi_t
-    std::vector<int> constrained_joints;     // whose bodies the constraints tie, and all before them in the tree
+    std::vector<int> constrained_joints;     // joints whose bodies the constraints tie, and their ancestors in the tree
     std::vector<Angle> constrained_angles;   // of these joints
     std::vector<int> constrained_dofs;       // in the supports of the rows, ascending
 
-    // Of the implicit reaction equation at most: a limit for each element, a force for each of the user's laws.
+    // Maximum size of the implicit reaction equation: a limit for each element, a force for each user law.
     size_t unknowns() const { return frictions.size() + static_cast<size_t>(user_laws) * mechanism.nv; }
-    // Rows of constraints and gaps come first, rows of friction's directions after them.
+    // Number of rows of constraints and gaps. Rows of friction directions follow them.
     int constraint_rows() const {
         return constraints < static_cast<int>(blocks.size()) ? blocks[constraints].row : layout.rows;
     }
 
-    // The share of one row of a block's description in multipliers by kept row, see `share_multipliers`.
+    // Multiplier of one row of a block's description for multipliers by kept row, see `share_multipliers`.
     double share(const Block& block, int row, const VecX& lam) const { return described.share(block.user_row + row, lam); }
-    // Those of all rows of constraints and contacts, as users number them.
+    // Multipliers of all rows of constraints and contacts in the user's numbering.
     VecX user_multipliers(const VecX& lam) const;
 
-    // Whether a function of the user's measures a gap.
+    // Check if a user function measures a gap.
     bool is_users(int gap) const { return std::holds_alternative<UserGapRow>(blocks[gaps[gap].block].kind); }
 
-    // A law, with places for its states.
+    // Add a law and allocate its states.
     void add(Law law);
-    // Numbers the kept rows, finds supports and lays out the storage; once, before the program is shared.
+    // Number the kept rows, compute supports and lay out the storage. Call once, before threads share the program.
     void finish();
 };
 

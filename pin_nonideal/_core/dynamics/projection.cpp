@@ -12,21 +12,21 @@ namespace pn {
 
 namespace {
 
-// After its first steps an iteration that leaves more than this part of the largest residual is at its end: the rest is
-// rounding. Newton's method halves each time near the constraints; the first steps may come from afar.
+// Past its first steps an iteration that keeps more than this fraction of the largest residual has converged to
+// rounding. Newton's method at least halves the residual near the constraints. The first steps may start far away.
 constexpr double stalled_part = 0.5;
 constexpr int sure_position_steps = 3, sure_velocity_steps = 1;
-// Factors of the new place cost less than this many iterations.
+// Factorization at the new position costs less than this many iterations.
 constexpr double iterations_for_factors = 3.0;
 // Rank tolerances tried in this order at a state off the constraints, where dependent rows have pivots above
-// rank_tolerance: the first choice, that of the fewest rows, whose projection closes all other rows is taken.
+// rank_tolerance. The first choice (fewest rows) whose projection closes all other rows is taken.
 constexpr double tolerances_near[] = {1e-3, 1e-5, 1e-7, 1e-9};
-// Choices of rows by which one position is projected: each takes the gaps of the others down with the square.
+// Maximum choices of rows to project one position. Each choice reduces the gaps of the other rows quadratically.
 constexpr int most_choices = 3;
-// Near a singular position no residual is small enough, and the count ends at unit roundoff.
+// Near a singular position the floor is zero. Iteration counts then assume convergence to unit roundoff.
 constexpr double no_floor = 1e-16;
 
-// x := R^-T B^T (B B^T)^-1 r, the least move in the metric of M that changes A x by r.
+// Compute x := R^-T B^T (B B^T)^-1 r, the least move in the metric of M that changes A x by r.
 void least_move(const Program& p, Workspace& w, VecX& x) {
     solve_rows(p.layout, w.now.rows, w.scratch.r, w.scratch.lam_step);
     x.setZero();
@@ -34,7 +34,7 @@ void least_move(const Program& p, Workspace& w, VecX& x) {
     solve_Rt(p.mechanism, w.now.terms, x);
 }
 
-// Takes a residual or rate of each kept row into r, negative; returns the largest of the rows that count.
+// Store the negative residual or rate of each kept row in r. Return the largest magnitude of the rows in `counts`.
 template <class Value>
 double gather(const Program& p, Workspace& w, const std::vector<char>& counts, Value value) {
     double largest = 0.0;
@@ -55,7 +55,8 @@ double gather_residuals(const Program& p, Workspace& w, const std::vector<char>&
 
 double gather_residuals(const Program& p, Workspace& w) { return gather_residuals(p, w, w.now.rows.active); }
 
-// A v + phi_t by the rows in the workspace, which needs no motion of the bodies; a user's rate is his own function.
+// Compute A v + phi_t from the rows in the workspace without motion of the bodies. A user's rate is a function of its
+// own.
 double gather_rates(const Program& p, Workspace& w, double t, const VecX& v, const std::vector<char>& counts) {
     const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
     for (int i : w.now.rows.blocks) {
@@ -75,13 +76,13 @@ double gather_rates(const Program& p, Workspace& w, double t, const VecX& v) {
     return gather_rates(p, w, t, v, w.now.rows.active);
 }
 
-// Whether factors of the new place are worth their cost when each iteration goes on to take as much as the last did.
+// Check if a new factorization pays off, assuming that each iteration reduces the residual as much as the last one.
 bool needs_new_factors(double before, double now, double floor) {
     if (!(now < before)) return true;
     return std::log(now / std::max(floor, no_floor)) / std::log(before / now) > iterations_for_factors;
 }
 
-// Product of multipliers of rows of unit length.
+// Inner product of multipliers of rows of unit length.
 double product(const Workspace& w, const VecX& x, const VecX& y) {
     double sum = 0.0;
     for (int k = 0; k < x.size(); ++k)
@@ -89,22 +90,22 @@ double product(const Workspace& w, const VecX& x, const VecX& y) {
     return sum;
 }
 
-// Next step of the multipliers, s := (B B^T)^-1 r with Broyden's corrections: the factors are those of the place where
-// the move started, and each step has shown how the rows have changed. [Kelley, Solving Nonlinear Equations with
-// Newton's Method, 2003, sec. 4.3.]
+// Compute the next step of the multipliers, s := (B B^T)^-1 r with Broyden's corrections. The factors belong to the
+// start of the move, and each step shows the change of the rows. [Kelley, Solving Nonlinear Equations with Newton's
+// Method, 2003, sec. 4.3.]
 void broyden_step(const Program& p, Workspace& w, int count) {
     VecX& step = w.scratch.position_lam_steps[count];
     solve_rows(p.layout, w.now.rows, w.scratch.r, step);
     for (int j = 0; j < count; ++j) {
         const VecX& known = w.scratch.position_lam_steps[j];
         const double part = product(w, known, step) / product(w, known, known);
-        if (!(std::abs(part) < broyden_limit)) return;  // rounding, or far from where the factors serve
+        if (!(std::abs(part) < broyden_limit)) return;  // rounding, or too far from the factorization
         if (j + 1 < count) step += part * w.scratch.position_lam_steps[j + 1];
         else step /= 1.0 - part;
     }
 }
 
-// q := position_start moved by R^-T B^T position_lam, on the given dofs.
+// Move q from position_start by R^-T B^T position_lam, on the given dofs.
 template <class... Dofs>
 void move_position(const Program& p, Workspace& w, VecX& q, const Dofs&... dofs) {
     w.scratch.scaled.setZero();
@@ -113,7 +114,7 @@ void move_position(const Program& p, Workspace& w, VecX& q, const Dofs&... dofs)
     retract(p.mechanism, w.scratch.position_start.data(), w.scratch.scaled.data(), q.data());
 }
 
-// What is rounding: near a singular position it would come back magnified, there every bit counts.
+// Rounding level of residuals. It is zero near a singular position, which magnifies rounding.
 double rounding_part(const Workspace& w) { return w.now.rows.distance < near_singular ? 0.0 : projection_floor; }
 
 }  // namespace
@@ -127,7 +128,7 @@ double scene_size(const Program& p, const Workspace& w) {
     return std::sqrt(square);
 }
 
-// Size of a row of A, at least 1: a row that was scaled up leaves a gap as much larger.
+// Largest entry of a row of A, at least 1. Scaling a row up scales its gap by the same factor.
 static double row_size(const Workspace& w, const Block& block, int row) {
     double size = 1.0;
     const size_t n = block.kept.size();
@@ -177,7 +178,7 @@ void follow_constraints(const Program& p, Workspace& w, double h, VecX& move) {
             if (block.holonomic[k]) w.scratch.r[block.row + k] = -0.5 * h * h * w.now.b[block.row + k];
     }
     solve_rows(p.layout, w.now.rows, w.scratch.r, w.scratch.position_lam);
-    // Terms of a series that do not fall predict nothing: close to a singular position, at great speed.
+    // The terms of the series do not decrease close to a singular position or at high speed. Drop the third order then.
     const double cube = h * h * h, second = product(w, w.scratch.position_lam, w.scratch.position_lam);
     const double third = product(w, w.state.third_order_lam, w.state.third_order_lam);
     if (cube * cube * third < falling_square * second) w.scratch.position_lam += cube * w.state.third_order_lam;
@@ -198,7 +199,7 @@ static double velocity_floor(const Workspace& w, const VecX& v) {
     return rounding_part(w) * std::max(1.0, v.cwiseAbs().maxCoeff());
 }
 
-// No move has closed the position. Open contacts have rows here too: hundreds of numbers in each step.
+// Reset the multipliers of the closing move. Open contacts have rows here too, so unneeded writes are skipped.
 static void forget_closing(Workspace& w) {
     if (w.now.has_closing) w.now.closing_lam.setZero();
     w.now.has_closing = false;
@@ -209,7 +210,7 @@ bool is_on_constraints(const Program& p, Workspace& w, double t, const VecX& q, 
     if (p.constraints == 0) return true;
     evaluate_residuals(p, w, t, q, v);
     if (gather_residuals(p, w) > position_floor(p, w)) return false;
-    if (p.constrained_joints.empty()) evaluate_rows(p, w, t, v);  // of coordinates only
+    if (p.constrained_joints.empty()) evaluate_rows(p, w, t, v);  // rows of coordinates only
     else update_kinematics(p, w, t, q, v);
     return gather_rates(p, w, t, v) <= velocity_floor(w, v);
 }
@@ -227,7 +228,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
     const bool moves = largest > floor;
     configured &= !moves;
     int count = 0;      // steps since the factors were taken
-    double rate = 1.0;  // of the largest residual, by the last of them
+    double rate = 1.0;  // ratio of the largest residuals of the last two steps
     for (int it = 0; it < projection_limit && largest > floor; ++it) {
         if (count == 0) {
             w.scratch.position_start = q;
@@ -237,11 +238,11 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
         w.scratch.position_lam += w.scratch.position_lam_steps[count];
         w.now.closing_lam += w.scratch.position_lam_steps[count++];
         w.now.has_closing = true;
-        // One that goes on falling so, and ends below rounding, is evaluated where the step's end is configured.
+        // A step expected to end below rounding is evaluated when the end of the step is configured.
         configured = count > 1 && largest * rate < trusted_part * floor;
         double now = largest;
         if (!configured) {
-            move_position(p, w, q, p.constrained_dofs);  // the others move no row
+            move_position(p, w, q, p.constrained_dofs);  // the other dofs move no row
             evaluate_residuals(p, w, t, q, v);
             now = gather_residuals(p, w);
             configured = now > floor && needs_new_factors(largest, now, floor);
@@ -252,12 +253,12 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
             now = gather_residuals(p, w);
             count = 0;
         }
-        if (it > sure_position_steps && now > stalled_part * largest) break;  // as good as rounding allows
+        if (it > sure_position_steps && now > stalled_part * largest) break;  // converged to rounding
         rate = now / largest;
         largest = now;
     }
     if (count > 0 && static_cast<int>(p.constrained_dofs.size()) < p.mechanism.nv) move_position(p, w, q);
-    // In deep trees M and its factor are one.
+    // In deep trees M and its factor share storage.
     const bool serves = p.affine_rates && w.now.rows.distance >= near_singular && p.mechanism.deep_dofs.empty();
     if (!configured && keeps_factors && serves) place(p, w, t, q, v);
     else if (!configured) configure(p, w, t, q, v);
@@ -307,7 +308,7 @@ bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, co
     return true;
 }
 
-// What sticks along a single dof has exactly no velocity there, like a joint that is locked, and not one of rounding.
+// Set the velocity of a single dof held by a sticking element to exactly zero, as for a locked joint.
 static void rest_alone(const Program& p, const Workspace& w, VecX& v) {
     for (int i : w.now.rows.blocks) {
         if (i < p.first_gap) continue;
@@ -324,7 +325,7 @@ static void rest_alone(const Program& p, const Workspace& w, VecX& v) {
 
 static void stop_locked(const Program& p, const Workspace& w, VecX& v) {
     for (int dof = 0; dof < p.mechanism.nv; ++dof)
-        if (w.now.terms.locked[dof]) v[dof] = 0.0;  // what sticks has exactly no velocity
+        if (w.now.terms.locked[dof]) v[dof] = 0.0;  // sticking elements have exactly zero velocity
 }
 
 bool keeps_to_rows(const Program& p, Workspace& w, double t, const VecX& q, VecX& v) {
@@ -333,7 +334,7 @@ bool keeps_to_rows(const Program& p, Workspace& w, double t, const VecX& q, VecX
     forget_closing(w);
     const double fastest = v.cwiseAbs().maxCoeff();
     if (!p.affine_rates || fastest > slow_speed) return false;
-    // Whether nothing can move is for the rows to tell that are independent.
+    // The check for immobility needs the independent rows, so projection decides it.
     if (fastest <= immobile_speed && (fastest > 0.0 || p.gaps.empty()) && is_immobile(p, w)) return false;
     place_bodies(p.mechanism, w.now.terms, q);
     place_rows(p, w, t, v);
@@ -412,10 +413,10 @@ void choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const V
 static void configure_anew(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
     set_modes(p, w, std::vector<Mode>(p.frictions.size(), slip_plus));
     configure(p, w, t, q, v);
-    choose_rows_near(p, w, t, q, v);  // their Cholesky factor does not show that they are independent
+    choose_rows_near(p, w, t, q, v);  // their Cholesky factor does not prove that they are independent
 }
 
-// What has gone through its plane comes out to it; whether it rests there or strikes its velocity tells later.
+// Move penetrating bodies out to the contact plane. The velocity later decides between rest and impact.
 static void project_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
     update_kinematics(p, w, t, q, v);
     std::vector<char> inside(p.gaps.size(), 0);

@@ -9,12 +9,12 @@
 
 namespace pn {
 
-// External forces on each body: given ones, multipliers, friction and the other laws that act on bodies.
+// Sum the external forces on each body: given forces, multipliers, friction and the other laws that act on bodies.
 static void gather_body_forces(const Program& p, Workspace& w, std::vector<Force>& body) {
     const Evaluation& now = w.now;
     if (p.has_body_forces) std::copy(now.body_force.begin(), now.body_force.end(), body.begin());
     else std::fill(body.begin(), body.end(), Force{Vec3::Zero(), Vec3::Zero()});
-    for (size_t i = 0; i < p.blocks.size(); ++i) {  // of constraints, and of what sticks at an anchor or contact
+    for (size_t i = 0; i < p.blocks.size(); ++i) {  // constraints, and sticking elements at an anchor or contact
         const Block& block = p.blocks[i];
         if (!now.values[i].geometric) continue;
         for (int k = 0; k < block.total; ++k) {
@@ -24,7 +24,7 @@ static void gather_body_forces(const Program& p, Workspace& w, std::vector<Force
         }
     }
     if (now.ideal) return;
-    for (size_t e = 0; e < p.frictions.size(); ++e) {  // what slips there, or is tried while modes are sought
+    for (size_t e = 0; e < p.frictions.size(); ++e) {  // slipping elements, and forces tried during the mode search
         const Friction& f = p.frictions[e];
         if (w.state.mode[e] == sticking || !now.values[f.block].geometric) continue;
         for (int k = 0; k < f.dim; ++k)
@@ -33,7 +33,7 @@ static void gather_body_forces(const Program& p, Workspace& w, std::vector<Force
     add_body_forces(p, w, body);
 }
 
-// Recursive Newton-Euler: motion of the bodies out from the roots, momentum and external forces of the subtrees back.
+// Recursive Newton-Euler: motion of the bodies from the roots outward, momentum and external forces of subtrees back.
 static void sweep_tree(const Mechanism& m, const Evaluation& now, Reactions& r) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = 0; i < n; ++i) r.momentum[i] = {Vec3::Zero(), Vec3::Zero()};
@@ -47,7 +47,7 @@ static void sweep_tree(const Mechanism& m, const Evaluation& now, Reactions& r) 
     }
     for (int i = n - 1; i > 0; --i) {
         const Joint& j = m.joints[i];
-        if (j.deep) {  // body by body, all of it: sums of the subtrees would cancel
+        if (j.deep) {  // body by body: differences of subtree sums would cancel
             r.momentum[i] += now.terms.body[i].own * r.motion[i];
             r.momentum[i] += now.terms.deep.bias[i];
             r.momentum[i] -= r.body[i];
@@ -62,13 +62,13 @@ static void sweep_tree(const Mechanism& m, const Evaluation& now, Reactions& r) 
     }
 }
 
-// Part of a unit vector of multipliers that exert no force below which a contact takes no part in it.
+// A contact with a smaller row in the orthonormal null-space basis of the multipliers does not share loads.
 static constexpr double takes_part = 1e-9;
-// Contacts that share a load, of which all pieces are looked through.
+// Maximum number of load-sharing contacts for which all zero-load sets are tried.
 static constexpr size_t most_sharing = 6;
 
-// Where the least-norm split among redundant rows has a contact pull, the least-norm one in which none does, if there is;
-// else one with the least pulls.
+// If the minimum-norm multipliers need tension in a contact, replace them by the minimum-norm ones without tension. If
+// none exist, minimize the tension.
 static void press_all(const Program& p, Workspace& w, Reactions& r) {
     const Evaluation& now = w.now;
     std::vector<int> gaps;
@@ -117,7 +117,8 @@ std::vector<std::vector<char>> load_pieces(const Program& p, const Workspace& w)
     if (sharing.size() > most_sharing) return pieces;
     const size_t free = dependent_rows(w.now.rows).size();
     for (unsigned piece = 0; piece < 1u << sharing.size(); ++piece) {
-        if (std::bitset<most_sharing>(piece).count() > free) continue;  // so many are never zero together but by chance
+        // more loads than the null space's dimension vanish only by coincidence
+        if (std::bitset<most_sharing>(piece).count() > free) continue;
         std::vector<char>& unloaded = pieces.emplace_back(p.gaps.size(), 0);
         for (size_t k = 0; k < sharing.size(); ++k) unloaded[sharing[k]] = piece >> k & 1;
     }

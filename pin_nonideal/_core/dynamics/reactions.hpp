@@ -1,5 +1,5 @@
-// Reactions: what joints, anchors and contacts carry in the motion at hand, ideal and nonideal forces included. They are
-// made when first asked for after a motion, and kept until the next.
+// Reactions: loads of joints, anchors and contacts in the current motion, including ideal and nonideal forces. They are
+// computed on first access and cached until the next motion.
 #pragma once
 
 #include "constraints/pull_feasibility.hpp"
@@ -9,15 +9,14 @@ namespace pn {
 
 const Reactions& reactions(const Program& p, Workspace& w);
 
-// Whether contacts that may open share a load: which of them carry nothing depends on the motion then.
+// Check if unilateral contacts may share a load. Then the motion determines the set of contacts with zero load.
 inline bool shares_pressing(const Program& p, const Workspace& w) { return !p.gaps.empty() && w.now.rows.redundant; }
 
-// All pieces of the loads of contacts that share them: by contact, whether it carries nothing. None where they would be too
-// many.
+// List all possible zero-load sets of contacts that share loads: by gap, true if its load is zero. Empty if there are
+// too many sets.
 std::vector<std::vector<char>> load_pieces(const Program& p, const Workspace& w);
 
-// As long as it lives, the contacts that carry nothing in the motion at hand go on to carry nothing: loads are linear in
-// the motion, one piece of what they are.
+// Freezes the zero-load set of the current motion during its lifetime. Loads are linear in the motion for a fixed set.
 class HeldPiece {
 public:
     HeldPiece(const Program& p, Workspace& w) : r_(w.now.reactions) {
@@ -26,7 +25,7 @@ public:
         reactions(p, w);
         hold(true);
     }
-    // Of the contacts told.
+    // Freeze the given set of contacts.
     HeldPiece(Workspace& w, const std::vector<char>& unloaded) : r_(w.now.reactions), held_(false) {
         r_.unloaded = unloaded;
         hold(true);
@@ -43,10 +42,10 @@ private:
         r_.current = false;
     }
     Reactions& r_;
-    bool held_ = false;  // by another, or there is nothing to hold
+    bool held_ = false;  // frozen by another object, or no contacts share a load
 };
 
-// The other way: loads as the motion has them, though a piece is held.
+// Releases a frozen zero-load set during its lifetime: each motion determines its own set.
 class FreeLoads {
 public:
     explicit FreeLoads(Workspace& w) : r_(w.now.reactions), held_(r_.holds_unloaded), kept_(r_.unloaded) {
@@ -66,17 +65,16 @@ private:
     const std::vector<char> kept_;
 };
 
-// Normal force of a contact or wheel by the shares of least norm, and whether it and those that it shares a load with
-// could press all: `contact` counts Program::contacts.
+// Normal force of a contact or wheel with minimum-norm shares. contact_press also checks if this contact and the
+// contacts that share its load can all be in compression. `contact` indexes Program::contacts.
 double normal_force(const Program& p, Workspace& w, int contact);
 Press contact_press(const Program& p, Workspace& w, int contact);
 
-// Wrench that crosses a joint onto its child body, [force; moment about the joint's origin], world axes; and the one of
+// Wrench of a joint on its child body, [force; moment about the joint's origin], world axes. anchor_wrench: wrench of
 // an anchor on the body of frame 1, about the anchor's point.
 Force joint_wrench(const Program& p, Workspace& w, int joint);
 Force anchor_wrench(const Program& p, Workspace& w, int block);
-// All that passes from the one body of an anchor or contact to the other, its friction included, about the origin of
-// frame 1.
+// Total wrench between the two bodies of an anchor or contact, including its friction, about the origin of frame 1.
 Force carried_wrench(const Program& p, Workspace& w, int block);
 
 }  // namespace pn

@@ -11,16 +11,16 @@
 
 namespace pn {
 
-// Rows that were found dependent must be met by the solution all the same, to this part of their terms; of
-// accelerations in play a thousandth counts, and as many m/s^2 where nothing is accelerated.
+// Tolerance of the residual of dependent rows, relative to the magnitudes of their terms. The scale of accelerations
+// counts with the factor `background`, and is at least `background` m/s^2.
 constexpr double consistency_tolerance = 1e-6, background = 1e-3;
-// By which the drifts of the rows that one depends on may enter its own.
+// Factor by which biases of a dependent row's basis rows may enter its own bias.
 constexpr double dependence_growth = 10.0;
-// Modes that change do not stop what moves by more than this part of its energy. Where rows that elements hold would, by
-// up to this part of their forces, they hold nothing; it is sought in steps of this factor.
+// A change of modes may take at most this fraction of the kinetic energy. If rows held by elements would take more,
+// rows held with at most `most_unheld` of their forces count as dependent. `unheld_growth` is the step of that search.
 constexpr double stopped_part = 1e-9, most_unheld = 1e-3, unheld_growth = 3.0;
 
-// Length of x in the metric of M, of the part that the rows see.
+// Length of x in the metric of M, restricted to the constrained dofs.
 static double scaled_length(const Program& p, Workspace& w, const VecX& x) {
     VecX& scaled = w.scratch.scaled;
     multiply_M(p.mechanism, w.now.terms, x, scaled);
@@ -32,16 +32,16 @@ static double scaled_length(const Program& p, Workspace& w, const VecX& x) {
     return std::sqrt(square);
 }
 
-// Angular speed of the body that turns fastest.
+// Angular speed [rad/s] of the body with the fastest rotation.
 static double fastest_turn(const Workspace& w) {
     double square = 0.0;
     for (const Body& body : w.now.terms.body) square = std::max(square, body.v.ang.squaredNorm());
     return std::sqrt(square);
 }
 
-// What a dependent row of unit length may miss beside its own terms: a part of the accelerations of turning, which may
-// cancel in each of its terms, and while elements stick what it sees of the motion by the part of itself, below the
-// tolerance, that it keeps beside the others.
+// Residual allowed to a dependent row of unit length besides its own terms. The first part is a fraction of the
+// rotational accelerations, which may cancel in each term. The second part applies while elements stick. It is the
+// effect of the motion on the row's independent component, which is below the rank tolerance.
 static double unseen(const Program& p, Workspace& w, const VecX& v) {
     const double speed = scaled_length(p, w, v);
     const double turning = consistency_tolerance * background * speed * fastest_turn(w);
@@ -50,12 +50,12 @@ static double unseen(const Program& p, Workspace& w, const VecX& v) {
                          (scaled_length(p, w, w.now.a) + speed * v.cwiseAbs().maxCoeff());
 }
 
-// Residual of the dependent rows; the worst block, or -1 when all are met.
+// Find the block with the largest residual of its dependent rows. Return -1 if all dependent rows are met.
 static int contradicting_block(const Program& p, Workspace& w, const VecX& v, double& worst) {
     int found = -1;
     double excess = 1.0;
-    std::optional<double> lacking;  // of a row of unit length
-    const double reach = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm() + background;  // accelerations in play
+    std::optional<double> lacking;  // for a row of unit length
+    const double reach = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm() + background;  // scale of accelerations
     for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
         const int n = static_cast<int>(block.kept.size());
@@ -94,13 +94,13 @@ bool configure_step(const Program& p, Workspace& w) {
     const RowSystem& rows = w.now.rows;
     const bool due = p.gaps.empty() && is_choice_due(p.layout, w.now.rows);  // contacts are chosen with their modes
     if (!rows.orthogonal && !due) return false;
-    // The Cholesky factor shows that the active rows are independent: a new choice has at most as many.
+    // The Cholesky factor proves that the active rows are independent: a new choice has at most as many.
     const bool keeps_rank = !rows.orthogonal;
     choose_rows_anew(p, w, keeps_rank ? std::count(rows.active.begin(), rows.active.end(), char(1)) : INT_MAX);
     return true;
 }
 
-// Names the contradicting block, and the one that shares the step with it and carries the largest multipliers.
+// Throw a failure that names the contradicting block and the other block with the largest multipliers.
 [[noreturn]] static void contradict(const Program& p, const Workspace& w, double t, int block, double residual) {
     std::vector<int> blame{block};
     double largest = -1.0;
@@ -114,14 +114,14 @@ bool configure_step(const Program& p, Workspace& w) {
     throw Failure(Failure::Kind::inconsistent, t, blame, residual);
 }
 
-// Laws are asked only once the rows are independent: others give them multipliers that mean nothing.
+// Evaluate laws after the rows are independent. Dependent rows would pass meaningless multipliers to the laws.
 static void move_step(const Program& p, Workspace& w, double t, const VecX& v, bool chosen) {
     assemble_forces(p, w, t, v);
     solve_dynamics(p, w, t, v);
     if (w.now.rows.blocks.empty() || !w.now.rows.redundant) return;
     double residual = 0.0;
     int block = contradicting_block(p, w, v, residual);
-    if (block >= 0 && !chosen) {  // what was dependent at an earlier step is not any more
+    if (block >= 0 && !chosen) {  // dependent rows of an earlier step may be independent now
         choose_rows_anew(p, w);
         solve_dynamics(p, w, t, v);
         block = contradicting_block(p, w, v, residual);
@@ -134,7 +134,7 @@ void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const V
     move_step(p, w, t, v, configure_step(p, w));
 }
 
-// Part of the kinetic energy of v that the rows in use would take from it.
+// Fraction of the kinetic energy of v that the rows in use would remove.
 static double part_stopped(const Program& p, Workspace& w, double t, const VecX& v) {
     VecX kept = v;
     project_velocity(p, w, t, kept);

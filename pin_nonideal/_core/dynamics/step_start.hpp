@@ -1,26 +1,25 @@
-// The evaluation at a step's start, which decides what holds over the step: the rows that are independent here.
+// Evaluation at the start of a step, with the choice of independent rows for the step.
 #pragma once
 
 #include "dynamics/workspace.hpp"
 
 namespace pn {
 
-// Evaluates and decides which rows are independent; contradicting rows are a failure.
+// Evaluate and choose the independent rows. Contradicting rows raise a failure.
 void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// The part of it that needs no forces: configures, and decides which rows are independent.
-// Returns whether it chose among them.
+// Configure and choose the independent rows, without forces. Return true if it chose rows.
 bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// Only that, where the workspace is configured.
+// Choose the independent rows in a configured workspace. Return true if it chose rows.
 bool configure_step(const Program& p, Workspace& w);
-// An evaluation that decides them too, where the workspace is configured, after v was brought to A v + phi_t = 0; returns
-// whether v moved.
+// Choose the rows in a configured workspace, project v onto A v + phi_t = 0, and evaluate. Return true if v changed.
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v);
-// The same with rows that were chosen there, or not; without the evaluation where nobody asks for it.
+// Do the same without a choice of rows: `chosen` is true if the rows were just chosen. Skip the evaluation unless
+// `evaluates`.
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v, bool chosen, bool evaluates);
-// Where modes have changed and rows just chosen would stop what moves: those that elements which stick hold by hardly any
-// of their forces count as dependent from here on. The workspace must be evaluated at (q, v), and is so after.
+// Keep bodies moving after a change of modes. If newly chosen rows would stop the motion, rows that sticking elements
+// hold with negligible forces count as dependent from now on. The workspace is evaluated at (q, v) before and after.
 void keep_moving(const Program& p, Workspace& w, double t, const VecX& v);
-// Brings a state onto the rows of modes that have just been set, of which it chooses the independent ones there.
+// Project a state onto the rows of newly set modes, with the rows that are independent there.
 void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 
 }  // namespace pn

@@ -10,15 +10,15 @@ namespace pn {
 
 namespace {
 
-constexpr double difference = 1e-7;      // part of the unknowns' size: square root of the rounding, with a margin
-constexpr double least_size = 1e-300;    // of unknowns that are all zero
+constexpr double difference = 1e-7;      // relative to the unknowns' size: square root of the rounding, with a margin
+constexpr double least_size = 1e-300;    // size if all unknowns are zero
 constexpr int newton_limit = 30;
-constexpr int most_mixed = 6;            // laws whose mixtures of branches are all looked at; else one by one
+constexpr int most_mixed = 6;            // more laws mirror one branch at a time instead of all combinations
 constexpr double same_solution = 1e-9;   // relative residual at which a point is a solution
-constexpr double other_solution = 1e-6;  // relative distance beyond which it is another one
-constexpr double near_motion = 1e-6;     // part of the unknowns by which the arrays of an equation may miss a motion
-constexpr int refinements = 3;           // of a solution that they miss
-constexpr double at_limit = 1e-9;        // part of its limit by which a force that holds may miss it
+constexpr double other_solution = 1e-6;  // relative distance beyond which two solutions differ
+constexpr double near_motion = 1e-6;     // tolerance between solutions of the arrays and motions, relative to the unknowns
+constexpr int refinements = 3;           // corrections of such a solution
+constexpr double at_limit = 1e-9;        // tolerance of a holding force, relative to its limit
 
 using Solutions = Failure::Solutions;
 
@@ -28,7 +28,7 @@ Failure paradox(const Unknowns& u, double determinant, Solutions solutions = Sol
     return failure;
 }
 
-// The failure that shows the motions of two solutions.
+// Failure with the motions of two solutions.
 Failure two_motions(Unknowns& u, double determinant, const VecX& one, const VecX& other) {
     Failure failure = paradox(u, determinant, Solutions::several);
     for (const VecX& y : {one, other}) {
@@ -44,7 +44,7 @@ double determinant_at(const ReactionEquation& equation, const VecX& y) {
     return ReactionNewton().factorize(equation, y);
 }
 
-// Those where a small change of the loads changes little come first, of them those near `start`.
+// Sort solutions: least sensitive to the loads first (regular determinant), then by distance to `start`.
 void sort_by_distance(const ReactionEquation& equation, const VecX& start, std::vector<VecX>& roots) {
     VecX size = start;
     for (const VecX& y : roots) size = size.cwiseMax(y);
@@ -56,7 +56,7 @@ void sort_by_distance(const ReactionEquation& equation, const VecX& start, std::
     std::sort(roots.begin(), roots.end(), [&](const VecX& y, const VecX& x) { return rank(y) < rank(x); });
 }
 
-// Takes out of a solution near a motion what rounding left in the arrays of the equation; false where none is near.
+// Remove the rounding of the arrays from a solution near a motion. Return false if no motion is near.
 bool refine(Unknowns& u, const ReactionEquation& equation, VecX& y) {
     const FreeLoads free(u.w);
     ReactionNewton newton;
@@ -72,8 +72,8 @@ bool refine(Unknowns& u, const ReactionEquation& equation, VecX& y) {
     return true;
 }
 
-// Of the solutions of the equation those that are motions: its limits are lengths, and where a contact that may open
-// pulls, or takes more than the least load that it shares, there is none.
+// Select the solutions that are motions: limits are nonnegative, and unilateral contacts have no tension and no more
+// than their minimum-norm share.
 std::vector<VecX> motions_of(Unknowns& u, const ReactionEquation& equation, const std::vector<VecX>& roots) {
     std::vector<VecX> list;
     for (const VecX& root : roots) {
@@ -83,7 +83,7 @@ std::vector<VecX> motions_of(Unknowns& u, const ReactionEquation& equation, cons
     return list;
 }
 
-// Whether all that sticks holds in the motion of a solution: where something gives way, it is none of these modes.
+// Check if all sticking elements hold in the motion of a solution. If one slips, the motion has other modes.
 bool holds(Unknowns& u, const VecX& y) {
     const FreeLoads free(u.w);
     u.set(y);
@@ -93,13 +93,13 @@ bool holds(Unknowns& u, const VecX& y) {
     return true;
 }
 
-// Whether all unknowns are limits of contacts that may open: pressing, they have but one branch.
+// Check if all unknowns are limits of unilateral contacts. In compression these have only one branch.
 bool only_opening(const Unknowns& u) {
     const std::vector<int> list = u.elements();
     return std::all_of(list.begin(), list.end(), [&](int e) { return u.p.frictions[e].gap >= 0; });
 }
 
-// Whether a contact that may open pulls: it is about to.
+// Check if a unilateral contact has tension. It is then about to open.
 bool pulls(const Unknowns& u, const VecX& y) {
     const std::vector<int> list = u.elements();
     for (size_t i = 0; i < list.size(); ++i)
@@ -142,7 +142,7 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     state.growth = growth(L);
     state.steps_since = 0;
     const bool contracts = state.growth < 1.0 - least_determinant_told;
-    const bool in_pieces = shares_pressing(u.p, u.w);  // of which one alone shows nothing of the others
+    const bool in_pieces = shares_pressing(u.p, u.w);  // one zero-load set proves nothing about the others
     state.unique = contracts && !in_pieces ? Uniqueness::shown : Uniqueness::not_shown;
     if (contracts && solved) return;
     if (solved && determinant_at(equation, y) > least_determinant_told) {
@@ -155,13 +155,13 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     if (!found.empty() && !u.p.gaps.empty()) {
         sort_by_distance(equation, start, found);
         const std::vector<VecX> motions = motions_of(u, equation, found);
-        if (motions.empty() && in_pieces) {  // the search goes on in the piece of the nearest one
+        if (motions.empty() && in_pieces) {  // the search continues in the zero-load set of the nearest solution
             y = found.front();
             return;
         }
-        if (!motions.empty()) found = motions;  // else a contact pulls, and is about to open
-        // What comes in from infinite loads is then a motion in which some contact pulls, unless det(I - dg/dy) is zero.
-        // One of which det is negative answers a push by more: what opens goes on in some other way.
+        if (!motions.empty()) found = motions;  // else a contact has tension and is about to open
+        // A solution from infinite loads then has a contact in tension, unless det(I - dg/dy) is zero. A solution with
+        // a negative determinant amplifies load changes, and the opening contact continues in another motion.
         if (only_opening(u)) roots.at_edge = !(determinant_at(equation, found.front()) > least_determinant_told);
     }
     const double edge = std::min(1.0 - state.growth, 0.0);
@@ -176,7 +176,8 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
         if (roots.complete && !in_pieces) state.unique = Uniqueness::shown;
         return;
     }
-    // Two motions are shown by two in which all that sticks holds; `start` may be beyond an event that is still to be found.
+    // Two motions exist only if all sticking elements hold in both. `start` may lie past an event that is not located
+    // yet.
     const auto hold = std::count_if(found.begin(), found.end(), [&](const VecX& root) { return holds(u, root); });
     const bool shown = found.size() == 1 || hold > 1;
     if (!shown && determinant_at(equation, y) > least_determinant_told) return;
@@ -203,7 +204,7 @@ void differentiate(Unknowns& u, const VecX& y, const VecX& g, double size, MatX&
 
 namespace {
 
-// Unknowns of one law, [first, last): a friction's limit or a user law's force.
+// Unknowns of each law, [first, last): a friction's limit or a user law's force.
 std::vector<std::pair<int, int>> groups(const Unknowns& u) {
     std::vector<std::pair<int, int>> list;
     const int nv = u.p.mechanism.nv;
@@ -213,7 +214,7 @@ std::vector<std::pair<int, int>> groups(const Unknowns& u) {
     return list;
 }
 
-// What a friction's limit is without any load.
+// Limits of the frictions without any load.
 VecX constants(const Unknowns& u) {
     VecX c = VecX::Zero(u.n);
     int k = 0;
@@ -222,8 +223,8 @@ VecX constants(const Unknowns& u) {
     return c;
 }
 
-// Laws mostly grow with |load|, which has two branches: beyond the kink a law's rows of dg/dy change their sign. Calls
-// `look` with dg/dy of each mixture of branches, and the rows that it mirrors.
+// Laws mostly grow with |load|, which has two branches: beyond the kink, the law's rows of dg/dy change sign. Call
+// `look` with dg/dy of each combination of branches, and the mirrored rows.
 template <class Look>
 void each_mixture(const Unknowns& u, const MatX& J, const Look& look) {
     const auto laws = groups(u);
@@ -242,7 +243,7 @@ void each_mixture(const Unknowns& u, const MatX& J, const Look& look) {
     }
 }
 
-// Whether Newton's method from `start` finds a solution that is not y; there it leaves `start`.
+// Check if Newton's method from `start` converges to a solution other than y. If so, `start` is that solution.
 bool leads_elsewhere(Unknowns& u, const VecX& y, VecX& start, double size) {
     VecX g(u.n);
     MatX J;
@@ -278,7 +279,7 @@ void look_for_others(Unknowns& u, VecX& y, const MatX& J, double size) {
     const bool regular = here > least_determinant_told;
     u.w.now.determinant = here;
     state.unique = Uniqueness::not_shown;
-    if (std::abs(here) <= least_determinant_told) throw paradox(u, std::min(here, 0.0));  // not told from zero: it is zero
+    if (std::abs(here) <= least_determinant_told) throw paradox(u, std::min(here, 0.0));  // counts as zero
     const VecX bound = solve(I - J.cwiseAbs(), VecX::Ones(u.n));
     if ((bound.array() > 0.0).all()) return;
     const VecX c = constants(u), solution = y;

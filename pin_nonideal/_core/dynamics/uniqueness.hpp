@@ -1,29 +1,29 @@
-// Whether a solution y of the implicit reaction equation y = g(y) is the only one.
+// Uniqueness of a solution y of the implicit reaction equation y = g(y).
 #pragma once
 
 #include "dynamics/unknowns.hpp"
 
 namespace pn {
 
-// Determinants below this are not told from zero.
+// Determinants below this value count as zero.
 constexpr double least_determinant_told = 1e-8;
 
-// Of bearings: where g contracts, or all solutions are found, this is shown. y is Newton's solution, or none when not
-// `solved`; `start` is where the search began, the motion before. Where there are several, y becomes the one nearest to
-// it or the failure shows two.
+// Decide uniqueness for bearings: g contracts, or all solutions are found. y is Newton's solution if `solved`. `start`
+// is the motion before, where the search began. If there are several solutions, y becomes the nearest to `start`, or
+// the failure shows two.
 void decide(Unknowns& unknowns, const ReactionEquation& equation, const VecX& start, VecX& y, bool solved);
 
-// Where one piece of the loads that contacts share has no solution, as `failure` says: y becomes the solution nearest to
-// `start` in any piece, or the failure holds of all.
+// Solve with all zero-load sets after one of them had no solution. y becomes the solution nearest to `start` in any
+// set. If there is none, throw `failure`.
 void decide_over_pieces(Unknowns& unknowns, const VecX& start, VecX& y, const Failure& failure);
 
-// With functions of the user's among the unknowns, whose dg/dy at y is J: a failure where the determinant tells of
-// others and Newton's method finds one. That it finds none shows nothing. Where the run is to continue, y becomes the
-// one in which a small change of the loads changes little.
+// Search for other solutions with user functions among the unknowns. J is dg/dy at y. Throws a failure if the
+// determinant indicates other solutions and Newton's method finds one. Finding none proves nothing. If the run
+// continues, y becomes the solution that is least sensitive to changes of the loads.
 void look_for_others(Unknowns& unknowns, VecX& y, const MatX& J, double size);
-// Least det(I - dg/dy) over the mixtures of branches of the laws.
+// Smallest det(I - dg/dy) over the combinations of branches of the laws.
 double least_determinant(const Unknowns& unknowns, const MatX& J);
-// dg/dy by differences, scaled by the unknowns' size.
+// Compute dg/dy by finite differences, scaled by the size of the unknowns.
 void differentiate(Unknowns& unknowns, const VecX& y, const VecX& g, double size, MatX& J);
 
 }  // namespace pn

@@ -8,9 +8,9 @@
 
 namespace pn {
 
-// Part of the unknowns that rounding leaves of a solution where two pieces of the loads meet.
+// Rounding of a solution at the boundary of two zero-load sets, relative to the unknowns.
 static constexpr double same_piece = 1e-11;
-// Part of the largest multiplier that rounding leaves of loads that are shared.
+// Rounding of shared loads, relative to the largest multiplier.
 static constexpr double shared_rounding = 1e-13;
 
 Unknowns::Unknowns(const Program& program, Workspace& workspace, double time, const VecX& q_, const VecX& v_)
@@ -43,7 +43,7 @@ void Unknowns::image(const VecX& y, VecX& g) {
     set(y);
     motion();
     ++w.counters.iterations;
-    // A stage that has run away is no case for the laws, a user's above all; and unknowns that have are no motion.
+    // Do not evaluate laws, above all user laws, for a diverged stage. Diverged unknowns give no motion.
     if (!std::isfinite(w.now.a.squaredNorm())) {
         const bool given = std::isfinite(w.now.F.squaredNorm() + w.now.base_C.squaredNorm());
         throw Failure(given ? Failure::Kind::not_converged : Failure::Kind::not_finite, t, elements());
@@ -79,7 +79,7 @@ void Unknowns::equation(const VecX& y, ReactionEquation& found) {
     image(y, g);
     double size = std::max(y.head(n).cwiseAbs().maxCoeff(), g.head(n).cwiseAbs().maxCoeff());
     if (!(size > 0.0)) size = 1.0;
-    // The vectors of the motion at hand, less those at y, over a step; and those at y.
+    // Load vectors of the current motion: at y (column -1), or differences to those at y divided by the step.
     const auto read = [&](int column, double step) {
         int i = 0;
         each([&](size_t e) {
@@ -107,7 +107,7 @@ void Unknowns::equation(const VecX& y, ReactionEquation& found) {
         ++w.counters.iterations;
         read(j, size);
     }
-    for (int at = 0; at < found.vectors(); ++at)  // from y to where there is no friction
+    for (int at = 0; at < found.vectors(); ++at)  // shift the origin from y to zero friction
         found.offset.col(at) -= found.columns.middleRows<3>(3 * at) * y.head(n);
 }
 

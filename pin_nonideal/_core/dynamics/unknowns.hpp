@@ -1,5 +1,5 @@
-// The unknowns y of the implicit reaction equation y = g(y): the limits of slipping frictions and the forces of users'
-// laws. Given y the motion follows from the factors at hand, the motion gives the loads, and these an image g(y).
+// Unknowns y of the implicit reaction equation y = g(y): limits of slipping frictions and forces of user laws. The
+// current factors give the motion for y. The motion gives the loads, and the loads give an image g(y).
 #pragma once
 
 #include "dynamics/law_forces.hpp"
@@ -13,11 +13,11 @@ struct Unknowns {
     double t;
     const VecX &q, &v;
     int n = 0;
-    bool bearings = true;  // no function of the user's is among them: a ReactionEquation says all
+    bool bearings = true;  // no user function among the unknowns: a ReactionEquation is exact
 
     Unknowns(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 
-    // Calls the first for each slipping element, then the second for each law, in the order of the unknowns.
+    // Call the first function for each slipping element, then the second for each law, in the order of the unknowns.
     template <class OnElement, class OnLaw>
     void each(const OnElement& on_element, const OnLaw& on_law) const {
         for (int e : w.now.slipping)
@@ -28,17 +28,17 @@ struct Unknowns {
     std::vector<int> elements() const;
 
     void set(const VecX& y);
-    // The motion for the limits and user forces in the workspace.
+    // Compute the motion for the limits and user forces in the workspace.
     void motion();
     void image(const VecX& y, VecX& g);
-    // g as arrays, by the motion for each unknown in turn. Steps are as large as the unknowns: g hides only lengths.
-    // Where contacts share a load, it is that of the piece that is held.
+    // Assemble g as arrays from one motion for each unknown. Steps are as large as the unknowns, since g is nonlinear
+    // only by vector lengths. If contacts share a load, the frozen zero-load set applies.
     void equation(const VecX& y, ReactionEquation& found);
-    // What rounding of loads that are shared leaves of the image: a contact that carries hardly anything has its load from
-    // the same sums as those beside it that carry all.
+    // Rounding of the image due to shared loads. A nearly unloaded contact has its load from the same sums as loaded
+    // contacts.
     double rounding() const;
-    // Whether a solution of that is one of y = g(y): no contact that may open pulls, and where some share a load it lies
-    // in the piece that was held.
+    // Check if a solution of the arrays solves y = g(y). Then no unilateral contact has tension, and shared loads are
+    // consistent with the frozen zero-load set.
     bool is_motion(const VecX& y);
 };
 

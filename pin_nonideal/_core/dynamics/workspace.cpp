@@ -1,4 +1,4 @@
-// The room that one thread works in.
+// Workspace of one thread.
 #include "dynamics/workspace.hpp"
 
 #include <algorithm>
@@ -78,7 +78,7 @@ Workspace::Workspace(const Program& p) {
     set_modes(p, *this, state.mode);
 }
 
-// Thousands of contacts may be open: of those that stay so no more is looked at than that.
+// Thousands of contacts may be open. Contacts that stay open cost one comparison each.
 static void select_contacts(const Program& p, Workspace& w) {
     if (same_bytes(w.state.closed, w.now.selected)) return;
     w.now.touching.clear();

@@ -7,9 +7,9 @@
 
 namespace pn {
 
-// Part of the limits that rounding leaves where two pieces of the loads meet.
+// Rounding of the limits at the boundary of two zero-load sets, relative to the limits.
 constexpr double same_piece = 1e-10;
-// Part of the accelerations in play that is rounding.
+// Rounding of accelerations, relative to their scale.
 constexpr double no_acceleration = 1e-12;
 
 static std::vector<int> joined(std::vector<int> list, const std::vector<int>& more) {
@@ -27,7 +27,7 @@ RestProblem::RestProblem(const Program& program, Workspace& workspace, double ti
     equation.W = problem_.W;
     equation.alpha0 = problem_.slip_accelerations(p, w);
     const double noise = no_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
-    for (int i = 0; i < problem_.rows; ++i)  // what the constraints hold still has no slip acceleration
+    for (int i = 0; i < problem_.rows; ++i)  // rows held by the constraints have no slip acceleration
         if (problem_.W(i, i) == 0.0 && std::abs(equation.alpha0[i]) <= noise) equation.alpha0[i] = 0.0;
     for (size_t i = 0; i < problem_.elements.size(); ++i) describe(i, i < resting.size());
     bool by_functions = false;
@@ -62,7 +62,7 @@ void RestProblem::describe(size_t i, bool resting) {
     if (!resting) {
         e.may_stick = false;
         e.direction = slip_velocity(w.now, f).normalized().eigen().head(f.dim);
-    } else if (response == 0.0 && alpha.norm() > 0.0) {  // the constraints drive it
+    } else if (response == 0.0 && alpha.norm() > 0.0) {  // driven by the constraints
         e.may_stick = false;
         e.direction = alpha.normalized();
     }
@@ -70,7 +70,8 @@ void RestProblem::describe(size_t i, bool resting) {
     equation.elements.back().factor = e.may_stick ? holding_factor(i) : sliding_factor(i);
 }
 
-// Loads are linear in the motion: those of the motion without friction, and what a force of each element adds.
+// Compute the loads, which are linear in the motion: loads without friction, and contribution of a unit force of each
+// element.
 void RestProblem::collect_loads() {
     std::vector<int> loaded;
     for (size_t i = 0; i < problem_.elements.size(); ++i) {
@@ -99,7 +100,7 @@ void RestProblem::collect_loads() {
         for (int k = 0; k < equation.elements[i].dim; ++k) {
             const int column = equation.elements[i].row + k;
             const double most = problem_.response.col(column).cwiseAbs().maxCoeff();
-            const double unit = most > 0.0 ? size / most : 1.0;  // a motion as large as the one without
+            const double unit = most > 0.0 ? size / most : 1.0;  // unit motion as large as the motion without friction
             move(unit * VecX::Unit(equation.n, column));
             equation.loads.col(column) = (collect() - equation.still) / unit;
         }

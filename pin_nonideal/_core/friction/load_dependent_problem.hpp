@@ -1,5 +1,5 @@
-// The equation of rest of a scene at one state: what its elements at rest have to do with each other, and with those
-// that slip under a load of their own.
+// Load-dependent friction problem at one state. It couples elements at rest with each other and with slipping elements
+// of load-dependent limits.
 #pragma once
 
 #include "dynamics/reactions.hpp"
@@ -12,23 +12,24 @@ class RestProblem {
 public:
     RestEquation equation;
 
-    // Where contacts share a load, the equation is that of the piece in which the motion without friction lies.
-    // The workspace must hold the motion in which `resting` and `slipping` (whose limits follow the load) carry no
-    // friction; it is left with a motion of no meaning.
+    // Set up the equation. If contacts share a load, the zero-load set of the motion without friction applies. The
+    // workspace must hold the motion without friction in `resting` and `slipping` (elements with load-dependent
+    // limits). On return the motion in the workspace is meaningless.
     RestProblem(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const std::vector<int>& resting,
                 const std::vector<int>& slipping);
-    RestProblem(const RestProblem&) = delete;  // the equation may ask it
+    RestProblem(const RestProblem&) = delete;  // the equation may hold a pointer to this object
     RestProblem& operator=(const RestProblem&) = delete;
 
-    // Of the motion under forces x, where laws are no functions.
+    // Acceleration under forces x, if no law is a user function.
     VecX acceleration(const VecX& x) const { return without_ + problem_.response * x; }
     bool has_pieces() const { return equation.loads.rows() > 0 && shares_pressing(p, w); }
-    // Whether the motion under forces x is one: no contact that may open pulls, and where some share a load it lies in the
-    // piece of the equation, which can be made that of its own.
+    // Check if forces x give a consistent motion. Then no unilateral contact has tension, and shared loads are
+    // consistent with the zero-load set of the equation. enter_piece sets up the equation for the zero-load set of x,
+    // or for a given set.
     bool is_motion(const VecX& x);
     void enter_piece(const VecX& x);
     void enter_piece(const std::vector<char>& unloaded);
-    // Of the i-th element: the factor of its limit while it holds and once it has begun to slip.
+    // Factor of the limit of the i-th element while it sticks, and after slip onset.
     double holding_factor(size_t i) const;
     double sliding_factor(size_t i) const;
 
@@ -37,7 +38,7 @@ private:
     void describe(size_t i, bool resting);
     void collect_loads();
     void ask(const VecX& x, VecX& alpha, FrictionLimits& limits);
-    // Puts the motion under forces x into the workspace.
+    // Set the motion in the workspace to that under forces x.
     void move(const VecX& x);
 
     const Program& p;

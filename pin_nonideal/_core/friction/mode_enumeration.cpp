@@ -11,7 +11,7 @@ namespace pn {
 
 namespace {
 
-constexpr int most_elements = 5;  // 243 choices, of one implicit equation each
+constexpr int most_elements = 5;  // 243 choices, each with one implicit equation
 
 bool may_be_tried(const Program& p, const std::vector<int>& list) {
     return list.size() <= most_elements &&
@@ -24,11 +24,12 @@ struct EachChoice {
     double t;
     const VecX &q, &v;
     const ModeQuestion& question;
-    std::vector<std::vector<Mode>> motions;  // choices whose motions keep the conditions that their modes stand for
-    bool shown = true;                       // that the others have none
-    double determinant = 0.0;                // the least of those that have none
+    std::vector<std::vector<Mode>> motions;  // modes whose motions satisfy the conditions of these modes
+    bool shown = true;                       // no motion exists for the other modes, as proven
+    double determinant = 0.0;                // smallest determinant of the modes without a motion
 
-    // All elements stick or slip one way or the other; false where one sticks that has just begun to slip.
+    // Decode `number` into modes: each element sticks or slips in either direction. Return false if an element at its
+    // limit sticks.
     bool choose(int number, std::vector<Mode>& modes) const {
         for (int e : question.at_rest) {
             modes[e] = number % 3 == 0 ? sticking : number % 3 == 1 ? slip_plus : slip_minus;
@@ -46,7 +47,7 @@ struct EachChoice {
         begin_step(p, w, t, q, v);
     }
 
-    // Whether the motion at hand does, but for rounding.
+    // Check if the current motion satisfies the conditions of its modes, up to rounding.
     bool keeps_conditions() {
         const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
         return std::all_of(question.at_rest.begin(), question.at_rest.end(), [&](int e) {

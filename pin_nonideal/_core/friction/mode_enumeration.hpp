@@ -1,5 +1,5 @@
-// All choices of modes of a few elements at rest that slip along one direction each, one after the other: slow, and sure
-// where turns and searches of forces and limits together come to nothing.
+// Enumeration of all modes of a few one-dimensional elements at rest. Slow, but complete if iterations and searches
+// fail.
 #pragma once
 
 #include "dynamics/workspace.hpp"
@@ -7,9 +7,10 @@
 
 namespace pn {
 
-// Of a few such elements takes the only choice whose motion keeps the conditions of its modes, or of several the one in
-// which all sticks that sticks in any other; false where there is none, but some choice might have another motion. Throws
-// a paradox where it is shown that there is none, or of several none holds the most. Leaves the workspace in that motion.
+// Select the only modes whose motion satisfies their own conditions. Among several select the modes in which every
+// element sticks that sticks in any other. Return false if there are none but other choices may have a motion. Throw a
+// paradox if no motion exists, or if no motion has all the sticking elements of the others. The workspace ends in the
+// selected motion.
 bool take_only_choice(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ModeQuestion& question);
 
 }  // namespace pn

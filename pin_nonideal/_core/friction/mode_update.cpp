@@ -9,15 +9,15 @@ namespace pn {
 
 namespace {
 
-// What sticks from now on loses slip of rounding. In a dead point of a loop, where slip turns while all else moves on,
-// that slip could stop everything: a velocity that changes by this part moves.
+// Sticking removes slip of rounding. At a dead center of a loop, slip reverses while other bodies move, and its removal
+// could stop the whole motion. A relative change of the velocity above this value is a change of the motion.
 constexpr double least_speed = 1e-6;
-constexpr double slack = 1e-9;  // part of the limit, or of the accelerations in play, by which rounding may miss
-constexpr int rounds = 6;       // of modes that are changed where their conditions fail; the program goes on from there
+constexpr double slack = 1e-9;  // rounding relative to the limit, or to the scale of accelerations
+constexpr int rounds = 6;       // rounds of mode changes before the full problem is solved
 
-// Sets right the modes whose conditions fail in the motion at hand: what is past its limit slips, what is driven against
-// its slip sticks. Returns how many; nothing where one motion does not tell, for elements of several directions or for
-// those that share what they hold.
+// Change the modes whose conditions fail in the current motion. An element past its limit slips, and an element driven
+// against its slip sticks. Return the number of changes. Return nothing if one motion does not decide, for elements of
+// several directions or redundant sticking elements.
 std::optional<int> change_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                                 const std::vector<int>& at_rest, std::vector<Mode>& modes) {
     const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
@@ -41,7 +41,7 @@ std::optional<int> change_modes(const Program& p, Workspace& w, double t, const 
 
 bool go_on(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const ModeQuestion& question, int element) {
     const bool breaks = !question.breaking.empty();
-    // What gives way moves on its own only where no others hold the same freedom.
+    // An element starts to slip alone only if no other rows hold the same freedom.
     const bool alone = p.frictions[element].dim == 1 && question.breaking.size() == 1 && !w.now.rows.redundant;
     if (p.needs_reactions || (breaks && !alone)) return false;
     std::vector<Mode> modes = question.modes;

@@ -1,16 +1,16 @@
-// The modes that an event most often leaves: all that rests goes on resting, but for the element of the event.
+// Most frequent modes after an event: all elements at rest stay at rest, except the element of the event.
 //
-// Where no limit depends on the load, the friction problem is convex: modes that keep their conditions solve it, and no
-// others need be looked for. One evaluation tells whether they do.
+// If no limit depends on the load, the friction problem is convex. Modes that satisfy their conditions then solve it,
+// and one evaluation checks them.
 #pragma once
 
 #include "friction/stick_slip.hpp"
 
 namespace pn {
 
-// Tries them at (q, v), which is brought onto the rows that must hold: the element of the event sticks; if it stuck and is
-// breaking, it gives way. Modes whose conditions fail are changed for a few rounds. Returns whether all conditions hold:
-// then the workspace ends evaluated there, else q and v are as they were.
+// Try these modes at (q, v), projected onto the required rows. The element of the event sticks, or slips if it was
+// sticking and reached its limit. Modes with violated conditions are changed for a few rounds. Return true if all
+// conditions hold: then the workspace is evaluated there. Otherwise q and v are restored.
 bool go_on(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const ModeQuestion& question, int element);
 
 }  // namespace pn

@@ -6,12 +6,12 @@
 
 namespace pn {
 
-// Part of an element's free response that the constraints must leave it; less is rounding.
+// Minimum response under constraints, relative to the free response of an element. Smaller responses are rounding.
 constexpr double least_response = 1e-13;
 
 static const Block& block_of(const Program& p, int element) { return p.blocks[p.frictions[element].block]; }
 
-// Calls act(column) with `force` the generalized force of a unit of each friction force in turn, which it may change.
+// Call act(column) for each friction force. `force` is the generalized force of its unit, and act may change it.
 template <class Act>
 void FrictionProblem::each_unit_force(const Program& p, const Workspace& w, const Act& act) {
     int column = 0;
@@ -54,7 +54,7 @@ void FrictionProblem::respond(const Program& p, Workspace& w) {
     });
 }
 
-// Bodies whose pivots of M differ much take refined solutions.
+// If pivots of M differ much, use refined solutions.
 void FrictionProblem::respond_in_step(const Program& p, Workspace& w) {
     scaled = !w.now.rows.refine;
     if (!scaled) return respond(p, w);
@@ -125,7 +125,7 @@ void FrictionProblem::clean(const Program& p, Workspace& w) {
     });
 }
 
-// Whose response is rounding beside what it would be if no constraint held.
+// Set row and column i of W to zero if its response is rounding compared to the unconstrained response.
 void FrictionProblem::drop_held(int i, double unconstrained) {
     if (W(i, i) > least_response * unconstrained) return;
     W.row(i).setZero();

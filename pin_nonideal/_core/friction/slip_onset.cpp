@@ -9,14 +9,13 @@ namespace pn {
 
 namespace {
 
-constexpr double unsolved = 10.0;  // what the equation lacks leaves so much in the accelerations
-constexpr double slow = 1e-6;      // part of the accelerations that begin at a limit alone
+constexpr double unsolved = 10.0;  // factor from the residual of the equation to the error of accelerations
+constexpr double slow = 1e-6;      // accelerations below this fraction are slip onset exactly at a limit
 
 struct Beginning {
-    VecX force, slip;   // along its directions, the force from the middle of its limits; slip tells the way that it begins
-                        // to go
-    bool slides, told;  // its acceleration is more than rounding; its way is known
-    bool breaks;        // it stuck until now, and is at its limit
+    VecX force, slip;   // along its directions: force relative to the middle of its limits, slip direction at onset
+    bool slides, told;  // acceleration above rounding, slip direction known
+    bool breaks;        // was sticking until now and is at its limit
 };
 
 bool breaks(const ModeQuestion& question, int e, const VecX& force, double limit) {
@@ -31,7 +30,7 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const std
         const int e = question.at_rest[i];
         const Beginning& one = all[i];
         modes[e] = sticking;
-        // Of those that reached their limits together some may hold on.
+        // Some of the elements that reach their limits together may keep sticking.
         if (!one.slides && !(one.breaks && (one.told || !any_told))) continue;
         const VecX direction = one.told ? VecX(one.slip.normalized()) : VecX(-one.force.normalized());
         Vec3 along;
@@ -44,8 +43,8 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const std
 
 }  // namespace
 
-// Of the friction of what slips and its acceleration, which are opposite, the one that is larger beside its rounding tells
-// the way.
+// Friction and acceleration of a slipping element are opposite. The larger one, relative to its rounding, gives the
+// slip direction.
 std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const FrictionProblem& problem, const VecX& f,
                            const FrictionLimits& limits) {
     const VecX alpha = problem.alpha0 + problem.W * f, from_middle = f - limits.middle;

@@ -1,5 +1,5 @@
-// What elements at rest begin to do under the forces found for them: what is below its limit sticks, the others go the way
-// that their accelerations tell, or those a little beyond the load at which they give way together.
+// Modes of elements at rest under given forces. An element below its limit sticks. The other elements slip along their
+// accelerations, or along the accelerations slightly past the load of their common slip onset.
 #pragma once
 
 #include "friction/problem.hpp"
@@ -7,23 +7,23 @@
 
 namespace pn {
 
-constexpr double at_limit = 1e-13;         // part of a limit by which rounding may miss it
-constexpr double limit_slack = 1e-9;       // part of a limit by which a mode may miss its condition by rounding
-constexpr double no_acceleration = 1e-12;  // part of the accelerations in play that is rounding
+constexpr double at_limit = 1e-13;         // rounding relative to a limit
+constexpr double limit_slack = 1e-9;       // allowed violation of a mode's condition, relative to a limit
+constexpr double no_acceleration = 1e-12;  // rounding relative to the scale of accelerations
 
-// Modes to be found: those of elements that move are known, the others are at rest along their directions.
+// Modes to compute: modes of moving elements are known, the other elements are at rest along their directions.
 struct ModeQuestion {
-    std::vector<Mode> modes;  // of all elements; what those at rest hold is no matter
+    std::vector<Mode> modes;  // by element, ignored for elements at rest
     std::vector<int> at_rest;
-    std::vector<int> breaking;  // of those at rest: stuck until now and has just reached its limit, so that it slips as
-                                // soon as its force is at the limit, though its acceleration is still zero
-    bool answered = false;      // `modes` are those of a motion that was found with all contacts together
-    std::vector<Vec3> near;     // friction of all elements in a motion that is near, where one is known
+    // Elements at rest that just reached their limit: they slip at the limit even with zero acceleration.
+    std::vector<int> breaking;
+    bool answered = false;      // `modes` belong to a motion solved with all contacts
+    std::vector<Vec3> near;     // friction of all elements in a nearby motion, if known
 };
-// Under forces f of a program for these limits. Directions of slip stay in the workspace.
+// Compute the modes for the forces f of a program with these limits. Slip directions are stored in the workspace.
 std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const FrictionProblem& problem, const VecX& f,
                            const FrictionLimits& limits);
-// The same of a solution of the equation of rest, which is as exact as what it lacks.
+// Compute the modes for a solution x of the load-dependent equation, as accurate as its residual.
 std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const RestEquation& equation, const VecX& x);
 
 }  // namespace pn

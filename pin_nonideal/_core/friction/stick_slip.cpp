@@ -19,22 +19,22 @@ namespace pn {
 
 namespace {
 
-constexpr double limit_tolerance = 1e-12; // relative change of the limits at which the turns end
-constexpr double least_limit = 1e-300;    // a limit of zero divides by this
-constexpr int most_turns = 100;           // of forces and limits
-constexpr int most_pieces = 30;           // of the loads that contacts share
+constexpr double limit_tolerance = 1e-12; // relative change of the limits at convergence
+constexpr double least_limit = 1e-300;    // divisor in place of a zero limit
+constexpr int most_turns = 100;           // maximum iterations of forces and limits
+constexpr int most_pieces = 30;           // maximum number of zero-load sets to try
 
 bool contains(const std::vector<int>& list, int e) { return std::find(list.begin(), list.end(), e) != list.end(); }
 
-// The modes of elements at rest at one state, as they are sought.
+// Search of the modes of elements at rest at one state.
 struct Search {
     const Program& p;
     Workspace& w;
     double t;
     const VecX &q, &v;
     const ModeQuestion& question;
-    const std::vector<int>& list;  // of the elements at rest
-    std::vector<int> slipping;     // those whose limits follow their load
+    const std::vector<int>& list;  // elements at rest
+    std::vector<int> slipping;     // slipping elements with load-dependent limits
 
     Search(const Program& program, Workspace& workspace, double time, const VecX& q_, const VecX& v_,
            const ModeQuestion& asked)
@@ -47,7 +47,7 @@ struct Search {
     void apply(const std::vector<Mode>& modes, bool limits_known) {
         set_modes(p, w, modes);
         w.state.warm = limits_known;
-        if (limits_known) {  // among all that these modes allow: the others are no motions from rest
+        if (limits_known) {  // other solutions of these modes do not start from rest
             w.state.unique = Uniqueness::shown;
             w.state.growth = 1.0;
             w.state.steps_since = -1;
@@ -55,13 +55,13 @@ struct Search {
         begin_step(p, w, t, q, v);
     }
 
-    // Whether the motion under the modes that the question suggests keeps the conditions that they stand for, where
-    // that makes it the only one: no limit depends on the load. The workspace ends evaluated there.
+    // Check if the motion of the suggested modes satisfies their conditions. The motion is then unique, because no
+    // limit depends on the load. The workspace ends evaluated there.
     bool keeps_suggestion() {
         if (p.needs_reactions || !question.breaking.empty()) return false;
         try {
             apply(question.modes, false);
-        } catch (const Failure& failure) {  // what is driven does not stick
+        } catch (const Failure& failure) {  // driven elements do not stick
             if (failure.kind != Failure::Kind::inconsistent) throw;
             return false;
         }
@@ -73,8 +73,8 @@ struct Search {
         });
     }
 
-    // Forces of all elements for the factors of their limits at hand, among all motions of a few elements; of more the
-    // one in which all stick, or else any.
+    // Solve for the forces of all elements for the current factors of their limits. A few elements: select among all
+    // motions. More elements: the motion in which all stick, else any motion.
     bool find(RestProblem& problem, VecX& x) {
         const RestEquation& equation = problem.equation;
         const AllMotions all = all_motions(equation);
@@ -82,7 +82,7 @@ struct Search {
             std::vector<VecX> motions;
             for (const VecX& forces : all.forces)
                 if (problem.is_motion(forces)) motions.push_back(forces);
-            // Where a contact pulls in all of them, it is about to open.
+            // If a contact has tension in all motions, it is about to open.
             return choose(problem, motions.empty() ? all.forces : motions, x);
         }
         VecX held = equation.holding_forces();
@@ -91,8 +91,8 @@ struct Search {
         return true;
     }
 
-    // The same in piece after piece of the loads that contacts share, until the motion lies in its own; where that leads to
-    // none, in all of them.
+    // Solve for one zero-load set after the other until the motion is consistent with its own set. If this fails, try
+    // all sets.
     bool find_in_pieces(RestProblem& problem, VecX& x) {
         for (int turn = 0; turn < most_pieces && find(problem, x); ++turn) {
             if (!problem.has_pieces() || problem.is_motion(x)) return true;
@@ -107,7 +107,7 @@ struct Search {
         return false;
     }
 
-    // Newton's method alone, near a solution.
+    // Refine by Newton's method alone, near a solution.
     bool refine_in_pieces(RestProblem& problem, VecX& x) {
         for (int turn = 0; turn < most_pieces; ++turn) {
             if (problem.has_pieces()) problem.enter_piece(x);
@@ -117,8 +117,8 @@ struct Search {
         return false;
     }
 
-    // Whether forces within their limits hold all that rests, where those of the turns let it slip, in any piece of the
-    // loads that contacts share.
+    // Check if forces within their limits hold all elements at rest, for any zero-load set, although the iteration
+    // found slip.
     bool rests(RestProblem& problem, VecX& x) {
         const auto begin = problem.equation.elements.begin();
         const auto may_stick = [](const RestElement& e) { return e.may_stick; };  // the constraints drive the others
@@ -132,7 +132,7 @@ struct Search {
         return false;
     }
 
-    // What rested goes on resting: of several motions the one in which all that sticks in any other sticks, and more.
+    // Select the motion in which all elements stick that stick in any other motion. Elements at rest stay at rest.
     bool choose(const RestProblem& problem, const std::vector<VecX>& motions, VecX& x) {
         const RestEquation& equation = problem.equation;
         proven = true;
@@ -152,7 +152,7 @@ struct Search {
         paradox(problem, determinant, motions);
     }
 
-    // `motions`: forces of some that are possible, of which two are shown.
+    // Throw a paradox with the forces of possible motions in `motions`, and store two of them.
     [[noreturn]] void paradox(const RestProblem& problem, double determinant, const std::vector<VecX>& motions) const {
         Failure failure(Failure::Kind::paradox, t, list, determinant);
         failure.solutions = motions.empty() ? Failure::Solutions::none : Failure::Solutions::several;
@@ -177,7 +177,7 @@ struct Search {
         return one != other;
     }
 
-    // What begins to slip has its kinetic limit from then on. Returns whether something just did.
+    // Set the kinetic limit of elements at slip onset. Return true if any limit changed.
     bool release(const RestProblem& problem, RestEquation& equation, const std::vector<Mode>& modes) {
         bool any = false;
         for (size_t i = 0; i < list.size(); ++i) {
@@ -189,7 +189,7 @@ struct Search {
         return any;
     }
 
-    // The motion of these modes, which have just been found together with the limits.
+    // Apply the modes, together with the limits of the same solution as warm start.
     void settle(const RestEquation& equation, const VecX& x, const std::vector<Mode>& modes) {
         VecX alpha;
         FrictionLimits limits;
@@ -202,8 +202,8 @@ struct Search {
         apply(modes, proven);
     }
 
-    // The motion under the forces f of the elements at rest, and the limits that its loads give: the kinetic one for what
-    // slips. Returns their largest relative change.
+    // Compute the motion under the forces f of the elements at rest, and update the limits from its loads. Slipping
+    // elements get their kinetic limit. Return the largest relative change of the limits.
     double follow(FrictionProblem& problem, const VecX& f, const std::vector<Mode>& modes, FrictionLimits& limits) {
         VecX C = VecX::Zero(p.mechanism.nv);
         problem.add_forces(p, w, f, C);
@@ -226,13 +226,13 @@ struct Search {
         return change;
     }
 
-    // Limits and forces in turn, each motion with the loads that it has; false where they do not come to rest soon.
+    // Alternate between forces and load-dependent limits. Return false if the iteration does not converge.
     bool take_turns(std::vector<Mode>& modes) {
         FrictionProblem problem(p, w, list);
         problem.clean(p, w);
         problem.alpha0 = problem.slip_accelerations(p, w);
         const double noise = no_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
-        for (int i = 0; i < problem.rows; ++i)  // what the constraints hold still has no slip acceleration
+        for (int i = 0; i < problem.rows; ++i)  // rows held by the constraints have no slip acceleration
             if (problem.W(i, i) == 0.0 && std::abs(problem.alpha0[i]) <= noise) problem.alpha0[i] = 0.0;
         FrictionLimits limits(static_cast<int>(list.size()), problem.rows);
         for (size_t i = 0, at = 0; i < list.size(); at += problem.dims[i], ++i) {
@@ -251,7 +251,7 @@ struct Search {
         return false;
     }
 
-    // Forces of the elements at rest in the motion that is near.
+    // Forces of the elements at rest in the nearby motion.
     VecX near(const RestEquation& equation) const {
         VecX x = VecX::Zero(equation.n);
         for (size_t i = 0; i < list.size(); ++i)
@@ -259,7 +259,7 @@ struct Search {
         return x;
     }
 
-    // Elements at rest without friction; `all`: those that slip under a load of their own as well.
+    // Remove the friction of elements at rest. `all`: also that of slipping elements with load-dependent limits.
     void unload(bool all) {
         std::vector<Mode> modes = question.modes;
         for (int e : list) modes[e] = unloaded;
@@ -279,7 +279,7 @@ struct Search {
             unload(false);
             found = take_turns(modes);
             presses = !found || reactions(p, w).presses;
-        } catch (const Failure& failure) {  // loads of what slips, while what rests has no force yet or not its own
+        } catch (const Failure& failure) {  // elements at rest do not have their final forces here
             if (failure.kind != Failure::Kind::paradox) throw;
         }
         if (p.needs_reactions && look_further(found, modes)) return;
@@ -287,7 +287,8 @@ struct Search {
         if (!take_only_choice(p, w, t, q, v, question)) throw Failure(Failure::Kind::not_converged, t, list);
     }
 
-    // Turns give what slips in one of them its kinetic limit: what holds in the end may have slipped on the way.
+    // Check if the iteration may have lowered a limit too early: an element that slips in one iterate gets its kinetic
+    // limit.
     bool released_early(const std::vector<Mode>& modes) const {
         return std::any_of(list.begin(), list.end(), [&](int e) {
             const Friction& friction = p.frictions[e];
@@ -295,8 +296,8 @@ struct Search {
         });
     }
 
-    // Where loads may leave several motions or none, or where turns found none to be trusted. Returns whether it knows
-    // better.
+    // Search further if loads may allow several motions or none, or if the iteration gave no reliable motion. Return true
+    // if the search found the motion.
     bool look_further(bool found, const std::vector<Mode>& turned) {
         const bool trusted = found && presses && !released_early(turned);
         const bool slid = !found || std::any_of(list.begin(), list.end(), [&](int e) { return turned[e] != sticking; });
@@ -305,7 +306,7 @@ struct Search {
         RestEquation& equation = problem.equation;
         if (trusted && contraction(equation) < 1.0) return false;
         VecX x;
-        // A search of all would have it; where all hold, that is the motion in which most sticks.
+        // A complete search includes this motion. If all elements hold, no other motion has more sticking elements.
         const bool all_known = is_searched(equation) && !problem.has_pieces();
         if (slid && !all_known && equation.loaded()) {
             if (rests(problem, x)) {
@@ -326,7 +327,7 @@ struct Search {
             solved = refine_in_pieces(problem, x);
         }
         if (!solved && release(problem, equation, std::vector<Mode>(p.frictions.size(), slip_plus))) {
-            one_limit = false;  // some stick by one limit and slip by another: the search had not all of these motions
+            one_limit = false;  // static and kinetic limits differ: the search missed such motions
             solved = find_in_pieces(problem, x);
         }
         while (solved && release(problem, equation, modes_of(w, question, equation, x))) solved = find_in_pieces(problem, x);
@@ -337,8 +338,8 @@ struct Search {
         return solved;
     }
 
-    bool presses = true;  // the loads of the turns' motion: it is one
-    bool proven = false;  // that there is no motion, or which there are
+    bool presses = true;  // the iteration's motion has no contact in tension
+    bool proven = false;  // the set of motions is complete
 };
 
 }  // namespace

@@ -14,7 +14,7 @@ Reach::Reach(const Program& program) : p(program), bodies_(program.mechanism.joi
         if (needed[joint]) joints_.push_back(static_cast<int>(joint));
 }
 
-// Motion of a joint's body against its parent, in the parent's axes.
+// Motion of a joint's body relative to its parent, in the parent's axes.
 Reach::Bound Reach::joint_bound(const Joint& joint) const {
     const auto v = speed_.segment(joint.iv, joint.nv), a = acceleration_.segment(joint.iv, joint.nv);
     const double speed = v.norm(), rate = a.norm();
@@ -27,10 +27,10 @@ Reach::Bound Reach::joint_bound(const Joint& joint) const {
         default: break;
     }
     const int slides = joint.kind == JointKind::free_flyer ? 3 : joint.kind == JointKind::planar ? 2 : joint.nv;
-    const bool other = slides == joint.nv;  // a joint of which nothing else is known: all its dofs may do both
+    const bool other = slides == joint.nv;  // unknown joint kind: each dof may translate and rotate
     const double spin = other ? speed : v.tail(joint.nv - slides).norm();
     const double slide = v.head(slides).norm();
-    // Velocities of a floating base stand in its own axes, which turn.
+    // Velocities of a floating base are in its own rotating axes.
     const double spin_rate = other ? rate + speed * speed : a.tail(joint.nv - slides).norm();
     return {slide, a.head(slides).norm() + spin * slide, spin, spin_rate};
 }
@@ -60,7 +60,7 @@ Reach::Bound Reach::frame_bound(const Frame& frame) const {
             body.acceleration + (body.spin_rate + body.spin * body.spin) * apart, body.spin, body.spin_rate};
 }
 
-// g = n . (x1 - x2) - r, with n fixed in body 2, of a point of body 1 that far from its frame.
+// g = n . (x1 - x2) - r, with n fixed in body 2, for a point of body 1 at distance `reach` from its frame.
 double Reach::over_plane(const Workspace& w, const Frame& frame, const Frame& plane, double reach) const {
     const Bound a = frame_bound(frame), b = frame_bound(plane);
     const double velocity = a.velocity + reach * a.spin + b.velocity;
@@ -77,12 +77,12 @@ double Reach::of(const Workspace& w, const ContactRow& kind) const {
     return over_plane(w, kind.frame1, kind.frame2, 0.0);
 }
 
-// Of each of its points, whichever is the lowest.
+// The bound holds for each point of the ellipsoid, whichever is the lowest.
 double Reach::of(const Workspace& w, const EllipsoidRow& kind) const {
     return over_plane(w, kind.frame1, kind.frame2, kind.reach());
 }
 
-// g = |c1 - c2| - r, least over both segments: points that stay on their bodies come near no faster than this.
+// g = |c1 - c2| - r, minimum over both segments. The bound holds for all pairs of points fixed on their bodies.
 double Reach::of(const Workspace&, const CapsulesRow& kind) const {
     const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
     return a.acceleration + b.acceleration + kind.half1 * (a.spin_rate + a.spin * a.spin) +
@@ -101,7 +101,7 @@ double Reach::of(const Workspace&, const RimsRow& kind) const {
     return of_points(kind.frame1, kind.first.reach, kind.frame2, kind.second.reach);
 }
 
-// Of any two points that far from their frames.
+// Bound for any two points at these distances from their frames.
 double Reach::of_points(const Frame& frame1, double reach1, const Frame& frame2, double reach2) const {
     const Bound a = frame_bound(frame1), b = frame_bound(frame2);
     return a.acceleration + b.acceleration + reach1 * (a.spin_rate + a.spin * a.spin) +
@@ -137,7 +137,7 @@ double Reach::bound(const Workspace& w, int gap) const {
     return of(w, std::get<LimitRow>(kind));
 }
 
-// Points at the ends of what belongs to a contact move no faster than this; a plane that turns reaches everywhere.
+// Maximum relative speed of the end points of a contact. Infinite if the plane rotates, because planes are unbounded.
 double Reach::speed(const ContactRow& kind) const {
     const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
     return b.spin > 0.0 ? HUGE_VAL : a.velocity + b.velocity;
@@ -185,8 +185,8 @@ double Reach::speed(int gap) const {
 
 bool Reach::knows(const Program& p, int gap) { return !p.is_users(gap); }
 
-// Points that pass by each other at a distance d with the speed u move apart with u^2 / d; that others become the nearest
-// takes off some. What belongs to the contact reaches so far from its frames.
+// Points that pass each other at distance d with relative speed u separate with acceleration u^2 / d. A change of the
+// nearest points only reduces this. reach1 and reach2 are the extents of the contact's geometry from its frames.
 double Reach::rise(double reach1, double reach2, const Frame& frame1, const Frame& frame2, double radius) const {
     const Bound a = frame_bound(frame1), b = frame_bound(frame2);
     const double velocity = a.velocity + b.velocity + reach1 * a.spin + reach2 * b.spin;

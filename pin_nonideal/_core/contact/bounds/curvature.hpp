@@ -1,5 +1,5 @@
-// How fast gaps may change their rate over a step: a bound on the second derivative of each, from bounds on the rates of
-// the joints and on their accelerations. With it no touch is leapt over, however long the step.
+// Bounds on the second derivative of gaps over a step, from bounds on joint velocities and accelerations. They
+// guarantee that steps of any length detect every contact.
 #pragma once
 
 #include <cmath>
@@ -12,22 +12,23 @@ class Reach {
 public:
     explicit Reach(const Program& p);
 
-    // Largest |v| and |a| of each dof over a step of length h; the bodies in the workspace stand at one end of it.
+    // Set the largest |v| and |a| of each dof over a step of length h. The bodies in the workspace are at one end of
+    // the step.
     void bound_bodies(const Workspace& w, const VecX& speed, const VecX& acceleration, double h);
-    // Over that step the second derivative of a gap stays above -bound, or between round bodies that of the gap of any two
-    // of their points does (contact/separation.hpp).
+    // Over that step the second derivative of a gap is at least -bound. For round bodies this holds for the distance of
+    // any two material points (contact/bounds/distance.hpp).
     double bound(const Workspace& w, int gap) const;
-    // Of the user's gaps nothing is known.
+    // Check if bounds exist. User gaps have none.
     static bool knows(const Program& p, int gap);
-    // And below this while the gap is open.
+    // Upper bound of the second derivative of a gap while the gap is open.
     double rise(const Workspace& w, int gap) const;
-    // By how much the gap may change over the step at most; infinite where that is not known.
+    // Maximum change of a gap over the step. Infinite if unknown.
     double travel(int gap) const { return h_ * speed(gap); }
-    // Of its points against each other, at the most.
+    // Maximum relative speed of a contact's points. Infinite if unknown.
     double speed(int gap) const;
 
 private:
-    struct Bound {  // on a body's origin and on its turning
+    struct Bound {  // bounds of a body's origin and rotation
         double velocity = 0.0, acceleration = 0.0, spin = 0.0, spin_rate = 0.0;
     };
     Bound joint_bound(const Joint& joint) const;
@@ -56,7 +57,7 @@ private:
     double rise(double reach1, double reach2, const Frame& frame1, const Frame& frame2, double radius) const;
 
     const Program& p;
-    std::vector<int> joints_;  // that gaps hang on, each after its parent
+    std::vector<int> joints_;  // joints that move contacts, each after its parent
     std::vector<Bound> bodies_;
     VecX speed_, acceleration_;
     double h_ = 0.0;

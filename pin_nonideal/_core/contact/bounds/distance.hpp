@@ -1,5 +1,5 @@
-// That two round bodies stay apart between two instants: whose corners lie beyond a plane at both, and accelerate no more
-// than a bound, cannot have met in between, whichever of their points were the nearest.
+// Proof that two round bodies stay apart between two instants. Their corners are beyond a plane at both instants, and
+// accelerations are bounded. Then no points can meet in between, whichever points are nearest.
 #pragma once
 
 #include <algorithm>
@@ -10,15 +10,16 @@
 
 namespace pn {
 
-// Two segments, or a point and a box or another solid, at one instant.
+// Two segments, or a point, segment or disk and a box or another solid, at one instant.
 struct Separation {
-    std::array<Vec3, 8> apart;  // from the ends or corners of the second to those of the first
-    int corners = 0;            // so many of them; of another solid none, but from its middle, then its axes, and then
-                                // the first one's, half a segment or across a disk
-    Vec3 normal;                // from the nearest point of the second to that of the first
-    double radius = 0.0;        // of both together
+    std::array<Vec3, 8> apart;  // from the ends or corners of the second body to those of the first
+    // Number of corners. Other solids have none. `apart` then holds the offset of the centers, the three axes of the
+    // solid, and the half segment or disk axis of the first body.
+    int corners = 0;
+    Vec3 normal;                // from the nearest point of the second body to that of the first
+    double radius = 0.0;        // sum of both radii
 
-    // Nothing where the gap is that of another kind.
+    // Check if the gap is of a supported kind.
     static bool has(const Program& p, int gap) {
         const Kind& kind = p.blocks[p.gaps[gap].block].kind;
         return std::holds_alternative<CapsulesRow>(kind) || std::holds_alternative<BoxRow>(kind) ||
@@ -77,7 +78,7 @@ struct Separation {
         out.apart[4] = axis_of_first;
         return out;
     }
-    // Least distance of both from each other along a direction.
+    // Minimum distance of the bodies along a direction.
     double along(const Vec3& direction, const Kind& kind) const {
         double least = direction.dot(apart[0]);
         for (int k = 1; k < corners; ++k) least = std::min(least, direction.dot(apart[k]));
@@ -97,16 +98,17 @@ struct Separation {
     }
 };
 
-// What changes from one width to another in a time over which its rate changes by no more than twice `parabola` a unit of
-// it: it stays above the straight course less that parabola, and so does the least of several such widths.
+// Check if a width stays above `least` between two instants. The second derivative is at most 2 `parabola` in
+// magnitude, per interval squared. The width then stays above its chord minus that parabola, and so does the minimum of
+// several such widths.
 inline bool stays_above(double from, double to, double parabola, double least) {
     const double slope = to - from - parabola;
     if (!(from > least && to > least)) return false;
     return std::abs(to - from) >= parabola || from - slope * slope / (4.0 * parabola) > least;
 }
 
-// How far points of two bodies may be from each other where a rim or a segment meets a solid, or two of them meet; of
-// others it is not asked.
+// Maximum distance of points of two bodies, for contacts of a rim or a segment with a solid, or of two rims. Infinite
+// for other contacts, which do not need it.
 inline double span(const Kind& kind, const Separation& at) {
     if (const auto* line = std::get_if<LineRow>(&kind)) return at.apart[0].norm() + line->half1 + line->solid.reach;
     if (const auto* rim = std::get_if<RimRow>(&kind)) return at.apart[0].norm() + rim->rim + rim->solid.reach;
@@ -114,10 +116,10 @@ inline double span(const Kind& kind, const Separation& at) {
     return HUGE_VAL;
 }
 
-// Along one direction the distance of any two points stays above its straight course less the parabola that accelerations
-// up to `bound` may take off over `length` [s]. Bodies that turn take their faces and edges with them: along a direction
-// that turns evenly from one normal to the other the parabola is larger by what the speed of the points against each other
-// and their distance add.
+// Check if two bodies stay apart over `length` [s]. Along a fixed direction the distance of any two points stays above
+// its chord minus the parabola of accelerations up to `bound`. Rotating bodies rotate their faces and edges. Along a
+// direction that turns uniformly between the normals, the relative speed and distance of the points enlarge the
+// parabola.
 inline bool stays_apart(const Kind& kind, const Separation& a, const Separation& b, double bound, double speed,
                         double length, double least) {
     const double parabola = 0.5 * bound * length * length;
@@ -130,8 +132,8 @@ inline bool stays_apart(const Kind& kind, const Separation& a, const Separation&
     return stays_above(a.along(a.normal, kind), b.along(b.normal, kind), parabola + turning, least);
 }
 
-// How deep segments, rims and sides may have entered each other and still tell which way is out: less than both are rounded.
-// Points in solids and over planes tell it at any depth.
+// Maximum penetration at which the direction out of contact is defined. Segments, rims and sides need a penetration
+// below their rounding radius. Points in solids and over planes have no limit.
 inline double rounded_by(const Kind& kind) {
     if (const auto* capsules = std::get_if<CapsulesRow>(&kind)) return capsules->radius;
     if (const auto* line = std::get_if<LineRow>(&kind)) return line->radius;
@@ -140,7 +142,7 @@ inline double rounded_by(const Kind& kind) {
     return HUGE_VAL;
 }
 
-// Whether the gap is that of one point after the other of a body over a plane, each of which stays above its own course.
+// Check if the gap is the lowest point of a body over a plane. Each point then stays above its own bound.
 inline bool has_lowest_point(const Program& p, int gap) {
     return std::holds_alternative<EllipsoidRow>(p.blocks[p.gaps[gap].block].kind);
 }

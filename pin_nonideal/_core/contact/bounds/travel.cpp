@@ -7,18 +7,18 @@ namespace pn {
 
 namespace {
 
-// Bodies are allowed this many times their way, for what projections add.
+// Safety factor of the travel, for the moves of projections.
 constexpr double way_factor = 2.0;
-// What slides is given this part of its distance ahead, and so many of its steps, before distances are taken again.
+// Sliding joints get a margin before levers are recomputed: this fraction of the distance, plus this many steps.
 constexpr double room_ahead = 0.5, steps_ahead = 4.0;
-// A sum times this is no smaller than in exact numbers.
+// Factor that makes a floating-point sum an upper bound.
 constexpr double rounded_up = 1.0 + 0x1p-51;
-// The same of a sum over all joints.
+// Factor that makes a floating-point sum over all joints an upper bound.
 constexpr double joints_rounded_up = 1.0 + 1e-12;
-// A unit of what a stop limits counts as a meter of its body at the least.
+// Minimum lever of a joint with a limit: one unit of the joint counts as one meter of its body.
 constexpr double lever_of_stop = 1.0;
 
-// How far what belongs to a contact reaches from its frames; a plane is told apart.
+// Extents of a contact's geometry from its frames, without planes.
 struct Extents { double first = 0.0, second = 0.0; };
 
 Extents extents(const Kind& kind) {
@@ -106,7 +106,7 @@ void WayBound::size(Ways& ways) const {
     ways.slid_until.assign(extent_.size(), -1.0);
 }
 
-// Motion of a joint's body against the one before.
+// Motion of a joint's body relative to its parent.
 WayBound::Speeds WayBound::speeds(const Moved& moved, const VecX& speed) {
     if (moved.nv == 1) return {moved.slide * speed[moved.iv], moved.turn * speed[moved.iv]};
     const auto all = speed.segment(moved.iv, moved.nv);
@@ -115,12 +115,12 @@ WayBound::Speeds WayBound::speeds(const Moved& moved, const VecX& speed) {
         case JointKind::translation: return {all.norm(), 0.0};
         case JointKind::free_flyer: return {all.head(3).norm(), all.tail(3).norm()};
         case JointKind::planar: return {all.head(2).norm(), all[2]};
-        default: return {all.norm(), all.norm()};  // of which nothing else is known
+        default: return {all.norm(), all.norm()};  // unknown joint kind
     }
 }
 
-// Along the tree, from the farthest point of a body to the joint that moves it, and on to the next. Origins of joints that
-// turn stay where they are on the body before; others are given room.
+// Compute levers along the tree, from the farthest point of a body to its joint and on to the parent. Origins of
+// rotating joints are fixed on the parent. Sliding joints get a margin.
 void WayBound::set_levers(const Terms& terms, Ways& ways) const {
     for (const Moved& moved : moved_) ways.lever[moved.joint] = extent_[moved.joint];
     for (auto moved = moved_.rbegin(); moved != moved_.rend(); ++moved) {
@@ -138,7 +138,7 @@ void WayBound::set_levers(const Terms& terms, Ways& ways) const {
     ways.placed = true;
 }
 
-// What was not summed up as yet goes with the levers so far.
+// Travel not yet summed uses the old levers.
 void WayBound::step(const Terms& terms, const VecX& speed, double h, Ways& ways) const {
     const double time = way_factor * h;
     bool far = !ways.placed;
@@ -162,7 +162,7 @@ void WayBound::step(const Terms& terms, const VecX& speed, double h, Ways& ways)
     ways.most_step *= joints_rounded_up;
 }
 
-// Along the tree: a body comes as far as the one before it, and by what its joint does.
+// Propagate along the tree: the travel of a body is that of its parent plus that of its joint.
 void WayBound::spread(const std::vector<double>& slid, const std::vector<double>& turned, Ways& ways) const {
     ways.scene_step = 0.0;
     for (const Moved& moved : moved_) {

@@ -1,5 +1,5 @@
-// How far bodies have come at most since a run began, from the speeds of the joints alone: a gap that was wider than its
-// two bodies have come since then is open, and nobody looks at it. What this costs a step does not grow with the contacts.
+// Maximum travel of bodies since the start of a run, from joint speeds only. A gap wider than the travel of its two
+// bodies is still open and is not evaluated. The cost per step does not grow with the number of contacts.
 #pragma once
 
 #include <vector>
@@ -8,25 +8,25 @@
 
 namespace pn {
 
-// What lasts from step to step. A way is counted in meters of any point by which a body touches, of a joint by itself in
-// its own unit; a turn in radians.
+// Travel data that lasts from step to step. Travel of a body is in meters, of any of its contact points. Travel of a
+// joint is in the joint's unit, and rotation in radians.
 struct Ways {
-    std::vector<double> body, joint, turn;  // by joint: of its body, of itself, of its body's turning
-    double scene = 0.0;                     // of the body that comes farthest in each step
-    // Of points on what a joint moves from its own origin [m], as long as joints that slide have not come farther.
+    std::vector<double> body, joint, turn;  // by joint: travel of its body, of the joint, rotation of its body
+    double scene = 0.0;                     // sum over the steps of the largest body travel
+    // Distance [m] of points that a joint moves from its origin. Valid until sliding joints travel beyond slid_until.
     std::vector<double> lever, slid_until;
-    bool placed = false;  // where that is known
-    // Of each joint by itself since those of the bodies were summed up: how far its body slid and turned on the one before.
+    bool placed = false;  // lever and slid_until are computed
+    // By joint, since the last sum over bodies: translation and rotation of its body relative to its parent.
     std::vector<double> slid, turned;
-    // Over the step at hand; of bodies only where that was summed up.
+    // Travel over the current step. Entries of bodies are valid only if `summed`.
     std::vector<double> body_step, joint_step, turn_step, slid_step, turned_step;
     double scene_step = 0.0;
-    double most = 0.0, most_step = 0.0;  // no less than the scene's way, so far and over the step
+    double most = 0.0, most_step = 0.0;  // upper bounds of the scene's travel: total, and over the step
     bool summed = false;
 
-    // The step is taken: its ways count.
+    // Add the travel of the step to the totals.
     void go_on();
-    // Those of bodies over the step at hand.
+    // Add the travel of bodies over the current step to the totals.
     void add_bodies();
 };
 
@@ -35,28 +35,30 @@ public:
     explicit WayBound(const Program& p);
 
     void size(Ways& ways) const;
-    // Over a step of length h with the largest |v| of each dof; the bodies stand at one end of it. Ways of joints, and the
-    // most that the scene's may be; `sum_up` makes those of the bodies, so far and over the step.
+    // Compute the travel of joints and the upper bound of the scene's travel over a step of length h. `speed` is the
+    // largest |v| of each dof. The bodies are at one end of the step. `sum_up` computes the travel of bodies, total and
+    // over the step.
     void step(const Terms& terms, const VecX& speed, double h, Ways& ways) const;
     void sum_up(Ways& ways) const;
 
-    // What a gap hangs on: the ways of two bodies, or of a joint.
+    // Bodies or joint that change a gap.
     struct Pair {
         int first = 0, second = 0, joint = 0;
-        double reach = 0.0;    // of the first from its frame [m]
-        bool turns = false;    // with a plane on the second, which may turn: the farther, the faster it comes
-        bool unknown = false;  // a function of the user's
+        double reach = 0.0;    // extent of the first body's geometry from its frame [m]
+        bool turns = false;    // the second body has a plane that may rotate: its speed grows with the distance
+        bool unknown = false;  // user function
     };
     const Pair& pair(int gap) const { return pairs_[gap]; }
-    // By how much a gap may have changed, by ways since it was looked at; with the distance of its bodies then.
+    // Maximum change of a gap for the travel since its last evaluation, with the distance of its bodies at that time.
     static double change(const Pair& pair, double way, double turn, double apart) {
         return pair.turns ? way + turn * (apart + way) : way;
     }
-    // The scene's way over which a gap may change so much; none where a plane turns, whose way depends on the distance.
+    // Scene travel over which a gap may change by `width`. Zero for a rotating plane, whose travel depends on the
+    // distance.
     static double least_way(const Pair& pair, double width) {
         return pair.turns ? 0.0 : pair.first == 0 || pair.second == 0 ? width : 0.5 * width;
     }
-    // That distance; asked only where a plane turns.
+    // Distance of the bodies of a gap, needed for rotating planes only.
     double apart(const Terms& terms, int gap) const;
     double way(const Ways& ways, int gap) const {
         const Pair& pair = pairs_[gap];
@@ -68,11 +70,11 @@ public:
     }
 
 private:
-    struct Moved {  // a joint that gaps hang on
+    struct Moved {  // joint that moves contacts
         int joint, parent, iv, nv;
         JointKind kind;
-        double slide, turn;  // of its body against the one before, by a unit of velocity; where it has one dof
-        bool drifts;         // moves its origin against a body that may turn
+        double slide, turn;  // translation and rotation of its body relative to the parent per unit velocity, for one dof
+        bool drifts;         // moves its origin relative to a body that may rotate
     };
     struct Speeds { double slide, turn; };
     static Speeds speeds(const Moved& moved, const VecX& speed);
@@ -81,8 +83,8 @@ private:
 
     const Program& p;
     std::vector<Moved> moved_;    // each after its parent
-    bool drift_ = false;          // some do
-    std::vector<double> extent_;  // by joint: of points by which its body touches, from its origin [m]
+    bool drift_ = false;          // some joint drifts
+    std::vector<double> extent_;  // by joint: distance of contact points of its body from its origin [m]
     std::vector<Pair> pairs_;     // by gap
 };
 
