@@ -10,7 +10,7 @@ from .differences import MET, rows_at
 from .given import given_force, mass_matrix
 from .rows import rows
 
-# Tolerances of a dense factorization of a KKT matrix of condition 1e4; multipliers have the squared condition.
+# Tolerances of a dense KKT solution of condition 1e4; multipliers have the squared condition.
 KKT = 1e-10
 MULTIPLIERS = 1e-8
 

@@ -197,7 +197,7 @@ def ackermann(rng, functions, drives=True):
 
 
 def omni(rng, functions):
-    """Return a robot with three omnidirectional wheels; each wheel constrains the velocity along its plane."""
+    """Return a robot with three omnidirectional wheels, each with one constraint along its plane."""
     radius = rng.uniform(0.03, 0.1)
     model, base, mass = _chassis(rng, 0.3, radius)
     light = mass * 10.0 ** rng.uniform(-3.0, -1.0)
