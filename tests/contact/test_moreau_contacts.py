@@ -231,7 +231,7 @@ def test_random_bodies_dropped(count):
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_humanoid_lands_on_its_soles(seed):
-    """Corners of soles and dry joint friction share the loads; the violation of the laws is reported and small.
+    """Corners of soles and dry joint friction share the loads; the violation is reported and small.
 
     The impulse of the ground equals the impulse of gravity plus the change of momentum.
     """
@@ -288,7 +288,7 @@ def test_feet_that_carry_nothing_slide_with_the_others(feet, height, method):
 @pytest.mark.parametrize("dt", [1e-3, 5e-4, 2.5e-4])
 @pytest.mark.parametrize(("feet", "mu", "torsional", "rolling"), TURNED)
 def test_feet_that_resist_turning_come_to_rest(feet, mu, torsional, rolling, dt):
-    """A table slides, rotates and drops onto one or two feet; resistance follows the loads."""
+    """A table slides, rotates and drops onto one or two feet; resistance is load-dependent."""
     model = empty()
     joint = body(model, 0, pin.JointModelFreeFlyer(), "table", 2.0, inertia=0.05 * np.eye(3))
     resists = {"mu": mu, "torsional": torsional, "rolling": rolling}

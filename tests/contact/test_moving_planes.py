@@ -38,7 +38,7 @@ def test_a_ball_on_a_turntable_runs_in_a_circle():
 @pytest.mark.parametrize("speed", [0.5, -0.5])
 @pytest.mark.parametrize("e", [0.0, 0.6])
 def test_a_ball_strikes_a_plank_on_a_pivot(e, speed):
-    """P (1/m + d^2/J) = (1 + e) v with approach velocity v; the plank rotates toward or away from the ball."""
+    """P (1/m + d^2/J) = (1 + e) v with approach velocity v; the plank rotates to or from the ball."""
     m, J, d, r = 0.7, 0.3, 0.4, 0.05
     model = empty((0.0, 0.0, 0.0))
     frame(model, "plank", body(model, 0, pin.JointModelRY(), "pivot", 1.0, inertia=J * np.eye(3)))

@@ -51,7 +51,7 @@ RATTLING = [10, 13, 31, 75, 82, 88, 120, 128, 133, 149, 178, 181, 195, 246, 286,
 
 @pytest.mark.parametrize("seed", seeds(RATTLING))
 def test_contacts_that_rattle_come_to_rest(seed):
-    """Two or more contacts chatter in alternation: the end of one series causes rebounds of another contact."""
+    """Two or more contacts chatter in alternation: the end of one series makes another contact rebound."""
     scene = dropped(seed)
     run = pn.simulate(scene, 3.0, record="energy", max_steps=20000)
     assert deepest(scene, run) < DEPTH

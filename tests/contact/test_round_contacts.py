@@ -31,7 +31,7 @@ def planar_ball(mass, inertia):
 
 
 def leaving_angle(model, contact, distance, start, spin):
-    """Return the angle from the top at which a ball leaves the hub, for a start at the top with small speed."""
+    """Return the angle from the top at which a ball leaves the hub, from a start with small speed."""
     q = [distance * np.sin(start), distance * np.cos(start), 0.0]
     speed = 1e-9 + np.sqrt(2.0 * GRAVITY * distance * (1.0 - np.cos(start)) / (1.0 + spin))
     v = [speed * np.cos(start), -speed * np.sin(start), speed / 0.1 * (spin > 0.0)]

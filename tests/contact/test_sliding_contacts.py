@@ -197,7 +197,7 @@ def test_friction_in_time_stepping_only_takes_energy(dt):
 @pytest.mark.parametrize("legs", [3, 4])
 @pytest.mark.parametrize("speed", [0.0, 1.0])
 def test_a_table_on_more_contacts_than_it_needs(legs, speed):
-    """Nine or twelve rows on six degrees of freedom: the table sticks, or slides by mu g t^2 / 2 as a point."""
+    """Nine or twelve rows on six degrees of freedom: the table sticks, or slides as a point would."""
     corners = [(0.3, 0.3), (-0.3, 0.3), (-0.3, -0.3), (0.3, -0.3)][:legs]
     scene = table(corners, v0=[speed, 0.0, 0.0, 0.0, 0.0, 0.0])  # centered on the ground: no tilting moment
     run = pn.simulate(scene, 0.2, rtol=1e-10)

@@ -33,8 +33,8 @@ COAL = 1e-6  # error of Coal's iterative distance of disks in 1 of 1,000 placeme
 NEAR = 1e-4  # [m]: smaller distances of Coal are not compared
 LINE = 1e-3  # radius of Coal's segments and points [m]
 THIN = 1e-12  # [m]
-# Difference between true shapes and their contacts, in radii of rounding.  Rims are inset and rounded, 1.3 at a
-# right angle, and the tip by 1 / sin of half its angle, on both bodies.
+# Difference between true shapes and their contacts, in radii of rounding.  Rims are inset and rounded, 1.3 at
+# a right angle, and the tip by 1 / sin of half its angle, on both bodies.
 ROUNDED_OFF = 6.0
 DEPTH = 1e-10  # maximum penetration [m]
 LEDGER = 1e-5  # energy error of default step control, of about 20 J [J]
