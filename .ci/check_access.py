@@ -1,4 +1,4 @@
-"""Hold a replay page to axe-core's rules of accessibility, in light and dark, on a desktop and on a phone.
+"""Check a replay page by axe-core's accessibility rules, in light and dark mode, for desktop and phone.
 
 Usage: python .ci/check_access.py FILE.html axe.min.js.  Exit code 0: no finding is serious or critical.
 """
@@ -17,7 +17,7 @@ GRAVE = ("serious", "critical")
 
 
 def main(path: str, axe: str) -> int:
-    """Check one page; returns the exit code."""
+    """Check one page and return the exit code."""
     found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
     findings = []
     with sync_playwright() as playwright:

@@ -1,8 +1,8 @@
-"""Check that the pin_nonideal installed here came from a wheel that runs anywhere.
+"""Check that the installed pin_nonideal came from a portable wheel.
 
-Usage: python .ci/check_wheel.py, in an environment where a wheel is installed.  Exit code 0: the wheel holds
-one library, the core; it finds Pinocchio's libraries by its own place alone, names no folder of the machine
-that built it, and refuses another minor version of Pinocchio.
+Usage: python .ci/check_wheel.py, in an environment with an installed wheel.  Exit code 0: the wheel contains
+one library, the core.  The core finds Pinocchio's libraries by a path relative to itself, contains no path of
+the build machine, and rejects another minor version of Pinocchio.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
-HOME = "cmeel.prefix/lib"  # where the pin wheel keeps its libraries, beside the package in site-packages
-# What the core may need: libraries of the pin wheel and of the system.
+HOME = "cmeel.prefix/lib"  # library folder of the pin wheel in site-packages
+# Libraries that the core may link: libraries of the pin wheel and of the system.
 NEEDED = r"(lib(pinocchio|boost)_|lib(stdc\+\+|m|gcc_s|c|pthread)\.so|ld-linux|lib(c\+\+|System))"
 # Folders in which a wheel is built.
 BUILT = rb"/(?:tmp|home|root|work|project|build|Users|private|opt/_internal|var/folders)/[^\0\n]{3,120}"
@@ -22,7 +22,7 @@ REFUSED = "import pinocchio; pinocchio.__version__ = '4.999.0'; import pin_nonid
 
 
 def core() -> Path:
-    """The core of the installed wheel."""
+    """Return the path of the core in the installed wheel."""
     files = metadata.files("pin-nonideal") or []
     libraries = [file for file in files if file.suffix in (".so", ".dylib", ".pyd")]
     assert [file.stem.split(".")[0] for file in libraries] == ["_core"], libraries
@@ -30,12 +30,12 @@ def core() -> Path:
 
 
 def output(*command: str) -> str:
-    """What a command prints."""
+    """Return the standard output of a command."""
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
 def searched_and_needed(library: Path) -> tuple[list[str], list[str]]:
-    """Folders in which a library looks for others, and those others."""
+    """Return the run-time search path of a library, and the libraries that it needs."""
     if sys.platform == "darwin":
         folders = re.findall(r"cmd LC_RPATH\n.*\n\s*path (\S+)", output("otool", "-l", str(library)))
         lines = output("otool", "-L", str(library)).splitlines()[1:]
@@ -46,7 +46,7 @@ def searched_and_needed(library: Path) -> tuple[list[str], list[str]]:
 
 
 def main() -> None:
-    """All checks."""
+    """Run all checks."""
     library = core()
     folders, needed = searched_and_needed(library)
     origin = "@loader_path" if sys.platform == "darwin" else "$ORIGIN"

@@ -1,7 +1,7 @@
-"""Open a replay page in headless Chromium, with the network off, and check that it shows a motion.
+"""Open a replay page in headless Chromium without network, and check that it shows a motion.
 
-Usage: python .ci/open_replay.py FILE.html.  Exit code 0: the page loads without an error or a request to
-anywhere, reports its duration, and its picture changes between the start and the middle of the motion.
+Usage: python .ci/open_replay.py FILE.html.  Exit code 0: the page loads without an error or a network
+request, reports its duration, and its picture changes between the start and the middle of the motion.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ FLAGS = [
     "--enable-unsafe-swiftshader",
 ]
 TIMEOUT_MS = 60_000
-# A pixel has changed when a channel differs by more than antialiasing noise does.
+# Channel difference of a changed pixel, above the noise of antialiasing.
 CHANNEL_DIFFERENCE = 20
-# A moving link covers far more than this; a page that ignores seek() changes none.
+# Minimum number of changed pixels.  A moving link changes many more, a page that ignores seek() none.
 MOVED_PIXELS = 200
 
 
 def picture(page: Page, time: float) -> np.ndarray:
-    """RGB pixels of the page at simulated `time` [s]."""
+    """Return RGB pixels of the page at simulated `time` [s]."""
     page.evaluate("t => replay.seek(t)", time)
     page.evaluate("() => new Promise(r => requestAnimationFrame(() => requestAnimationFrame(r)))")
     return np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(int)
 
 
 def main(path: str) -> int:
-    """Check one page; returns the exit code."""
+    """Check one page and return the exit code."""
     browser_path = next(
         filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
     )

@@ -1,4 +1,4 @@
-"""Hook of mkdocs: docstrings below the tables of the reference; files outside of docs/ that pages link to."""
+"""Hook of mkdocs: adds docstrings below the tables of the reference, and linked files outside of docs/."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def _place(target: str) -> str:
-    """Where a file of the checkout stands on the site."""
+    """Return the path on the site of a file of the checkout."""
     return f"source/{target}.txt"
 
 
 def _with_docstrings(table: re.Match[str]) -> str:
-    """A table of names, and what mkdocstrings shows of each."""
+    """Return a table of names, with the directives of mkdocstrings for each name."""
     names = re.findall(r"^\| `(\w+)`", table[0], re.MULTILINE)
     return "\n\n".join([table[0], *(f"::: pin_nonideal.{name}" for name in names), ""])
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Adds the files that pages link to."""
+    """Add the files that pages link to."""
     for page in files.documentation_pages():
         for target, _ in OUTSIDE.findall(page.content_string):
             path = ROOT / target
@@ -36,7 +36,7 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Points links at them; a folder is no page, so its name stays without a link."""
+    """Redirect links to the added files; links to folders are removed and their names kept."""
     if page.file.src_uri == "reference.md":
         return TABLE.sub(_with_docstrings, markdown)
 

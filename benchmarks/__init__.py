@@ -1,5 +1,5 @@
-"""Benchmarks: run time against error, cost per evaluation, per feature and per loop, beside the alternatives.
+"""Benchmarks: run time against error, and cost per evaluation, feature and loop, compared with other tools.
 
-`pin-nonideal bench` or `python -m benchmarks` runs them in a checkout; `--help` tells the rest.  Peers are
-optional (`pip install '.[bench]'`); the loop over Pinocchio and SciPy is always there.
+`pin-nonideal bench` or `python -m benchmarks` runs the benchmarks in a checkout; `--help` lists the options.
+Peers are optional (`pip install '.[bench]'`).  The loop over Pinocchio and SciPy is always available.
 """

@@ -1,4 +1,4 @@
-"""The one entry of the benchmarks: `python -m benchmarks`, or this folder run by `pin-nonideal bench`."""
+"""Entry point of the benchmarks: `python -m benchmarks`, or `pin-nonideal bench`, which runs this folder."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import os
 import sys
 from pathlib import Path
 
-# One thread for everybody; libraries read this when they are loaded.
+# One thread for all tools. Libraries read these variables when they are loaded.
 for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_variable, "1")
 
 if not __package__:
-    import pin_nonideal as _installed  # found before the checkout is put in front of it
+    import pin_nonideal as _installed  # imported before the checkout is first on the path
 
     del _installed
     sys.path.insert(0, str(Path(__file__).resolve().parent.parent))

@@ -1,8 +1,8 @@
-"""Work and precision: processor time of one run from its start against the error of its end, tool by tool.
+"""Work-precision: processor time of one run against its error, for each tool.
 
-First every setting runs once or a few times, which gives its error and a rough time.  Then, for each error
-level, the settings of every tool that reached it and may be its fastest run again, all in turn; the ratios
-are medians over the rounds, between the fastest ones.
+First every setting runs once or a few times for its error and an approximate time.  Then, for each error
+level, the fastest settings of every tool that reached the level run again in alternating rounds.  The ratios
+are medians over the rounds between the fastest settings.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from .tools import Outcome, Setting, Tool
 from .tools.package import Package
 
 OURS = Package.name
-# A family has met its floor when its last settings, ever finer, do not halve the errors of as many before
-# them.  Errors of order one tell nothing yet, and one lucky setting among the others must not end the search.
+# A family has reached its error floor if its last WINDOW settings do not halve the errors of the WINDOW
+# settings before.  Errors above TELLING are not counted.  The window makes the test robust to a single small
+# error.
 WINDOW, TELLING = 3, 0.1
-# Length of one turn of a race [s]: everybody's is as long as one run of the slowest, within these bounds, so
-# that all meet as many of the machine's slow moments, and a run of a millisecond is timed among its like, not
-# in the caches that a long run of another tool has left.
+# Bounds of the length of one turn of a race [s].  All turns are as long as one run of the slowest setting.
+# Then disturbances of the machine affect all tools equally, and short runs are repeated with warm caches.
 SHORTEST_TURN, LONGEST_TURN = 0.02, 0.4
-# Settings of one tool that race for a level, and how much longer than its fastest they may have taken before.
+# Maximum number of settings of a tool in a race, and their maximum time relative to the fastest setting.
 ENTRANTS, ROUGH = 3, 1.5
 
 
 def sweep(problem: Problem, tool: Tool, limit: float, stride: int = 1) -> list[dict[str, Any]]:
-    """Runs the settings of a tool; those that would take longer than the limit are named and left out.
+    """Run the settings of a tool; settings with an expected time above the limit are skipped and reported.
 
     Args:
-        problem: what to compute.
-        tool: by what.
-        limit: of one run [s].
-        stride: every how many of a family's settings are tried.
+        problem: problem to compute.
+        tool: tool to run.
+        limit: maximum time of one run [s].
+        stride: step between the settings of a family that run.
     """
     rows: list[dict[str, Any]] = []
     last: tuple[str, int | None, float] = ("", None, 0.0)
@@ -63,13 +63,13 @@ def sweep(problem: Problem, tool: Tool, limit: float, stride: int = 1) -> list[d
 
 
 def has_met_its_floor(errors: Sequence[float]) -> bool:
-    """Whether the last settings of a family, ever finer, brought nothing."""
+    """Check if the last and finest settings of a family did not reduce the error."""
     before, last = errors[-2 * WINDOW : -WINDOW], errors[-WINDOW:]
     return len(before) == WINDOW and max(before) < TELLING and min(last) > 0.5 * max(before)
 
 
 def every(settings: Sequence[Setting], stride: int) -> list[Setting]:
-    """Every `stride`-th setting of each family."""
+    """Return every `stride`-th setting of each family."""
     kept: list[Setting] = []
     place: dict[str, int] = {}
     for setting in settings:
@@ -81,14 +81,14 @@ def every(settings: Sequence[Setting], stride: int) -> list[Setting]:
 
 
 def timed(run: Callable[[], object]) -> float:
-    """Seconds of one run."""
+    """Return the time of one run [s]."""
     begin = clock()
     run()
     return clock() - begin
 
 
 def judged(problem: Problem, outcome: Outcome) -> dict[str, Any]:
-    """Error, steps and status of a run."""
+    """Return error, steps and status of a run."""
     found: dict[str, Any] = {"steps": outcome.steps, "error": None}
     if outcome.failure:
         found["status"] = f"failed: {outcome.failure}"
@@ -101,7 +101,7 @@ def judged(problem: Problem, outcome: Outcome) -> dict[str, Any]:
 
 
 def entrants(rows: Sequence[dict[str, Any]], tool: str, level: float) -> list[dict[str, Any]]:
-    """The settings of a tool that reached a level and may be its fastest, by times that are rough."""
+    """Return the settings of a tool that reached a level and may be the fastest, by approximate times."""
     reached = [r for r in rows if r["tool"] == tool and r.get("error") is not None and r["error"] <= level]
     reached.sort(key=lambda r: r["seconds"])
     return [r for r in reached[:ENTRANTS] if r["seconds"] < ROUGH * reached[0]["seconds"]]
@@ -110,7 +110,7 @@ def entrants(rows: Sequence[dict[str, Any]], tool: str, level: float) -> list[di
 def race(
     problem: Problem, tools: Sequence[Tool], rows: list[dict[str, Any]], rounds: int, seconds: float
 ) -> list[dict[str, Any]]:
-    """For each level, the times of all entrants in turn, at most `rounds` of each, and the winners."""
+    """Time all entrants of each level in alternating rounds, at most `rounds`, and return the winners."""
     results = []
     for level in problem.levels:
         racing = {tool.name: entrants(rows, tool.name, level) for tool in tools}
@@ -143,7 +143,7 @@ def race(
 
 
 def winner(times: dict[tuple[str, int], timing.Times], tool: str, count: int) -> int:
-    """Which of a tool's entrants is the fastest, round by round."""
+    """Return the index of a tool's fastest entrant by the median ratio over the rounds."""
     return min(range(count), key=lambda k: timing.ratio(times[tool, k], times[tool, 0]))
 
 
@@ -154,13 +154,13 @@ def found(settings: list[Setting], row: dict[str, Any]) -> Setting:
 def measure(
     problem: Problem, tools: Sequence[Tool], quick: bool, say: Callable[[str], None] = print
 ) -> dict[str, Any]:
-    """All runs of one problem.
+    """Run all tools on one problem.
 
     Args:
-        problem: what to compute.
-        tools: ours and its peers.
-        quick: shorter limits.
-        say: told what happens.
+        problem: problem to compute.
+        tools: this package and its peers.
+        quick: whether to use shorter limits.
+        say: function that prints progress.
     """
     reference = problem.solution
     rows: list[dict[str, Any]] = []

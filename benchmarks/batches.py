@@ -1,10 +1,10 @@
-"""Throughput of batches: pn.rollout against mujoco.rollout, the call from Python included.
+"""Throughput of batches: pn.rollout against mujoco.rollout, including the call from Python.
 
-Both record every step.  Only steps really made count: MuJoCo stops a diverged state and pads its output.
-One thread is timed by the processor time of the process, which other users of the machine do not stretch; two
-threads by wall time, beside what they can gain at most at that moment: two processes, which share nothing,
-with half of the batch each.  A batch has as many states as make it long against the start of a thread, which
-a virtual machine may delay by a millisecond.
+Both record every step.  Only completed steps count: MuJoCo stops a diverged state and pads its output.  One
+thread is timed by the processor time of the process, which is independent of the load of the machine.  Two
+threads are timed by wall time.  Two processes without shared data, with half of the batch each, give the
+upper bound of their gain.  The batch is long compared with the start of a thread, which may take a
+millisecond on a virtual machine.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from .problems import Problem
 
 DT = 2e-3
 STATES, STEPS = 64, 200
-LONG = 0.2  # seconds of a batch in one thread, at least
+LONG = 0.2  # minimum time of a batch in one thread [s]
 MOST_STATES = 4096
-SPREAD = 0.05  # of the velocities of the batch around the scene's [rad/s or m/s]
+SPREAD = 0.05  # standard deviation of the initial velocities around the scene's [rad/s or m/s]
 OURS, RIVALS = "pin_nonideal", ("mujoco Euler", "mujoco implicitfast")
 
 CASES: dict[str, Callable[[], Problem]] = {
@@ -36,12 +36,12 @@ CASES: dict[str, Callable[[], Problem]] = {
     for maker in (cases.panda, cases.four_bar, cases.n_four_bar, cases.talos, cases.solo12_held)
 }
 
-# Returns the steps really made, and what went wrong, empty when nothing did.
+# Returns the number of completed steps, and the failure message, empty if there is none.
 Call = Callable[[], tuple[int, str]]
 
 
 def starts(problem: Problem, scene: pn.Scene, count: int) -> tuple[Any, Any]:
-    """States around the problem's, all consistent."""
+    """Return random consistent states around the problem's initial state."""
     generator = np.random.default_rng(5)
     pairs = []
     for _ in range(count):
@@ -51,7 +51,7 @@ def starts(problem: Problem, scene: pn.Scene, count: int) -> tuple[Any, Any]:
 
 
 def ours(scene: pn.Scene, q: Any, v: Any, steps: int, threads: int) -> Call:
-    """A call of pn.rollout."""
+    """Return a call of pn.rollout."""
 
     def call() -> tuple[int, str]:
         try:
@@ -64,9 +64,9 @@ def ours(scene: pn.Scene, q: Any, v: Any, steps: int, threads: int) -> Call:
 
 
 def theirs(problem: Problem, q: Any, v: Any, steps: int, threads: int, integrator: str) -> Call:
-    """A call of mujoco.rollout, with the constraints of its defaults.
+    """Return a call of mujoco.rollout with its default constraints.
 
-    Without warm start: its Newton method ends after one iteration on joints that are held, warm or cold.
+    The warm start is disabled: with and without it, Newton's method takes one iteration on held joints.
     """
     import mujoco
     from mujoco import rollout
@@ -89,7 +89,7 @@ def theirs(problem: Problem, q: Any, v: Any, steps: int, threads: int, integrato
 
     def call() -> tuple[int, str]:
         state, _ = pool.rollout(mj, data, initial, nstep=steps)
-        times = np.round(state[:, :, 0] / DT)  # the first number of a state is its time
+        times = np.round(state[:, :, 0] / DT)  # the first entry of a state is its time
         made = sum(np.unique(one).size for one in times)
         return made, "" if made == len(q) * steps else f"diverged: {made} of {len(q) * steps} steps"
 
@@ -97,7 +97,7 @@ def theirs(problem: Problem, q: Any, v: Any, steps: int, threads: int, integrato
 
 
 def half(name: str, states: int, steps: int, which: int) -> Call:
-    """Our call for the first or second half of a batch, in one thread."""
+    """Return a call of pn.rollout for the first or second half of a batch, in one thread."""
     problem = CASES[name]()
     scene = problem.scene()
     part = slice(which * states // 2, (which + 1) * states // 2)
@@ -106,9 +106,9 @@ def half(name: str, states: int, steps: int, which: int) -> Call:
 
 
 def follow(name: str, states: int, steps: int, orders: Connection) -> None:
-    """What the second process does: its half of the batch, whenever it is told to."""
+    """Run the second process: compute its half of the batch on each request."""
     call = half(name, states, steps, 1)
-    with suppress(EOFError):  # the first process is done
+    with suppress(EOFError):  # the first process has closed the pipe
         while orders.recv():
             call()
             orders.send(True)
@@ -116,12 +116,12 @@ def follow(name: str, states: int, steps: int, orders: Connection) -> None:
 
 @contextmanager
 def two_processes(name: str, states: int, steps: int) -> Iterator[Callable[[], object]]:
-    """A batch by two processes, half and half: what two threads could gain at most."""
+    """Return a batch in two processes, half each: the upper bound of the gain of two threads."""
     context = multiprocessing.get_context("spawn")
     orders, theirs_end = context.Pipe()
     other = context.Process(target=follow, args=(name, states, steps, theirs_end), daemon=True)
     other.start()
-    theirs_end.close()  # so that the end of the other process is heard
+    theirs_end.close()  # otherwise the end of the other process goes unnoticed
     call = half(name, states, steps, 0)
 
     def both() -> None:
@@ -137,7 +137,7 @@ def two_processes(name: str, states: int, steps: int) -> Iterator[Callable[[], o
 
 
 def batch_of(function: Callable[[], Any], clock: Callable[[], float]) -> timing.Batch:
-    """A batch timed by a clock of all threads."""
+    """Return a batch timed by a clock of all threads."""
 
     def batch(count: int) -> float:
         begin = clock()
@@ -149,14 +149,14 @@ def batch_of(function: Callable[[], Any], clock: Callable[[], float]) -> timing.
 
 
 def long_batch(problem: Problem, scene: pn.Scene, steps: int) -> int:
-    """The number of states of a batch that lasts long enough, in whole multiples of STATES."""
+    """Return the number of states of a batch of at least LONG seconds, a multiple of STATES."""
     call = ours(scene, *starts(problem, scene, STATES), steps, 1)
     seconds = min(batch_of(call, time.process_time)(1) for _ in range(3))
     return min(STATES * math.ceil(LONG / seconds), MOST_STATES)
 
 
 def measure_case(name: str, states: int | None, steps: int, rounds: int) -> dict[str, Any]:
-    """Steps a second of one robot, by tool and number of threads; `states` None for a batch that is long."""
+    """Return steps per second of one robot by tool and threads; `states` None for a batch of LONG seconds."""
     problem = CASES[name]()
     scene = problem.scene()
     if states is None:
@@ -197,7 +197,7 @@ def measure_case(name: str, states: int | None, steps: int, rounds: int) -> dict
 
 
 def against_the_best(times: dict[tuple[str, int], timing.Times], threads: int) -> dict[str, Any]:
-    """The fastest rival with this number of threads, and our steps over its steps in the same time."""
+    """Return the fastest rival with this number of threads, and our steps over its steps in the same time."""
     rivals = [who for who in times if who[0] in RIVALS and who[1] == threads]
     if not rivals or (OURS, threads) not in times:
         return {"against": None, "ratio": None}
@@ -206,7 +206,7 @@ def against_the_best(times: dict[tuple[str, int], timing.Times], threads: int) -
 
 
 def measure(quick: bool, only: str | None, say: Callable[[str], None] = print) -> list[dict[str, Any]]:
-    """All robots, or one."""
+    """Measure all robots, or one."""
     results = []
     for name in CASES:
         if only not in (None, name):

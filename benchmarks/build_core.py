@@ -16,7 +16,7 @@ LAUNCHER = Path(__file__).resolve().parent / "measured.py"
 
 
 def build() -> int:
-    """Compiles the core in a temporary folder, on all processors, and prints a table.
+    """Compile the core in a temporary folder, on all processors, and print a table.
 
     Returns:
         The exit code of CMake.
@@ -34,7 +34,7 @@ def build() -> int:
         status = subprocess.run(configure, env=environment, check=False, stdout=subprocess.DEVNULL).returncode
         if status:
             return status
-        log.unlink(missing_ok=True)  # of CMake's trials
+        log.unlink(missing_ok=True)  # entries of CMake's compiler checks
         begin = time.monotonic()
         status = subprocess.run(["cmake", "--build", folder], env=environment, check=False).returncode
         wall = time.monotonic() - begin
@@ -45,11 +45,11 @@ def build() -> int:
 
 
 def table(units: list[dict[str, float | str]], wall: float) -> str:
-    """Sums by room, as text.
+    """Return sums by folder of the core, as text.
 
     Args:
-        units: output, processor and wall seconds and largest memory [MB] of each call of the compiler.
-        wall: seconds of the whole build.
+        units: output, processor and wall time [s] and peak memory [MB] of each compiler call.
+        wall: time of the whole build [s].
     """
     rooms = defaultdict(list)
     for unit in units:
@@ -72,7 +72,7 @@ def total(units: list[dict[str, float | str]], key: str) -> float:
 
 
 def room_of(output: str) -> str:
-    """The folder of a source in the core, from the path of its object file."""
+    """Return the folder of a source in the core, from the path of its object file."""
     if not output.endswith(".o"):
         return "precompiled headers" if output.endswith((".gch", ".pch")) else "link"
     if "nanobind" in output:

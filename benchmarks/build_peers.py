@@ -1,4 +1,4 @@
-"""Builds the C++ peer modules into a cache folder, and finds them there."""
+"""Build of the C++ peer modules in a cache folder, and their import."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NAMES = ("pinocchio_wheel", "pinocchio_headers")
 
 
 def build() -> int:
-    """Configures and compiles; takes some minutes.
+    """Configure and compile the peer modules; takes some minutes.
 
     Returns:
         The exit code of CMake.
@@ -37,11 +37,11 @@ def build() -> int:
 
 @cache
 def load(name: str) -> ModuleType | None:
-    """A peer module of the cache folder, or None when it has not been built."""
+    """Return a peer module of the cache folder, or None if it is not built."""
     path = CACHE / f"{name}{sysconfig.get_config_var('EXT_SUFFIX')}"
     if not path.is_file():
         return None
-    import pinocchio  # noqa: F401  its types must be known first
+    import pinocchio  # noqa: F401  registers its types first
 
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:

@@ -1,4 +1,4 @@
-"""Robots whose evaluations and steps are timed: a model, its anchors and a state, no reference."""
+"""Robots for timing of evaluations and steps: model, anchors and state, without a reference."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from .problems import Problem, solo12_gains
 
 
 def scene_problem(scene: pn.Scene, title: str, anchors: Any = None, **extra: Any) -> Problem:
-    """A scene's model, anchors and initial state.
+    """Return a problem with a scene's model, anchors and initial state.
 
     Args:
-        scene: where they come from.
-        title: shown in tables.
-        anchors: instead of the scene's constraints.
+        scene: source of model, constraints and initial state.
+        title: title in tables.
+        anchors: replacement of the scene's constraints; None to keep them.
         extra: further attributes of the Problem.
     """
     q0, v0 = scene.initial_state()

@@ -1,4 +1,4 @@
-"""Command line of the benchmarks: which parts run, on what, beside whom, and where the results go."""
+"""Command line of the benchmarks: selection of parts, problems, peers and output folder."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent
 DEFAULT_OUTPUT = ROOT.parent / "build" / "benchmarks" / "results"
 PACKAGES = ("pin", "numpy", "scipy", "mujoco", "exudyn", "drake")
-DIGITS = 6  # significant ones of a number in the results; times have fewer
+DIGITS = 6  # significant digits of numbers in the results
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Runs the parts asked for, or one of the actions.
+    """Run the requested parts, or one of the actions.
 
     Args:
-        arguments: words of the command line.
+        arguments: arguments of the command line.
 
     Returns:
         The exit code.
@@ -74,7 +74,7 @@ actions:
 
 
 def run_parts(options: argparse.Namespace) -> int:
-    """Runs the parts; writes JSON and Markdown for each, and the pictures of those that have one."""
+    """Run the parts; write JSON, Markdown and, if available, a picture for each part."""
     from . import plots, report
 
     options.output.mkdir(parents=True, exist_ok=True)
@@ -94,7 +94,7 @@ def run_parts(options: argparse.Namespace) -> int:
 
 
 def beside_the_others(record: dict[str, Any], path: Path) -> dict[str, Any]:
-    """The results of some problems or cases among those of the others measured before in the same way."""
+    """Return new results merged into earlier results with the same settings on the same machine."""
     if not path.is_file():
         return record
     before = json.loads(path.read_text(encoding="utf-8"))
@@ -107,7 +107,7 @@ def beside_the_others(record: dict[str, Any], path: Path) -> dict[str, Any]:
 
 
 def rounded(value: Any) -> Any:
-    """Results with numbers of few digits."""
+    """Return results with numbers rounded to DIGITS significant digits."""
     if isinstance(value, float):
         return float(f"{value:.{DIGITS}g}")
     if isinstance(value, dict):
@@ -118,7 +118,7 @@ def rounded(value: Any) -> Any:
 
 
 def machine() -> dict[str, Any]:
-    """What a reader has to know about where the numbers come from, in general terms."""
+    """Return processor, system and package versions of the measurements."""
     versions, absent = {}, []
     for package in PACKAGES:
         try:
@@ -134,7 +134,7 @@ def machine() -> dict[str, Any]:
 
 
 def processor() -> str:
-    """The processor's model where the system tells it, else its architecture."""
+    """Return the processor's model if the system provides it, else its architecture."""
     info = Path("/proc/cpuinfo")
     if info.is_file():
         for line in info.read_text(encoding="utf-8").splitlines():
@@ -210,7 +210,7 @@ def footprint(options: argparse.Namespace) -> Any:
 
 
 def chosen_tools(options: argparse.Namespace) -> list[Any]:
-    """Ours and the peers asked for that are installed; the others are told."""
+    """Return this package and the requested peers that are installed; missing peers are printed."""
     from .tools import TOOLS
 
     wanted = None if options.peers is None else [word.strip() for word in options.peers.split(",")]

@@ -1,4 +1,4 @@
-"""Bodies on the ground whose motions have closed forms: a ball bounces, a box slides to rest or stands."""
+"""Contact cases with closed forms: a bouncing ball, a box that slides to rest, and a box at rest."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from .mjcf_export import numbers
 Array = NDArray[np.float64]
 
 GRAVITY = 9.81
-RESTITUTION, SLIDING, STANDING = 0.8, 0.3, 0.5  # of the ball; coefficients of friction of both boxes
+RESTITUTION, SLIDING, STANDING = 0.8, 0.3, 0.5  # ball; friction coefficients of the boxes
 SLOPE = math.atan(0.4)
-EDGES, RADIUS = (0.2, 0.2, 0.1), 0.1  # of the boxes and the ball [m]
+EDGES, RADIUS = (0.2, 0.2, 0.1), 0.1  # boxes and ball [m]
 
 
 @dataclass(frozen=True)
 class Case:
-    """A body whose motion on the ground has a closed form.
+    """Body on the ground with a motion in closed form.
 
     Attributes:
-        name: of the case.
-        title: in words.
-        scene: with the contacts.
-        duration: of the run [s].
-        end: where the middle of the body is then [m], (3,).
-        geom: the body's shape and friction as attributes of an MJCF geom.
-        restitution: of its contacts.
+        name: name of the case.
+        title: title in tables.
+        scene: scene with the contacts.
+        duration: duration of the run [s].
+        end: position of the body's center at the end [m], (3,).
+        geom: shape and friction of the body as attributes of an MJCF geom.
+        restitution: coefficient of restitution of the contacts.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Case:
 
 
 def free_body(inertia: Any, tilt: float = 0.0) -> Any:
-    """One free body; gravity leans by `tilt` toward +x."""
+    """Return a model of one free body; gravity is tilted by `tilt` [rad] toward +x."""
     model = pin.Model()
     down = GRAVITY * np.array([math.sin(tilt), 0.0, -math.cos(tilt)])
     model.gravity = pin.Motion(down, np.zeros(3))
@@ -61,7 +61,7 @@ def at(height: float) -> Array:
 
 
 def bouncing() -> Case:
-    """A ball between its third and fourth impact."""
+    """Return the case of a bouncing ball, which ends between the third and the fourth impact."""
     drop, duration = 1.0, 1.9
     model = free_body(pin.Inertia.FromSphere(1.0, RADIUS))
     contact = pn.PointContact("middle", radius=RADIUS, restitution=RESTITUTION)
@@ -88,7 +88,7 @@ def box_geom(mu: float) -> dict[str, str]:
 
 
 def sliding() -> Case:
-    """A box that friction stops on the way."""
+    """Return the case of a box that friction brings to rest."""
     speed = 2.0
     scene = box(SLIDING, 0.0, np.array([speed, 0.0, 0.0, 0.0, 0.0, 0.0]))
     end = np.array([speed**2 / (2.0 * SLIDING * GRAVITY), 0.0, 0.5 * EDGES[2]])
@@ -96,7 +96,7 @@ def sliding() -> Case:
 
 
 def standing() -> Case:
-    """A box below its angle of friction: it does not move at all."""
+    """Return the case of a box on a slope below the friction angle, which does not move."""
     scene = box(STANDING, SLOPE, np.zeros(6))
     end = np.array([0.0, 0.0, 0.5 * EDGES[2]])
     return Case("standing", "a box stands on a slope for 10 s", scene, 10.0, end, box_geom(STANDING))

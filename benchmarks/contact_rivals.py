@@ -1,7 +1,7 @@
-"""MuJoCo, Drake and Pinocchio's ADMM solver on bodies that touch the ground, each at its best.
+"""MuJoCo, Drake and Pinocchio's ADMM solver on contact cases, with their best settings.
 
-MuJoCo and Drake (its discrete solver SAP) soften contacts: these are as stiff as the step resolves, and of a
-ball that bounces have the damping of its restitution.
+MuJoCo and Drake (discrete solver SAP) have compliant contacts.  Their stiffness is the largest that the step
+resolves.  The contact of the bouncing ball has the damping of its restitution.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from . import timing
 from .contact_cases import Array, Case
 from .mjcf_export import mjcf, numbers
 
-BOUNCE_RATE = 0.1  # frequency of a contact that bounces times the step [rad]
-REST_RATE = 2.0 * math.pi  # the same of contacts that only rest, by Drake, which makes none stiffer [rad]
-FOOT = 1e-2  # radius of the spheres that Drake's boxes stand on; a box is one contact to it [m]
+BOUNCE_RATE = 0.1  # frequency of a bouncing contact times the step [rad]
+REST_RATE = 2.0 * math.pi  # frequency of a resting contact times the step, the maximum of Drake [rad]
+FOOT = 1e-2  # radius of the spheres at the corners of Drake's boxes [m]: Drake has one contact per box
 
 
 @dataclass
 class Run:
-    """One setting of one tool.
+    """Run of one tool with one setting.
 
     Attributes:
-        tool: its name.
-        setting: in words.
-        run: carries it out, and gives the middle of the body at the end.
+        tool: name of the tool.
+        setting: description of the setting.
+        run: function that runs the case and returns the position of the body's center at the end.
     """
 
     tool: str
@@ -44,7 +44,7 @@ class Run:
 
 
 def damping_ratio(restitution: float) -> float:
-    """Of a damped spring that only pushes: it lets go where its force, not its length, is zero."""
+    """Return the damping ratio of a compressive spring-damper that opens at zero force, for a restitution."""
 
     def excess(ratio: float) -> float:
         root = math.sqrt(1.0 - ratio**2)
@@ -55,7 +55,7 @@ def damping_ratio(restitution: float) -> float:
 
 
 def with_ground(text: str, geoms: dict[str, list[dict[str, str]]], h: float, restitution: float) -> Any:
-    """MuJoCo's model with shapes of bodies above the ground, contacts as stiff as a step h allows."""
+    """Return MuJoCo's model with shapes and a ground plane; contacts are as stiff as the step h allows."""
     import mujoco
 
     root = ET.fromstring(text)
@@ -65,7 +65,7 @@ def with_ground(text: str, geoms: dict[str, list[dict[str, str]]], h: float, res
     assert world is not None
     option.attrib |= {"timestep": numbers(h), "cone": "elliptic", "impratio": "100", "tolerance": "1e-12"}
     solref = [2.0 * h, 1.0]
-    if restitution > 0.0:  # stiffness and damping themselves, as negative numbers
+    if restitution > 0.0:  # negative numbers: stiffness and damping
         rate = BOUNCE_RATE / h
         solref = [-(rate**2), -2.0 * damping_ratio(restitution) * rate]
     soft = {"solref": numbers(solref), "solimp": "0.9999 0.9999 0.001 0.5 2"}
@@ -98,10 +98,10 @@ def mujocos(case: Case, steps: Sequence[float]) -> list[Run]:
 
 
 def drakes(case: Case, steps: Sequence[float]) -> list[Run]:
-    """Drake's discrete plant; a box stands on small spheres at its corners."""
+    """Return runs of Drake's discrete plant; a box has small spheres at its corners."""
     from pydrake.systems.analysis import Simulator
 
-    logging.getLogger("drake").setLevel(logging.ERROR)  # half spaces do not touch deformable bodies
+    logging.getLogger("drake").setLevel(logging.ERROR)  # warnings on half spaces and deformable bodies
     q0, v0 = case.scene.initial_state()
     place, speed = np.r_[q0[6], q0[3:6], q0[:3]], np.r_[v0[3:], v0[:3]]
     found = []
@@ -126,7 +126,7 @@ def drakes(case: Case, steps: Sequence[float]) -> list[Run]:
 
 
 def drake_plant(case: Case, h: float) -> tuple[Any, Any]:
-    """The body above the ground, and the diagram that it is part of."""
+    """Return the plant of the body and the ground, and its diagram."""
     from pydrake.geometry import AddContactMaterial, HalfSpace, ProximityProperties, Sphere
     from pydrake.math import RigidTransform
     from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlantConfig
@@ -139,10 +139,10 @@ def drake_plant(case: Case, h: float) -> tuple[Any, Any]:
     spheres = [(np.add(c.offset, lift), c.radius or FOOT) for c, lift in zip(contacts, lifts, strict=True)]
     if case.restitution:
         rate = BOUNCE_RATE / h
-        # The implicit scheme damps an oscillation by half its rate times the step.
+        # The implicit scheme adds a damping ratio of half the rate times the step.
         relaxation = 2.0 * (damping_ratio(case.restitution) - 0.5 * BOUNCE_RATE) / rate
     else:
-        rate, relaxation = REST_RATE / h, h  # as its documentation advises
+        rate, relaxation = REST_RATE / h, h  # as Drake's documentation recommends
 
     def material(stiffness: float, relaxation: float) -> Any:
         made = ProximityProperties()
@@ -157,7 +157,7 @@ def drake_plant(case: Case, h: float) -> tuple[Any, Any]:
     turns = UnitInertia(*(np.diag(inertia.inertia) / inertia.mass))
     body = plant.AddRigidBody("body", SpatialInertia(inertia.mass, np.zeros(3), turns))
     plant.mutable_gravity_field().set_gravity_vector(case.scene.model.gravity.linear)
-    ground = material(1e14, 0.0)  # rigid: stiffnesses in series, relaxation times are added
+    ground = material(1e14, 0.0)  # rigid: stiffnesses act in series, relaxation times add up
     plant.RegisterCollisionGeometry(plant.world_body(), RigidTransform(), HalfSpace(), "ground", ground)
     soft = material(inertia.mass * rate**2 / len(spheres), relaxation)
     for k, (middle, radius) in enumerate(spheres):
@@ -167,7 +167,7 @@ def drake_plant(case: Case, h: float) -> tuple[Any, Any]:
 
 
 class Stepping:
-    """Time stepping by Pinocchio's ADMM solver, as its examples write it in Python."""
+    """Time stepping with Pinocchio's ADMM solver, as in its Python examples."""
 
     def __init__(self, scene: pn.Scene, h: float) -> None:
         self.model, self.h = scene.model, h
@@ -184,7 +184,7 @@ class Stepping:
         self.settings = pin.ADMMSolverSettings()
 
     def step(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
-        """One step from (q, v) with all contacts closed."""
+        """Compute one step from (q, v) with all contacts closed."""
         model, data = self.model, self.data
         free = v + self.h * pin.aba(model, data, q, v, tau)
         pin.crba(model, data, q, pin.Convention.WORLD)
@@ -202,7 +202,7 @@ class Stepping:
 
 
 def mujoco_steps(scene: pn.Scene, q: Array, h: float) -> timing.Batch:
-    """mj_step of the same quadruped with spheres as feet."""
+    """Return a batch of mj_step for the same quadruped with spherical feet."""
     import mujoco
 
     model = scene.model
@@ -220,7 +220,7 @@ def mujoco_steps(scene: pn.Scene, q: Array, h: float) -> timing.Batch:
             }
         )
     mj = with_ground(mjcf(model, scene.q0, hold=gains), geoms, h, 0.0)
-    mj.opt.tolerance = 1e-8  # its own default
+    mj.opt.tolerance = 1e-8  # MuJoCo's default
     data = mujoco.MjData(mj)
     data.qpos[:] = q[[0, 1, 2, 6, 3, 4, 5, *range(7, model.nq)]]
     mujoco.mj_step(mj, data, nstep=2000)

@@ -1,8 +1,8 @@
-"""Contacts that open, strike and rest, beside MuJoCo, Drake and Pinocchio's ADMM solver.
+"""Unilateral contacts, compared with MuJoCo, Drake and Pinocchio's ADMM solver.
 
-Time against error of a ball that bounces, a box that slides to rest and a box that stands on a slope, whose
-ends have closed forms; the cost of a step of the standing quadruped, of an impact, and of contacts that are
-declared and stay open.  Rivals are set as their documentations advise (`contact_rivals`).
+The module measures time against error of three cases with closed forms: a bouncing ball, a box that slides to
+rest, and a box at rest on a slope.  It also measures the cost of a step of a standing quadruped, of an
+impact, and of open contacts.  Settings of rivals follow their documentation (`contact_rivals`).
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from .contact_rivals import Run, Stepping, drakes, mujoco_steps, mujocos
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 STEPS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)  # [s]
 LEVELS = (1e-2, 1e-4, 1e-6, 1e-8)
-STEP = 1e-3  # of time stepping, where one step is timed [s]
-OPEN = (4, 40, 400)  # contacts that stay open
-LEAST_STEPS = 1000  # of time stepping in a batch
-FALLS = (1, 2, 4, 8)  # contacts that strike at once
+STEP = 1e-3  # step of time stepping for the timing of one step [s]
+OPEN = (4, 40, 400)  # numbers of open contacts
+LEAST_STEPS = 1000  # minimum number of time steps in a batch
+FALLS = (1, 2, 4, 8)  # numbers of simultaneous impacts
 RIVALS = {"mujoco": mujocos, "drake": drakes}
 
 
@@ -44,7 +44,7 @@ def ours(case: Case, steps: Sequence[float]) -> list[Run]:
 
 
 def curve(case: Case, rivals: Collection[str], quick: bool, say: Callable[[str], None]) -> dict[str, Any]:
-    """Time and error of all settings of all tools, and the fastest of each tool below each error."""
+    """Return time and error of all settings, and the fastest setting of each tool below each error."""
     steps = STEPS[:3] if quick else STEPS
     runs = ours(case, steps)
     for name, make in RIVALS.items():
@@ -68,7 +68,7 @@ def curve(case: Case, rivals: Collection[str], quick: bool, say: Callable[[str],
 
 
 def steps_of(scene: pn.Scene, h: float, **start: Any) -> timing.Batch:
-    """Steps of time stepping, so many at least that the start of a run counts little."""
+    """Return a batch of time steps; at least LEAST_STEPS, so that the start of a run is negligible."""
 
     def batch(count: int) -> float:
         steps = max(count, LEAST_STEPS)
@@ -80,7 +80,7 @@ def steps_of(scene: pn.Scene, h: float, **start: Any) -> timing.Batch:
 
 
 def quadruped(rivals: Collection[str], quick: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
-    """One step of Solo12 as it stands on its four feet, held by its motors."""
+    """Measure one step of Solo12 at rest on its four feet with position control."""
     scene = pn.load("solo12_dropped")
     rest = pn.simulate(scene, 4.0, method="moreau", dt=STEP, output_dt=4.0)
     q, v, model = rest.q[-1], np.zeros(scene.model.nv), scene.model
@@ -109,7 +109,7 @@ def quadruped(rivals: Collection[str], quick: bool, say: Callable[[str], None]) 
 
 
 def impacts(quick: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
-    """A landing by how many contacts strike at once: the cost of a run with it less one that ends before."""
+    """Measure the cost of an impact by number of contacts: a run past it minus a run that ends before."""
     rows = []
     for count in FALLS:
         model = free_body(pin.Inertia.FromBox(1.0, *EDGES))
@@ -132,7 +132,7 @@ def impacts(quick: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
 
 
 def beside(corners: Sequence[Any]) -> list[pn.PointContact]:
-    """A contact halfway between each corner and the middle, at the same height."""
+    """Return a contact halfway between each corner and the center, at the same height."""
     return [
         pn.PointContact(
             c.frame,
@@ -146,7 +146,7 @@ def beside(corners: Sequence[Any]) -> list[pn.PointContact]:
 
 
 def idle(quick: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
-    """A hand in the air: run times with contacts that are declared and stay open, over those without."""
+    """Measure run times of a robot arm with open contacts, relative to the time without contacts."""
     rows = []
     arm = pn.load("panda")
     for count in OPEN:
@@ -176,13 +176,13 @@ def idle(quick: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
 def measure(
     rivals: Collection[str], quick: bool, only: str | None, say: Callable[[str], None]
 ) -> dict[str, Any]:
-    """All tables.
+    """Measure all tables.
 
     Args:
-        rivals: names of the tools that take part beside ours and Pinocchio.
-        quick: fewer settings and rounds.
-        only: one case of the curves.
-        say: told of progress.
+        rivals: names of the tools in addition to this package and Pinocchio.
+        quick: whether to use fewer settings and rounds.
+        only: one case of the curves; None for all.
+        say: function that prints progress.
     """
     cases = [make() for name, make in CASES.items() if only in (None, name)]
     return {

@@ -1,6 +1,6 @@
-"""Seconds of one constrained acceleration, ours inside the core against Pinocchio's inside C++.
+"""Time of one constrained acceleration: the core of this package against Pinocchio in C++.
 
-Same model, same state, same flags of the compiler; `acceleration` of the peers is checked against ours first.
+Model, state and compiler flags are the same.  The accelerations of the peers are checked against ours first.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from . import build_peers, cases, timing
 from .problems import Problem
 from .tools import pinocchio_scipy as loop
 
-SAME_ACCELERATION = 1e-9  # relative; Pinocchio's with a proximal term of 1e-12 agrees to 1e-13
+SAME_ACCELERATION = 1e-9  # relative; with a proximal term of 1e-12 Pinocchio agrees to 1e-13
 PINOCCHIO_TERMS = 'pin_nonideal, terms="pinocchio"'
 
 
@@ -36,13 +36,13 @@ CASES: dict[str, Callable[[], Problem]] = {
 
 
 def our_batch(scene: pn.Scene, q: Any, v: Any) -> timing.Batch:
-    """The core's own evaluation."""
+    """Return a batch of evaluations of the core."""
     runner = scene._compiled.program.runner()
     return timing.counted(lambda count: runner.time_evaluations(q, v, 0.0, count))
 
 
 def compiled_batches(case: Problem) -> dict[str, timing.Batch]:
-    """Pinocchio's evaluation in C++: from the wheel's libraries and from its headers."""
+    """Return batches of Pinocchio's evaluation in C++, from the wheel's libraries and from its headers."""
     batches: dict[str, timing.Batch] = {}
     q, v = np.array(case.q0), np.array(case.v0)
     for name in build_peers.NAMES:
@@ -62,7 +62,11 @@ def compiled_batches(case: Problem) -> dict[str, timing.Batch]:
 
 
 def check_same(case: Problem, peer: Any) -> None:
-    """The peer computes the same acceleration, or its time means nothing."""
+    """Check that the peer computes the same acceleration.
+
+    Raises:
+        RuntimeError: the accelerations differ by more than SAME_ACCELERATION.
+    """
     theirs = np.empty(case.model.nv)
     peer.acceleration(np.array(case.q0), np.array(case.v0), theirs)
     ours = case.scene().acceleration(case.q0, case.v0)
@@ -72,7 +76,7 @@ def check_same(case: Problem, peer: Any) -> None:
 
 
 def python_batch(case: Problem) -> timing.Batch:
-    """Pinocchio's evaluation called from Python, data and settings made once."""
+    """Return a batch of Pinocchio's evaluation called from Python, with data and settings created once."""
     model, q, v, tau = case.model, np.array(case.q0), np.array(case.v0), np.zeros(case.model.nv)
     data = model.createData()
     if not case.anchors:
@@ -84,7 +88,7 @@ def python_batch(case: Problem) -> timing.Batch:
 
 
 def mujoco_batch(case: Problem) -> timing.Batch | None:
-    """mj_forward without its warm start, which at a fixed state would begin at the answer."""
+    """Return a batch of mj_forward without warm start, which at a fixed state would start at the solution."""
     try:
         import mujoco
     except ImportError:
@@ -100,7 +104,7 @@ def mujoco_batch(case: Problem) -> timing.Batch | None:
 
 
 def measure_case(case: Problem, rounds: int) -> dict[str, Any]:
-    """Times of everybody on one case, and ours over the faster of Pinocchio's builds and over MuJoCo."""
+    """Return the times of all tools on one case, and ours over Pinocchio's faster build and over MuJoCo."""
     scene = case.scene()
     batches = {
         "pin_nonideal": our_batch(scene, case.q0, case.v0),
@@ -128,7 +132,7 @@ def measure_case(case: Problem, rounds: int) -> dict[str, Any]:
 
 
 def measure(quick: bool, only: str | None, say: Callable[[str], None] = print) -> list[dict[str, Any]]:
-    """All cases, or one."""
+    """Measure all cases, or one."""
     results = []
     for name, maker in CASES.items():
         if only not in (None, name):

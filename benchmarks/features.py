@@ -1,9 +1,9 @@
-"""What each feature of a scene costs, added one at a time to the same mechanism, and what absent ones cost.
+"""Cost of each feature of a scene, added one at a time to the same mechanism, and of inactive features.
 
-The mechanism is the planar five-bar, which still moves when one of its joints sticks.  Steps are steps of
-rk4, four evaluations each, so that what a step needs beside them shows.  What is absent, or stated and never
-acts, is timed beside the scene without it.  What an event costs shows in chains whose hinges stick and slip,
-beside the same chains with viscous hinges, which have none.
+The mechanism is the planar five-bar, which still moves if one of its joints sticks.  Steps are rk4 steps with
+four evaluations each, which shows the cost of a step beyond its evaluations.  Inactive features are timed
+relative to the scene without them.  The cost of an event is measured with chains of hinges that stick and
+slip, relative to the same chains with viscous hinges, which have no events.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .problems import Problem
 DT = 1e-3
 STEPS = 200
 
-# Chains of links of 1 m and 1 kg, released level; their hinges rub with so much [N m], or [N m s].
+# Chains of links of 1 m and 1 kg, released horizontally, with hinge friction [N m] or viscosity [N m s].
 LINKS = (10, 20, 50, 100)
 COULOMB, VISCOUS = 5.0, 1e-3
 CHAIN_SECONDS = 1.0
@@ -33,13 +33,13 @@ CHAIN_SECONDS = 1.0
 
 @dataclass(frozen=True)
 class Stage:
-    """A scene with a feature and all before it.
+    """Scene with a feature and all features before it.
 
     Attributes:
-        name: of the feature.
-        scene: with it.
-        settings: of the run.
-        sticks: whether its last frictional element sticks.
+        name: name of the feature.
+        scene: scene with the feature.
+        settings: settings of the run.
+        sticks: whether the last friction element sticks.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Stage:
 
 
 def five_bar(constraints: list[Any], laws: list[Any], v0: Any = None, **extra: Any) -> pn.Scene:
-    """The package's five-bar with other constraints and laws; its motors turn against each other."""
+    """Return the package's five-bar with other constraints and laws; by default its motors counter-rotate."""
     base = pn.load("five_bar")
     q0, _ = base.initial_state()
     if v0 is None:
@@ -67,7 +67,7 @@ def the_loop() -> Any:
 
 
 def stages() -> list[Stage]:
-    """Features in the order in which they are added."""
+    """Return the features in the order in which they are added."""
     loop = the_loop()
     viscous = pn.JointFriction("elbow1", viscous=0.003, name="elbow 1")
     coulomb = replace(viscous, coulomb=1e-3)
@@ -90,7 +90,7 @@ def stages() -> list[Stage]:
 
 
 def run(stage: Stage) -> pn.Trajectory:
-    """A run of STEPS steps; its start and its arrays count as part of the steps."""
+    """Run STEPS steps; the cost of a step includes the start and the arrays of the run."""
     return pn.simulate(stage.scene, STEPS * DT, method="rk4", dt=DT, progress=False, **stage.settings)
 
 
@@ -99,7 +99,7 @@ def evaluation_batch(scene: pn.Scene) -> timing.Batch:
 
 
 def added(rounds: int, say: Callable[[str], None]) -> list[dict[str, Any]]:
-    """Cost of every stage per evaluation and per step."""
+    """Measure the cost of every stage per evaluation and per step."""
     found = stages()
     for stage in found:
         modes = run(stage).modes
@@ -116,7 +116,7 @@ def added(rounds: int, say: Callable[[str], None]) -> list[dict[str, Any]]:
 
 
 def absent(rounds: int, say: Callable[[str], None]) -> list[dict[str, Any]]:
-    """Evaluations of scenes that state what never acts, over those of the scene without it."""
+    """Measure evaluations of scenes with inactive features, relative to the scene without them."""
     loop = the_loop()
     plain = five_bar([loop], [])
     idle = {
@@ -145,7 +145,7 @@ def absent(rounds: int, say: Callable[[str], None]) -> list[dict[str, Any]]:
 
 
 def chain(links: int, **friction: float) -> pn.Scene:
-    """A chain from the ground along x, each hinge about y with this friction."""
+    """Return a chain from the ground along x; each hinge about y has this friction."""
     model = pin.Model()
     rod = pin.Inertia(1.0, np.array([0.5, 0.0, 0.0]), np.diag([1e-3, 1.0, 1.0]) / 12.0)
     for k in range(links):
@@ -157,7 +157,7 @@ def chain(links: int, **friction: float) -> pn.Scene:
 
 
 def events(quick: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
-    """Evaluations and time of an event, beside those of the steps."""
+    """Measure evaluations and time of an event, without the cost of the steps."""
     rows = []
     for links in LINKS[:2] if quick else LINKS:
         scenes = {"rough": chain(links, coulomb=COULOMB), "smooth": chain(links, viscous=VISCOUS)}
@@ -167,7 +167,7 @@ def events(quick: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
             {name: timing.per_call(call) for name, call in calls.items()}, 2 if quick else 5
         )
         steps, smooth_steps = (run.stats.steps + run.stats.rejected for run in (rough, smooth))
-        own = steps / smooth_steps  # what the steps cost without events
+        own = steps / smooth_steps  # steps relative to the smooth run
         count = len(rough.events)
         evaluations = (rough.stats.evaluations - own * smooth.stats.evaluations) / count
         seconds = (times["rough"].best - own * times["smooth"].best) / count
@@ -180,6 +180,6 @@ def events(quick: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
 
 
 def measure(quick: bool, say: Callable[[str], None] = print) -> dict[str, Any]:
-    """What features add, what absent ones cost, and what an event does."""
+    """Measure the cost of features, of inactive features and of events."""
     rounds = 10 if quick else 60
     return {"added": added(rounds, say), "absent": absent(rounds, say), "events": events(quick, say)}

@@ -1,4 +1,4 @@
-"""What it costs to have a tool: time and memory of its import, in a fresh interpreter."""
+"""Time and memory of the import of each tool, in a new interpreter."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ print(json.dumps([time.process_time() - begin, resident() - before]))
 
 
 def one(modules: str) -> tuple[float, float]:
-    """Processor seconds and bytes of an import in an interpreter of its own, with compiled Python files."""
-    # First the package that runs here: a checkout may have no compiled core in it.
+    """Return processor time [s] and bytes of an import in a new interpreter, with compiled Python files."""
+    # The package of this process is first on the path: a checkout may have no compiled core.
     paths = [str(Path(pn.__file__).resolve().parents[1]), *(path for path in sys.path if path)]
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     environment["PYTHONPATH"] = os.pathsep.join(paths)
@@ -53,7 +53,7 @@ def one(modules: str) -> tuple[float, float]:
 
 
 def measure(quick: bool, say: Callable[[str], None] = print) -> list[dict[str, Any]]:
-    """All modules that are installed, in turn; the best of the rounds, files being in memory then."""
+    """Measure all installed modules in alternating rounds; the minimum has all files in the disk cache."""
     here = {
         name: modules
         for name, modules in MODULES.items()

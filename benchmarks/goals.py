@@ -1,4 +1,4 @@
-"""Key figures of the recorded results, each beside the goal that it is held to."""
+"""Key figures of the recorded results, with their goals."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ HELD_BATCHES = ("panda", "four_bar", "n_four_bar", "talos")
 
 @dataclass(frozen=True)
 class KeyFigure:
-    """A measured number and its goal.
+    """Measured number and its goal.
 
     Attributes:
-        title: what is measured.
-        value: None when it was not measured, or nobody else got there.
-        goal: what it is held to.
-        at_least: whether the goal is a lower bound, else an upper one.
-        remark: shown instead of the value when that is None.
+        title: title of the figure.
+        value: measured value; None if it was not measured, or if no rival reached the error.
+        goal: bound of the value.
+        at_least: whether the goal is a lower bound, else an upper bound.
+        remark: text in place of a value that is None.
     """
 
     title: str
@@ -34,31 +34,31 @@ class KeyFigure:
 
     @property
     def met(self) -> bool:
-        """Whether the goal is reached; nobody else getting there reaches it."""
+        """Check if the goal is met; it is met if no rival reached the error."""
         if self.value is None:
             return self.remark.startswith("no rival")
         return self.value >= self.goal if self.at_least else self.value <= self.goal
 
     @property
     def shown(self) -> str:
-        """The value in words."""
+        """Return the value as text."""
         if self.value is None:
             return self.remark
         return f"{self.value:.1e}" if 0.0 < self.value < 1e-3 else f"{self.value:.3g}"
 
     @property
     def bound(self) -> str:
-        """The goal in words."""
+        """Return the goal as text."""
         return f"{'>=' if self.at_least else '<='} {self.goal:g}"
 
 
 def power(error: float) -> str:
-    """A power of ten, briefly."""
+    """Return an error as a rounded power of ten, such as 1e-6."""
     return f"1e{round(math.log10(error))}"
 
 
 def level(records: Records, problem: str, error: float) -> dict[str, Any]:
-    """What each tool needs to reach an error; empty when that was not measured."""
+    """Return the results of each tool at an error level; empty if not measured."""
     for result in records.get("accuracy", {}).get("results", ()):
         if result["problem"] == problem:
             for entry in result["levels"]:
@@ -68,7 +68,7 @@ def level(records: Records, problem: str, error: float) -> dict[str, Any]:
 
 
 def best_rival(tools: dict[str, Any]) -> tuple[str, dict[str, Any]] | None:
-    """The fastest of the others that got there."""
+    """Return the fastest rival that reached the level, or None."""
     there = {name: row for name, row in tools.items() if name != OURS and "seconds" in row}
     if not there:
         return None
@@ -77,7 +77,7 @@ def best_rival(tools: dict[str, Any]) -> tuple[str, dict[str, Any]] | None:
 
 
 def times_faster(title: str, tools: dict[str, Any], goal: float, rival: str | None = None) -> KeyFigure:
-    """Time of a rival, or of the best one, over ours, at equal errors."""
+    """Return the time of a rival, or of the best rival, over ours at equal errors."""
     if OURS not in tools or "seconds" not in tools[OURS] or (rival is not None and rival not in tools):
         return KeyFigure(title, None, goal)
     found = best_rival({rival: tools[rival]} if rival is not None else tools)
@@ -87,7 +87,7 @@ def times_faster(title: str, tools: dict[str, Any], goal: float, rival: str | No
 
 
 def earlier(title: str, fine: dict[str, Any], coarse: dict[str, Any]) -> KeyFigure:
-    """Time of the best rival to a coarse error over ours to a fine one."""
+    """Return the time of the best rival to a coarse error over ours to a fine error."""
     if "seconds" not in fine.get(OURS, {}):
         return KeyFigure(title, None, 1.0)
     found = best_rival(coarse)
@@ -97,7 +97,7 @@ def earlier(title: str, fine: dict[str, Any], coarse: dict[str, Any]) -> KeyFigu
 
 
 def key_figures(records: Records) -> list[KeyFigure]:
-    """All of them, in the order of the report."""
+    """Return all key figures, in the order of the report."""
     return [*at_equal_errors(records), *with_many_loops(records), *in_batches(records)]
 
 

@@ -1,7 +1,7 @@
-"""How cost grows: deep chains and rings, mechanisms side by side, a humanoid that rubs, feet, short runs.
+"""Growth of cost with size: deep chains and rings, independent mechanisms, a humanoid, feet, short runs.
 
-Each row has the seconds of everybody who can do the same, and where accelerations are compared, their error
-beside a recursion in long double.  Contestants of a row have their turns in the same rounds.
+Each row has the times of all tools that can compute it.  If accelerations are compared, it also has their
+errors relative to a recursion in long double.  Tools of a row are timed in the same rounds.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ from .evaluation import our_batch
 from .problems import Problem
 
 OURS, ABA, ODEINT, MUJOCO = "pin_nonideal", "pinocchio aba in C++", "aba + odeint in C++", "mujoco"
-MOST_NESTED = 300  # elements of XML in each other that Python writes
-MOST_CUBED = 500  # dofs of what needs room by their cube
-SWAYING = 0.2  # seconds in which a humanoid sways, and less
-LEAST_RUN, LONG_RUN = 1e-3, 0.05  # seconds of a turn
+MOST_NESTED = 300  # maximum nesting of XML elements that Python writes
+MOST_CUBED = 500  # maximum nv of tools with memory of order nv^3
+SWAYING = 0.2  # duration of the first phase of the humanoid's motion [s]
+LEAST_RUN, LONG_RUN = 1e-3, 0.05  # length of a turn [s]
 COULOMB: dict[str, Any] = {"coulomb": 0.1}
 LOADED: dict[str, Any] = {"mu": 0.1, "radius": 0.05}
 
 
 @dataclass
 class Row:
-    """What is timed together.
+    """Contestants that are timed together.
 
     Attributes:
-        group: of rows that grow into each other.
+        group: name of a series of rows of growing size.
         size: number of links, mechanisms, feet or runs.
-        what: is timed.
-        batches: by contestant.
-        errors: of the acceleration or of the motion, by contestant.
-        per: what the times are divided by, such as simulated seconds or steps.
+        what: description of the computation.
+        batches: batches by contestant.
+        errors: error of the acceleration or of the motion, by contestant.
+        per: divisor of the times, such as simulated seconds or steps.
     """
 
     group: str
@@ -57,7 +57,7 @@ class Row:
 
 
 def chain(links: int, turn: float = 0.0, axes: str = "xyz") -> Any:
-    """Equal links of 0.1 m in a row; joints turn about the axes one after another."""
+    """Return a chain of equal links of 0.1 m; the joint axes cycle through `axes`."""
     model, parent = pin.Model(), 0
     kinds = {"x": pin.JointModelRX, "y": pin.JointModelRY, "z": pin.JointModelRZ}
     for i in range(links):
@@ -72,7 +72,7 @@ def chain(links: int, turn: float = 0.0, axes: str = "xyz") -> Any:
 
 
 def pendulums(count: int, law: dict[str, Any]) -> tuple[pn.Scene, Any]:
-    """Double pendulums side by side that rub in their joints, and their start."""
+    """Return independent double pendulums with joint friction, and their initial configuration."""
     model, start = pin.Model(), []
     lengths = np.random.default_rng(3).uniform(0.3, 0.6, (count, 2))
     angles = np.random.default_rng(4).uniform(0.0, 2.0, (count, 2))
@@ -90,7 +90,7 @@ def pendulums(count: int, law: dict[str, Any]) -> tuple[pn.Scene, Any]:
 
 
 def table(feet: int) -> pn.Scene:
-    """A body on feet evenly on a circle, pushed and turned from rest beyond what their friction holds."""
+    """Return a body on feet on a circle, with a force and a moment beyond the friction limits of the feet."""
     model = pin.Model()
     joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "table")
     model.appendBodyToJoint(joint, pin.Inertia(10.0, np.zeros(3), 0.3 * np.eye(3)), pin.SE3.Identity())
@@ -108,7 +108,7 @@ def table(feet: int) -> pn.Scene:
 
 
 def humanoid() -> tuple[pn.Scene, Any, Any]:
-    """Talos on two feet held in 6D, with a controller of positions and dry friction in all joints."""
+    """Return Talos with two feet fixed in 6D, position control and dry joint friction, and its state."""
     robot = pn.load("talos")
     model = robot.model
     scene = pn.Scene(
@@ -126,7 +126,7 @@ def humanoid() -> tuple[pn.Scene, Any, Any]:
 
 
 def mujoco_model(model: Any, q: Any, v: Any) -> Any:
-    """The same tree in MuJoCo at this state, with the places of its coordinates; None where it is missing."""
+    """Return MuJoCo's model of a tree and its coordinate map, or None if MuJoCo is not installed."""
     with suppress(ImportError):
         from .tools.mujoco import Coordinates, states
 
@@ -137,7 +137,7 @@ def mujoco_model(model: Any, q: Any, v: Any) -> Any:
 
 
 def forward(model: Any, q: Any, v: Any) -> tuple[timing.Batch, Any] | None:
-    """MuJoCo's evaluation of a tree and its acceleration."""
+    """Return a batch of MuJoCo's evaluation of a tree, and its acceleration."""
     found = mujoco_model(model, q, v)
     if found is None:
         return None
@@ -151,7 +151,7 @@ def forward(model: Any, q: Any, v: Any) -> tuple[timing.Batch, Any] | None:
 
 
 def peers(model: Any) -> dict[str, Any]:
-    """Pinocchio's compiled side, as far as it has been built; making its data takes 32 nv^3 bytes."""
+    """Return the built C++ peers of Pinocchio; their data take 32 nv^3 bytes."""
     if model.nv > MOST_CUBED:
         return {}
     modules = {name: build_peers.load(name) for name in build_peers.NAMES}
@@ -291,7 +291,7 @@ def short(sizes: tuple[int, ...]) -> Iterator[Row]:
     yield Row("short runs", 1, "scene.step, mj_step", step)
 
 
-# Each with its sizes, and those of a quick run.
+# Sizes of each case: full run and quick run.
 CASES: dict[Callable[[tuple[int, ...]], Iterator[Row]], tuple[tuple[int, ...], tuple[int, ...]]] = {
     chains: ((10, 30, 100, 300, 1000), (10, 100)),
     motions: ((10, 30, 100, 300), (10,)),
@@ -304,7 +304,7 @@ CASES: dict[Callable[[tuple[int, ...]], Iterator[Row]], tuple[tuple[int, ...], t
 
 
 def measure(quick: bool, only: str | None, say: Callable[[str], None] = print) -> list[dict[str, Any]]:
-    """All cases, or one."""
+    """Measure all cases, or one."""
     results = []
     for make, (all_sizes, few) in CASES.items():
         if only not in (None, make.__name__):
@@ -329,7 +329,7 @@ def measure(quick: bool, only: str | None, say: Callable[[str], None] = print) -
 
 
 def timed(row: Row, rounds: int) -> dict[str, Any]:
-    """A row with the seconds of its contestants, and ours over each other's."""
+    """Return a row with the times of its contestants, and ours over each of the others."""
     times = timing.paired(row.batches, rounds, LEAST_RUN if row.what == "evaluation" else LONG_RUN)
     return {
         "group": row.group,
@@ -342,13 +342,13 @@ def timed(row: Row, rounds: int) -> dict[str, Any]:
 
 
 def failed(row: Row, how: str) -> dict[str, Any]:
-    """A row that did not come to its end."""
+    """Return the entry of a row that failed."""
     named = {"group": row.group, "size": row.size, "what": f"{row.what}: {how}"}
     return named | {"seconds": {}, "ratio": {}, "errors": {}}
 
 
 def exponents(rows: list[dict[str, Any]]) -> dict[str, float]:
-    """Of our cost between the last size and the one nearest to a tenth to a quarter of it, by group."""
+    """Return the exponents of our cost by group, between the last size and the one nearest to an eighth."""
     found = {}
     for group in dict.fromkeys(row["group"] for row in rows):
         times = {

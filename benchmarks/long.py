@@ -1,4 +1,4 @@
-"""Ten simulated seconds, tool by tool: cost of a second, closure gap and energy change at the end."""
+"""Ten simulated seconds for each tool: cost of a second, closure gap and energy change at the end."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PROBLEMS = (*CONSERVATIVE, "solo12")
 
 
 def settings(problem: Problem) -> dict[str, list[Setting]]:
-    """What a user would take, by tool: the defaults, and what is known to be careful."""
+    """Return typical settings of each tool: its defaults and careful settings."""
     careful = "RK4 stiff" if problem.anchors else "RK4"
 
     def fixed(h: float) -> int:
@@ -50,14 +50,14 @@ def settings(problem: Problem) -> dict[str, list[Setting]]:
 
 
 def energy(problem: Problem, q: Array, v: Array) -> float:
-    """Kinetic and potential energy [J]."""
+    """Return the sum of kinetic and potential energy [J]."""
     data = problem.model.createData()
     pin.computeMechanicalEnergy(problem.model, data, q, v)
     return float(data.mechanical_energy)
 
 
 def gap(problem: Problem, q: Array) -> float:
-    """Largest distance between the points that anchors hold together [m]."""
+    """Return the largest distance between two anchored points [m]."""
     model = problem.model
     start, end = model.createData(), model.createData()
     pin.framesForwardKinematics(model, start, problem.q0)
@@ -71,7 +71,7 @@ def gap(problem: Problem, q: Array) -> float:
 
 
 def judged(problem: Problem, outcome: Outcome) -> dict[str, Any]:
-    """Gap, energy change and status of a run."""
+    """Return gap, energy change and status of a run."""
     if outcome.failure:
         return {"status": f"failed: {outcome.failure}"}
     if not outcome.complete or outcome.q is None or outcome.v is None:
@@ -88,7 +88,7 @@ def judged(problem: Problem, outcome: Outcome) -> dict[str, Any]:
 
 
 def measure_one(problem: Problem, tools: Sequence[Tool], rounds: int) -> dict[str, Any]:
-    """All settings of all tools on one problem, timed in turn."""
+    """Time all settings of all tools on one problem in alternating rounds."""
     rows, runs = [], {}
     for tool in tools:
         if not tool.settings(problem):
@@ -109,7 +109,7 @@ def measure_one(problem: Problem, tools: Sequence[Tool], rounds: int) -> dict[st
 def measure(
     tools: Sequence[Tool], quick: bool, only: str | None, say: Callable[[str], None] = print
 ) -> list[dict[str, Any]]:
-    """All problems, or one."""
+    """Measure all problems, or one."""
     results = []
     for name in PROBLEMS:
         if only not in (None, name):

@@ -1,4 +1,4 @@
-"""Runs a command and appends its time and memory to a file: python measured.py FILE COMMAND..."""
+"""Run a command and append its time and memory to a file: python measured.py FILE COMMAND..."""
 
 import json
 import os
@@ -12,7 +12,7 @@ status = subprocess.run(sys.argv[2:], check=False).returncode
 used = resource.getrusage(resource.RUSAGE_CHILDREN)
 words = sys.argv[2:]
 output = words[words.index("-o") + 1] if "-o" in words else ""
-scale = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss
+scale = 1 if sys.platform == "darwin" else 1024  # unit of ru_maxrss [bytes]
 measured = {
     "output": output,
     "processor": used.ru_utime + used.ru_stime,

@@ -1,4 +1,4 @@
-"""One Pinocchio model as MJCF, with the problem's anchors, springs, gains and friction."""
+"""Export of a Pinocchio model to MJCF, with anchors, springs, gains and friction of a problem."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ def numbers(values: Any) -> str:
 
 
 def quaternion(R: Array) -> str:
-    """(w, x, y, z), as MJCF orders it."""
+    """Return the quaternion (w, x, y, z) of a rotation matrix, in the order of MJCF."""
     x, y, z, w = pin.Quaternion(R).coeffs()
     return numbers([w, x, y, z])
 
 
 def thickened(inertia: Array) -> Array:
-    """MuJoCo takes no rod without thickness: its own axis gets a part in a million of the largest moment."""
+    """Return the inertia with moments of at least THIN times the largest: MuJoCo rejects thin rods."""
     moments, axes = np.linalg.eigh(inertia)
     return (axes * np.maximum(moments, THIN * moments.max())) @ axes.T
 
@@ -41,11 +41,11 @@ def mjcf(
     coulomb: Array | None = None,
     viscous: Array | None = None,
 ) -> str:
-    """The text of an MJCF file.
+    """Return the text of an MJCF file.
 
     Args:
-        model: pinocchio.Model of revolute joints, and free flyers on the ground.
-        q0: where frames held to the world are held, and what `hold` holds.
+        model: pinocchio.Model of revolute joints, and free flyers attached to the world.
+        q0: configuration of frames anchored to the world, and reference of `hold`.
         anchors: PointAnchor and FrameAnchor descriptions; MuJoCo's connect has all three rows of a point.
         springs: SpringDamper descriptions.
         hold: proportional and derivative gains, (nv,) each, as springs and dampers of the joints.
@@ -71,12 +71,12 @@ def mjcf(
         joint(body, model, i, q0, hold, coulomb, viscous)
         bodies.append(body)
     places: Any = None
-    if any(anchor.frame2 is None for anchor in anchors):  # Data of a large model takes gigabytes
+    if any(anchor.frame2 is None for anchor in anchors):  # pinocchio.Data of a large model takes gigabytes
         places = model.createData()
         pin.framesForwardKinematics(model, places, q0)
 
     def site(name: str | None, tag: str, at: Any) -> str:
-        """A site at a frame, or in the world at a place; its name."""
+        """Add a site at a frame, or in the world at a placement, and return its name."""
         if name is None:
             parent, place = world, at
         else:
@@ -107,7 +107,7 @@ def mjcf(
 def joint(
     body: ET.Element, model: Any, i: int, q0: Array, hold: Any, coulomb: Array | None, viscous: Array | None
 ) -> None:
-    """The joint that moves a body."""
+    """Add the joint of a body."""
     kind, dof = model.joints[i].shortname(), model.joints[i].idx_v
     if kind == "JointModelFreeFlyer":
         ET.SubElement(body, "freejoint", name=model.names[i])

@@ -1,10 +1,11 @@
-"""What loads of the world's robots, and what of it is right: a table over folders of URDF and MJCF files.
+"""Table of the models that load, and of their correctness, over folders of URDF and MJCF files.
 
     python -m benchmarks.models FOLDER ... [--write docs/models.md]
 
-Each folder is a row; "example-robot-data" stands for the names of that package.  Right means, at random
-states that meet the constraints: for MJCF MuJoCo's own M, bias, actuator forces and accelerations (contacts
-and limits off, exact equalities), for URDF Pinocchio's articulated-body accelerations.
+Each folder is a row.  "example-robot-data" stands for the robots of that package.  A right model agrees with
+the reference at random consistent states.  The reference of MJCF is MuJoCo's M, bias, actuator forces and
+accelerations, with exact equalities and without contacts and limits.  The reference of URDF is Pinocchio's
+articulated-body acceleration.
 """
 
 from __future__ import annotations
@@ -25,22 +26,22 @@ import pin_nonideal as pn
 from oracles import mujoco_motion
 from pin_nonideal.loading.mjcf.compile import compile_mjcf
 
-RIGHT = 1e-9  # of M, forces and accelerations beside their largest entry
-ROUNDED = 1e-5  # of accelerations of loops whose frames the file has rounded
+RIGHT = 1e-9  # tolerance of M, forces and accelerations, relative to 1 + the largest entry
+ROUNDED = 1e-5  # tolerance of accelerations of loops with rounded frames in the file
 STATES = 2
 QUOTED = re.compile(r'"[^"]*"')
-SPREAD = 0.3  # of the states around the reference [m or rad]
-MANY, CLOSE = 20, 1e-3  # constraints beyond which states are closed from near by: closing them takes minutes
-DENSITY = 1000.0  # of links without inertia [kg/m^3]
+SPREAD = 0.3  # spread of the states around the reference [m or rad]
+MANY, CLOSE = 20, 1e-3  # spread CLOSE above MANY constraints: projection from far takes minutes
+DENSITY = 1000.0  # density of links without inertia [kg/m^3]
 
 
 class Verdict(NamedTuple):
-    """What came of one file.
+    """Result of one file.
 
     Attributes:
         kind: "right", "wrong", "refused" or "no model" (fragments that MuJoCo itself refuses).
-        help: "", or what the loading needed: "density", "allow".
-        words: the error, or how far it was off.
+        help: "", or the option that loading needed: "density", "allow".
+        words: error message, or size of the difference.
         notes: number of notes.
     """
 
@@ -51,7 +52,7 @@ class Verdict(NamedTuple):
 
 
 def main(arguments: list[str]) -> int:
-    """Prints or writes the table."""
+    """Print or write the table."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.models", description=__doc__.splitlines()[0])
     parser.add_argument("folders", nargs="+", metavar="FOLDER")
     parser.add_argument("--write", type=Path, metavar="FILE", help="where the page goes (default: printed)")
@@ -90,7 +91,7 @@ often lack large files; a body whose mass is that of a mesh which is not there i
 
 
 def models_in(folder: str) -> Iterator[str]:
-    """Paths of the models in a folder, or the names of example-robot-data."""
+    """Yield paths of the models in a folder, or names of example-robot-data."""
     if folder == "example-robot-data":
         from example_robot_data import robots_loader
 
@@ -103,7 +104,7 @@ def models_in(folder: str) -> Iterator[str]:
 
 
 def verdict(name: str) -> Verdict:
-    """Loads one file and compares it."""
+    """Load one file and compare the scene with its reference."""
     try:
         scene, needed = loaded(name)
     except pn.PinNonidealError as error:
@@ -122,7 +123,7 @@ def verdict(name: str) -> Verdict:
 
 
 def loaded(name: str) -> tuple[pn.Scene, str]:
-    """The scene, and what the loading needed beside the name."""
+    """Return the scene, and the option that loading needed."""
     try:
         return pn.load(name), ""
     except pn.PinNonidealError as error:
@@ -135,7 +136,7 @@ def loaded(name: str) -> tuple[pn.Scene, str]:
 
 
 def differences(name: str, scene: pn.Scene, partly: bool) -> float:
-    """The largest difference beside the largest entry."""
+    """Return the largest difference relative to the largest entry, over STATES random states."""
     if scene.model.nv == 0:
         return 0.0
     rng, worst = np.random.default_rng(1), 0.0
@@ -146,7 +147,7 @@ def differences(name: str, scene: pn.Scene, partly: bool) -> float:
 
 
 def reference(path: str) -> object:
-    """MuJoCo's own model of a file with its meshes; where some are missing, that of the scene."""
+    """Return MuJoCo's model of a file with its meshes, or the scene's model if meshes are missing."""
     try:
         return mujoco.MjModel.from_xml_path(path)
     except ValueError:
@@ -154,7 +155,7 @@ def reference(path: str) -> object:
 
 
 def of_mjcf(scene: pn.Scene, compiled: object, rng: np.random.Generator, partly: bool) -> float:
-    """M, bias, actuator forces and accelerations beside MuJoCo's."""
+    """Compare M, bias, actuator forces and accelerations with MuJoCo's."""
     spread = SPREAD if len(scene.constraints) <= MANY else CLOSE
     qpos, qvel = mujoco_motion.random_state(compiled, rng, spread)
     if scene.constraints:
@@ -174,7 +175,7 @@ def of_mjcf(scene: pn.Scene, compiled: object, rng: np.random.Generator, partly:
 
 
 def of_urdf(scene: pn.Scene, rng: np.random.Generator) -> float:
-    """Free accelerations of the core beside Pinocchio's articulated-body algorithm."""
+    """Compare the core's free accelerations with Pinocchio's articulated-body algorithm."""
     model = scene.model
     free = pn.Scene(model, q0=scene.q0)
     q = pin.integrate(model, scene.q0, 0.3 * rng.uniform(-1.0, 1.0, model.nv))
@@ -187,7 +188,7 @@ def of_urdf(scene: pn.Scene, rng: np.random.Generator) -> float:
 
 
 def row(name: str, verdicts: list[Verdict]) -> str:
-    """A line of the table."""
+    """Return a row of the table."""
     kinds, total = Counter(v.kind for v in verdicts), len(verdicts)
     models = total - kinds["no model"]
     as_is = sum(v.kind in ("right", "wrong") and not v.help for v in verdicts)
@@ -199,7 +200,7 @@ def row(name: str, verdicts: list[Verdict]) -> str:
 
 
 def detail(name: str, found: dict[str, Verdict]) -> list[str]:
-    """What was refused or wrong in a set, by reason."""
+    """Return counts of refused and wrong models of a set, by reason."""
     reasons = Counter(
         f"{v.kind}: {QUOTED.sub('...', v.words)[:110]}"
         for v in found.values()

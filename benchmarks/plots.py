@@ -1,4 +1,4 @@
-"""Log-log pictures: run time against error, problem by problem, and cost against the number of loops."""
+"""Log-log plots of run time against error for each problem, and of cost against size."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MARKERS, DASHES = "osD^vP*X", ("-", (0, (5, 2)), (0, (1, 1.5)), "-.")
 
 
 def look(number: int, count: int) -> dict[str, Any]:
-    """Marker and line of a series: where several coincide the first is the widest and the last is on top."""
+    """Return marker and line of a series; of coincident series the first is the widest, the last on top."""
     rest = (count - number) / max(count, 1)
     return {
         "marker": MARKERS[number % len(MARKERS)],
@@ -36,7 +36,7 @@ def look(number: int, count: int) -> dict[str, Any]:
 
 
 def lower_front(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Of (seconds, error), what nobody faster beats: the curve that a user would live on."""
+    """Return the Pareto front of points (seconds, error)."""
     front: list[tuple[float, float]] = []
     for seconds, error in sorted(points):
         if not front or error < front[-1][1]:
@@ -45,7 +45,7 @@ def lower_front(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def accuracy(results: list[dict[str, Any]]) -> Figure:
-    """A panel for each problem: of each tool the settings that none of its faster ones beats."""
+    """Plot a panel for each problem with the Pareto front of each tool."""
     rows = -(-len(results) // COLUMNS)
     figure = Figure(figsize=(4.0 * COLUMNS, 3.0 * rows), layout="constrained")
     panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
@@ -71,7 +71,7 @@ def accuracy(results: list[dict[str, Any]]) -> Figure:
 
 
 def scaling(results: dict[str, Any]) -> Figure:
-    """Microseconds of an evaluation over N."""
+    """Plot the time of an evaluation over N."""
     figure = Figure(figsize=(5.0, 3.6), layout="constrained")
     panel = figure.subplots()
     names = dict.fromkeys(name for row in results["sizes"] for name in row.get("seconds", ()))
@@ -86,7 +86,7 @@ def scaling(results: dict[str, Any]) -> Figure:
 
 
 def growth(results: list[dict[str, Any]]) -> Figure:
-    """A panel for each case of several sizes: time over size, of everybody in every group."""
+    """Plot a panel for each case of several sizes: time over size for each tool and group."""
     shown = [result for result in results if result["exponents"] and is_curve(result["rows"])]
     rows = max(1, -(-len(shown) // COLUMNS))
     figure = Figure(figsize=(4.0 * COLUMNS, 3.0 * rows), layout="constrained")
@@ -106,13 +106,13 @@ def growth(results: list[dict[str, Any]]) -> Figure:
 
 
 def is_curve(rows: list[dict[str, Any]]) -> bool:
-    """Whether no size comes twice in a group; what does is a list of different things."""
+    """Check if all sizes in each group are distinct; else the rows are no curve."""
     measured = [(row["group"], row["size"]) for row in rows]
     return len(set(measured)) == len(measured)
 
 
 def label(panel: Axes, title: str, x: str, y: str) -> None:
-    """Title, axes and grid; ticks at powers of ten only, which keeps the file small."""
+    """Set title, axes and grid; ticks are at powers of ten only to keep the file small."""
     panel.set_title(title, fontsize="medium")
     panel.set_xlabel(x)
     panel.set_ylabel(y)
@@ -124,7 +124,7 @@ FIGURES = {"accuracy": accuracy, "scaling": scaling, "growth": growth}
 
 
 def draw(records: Records, folder: Path) -> None:
-    """Writes one SVG file for each part that has a picture; equal results give equal files."""
+    """Write one SVG file for each part with a picture; equal results give equal files."""
     folder.mkdir(parents=True, exist_ok=True)
     with mpl.rc_context({"svg.hashsalt": "benchmarks", "svg.fonttype": "none"}):
         for name in FIGURES.keys() & records.keys():

@@ -1,4 +1,4 @@
-"""The table of problems: each is defined once, for every tool, with a reference that none of them made."""
+"""Table of problems, defined once for all tools, with references that are independent of the tools."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ LEVELS = (1e-3, 1e-6, 1e-8, 1e-10)  # errors for which the time is reported
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """One motion to compute.
+    """Motion to compute.
 
     Attributes:
-        name: used on the command line and in the results.
-        title: shown in tables.
-        model: pinocchio.Model, the one source of every tool's model.
-        q0: configuration at the start, consistent with the anchors.
-        v0: velocity at the start, likewise.
-        duration: [s].
-        reference: computes the configurations at `times`.
+        name: name on the command line and in the results.
+        title: title in tables.
+        model: pinocchio.Model, the source of every tool's model.
+        q0: initial configuration, consistent with the anchors.
+        v0: initial velocity, consistent with the anchors.
+        duration: duration [s].
+        reference: function that computes the configurations at `times`.
         anchors: PointAnchor and FrameAnchor descriptions.
         springs: SpringDamper descriptions.
         torque: constant joint torques, (nv,).
         hold: proportional and derivative gains (nv,), (nv,), around q0.
         coulomb: constant dry friction of each degree of freedom, (nv,).
         viscous: viscous friction of each degree of freedom, (nv,).
-        notes: a remark for tables.
+        notes: remark in tables.
         levels: errors for which the time is reported.
     """
 
@@ -63,16 +63,16 @@ class Problem:
 
     @cached_property
     def solution(self) -> Reference:
-        """The reference: the stored one, or computed."""
+        """Return the stored reference, or compute it."""
         return reference_store.read(self) or self.reference(self)
 
     @property
     def times(self) -> Array:
-        """Where errors are measured [s]: ten times, so that one lucky crossing of zero counts for nothing."""
+        """Return the SAMPLES times of error measurement [s], against zero crossings of the error."""
         return np.linspace(0.0, self.duration, SAMPLES + 1)[1:]
 
     def error(self, q: Array) -> float:
-        """Largest error of a coordinate [rad or m]; infinite when q is not finite.
+        """Return the largest error of a coordinate [rad or m]; infinite if q is not finite.
 
         Args:
             q: configurations at the last of `times`, (k, nq).
@@ -83,10 +83,10 @@ class Problem:
         return max(float(np.abs(pin.difference(self.model, exact, found)).max()) for exact, found in pairs)
 
     def scene(self, terms: str = "core") -> pn.Scene:
-        """The problem as a scene of the package.
+        """Return the problem as a scene of the package.
 
         Args:
-            terms: who computes M and the bias forces.
+            terms: implementation of M and the bias forces, "core" or "pinocchio".
         """
         laws = []
         for i in range(1, self.model.njoints):
@@ -112,13 +112,13 @@ class Problem:
 
 
 def bare(scene: pn.Scene) -> dict[str, Any]:
-    """What the problems take of a robot of the package: its model, anchors and consistent initial state."""
+    """Return model, anchors and consistent initial state of a scene, as attributes of a Problem."""
     q0, v0 = scene.initial_state()
     return {"model": scene.model, "anchors": scene.constraints, "q0": q0, "v0": v0}
 
 
 def hanging(lengths: list[float], masses: list[float]) -> Any:
-    """A chain of rods that hangs along -z at zero angles."""
+    """Return a chain of rods along -z at zero angles."""
     return rods(lengths, masses, along=(0.0, 0.0, -1.0), name="hinge")
 
 
@@ -186,7 +186,7 @@ def andrews() -> Problem:
 
 
 def solo12_gains(model: Any) -> tuple[Any, Any]:
-    """Gains with which Solo12 stands [N m/rad, N m s/rad]."""
+    """Return position and velocity gains of the standing Solo12 [N m/rad, N m s/rad]."""
     kp, kd = np.full(model.nv, 8.0), np.full(model.nv, 0.1)
     kp[:6] = kd[:6] = 0.0
     return kp, kd
@@ -258,5 +258,5 @@ MAKERS: dict[str, Callable[[], Problem]] = {
 
 @cache
 def problem(name: str) -> Problem:
-    """A problem of the table, made once a process."""
+    """Return a problem of the table; cached for the process."""
     return MAKERS[name]()

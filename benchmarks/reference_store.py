@@ -1,6 +1,6 @@
-"""References, which take seconds to compute, kept beside the code with a checksum of their problem.
+"""Stored references with a checksum of their problem; the computation takes seconds.
 
-`python -m benchmarks references` computes all of them anew and writes the file.
+`python -m benchmarks references` recomputes all references and writes the file.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import numpy as np
 from .references import Reference
 
 STORE = Path(__file__).resolve().parent / "references.json"
-SAME = 1e-12  # relative change of the checksum that rounding in the initial state may make
+SAME = 1e-12  # relative tolerance of the checksum for rounding of the initial state
 
 
 def checksum(problem: Any) -> float:
-    """A number that changes with everything that decides the motion."""
+    """Return a number that depends on model, initial state, duration, torques, gains and friction."""
     model = problem.model
     parts = [problem.q0, problem.v0, [problem.duration], model.gravity.linear]
     for place, body in zip(model.jointPlacements, model.inertias, strict=True):
@@ -30,7 +30,7 @@ def checksum(problem: Any) -> float:
 
 
 def read(problem: Any) -> Reference | None:
-    """The stored reference, when there is one for just this problem."""
+    """Return the stored reference of the problem, or None if its checksum differs."""
     if not STORE.is_file():
         return None
     entry = json.loads(STORE.read_text()).get(problem.name)
@@ -40,7 +40,7 @@ def read(problem: Any) -> Reference | None:
 
 
 def write(problems: list[Any]) -> None:
-    """Computes the references of problems and writes them."""
+    """Compute the references of problems and write them."""
     entries = {}
     for problem in problems:
         reference = problem.reference(problem)

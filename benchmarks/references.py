@@ -1,6 +1,6 @@
-"""References: closed forms by quadrature where there is one freedom, published values, else dense mechanics.
+"""References: quadrature for one degree of freedom, published values, else dense mechanics.
 
-None of them calls an algorithm of Pinocchio or of this package; `uncertainty` says how far to trust them.
+References call no algorithm of Pinocchio or of this package.  `uncertainty` bounds their error.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from oracles.dense import DenseScene
 
 Array = NDArray[np.float64]
 
-ROUNDING = 1e-13  # what sums of some hundred terms of order one lose
+ROUNDING = 1e-13  # rounding error of sums of several hundred terms of order one
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Configurations at the times of a problem.
+    """Reference configurations at the times of a problem.
 
     Attributes:
         q: configurations, (k, nq).
-        uncertainty: what its coordinates may be wrong by [rad or m].
-        how: in words.
+        uncertainty: error bound of the coordinates [rad or m].
+        how: description of the method.
     """
 
     q: Array
@@ -38,16 +38,16 @@ class Reference:
 
 
 def place_after(t: float, start: float, speed: Callable[[Array], Array], direction: float = 1.0) -> float:
-    """The coordinate x at time t of a motion from `start` that never stops, with dx/dt = direction speed(x).
+    """Return x at time t of a motion from `start` that never stops, with dx/dt = direction speed(x).
 
     Args:
         t: time [s].
         start: x at time zero.
-        speed: positive speed at many places at once.
+        speed: positive speed for an array of x.
         direction: 1 or -1.
     """
     nodes, weights = np.polynomial.legendre.leggauss(24)
-    step = 0.05  # of the panels; 24 nodes resolve a smooth integrand to rounding there
+    step = 0.05  # panel length; 24 nodes resolve a smooth integrand to rounding
     x, left = start, t
     while True:
         half = 0.5 * direction * step
@@ -56,7 +56,7 @@ def place_after(t: float, start: float, speed: Callable[[Array], Array], directi
             break
         x, left = x + direction * step, left - duration
     length = step * left / duration
-    for _ in range(50):  # Newton, on the length of the last panel
+    for _ in range(50):  # Newton's method for the length of the last panel
         half = 0.5 * direction * length
         miss = 0.5 * length * float(weights @ (1.0 / speed(x + half + half * nodes))) - left
         move = miss * float(speed(np.array([x + direction * length]))[0])
@@ -67,7 +67,7 @@ def place_after(t: float, start: float, speed: Callable[[Array], Array], directi
 
 
 def four_bar_quadrature(problem: Any) -> Reference:
-    """Crank-rocker in the x-z plane: angles from +x towards +z, closed by the cosine rule."""
+    """Solve the crank-rocker in the x-z plane: angles from +x towards +z, closed by the cosine rule."""
     model = problem.model
     joint = {name: i for i, name in enumerate(model.names)}
     crank, coupler, rocker = (joint[f"{name}_joint"] for name in ("crank", "coupler", "rocker"))
@@ -85,17 +85,17 @@ def four_bar_quadrature(problem: Any) -> Reference:
     g = -model.gravity.linear[2]
 
     def angles(x: Array) -> tuple[Array, Array]:
-        """Absolute angles of coupler and rocker, for the branch of this model (the rocker's tip above)."""
+        """Return absolute angles of coupler and rocker, on the branch of this model (rocker tip above)."""
         gap = l1 * np.exp(1j * x) - ground  # from the rocker's pivot to the crank's tip
         d = np.abs(gap)
         y = np.pi + np.angle(-gap) - np.arccos((d**2 + l3**2 - l2**2) / (2.0 * d * l3))
         return np.angle(ground + l3 * np.exp(1j * y) - l1 * np.exp(1j * x)), y
 
     def energies(x: Array) -> tuple[Array, Array]:
-        """Inertia about x, and potential."""
+        """Return the effective inertia of x, and the potential energy."""
         w, y = angles(x)
         e1, e2, e3 = np.exp(1j * x), np.exp(1j * w), np.exp(1j * y)
-        # l1 e1 + l2 e2 w' = l3 e3 y' across and along the coupler give both ratios of speeds.
+        # Components of l1 e1 + l2 e2 w' = l3 e3 y' give both velocity ratios.
         y_rate = l1 * np.real(e1 * np.conj(1j * e2)) / (l3 * np.real(e3 * np.conj(1j * e2)))
         w_rate = -l1 * np.real(e1 * np.conj(1j * e3)) / (l2 * np.real(e2 * np.conj(1j * e3)))
         inertia, potential = np.zeros_like(x), np.zeros_like(x)
@@ -125,7 +125,7 @@ def four_bar_quadrature(problem: Any) -> Reference:
 
 
 def n_four_bar_quadrature(problem: Any) -> Reference:
-    """Cranks in parallel: I phi'^2 / 2 + P cos(phi) = E, uniform rods of 1 kg and 1 m (IFToMM A02)."""
+    """Solve parallel cranks: I phi'^2 / 2 + P cos(phi) = E, uniform rods of 1 kg and 1 m (IFToMM A02)."""
     model = problem.model
     n = (model.nq - 1) // 2
     g = -model.gravity.linear[2]
@@ -141,7 +141,7 @@ def n_four_bar_quadrature(problem: Any) -> Reference:
 
 
 def coulomb_swings(problem: Any) -> Reference:
-    """I x'' = -P sin(x) - c sgn(x') from rest: swings by quadrature, turning points by the energy."""
+    """Solve I x'' = -P sin(x) - c sgn(x') from rest: swings by quadrature, reversals by the energy."""
     body, c, g = problem.model.inertias[1], float(problem.coulomb[0]), -problem.model.gravity.linear[2]
     weight = -body.mass * g * body.lever[2]
     inertia = body.mass * body.lever[2] ** 2 + body.inertia[1, 1]
@@ -150,17 +150,17 @@ def coulomb_swings(problem: Any) -> Reference:
 
 
 def coulomb_place(x: float, left: float, weight: float, inertia: float, c: float) -> float:
-    """Angle after the time `left` [s] from rest at x."""
+    """Return the angle after the time `left` [s] from rest at x."""
     nodes, weights = np.polynomial.legendre.leggauss(60)
     while weight * abs(np.sin(x)) > c:
-        a, side = abs(x), np.sign(x)  # from a down to -b, friction acting upwards
+        a, side = abs(x), np.sign(x)  # swing from a to -b
         b = a
         for _ in range(100):  # weight (cos b - cos a) = c (a + b)
             b -= (weight * (np.cos(b) - np.cos(a)) - c * (a + b)) / (-weight * np.sin(b) - c)
         middle, half = 0.5 * (a - b), 0.5 * (a + b)
 
         def density(s: Array, middle: float = middle, half: float = half, a: float = a) -> Array:
-            """dt/ds at x = middle + half cos(s), which removes both square roots."""
+            """Return dt/ds at x = middle + half cos(s), which removes both square-root singularities."""
             x = middle + half * np.cos(s)
             work = 2.0 * weight * np.sin(0.5 * (a - x)) * np.sin(0.5 * (a + x)) - c * (a - x)
             return half * np.sin(s) / np.sqrt(2.0 * work / inertia)
@@ -199,7 +199,7 @@ def dense_motion(problem: Any) -> Reference:
 
 
 def andrews(problem: Any) -> Reference:
-    """Dense mechanics, ended and checked by the published place."""
+    """Solve by dense mechanics; the end is replaced by the published value, which gives the uncertainty."""
     reference = dense_motion(problem)
     end = reference.q[-1].copy()
     for name, value in ANDREWS_END.items():

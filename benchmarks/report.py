@@ -1,4 +1,4 @@
-"""Results as Markdown: a section for each part, the page of the documentation, and the README's table."""
+"""Results as Markdown: a section for each part, the documentation page, and the README's table."""
 
 from __future__ import annotations
 
@@ -88,13 +88,13 @@ it. And the time of runs of a Panda in the air with contacts that stay open, ove
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A Markdown table; columns after the first are aligned to the right."""
+    """Return a Markdown table; columns after the first are right-aligned."""
     lines = ["| " + " | ".join(head) + " |", "| --- |" + " ---: |" * (len(head) - 1)]
     return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)]) + "\n"
 
 
 def scaled(seconds: float) -> str:
-    """A time with its unit."""
+    """Return a time as text with its unit."""
     for unit, factor in (("s", 1.0), ("ms", 1e3), ("us", 1e6)):
         if seconds * factor >= 1.0:
             return f"{seconds * factor:.3g} {unit}"
@@ -102,7 +102,7 @@ def scaled(seconds: float) -> str:
 
 
 def conditions(records: Records) -> str:
-    """Where the numbers come from."""
+    """Return machine, packages and kind of the measurements as text."""
     lines = []
     for machine in {
         json.dumps(r["machine"], sort_keys=True): r["machine"] for r in records.values()
@@ -166,7 +166,7 @@ def growth(results: list[dict[str, Any]]) -> str:
 
 
 def timed(row: dict[str, Any], name: str) -> str:
-    """A cell: time, and in brackets the error and ours over it."""
+    """Return a table cell: time and, in brackets, the error and our time over it."""
     if name not in row["seconds"]:
         return ""
     notes = [f"error {row['errors'][name]:.0e}"] if name in row["errors"] else []
@@ -188,7 +188,7 @@ def accuracy(results: list[dict[str, Any]]) -> str:
 
 
 def reached(row: dict[str, Any] | None) -> str:
-    """A cell of the table of levels."""
+    """Return a cell of the table of levels."""
     if row is None:
         return ""
     if "seconds" not in row:
@@ -198,7 +198,7 @@ def reached(row: dict[str, Any] | None) -> str:
 
 
 def runs_lost(result: dict[str, Any]) -> str:
-    """How many runs failed, by tool."""
+    """Return the number of failed runs by tool."""
     bad = [r["tool"] for r in result["runs"] if r["status"] != "ok" and not r["status"].startswith("not run")]
     return ", ".join(f"{bad.count(tool)} of {tool}" for tool in dict.fromkeys(bad))
 
@@ -294,32 +294,32 @@ SECTIONS: dict[str, Callable[[Any], str]] = {
 
 
 def section(record: dict[str, Any]) -> str:
-    """One part as Markdown."""
+    """Return one part as Markdown."""
     return SECTIONS[record["part"]](record["results"])
 
 
 def document(records: Records) -> str:
-    """The page of the documentation."""
+    """Return the documentation page."""
     parts = [INTRODUCTION, conditions(records), key_section(records)]
     parts += [section(records[name]) for name in SECTIONS if name in records]
     return "\n".join(parts)
 
 
 def readme_table(records: Records) -> str:
-    """The key figures as the README shows them."""
+    """Return the table of key figures of the README."""
     return table(
         ("what", "measured"), [(f.title, f.shown) for f in key_figures(records) if f.value is not None]
     )
 
 
 def read(folder: Path) -> Records:
-    """The records of a folder by their parts."""
+    """Return the records of a folder by part."""
     found = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*.json"))]
     return {record["part"]: record for record in found}
 
 
 def keep_full_runs(folder: Path) -> None:
-    """Copies full results to where they are recorded; quick ones would replace better ones."""
+    """Copy full results to the folder of recorded results; quick results are skipped."""
     RECORDED.mkdir(exist_ok=True)
     for name, record in read(folder).items():
         if not record["quick"]:
@@ -327,7 +327,7 @@ def keep_full_runs(folder: Path) -> None:
 
 
 def write() -> None:
-    """The page, its pictures and the README's table, from the recorded results."""
+    """Write the page, its pictures and the README's table from the recorded results."""
     from . import plots
 
     records = read(RECORDED)

@@ -1,6 +1,6 @@
-"""Cost of one evaluation against the number of loops: N four-bars side by side, each crank its own branch.
+"""Cost of one evaluation against the number of loops: N four-bars, each crank a separate branch.
 
-All sizes of all tools have their turns in the same rounds, so that the exponent is one of paired times.
+All sizes of all tools are timed in the same rounds, so that the exponent comes from paired times.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from .evaluation import compiled_batches, mujoco_batch, our_batch
 
 SIZES = (1, 2, 5, 10, 20, 40, 80, 160, 320, 640)
 QUICK = (1, 5, 20, 40, 160)
-# Pinocchio's constraintDynamics factors all rows densely, and its Data holds tensors of nv^3 numbers.
+# Pinocchio's constraintDynamics has a dense factorization, and its Data contains tensors of nv^3 numbers.
 LARGEST_DENSE = 80
 FIT_FROM = 40
-BATCH_SECONDS = 0.02  # so that the largest size is evaluated many times in a row, as it is in a run
+BATCH_SECONDS = 0.02  # long enough for many evaluations of the largest size, as in a run
 OURS, RIVAL = "pin_nonideal", "mujoco mj_forward"
 
 
 def batches_of(size: int) -> dict[str, timing.Batch]:
-    """Everybody's evaluation of one size."""
+    """Return the evaluations of all tools for one size."""
     case = cases.n_four_bar(size)
     batches = {OURS: our_batch(case.scene(), case.q0, case.v0)}
     rival = mujoco_batch(case)
@@ -35,13 +35,13 @@ def batches_of(size: int) -> dict[str, timing.Batch]:
 
 
 def exponent(small: timing.Times, large: timing.Times, growth: float) -> float:
-    """Of the cost: log(cost) over log(N), median over the rounds."""
+    """Return the exponent of the cost: log(cost) over log(N), median over the rounds."""
     pairs = zip(small.seconds, large.seconds, strict=True)
     return statistics.median(math.log(b / a) for a, b in pairs) / math.log(growth)
 
 
 def measure(quick: bool, say: Callable[[str], None] = print) -> dict[str, Any]:
-    """All sizes."""
+    """Measure all sizes."""
     batches: dict[tuple[str, int], timing.Batch] = {}
     failures: dict[int, str] = {}
     for size in QUICK if quick else SIZES:

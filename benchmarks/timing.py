@@ -1,7 +1,8 @@
-"""Timing on a machine that others use too: batches, contestants in turn, minima, medians of ratios.
+"""Timing on a shared machine: batches, contestants in alternating rounds, minima, medians of ratios.
 
-`clock` counts the processor time of the calling thread.  On an idle machine that is wall time, since tools
-run on one thread; on a busy one wall time would punish long runs, which lose the processor more often.
+`clock` measures the processor time of the calling thread.  It equals wall time on an idle machine, since
+tools run on one thread.  On a busy machine, wall time would penalize long runs, which are preempted more
+often.
 """
 
 from __future__ import annotations
@@ -12,30 +13,30 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import TypeVar
 
-# Runs a number of evaluations and returns the seconds of one.
+# Runs a number of evaluations and returns the time of one evaluation [s].
 Batch = Callable[[int], float]
 Name = TypeVar("Name", bound=Hashable)
 
 clock = time.thread_time
 
-# Seconds of one batch: long against the clock's resolution, short against the machine's slices of time.
+# Length of one batch [s]: long compared with the clock's resolution, short compared with time slices.
 BATCH_SECONDS = 1e-3
 
 
 @dataclass(frozen=True)
 class Times:
-    """Seconds of one contestant, one number a round."""
+    """Times of one contestant [s], one for each round."""
 
     seconds: list[float]
 
     @property
     def best(self) -> float:
-        """The minimum: what it takes when nobody else interferes."""
+        """Return the minimum, the time without interference."""
         return min(self.seconds)
 
 
 def per_call(function: Callable[[], object]) -> Batch:
-    """A batch that calls a Python function in a loop."""
+    """Return a batch that calls a Python function in a loop."""
 
     def batch(count: int) -> float:
         begin = clock()
@@ -47,10 +48,10 @@ def per_call(function: Callable[[], object]) -> Batch:
 
 
 def counted(function: Callable[[int], object]) -> Batch:
-    """A batch of compiled code that repeats by itself.
+    """Return a batch of compiled code with its own loop.
 
     Args:
-        function: runs the given number of evaluations.
+        function: function that runs the given number of evaluations.
     """
 
     def batch(count: int) -> float:
@@ -64,11 +65,11 @@ def counted(function: Callable[[int], object]) -> Batch:
 def paired(
     contestants: dict[Name, Batch], rounds: int, batch_seconds: float = BATCH_SECONDS
 ) -> dict[Name, Times]:
-    """Times all contestants in turn, `rounds` times, so that a slow moment hits them alike.
+    """Time all contestants in alternating rounds, so that interference affects them equally.
 
     Args:
-        contestants: by name.
-        rounds: how often everybody has a turn.
+        contestants: batches by name.
+        rounds: number of turns of each contestant.
         batch_seconds: length of one turn [s].
     """
     counts = {}
@@ -87,5 +88,5 @@ def paired(
 
 
 def ratio(one: Times, other: Times) -> float:
-    """Median over the rounds of one's time over the other's."""
+    """Return the median over the rounds of the time of `one` over the time of `other`."""
     return statistics.median(a / b for a, b in zip(one.seconds, other.seconds, strict=True))

@@ -1,10 +1,10 @@
-"""Contacts that open, strike and rest: balls, boxes, stops, a gripper, feet.
+"""Unilateral contacts with impacts and rest: balls, boxes, stops, a gripper, feet.
 
-Each prints what the run did beside what can be said in closed form.  With --html FOLDER it writes replays.
+Each example prints results of the run beside closed forms.  With --html FOLDER it writes replays.
 
 Run: python examples/contacts.py [NAME ...] [--html FOLDER]
-with NAME among bouncing_ball, ball_to_rolling, box_on_incline, pendulum_between_stops, gripper, biped,
-solo12_dropped; all when left out.
+NAME is bouncing_ball, ball_to_rolling, box_on_incline, pendulum_between_stops, gripper, biped or
+solo12_dropped; the default is all examples.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ TIGHT = {"rtol": 1e-11, "atol": 1e-12}
 
 
 def times(run, kind):
-    """Times of the events of a kind [s]."""
+    """Return the times of the events of a kind [s]."""
     return [event.time for event in run.events if event.kind == kind]
 
 
 def chain(*joints, gravity=(0.0, 0.0, -G), mass=1.0, lever=(0.0, 0.0, 0.0), inertia=0.0):
-    """Joints one after the other, named a, b, c, and a body on the last."""
+    """Return a chain of joints named a, b, c with a body on the last joint, and that joint's index."""
     model, joint = pin.Model(), 0
     model.gravity = pin.Motion(np.array(gravity), np.zeros(3))
     for name, kind in zip("abc", joints, strict=False):
@@ -42,7 +42,7 @@ def frame(model, name, joint, x, z):
 
 
 def bouncing_ball():
-    """1 kg from 1 m, restitution 0.8: infinitely many impacts in 4.06 s, and rest."""
+    """Drop 1 kg from 1 m with restitution 0.8: infinitely many impacts in 4.06 s, then rest."""
     model, joint = chain(pin.JointModelPZ())
     frame(model, "ball", joint, 0.0, 0.0)
     scene = pn.Scene(model, contacts=[pn.PointContact("ball", restitution=0.8)], q0=[1.0])
@@ -57,7 +57,10 @@ def bouncing_ball():
 
 
 def box_on_incline():
-    """0.2 m by 0.5 m on 25 degrees: beyond b/h = 0.4 it tips about its lower edge, if that does not slide."""
+    """Place a box of 0.2 m by 0.5 m on a slope of 25 degrees: b/h < tan(slope), so it tips or slides.
+
+    It slides with mu = 0.3 and tips about its lower edge with mu = 0.5.
+    """
     slope, mass, b, h = np.deg2rad(25.0), 2.0, 0.2, 0.5
     inertia = mass * (b * b + h * h) / 12.0
     gravity = (G * np.sin(slope), 0.0, -G * np.cos(slope))
@@ -85,7 +88,7 @@ def box_on_incline():
 
 
 def pendulum_between_stops():
-    """1 m from 1.2 rad onto a stop at 0.25 rad, restitution 0.7: it comes to rest on the stop."""
+    """Release a 1 m pendulum at 1.2 rad onto a stop at 0.25 rad with restitution 0.7, where it rests."""
     model, _ = chain(pin.JointModelRY(), lever=(0.0, 0.0, -1.0))
     limit = pn.JointLimit("a", lower=0.25, upper=1.3, restitution=0.7, name="stop")
     run = pn.simulate(pn.Scene(model, contacts=[limit], q0=[1.2]), 10.0, record="forces", **TIGHT)
@@ -102,7 +105,7 @@ def pendulum_between_stops():
 
 
 def ball_to_rolling():
-    """A billiard ball with side spin: it slides along a parabola, then rolls straight on."""
+    """Simulate a billiard ball with side spin: it slides along a parabola, then rolls straight."""
     r, mu, v, w = 0.0285, 0.2, np.array([2.0, 0.0, 0.0]), np.array([-30.0, 10.0, 0.0])
     model, joint = chain(pin.JointModelFreeFlyer(), mass=0.17, inertia=0.4 * 0.17 * r * r)
     frame(model, "ball", joint, 0.0, 0.0)
@@ -124,7 +127,7 @@ def ball_to_rolling():
 
 
 def gripper():
-    """Two fingers press a block of 0.5 kg: it stays for ever if 2 mu F carries its weight, and else slips."""
+    """Hold a block of 0.5 kg with two fingers: it sticks without drift if 2 mu F > m g, else it slips."""
     mass, mu = 0.5, 0.6
     model, fingers = pin.Model(), []
     model.gravity = pin.Motion(np.array([0.0, 0.0, -G]), np.zeros(3))
@@ -161,7 +164,7 @@ def gripper():
 
 
 def biped():
-    """Two flat feet under a trunk that sags on its motors: forces of all corners, and the whole's motion."""
+    """Simulate a trunk on two legs with flat feet: contact forces match the center-of-mass motion."""
     model = pin.Model()
     model.gravity = pin.Motion(np.array([0.0, 0.0, -G]), np.zeros(3))
     trunk = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "trunk")
@@ -192,7 +195,7 @@ def biped():
 
 
 def solo12_dropped():
-    """The quadruped falls freely onto its feet, and its motors catch it."""
+    """Drop the quadruped onto its feet; position control brings it to rest."""
     scene = pn.load("solo12_dropped")
     model, data = scene.model, scene.model.createData()
     pin.framesForwardKinematics(model, data, scene.q0)

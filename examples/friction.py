@@ -1,10 +1,11 @@
-"""Five mechanisms that rub: one holds, two settle, one sticks and slips in turn, one locks itself.
+"""Five mechanisms with friction: one holds, two settle, one has stick-slip, one is self-locking.
 
-Each prints what friction did beside what can be said in closed form.  With --html FOLDER it writes replays,
-whose time lines show what sticks and what slips.
+Each example prints results of the run beside closed forms.  With --html FOLDER it writes replays with the
+stick-slip modes on a time line.
 
 Run: python examples/friction.py [NAME ...] [--html FOLDER]
-with NAME among loaded_joint, rough_four_bar, panda_settling, belt_oscillator, worm_drive; all when left out.
+NAME is loaded_joint, rough_four_bar, panda_settling, belt_oscillator or worm_drive; the default is all
+examples.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ TIGHT = {"rtol": 1e-10, "atol": 1e-11}
 
 
 def first(run, kind):
-    """Time of the first event of a kind [s]."""
+    """Return the time of the first event of a kind [s]."""
     return next(event.time for event in run.events if event.kind == kind)
 
 
 def loaded_joint():
-    """A pin of radius 20 mm carries 8.56 kg; it holds until the torque on it reaches 1.3 mu r m g."""
+    """Load a pin of radius 20 mm with 8.56 kg: it sticks until its torque reaches 1.3 mu r m g."""
     run = pn.simulate(pn.load("loaded_joint"), 6.0, **TIGHT)
     limit = 1.3 * 0.2 * 0.02 * 8.56 * G
     weight = (1.0 * 0.14 + 1.56 * 0.42 - 6.0 * 0.13) * G  # torque of the lever about the pin
@@ -36,7 +37,7 @@ def loaded_joint():
 
 
 def rough_four_bar():
-    """Four pins, the one that closes the loop among them, take all that the four-bar had."""
+    """Simulate a four-bar with friction in all four pins, which dissipates its kinetic energy."""
     run = pn.simulate(pn.load("rough_four_bar"), 5.0, record="energy", **TIGHT)
     taken = sum(values[-1] for name, values in run.energy.items() if name.endswith("friction"))
     show("work of the pins [J]", taken, run.energy["total"][-1] - run.energy["total"][0])
@@ -45,7 +46,7 @@ def rough_four_bar():
 
 
 def panda_settling():
-    """Seven joints whose friction follows what they carry bring the hanging arm to rest."""
+    """Simulate a hanging arm with load-dependent friction in seven joints until it rests."""
     run = pn.simulate(pn.load("panda_settling"), 10.0, record="energy", **TIGHT)
     rest = run.t[np.flatnonzero(np.abs(run.v).max(axis=1))[-1]]
     print(f"  at rest from {rest:.6f} s on, after {len(run.events)} events")
@@ -56,7 +57,10 @@ def panda_settling():
 
 
 def belt_oscillator():
-    """1 kg on 100 N/m, belt 0.1 m/s, 8 N before it slips, then 5 N: a circle's arc in the phase plane."""
+    """Simulate 1 kg on a spring of 100 N/m and a belt at 0.1 m/s, with 8 N static and 5 N kinetic friction.
+
+    The slip phase is an arc of a circle in the phase plane.
+    """
     run = pn.simulate(pn.load("belt_oscillator"), 5.0, **TIGHT)
     slips = [event.time for event in run.events if event.kind == "slip"]
     sticks = [event.time for event in run.events if event.kind == "stick" and event.time > slips[0]]
@@ -67,7 +71,7 @@ def belt_oscillator():
 
 
 def worm_drive():
-    """The thread, mu r = 2 mm, holds the rack, which falls 1.6 mm a radian, with the motor off."""
+    """Simulate a self-locking thread with mu r = 2 mm and a rack that falls 1.6 mm per radian."""
     run = pn.simulate(pn.load("worm_drive"), 7.0, output_dt=0.01, **TIGHT)
     off = (run.t > first(run, "stick")) & (run.t < first(run, "slip"))
     show("speed with the motor off [rad/s]", np.abs(run.v[off]).max(), 0.0)

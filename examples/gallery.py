@@ -1,6 +1,6 @@
-"""A page of all robots of the package and of the paper's examples, a still of each, linked to its replay.
+"""Gallery page of the package's robots and the paper's examples, with an image and a replay of each.
 
-Run: python examples/gallery.py [FOLDER]   (docs/gallery when left out; index.html is the page)
+Run: python examples/gallery.py [FOLDER]   (default docs/gallery; index.html is the page)
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ CARD = """<a href="{name}.html"><img src="{name}.png" alt="{title}" width="{widt
 
 
 def example(name: str) -> Any:
-    """A script beside this one as a module."""
+    """Import a script of this folder as a module."""
     spec = importlib.util.spec_from_file_location(name, HERE / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
@@ -53,7 +53,7 @@ def example(name: str) -> Any:
 
 
 def paper_runs() -> Iterator[tuple[str, str, Callable[[], Any]]]:
-    """The paper's three examples."""
+    """Yield name, description and run function of the paper's three examples."""
     a, b, c = (example(f"paper_{name}") for name in ("a_particle", "b_ring", "c_incline"))
 
     def run(scene: Any, duration: float, q: Any, v: Any) -> Any:
@@ -76,7 +76,7 @@ def paper_runs() -> Iterator[tuple[str, str, Callable[[], Any]]]:
 
 
 def robot_run(name: str) -> Any:
-    """A robot of the package for some seconds."""
+    """Simulate a robot of the package; of a failed run, return the trajectory before the failure."""
     duration = DURATIONS.get(name, LONGEST)
     try:
         return pn.simulate(pn.load(name), duration, record=RECORD, output_dt=duration / SAMPLES)
@@ -87,7 +87,7 @@ def robot_run(name: str) -> Any:
 
 
 def main(folder: str | Path = HERE.parent / "docs" / "gallery") -> None:
-    """Makes the page, and a replay and a still for each entry."""
+    """Write the page, and a replay and an image for each entry."""
     target, begun = Path(folder), time.perf_counter()
     target.mkdir(parents=True, exist_ok=True)
     entries = [*paper_runs()]

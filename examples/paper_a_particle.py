@@ -1,8 +1,8 @@
 """Example (a) of the paper: a particle under a nonlinear nonholonomic constraint and velocity-power drag.
 
-A unit mass at (x, y, z) must move with ydot = z^2 xdot + alpha g(x, t), and the force that makes it do so
-also resists along the velocity.  The script prints the paper's formulas beside the values from `pn.solve`,
-then runs the particle as a scene and compares it with a motion that is known in closed form.
+A unit mass at (x, y, z) has the constraint ydot = z^2 xdot + alpha g(x, t) with a nonideal constraint force
+along the velocity.  The script prints the paper's formulas beside the values from `pn.solve`.  Then it
+simulates the particle as a scene and compares the motion with a closed form.
 
 Run: python examples/paper_a_particle.py
 Source: Udwadia, Kalaba, Phohomsiri, J. Appl. Mech. 71 (2004), Example (a), Eqs. (51)-(59).
@@ -20,13 +20,13 @@ import pin_nonideal as pn
 
 @dataclass(frozen=True)
 class Particle:
-    """The particle and what the paper prints for it; q = (x, y, z) [m], v = (xdot, ydot, zdot) [m/s].
+    """Particle with the formulas of the paper; q = (x, y, z) [m], v = (xdot, ydot, zdot) [m/s].
 
     Args:
-        alpha: size of the driving term of the constraint; g(x, t) = sin(x - t).
-        a0: size of the drag.
-        beta: the drag grows with the power 2 beta of the speed.
-        push: size of the given force (f_x, f_y, f_z) [N].
+        alpha: factor of the rheonomic term of the constraint, g(x, t) = sin(x - t).
+        a0: drag coefficient.
+        beta: half of the exponent of the speed in the drag.
+        push: factor of the applied force (f_x, f_y, f_z) [N].
     """
 
     alpha: float = 0.3
@@ -37,16 +37,16 @@ class Particle:
     M = np.eye(3)
 
     def given(self, t, q, v):
-        """The force (f_x, f_y, f_z) [N]."""
+        """Return the applied force (f_x, f_y, f_z) [N]."""
         x, y, z = q
         return self.push * np.array([z - x, np.sin(t) - y, x * y])
 
     def rate(self, t, q, v):
-        """The constraint itself, on velocities."""
+        """Return the velocity residual of the constraint."""
         return np.array([v[1] - q[2] ** 2 * v[0] - self.alpha * np.sin(q[0] - t)])
 
     def rows(self, t, q, v, data=None):
-        """A and b of A a = b, the constraint differentiated once."""
+        """Return A and b of A a = b, the time derivative of the constraint."""
         x, _, z = q
         g_x, g_t = np.cos(x - t), -np.cos(x - t)
         A = np.array([[-(z**2), 1.0, 0.0]])  # Eq. (52)
@@ -54,21 +54,21 @@ class Particle:
         return A, b
 
     def drag(self, t, q, v, reactions=None):
-        """C: its work on virtual displacements is that of a force against the velocity, Eq. (57)."""
+        """Return C, with the virtual work of a force against the velocity, Eq. (57)."""
         return -self.a0 * (v @ v) ** (self.beta - 0.5) * v  # Eq. (58)
 
     def paper_null_space(self, q, k1, k2):
-        """V, for any k1 != k2."""
+        """Return V, for any k1 != k2."""
         z = q[2]
         return np.array([[1.0, 1.0], [z**2, z**2], [k1, k2]])  # Eq. (55)
 
     def paper_inverse(self, q):
-        """J B^T, the Moore-Penrose inverse of B."""
+        """Return J B^T, the Moore-Penrose inverse of B."""
         z = q[2]
         return np.array([-(z**2), 1.0, 0.0]) / (1.0 + z**4)  # Eq. (56)
 
     def paper_force(self, t, q, v):
-        """The force of constraint, ideal and nonideal part, Eq. (59)."""
+        """Return the ideal and the nonideal constraint force, Eq. (59)."""
         (xd, yd, zd), z = v, q[2]
         f_x, f_y, _ = self.given(t, q, v)
         _, b = self.rows(t, q, v)
@@ -83,12 +83,12 @@ class Particle:
         return ideal, nonideal
 
     def start(self, q, direction):
-        """A velocity at t = 0 that satisfies the constraint, from its x and z components."""
+        """Return the velocity at t = 0 that satisfies the constraint, from its x and z components."""
         xd, zd = direction
         return np.array([xd, q[2] ** 2 * xd + self.alpha * np.sin(q[0]), zd])
 
     def scene(self):
-        """The particle for `pn.simulate`."""
+        """Return the particle as a scene."""
         model = pin.Model()
         model.name = "particle"
         model.gravity.linear = np.zeros(3)
@@ -102,9 +102,9 @@ class Particle:
         )
 
     def coasting(self, t, q0, v0):
-        """Speed and height of the free particle (alpha = 0, no given force, beta = 1) at times t.
+        """Return speed and height of the free particle (alpha = 0, no applied force, beta = 1) at times t.
 
-        Only the drag changes the energy, so d|v|/dt = -a0 |v|^2, and zdot keeps its share of the speed.
+        Only the drag changes the energy, so d|v|/dt = -a0 |v|^2.  The ratio of zdot to the speed is constant.
         """
         speed0 = np.linalg.norm(v0)
         travelled = np.log1p(self.a0 * speed0 * t) / self.a0

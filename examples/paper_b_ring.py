@@ -1,7 +1,7 @@
 """Example (b) of the paper: a bead on a rough ring in a vertical plane.
 
-The script prints the paper's formulas beside the values from `pn.solve`, then runs the bead as a scene, with
-Coulomb friction taken from the multiplier of the ring, and compares it with the closed form.
+The script prints the paper's formulas beside the values from `pn.solve`.  Then it simulates the bead as a
+scene with Coulomb friction from the multiplier of the ring, and compares the motion with the closed form.
 
 Run: python examples/paper_b_ring.py
 Source: Udwadia, Kalaba, Phohomsiri, J. Appl. Mech. 71 (2004), Example (b), Eqs. (61)-(69).
@@ -19,11 +19,11 @@ import pin_nonideal as pn
 
 @dataclass(frozen=True)
 class Ring:
-    """The bead on x^2 + y^2 = R^2, y upwards, and what the paper prints for it; q = (x, y) [m], v = its rate.
+    """Bead on x^2 + y^2 = R^2, y upwards, with the formulas of the paper; q = (x, y) [m], v = dq/dt.
 
     Args:
-        mass: of the bead [kg].
-        radius: R [m].
+        mass: mass of the bead [kg].
+        radius: radius R of the ring [m].
         mu: coefficient of friction.
         g: gravity [m/s^2].
     """
@@ -35,60 +35,60 @@ class Ring:
 
     @property
     def mass_matrix(self):
-        """M [kg]."""
+        """Return M [kg]."""
         return self.mass * np.eye(2)
 
     @property
     def given(self):
-        """F [N]: gravity."""
+        """Return F [N], the force of gravity."""
         return np.array([0.0, -self.mass * self.g])  # M a with the a of Eq. (61)
 
     def residual(self, t, q):
-        """The ring, halved so that its rate is x xdot + y ydot."""
+        """Return the residual of the ring, halved so that its rate is x xdot + y ydot."""
         return np.array([(q @ q - self.radius**2) / 2.0])  # Eq. (2)
 
     def rate(self, t, q, v):
-        """Rate of the residual."""
+        """Return the rate of the residual."""
         return np.array([q @ v])
 
     def rows(self, t, q, v, data=None):
-        """A and b of A a = b."""
+        """Return A and b of A a = b."""
         return q[None, :].copy(), np.array([-(v @ v)])  # Eqs. (63), (64)
 
     def normal(self, q, v):
-        """N = m (v^2 - y g) / R [N], positive when the ring pushes towards its centre."""
+        """Return N = m (v^2 - y g) / R [N], positive if the ring pushes the bead towards its center."""
         return self.mass * (v @ v - q[1] * self.g) / self.radius
 
     def rubbing(self, h, v):
-        """C for a friction of size h against the velocity, Eq. (68); none at rest."""
+        """Return C for a friction force of size h against the velocity, Eq. (68); zero at rest."""
         speed = np.linalg.norm(v)
         return -h / speed * v if speed > 0.0 else np.zeros(2)
 
     def prescribed(self, t, q, v, reactions=None):
-        """C with h a given function of the state, as the paper states it."""
+        """Return C with h as a function of the state, as in the paper."""
         return self.rubbing(self.mu * abs(self.normal(q, v)), v)
 
     def from_reactions(self, t, q, v, reactions):
-        """C with h from the multiplier: the ring's force is lam [x, y], of size |lam| R."""
+        """Return C with h from the multiplier: the ring's force is lam [x, y], of size |lam| R."""
         return self.rubbing(self.mu * abs(reactions.lam[0]) * np.linalg.norm(q), v)
 
     def paper_null_space(self, q):
-        """V."""
+        """Return V."""
         return np.sqrt(self.mass) * np.array([[q[1]], [-q[0]]])  # Eq. (66)
 
     def paper_inverse(self, q):
-        """J B^T, the Moore-Penrose inverse of B."""
+        """Return J B^T, the Moore-Penrose inverse of B."""
         return np.sqrt(self.mass) / self.radius**2 * q  # Eq. (67)
 
     def paper_force(self, q, v, h):
-        """The force of constraint, ideal and nonideal part, Eq. (69)."""
+        """Return the ideal and the nonideal constraint force, Eq. (69)."""
         (x, y), (xd, yd) = q, v
         ideal = -self.mass * (v @ v - y * self.g) / self.radius**2 * q
         nonideal = -h / np.linalg.norm(v) * (y * xd - x * yd) / self.radius**2 * np.array([y, -x])
         return ideal, nonideal
 
     def scene(self, reaction="total"):
-        """The bead as a scene; reaction=None takes h as a function of the state instead of the multiplier."""
+        """Return the bead as a scene; h depends on the multiplier, or on the state if reaction=None."""
         model = pin.Model()
         model.name = "ring"
         model.gravity.linear = np.array([0.0, -self.g, 0.0])
@@ -108,12 +108,12 @@ class Ring:
         )
 
     def at(self, angle, speed):
-        """State at an angle from the bottom [rad] with a speed along the ring [m/s]."""
+        """Return the state at an angle from the bottom [rad] with a speed along the ring [m/s]."""
         tangent = np.array([np.cos(angle), np.sin(angle)])
         return self.radius * np.array([np.sin(angle), -np.cos(angle)]), speed * tangent
 
     def speed_squared(self, angle, speed0):
-        """v^2 at an angle [rad], started at the bottom with speed0, while N and the speed keep their signs.
+        """Return v^2 at an angle [rad] for speed0 at the bottom, while N and the speed keep their signs.
 
         d(v^2)/d(angle) + 2 mu v^2 = -2 g R (sin + mu cos) has constant coefficients.
         """
@@ -125,8 +125,9 @@ class Ring:
         return (speed0**2 - forced(0.0)) * np.exp(-2.0 * self.mu * angle) + forced(angle)
 
 
-# From `speed_squared` for mass 1, R = 1, mu = 0.25, g = 9.81, started at the bottom, times by quadrature of
-# R / speed: at 4 m/s the angle and its rate after 0.2 s; at 12 m/s the time of one loop and the speed after.
+# Values from `speed_squared` for mass 1, R = 1, mu = 0.25, g = 9.81 and a start at the bottom.  Times are
+# quadratures of R / speed.  Start at 4 m/s: angle and rate after 0.2 s.  Start at 12 m/s: time of one loop
+# and speed after it.
 ANGLE_AT_0P2, RATE_AT_0P2 = 0.6446178976906048, 2.354981131780303
 LOOP_TIME, SPEED_AFTER_LOOP = 1.201799564074831, 4.400375469951236
 

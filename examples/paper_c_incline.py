@@ -1,7 +1,7 @@
 """Example (c) of the paper: a block on a vertically vibrating incline with Coulomb friction.
 
-The script prints the paper's formulas beside the values from `pn.solve`, then runs the block as a scene, with
-friction taken from the size of the ideal force of constraint, and compares it with the closed form.
+The script prints the paper's formulas beside the values from `pn.solve`.  Then it simulates the block as a
+scene with friction from the size of the ideal constraint force, and compares the motion with the closed form.
 
 Run: python examples/paper_c_incline.py
 Source: Udwadia, Kalaba, Phohomsiri, J. Appl. Mech. 71 (2004), Example (c), Eqs. (71)-(81).
@@ -19,14 +19,14 @@ import pin_nonideal as pn
 
 @dataclass(frozen=True)
 class Incline:
-    """The block on y = x tan(alpha) - beta sin(omega t), **y downwards**; q = (x, y) [m], v = its rate.
+    """Block on y = x tan(alpha) - beta sin(omega t), **y downwards**; q = (x, y) [m], v = dq/dt.
 
     Args:
-        mass: of the block [kg].
+        mass: mass of the block [kg].
         alpha: inclination [rad], between 0 and pi / 2.
         mu: coefficient of friction.
         beta: amplitude of the plane's vertical motion [m].
-        omega: its angular frequency [rad/s].
+        omega: angular frequency of the plane [rad/s].
         g: gravity [m/s^2].
     """
 
@@ -39,69 +39,69 @@ class Incline:
 
     @property
     def mass_matrix(self):
-        """M [kg]."""
+        """Return M [kg]."""
         return self.mass * np.eye(2)
 
     @property
     def given(self):
-        """F [N]: gravity."""
+        """Return F [N], the force of gravity."""
         return np.array([0.0, self.mass * self.g])  # M a with the a of Eq. (71)
 
     @property
     def slope(self):
-        """The direction [1, tan(alpha)] in which x grows along the plane."""
+        """Return the direction [1, tan(alpha)] of the plane."""
         return np.array([1.0, np.tan(self.alpha)])
 
     def load(self, t):
-        """Weight felt per mass, g - beta omega^2 sin(omega t) [m/s^2]; not negative while the block stays."""
+        """Return the effective gravity g - beta omega^2 sin(omega t) [m/s^2]; not negative in contact."""
         return self.g - self.beta * self.omega**2 * np.sin(self.omega * t)
 
     def residual(self, t, q):
-        """Depth below the plane."""
+        """Return the depth below the plane [m]."""
         return np.array([q[1] - q[0] * np.tan(self.alpha) + self.beta * np.sin(self.omega * t)])  # Eq. (2)
 
     def rate(self, t, q, v):
-        """Rate of the residual."""
+        """Return the rate of the residual."""
         return np.array([v[1] - v[0] * np.tan(self.alpha) + self.beta * self.omega * np.cos(self.omega * t)])
 
     def rows(self, t, q, v, data=None):
-        """A and b of A a = b."""
+        """Return A and b of A a = b."""
         A = np.array([[-np.tan(self.alpha), 1.0]])
         return A, np.array([self.beta * self.omega**2 * np.sin(self.omega * t)])  # Eq. (72)
 
     def friction(self, size, v):
-        """C from |F_ideal|, against the motion along the plane; from rest the block starts downhill."""
+        """Return C from |F_ideal|, against the motion along the plane; at rest, against downhill motion."""
         s = -1.0 if v[0] < 0.0 else 1.0
         return -self.mu * size * np.cos(self.alpha) * self.slope * s  # Eqs. (77), (78)
 
     def from_reactions(self, t, q, v, reactions):
-        """C with |F_ideal| = |lam| |A|, where |A| = 1 / cos(alpha)."""
+        """Return C with |F_ideal| = |lam| |A| and |A| = 1 / cos(alpha)."""
         return self.friction(abs(reactions.lam[0]) / np.cos(self.alpha), v)
 
     def paper_null_space(self, delta):
-        """V, for any delta != 0."""
+        """Return V, for any delta != 0."""
         return np.sqrt(self.mass) * delta * self.slope[:, None]  # Eq. (73)
 
     def paper_inverse(self):
-        """J B^T, the Moore-Penrose inverse of B."""
+        """Return J B^T, the Moore-Penrose inverse of B."""
         return np.sqrt(self.mass) * np.cos(self.alpha) ** 2 * np.array([-np.tan(self.alpha), 1.0])  # Eq. (75)
 
     def paper_ideal(self, t):
-        """F_ideal."""
+        """Return F_ideal."""
         weight = self.mass * np.cos(self.alpha) ** 2 * self.load(t)
         return weight * np.array([np.tan(self.alpha), -1.0])  # Eq. (76)
 
     def paper_size(self, t):
-        """Length of F_ideal."""
+        """Return the norm of F_ideal."""
         return self.mass * np.cos(self.alpha) * abs(self.load(t))  # Eq. (79)
 
     def paper_nonideal(self, t, v):
-        """F_nonideal."""
+        """Return F_nonideal."""
         s = np.sign(v[0])
         return -self.mu * self.mass * np.cos(self.alpha) ** 2 * abs(self.load(t)) * self.slope * s  # Eq. (80)
 
     def scene(self):
-        """The block for `pn.simulate`."""
+        """Return the block as a scene."""
         model = pin.Model()
         model.name = "incline"
         model.gravity.linear = np.array([0.0, self.g, 0.0])
@@ -120,16 +120,16 @@ class Incline:
         )
 
     def at(self, s, speed):
-        """State at t = 0, s [m] down the plane with a speed [m/s] relative to it."""
+        """Return the state at t = 0, s [m] down the plane with a speed [m/s] relative to the plane."""
         down = np.cos(self.alpha) * self.slope
         return s * down, speed * down - np.array([0.0, self.beta * self.omega])
 
     def along(self, q):
-        """Distance (of a position) or speed relative to the plane (of a velocity), downhill."""
+        """Return the downhill distance of a position, or the downhill speed of a velocity."""
         return q[..., 0] / np.cos(self.alpha)
 
     def sliding(self, t, speed):
-        """Distance [m] and speed [m/s] down the plane after sliding downhill from s = 0 with that speed."""
+        """Return distance [m] and speed [m/s] down the plane at t, for a start at s = 0 with `speed`."""
         factor = np.sin(self.alpha) - self.mu * np.cos(self.alpha)
         lift = self.beta * np.sin(self.omega * t)
         lift_rate, lift_rate_0 = self.beta * self.omega * np.cos(self.omega * t), self.beta * self.omega
@@ -137,11 +137,11 @@ class Incline:
         return distance, speed + factor * (self.g * t + lift_rate - lift_rate_0)
 
 
-# Closed forms for alpha = pi / 6, g = 9.81.  Vibrating plane (mu 0.3, beta 0.002 m, omega 40 rad/s), started
+# Closed forms for alpha = pi / 6, g = 9.81.  Vibrating plane (mu 0.3, beta 0.002 m, omega 40 rad/s), start
 # downhill at 0.1 m/s: distance and speed after 1 s, from `sliding`.
 DISTANCE_AT_1, SPEED_AT_1 = 1.2592861690271027, 2.4242563711865315
-# Plane at rest (mu 0.2), thrown uphill at 3 m/s: time and distance of the turn, time and speed of the return,
-# with the accelerations -g (sin + mu cos) and -g (sin - mu cos).
+# Plane at rest (mu 0.2), start uphill at 3 m/s: time and distance of the reversal, time and speed of the
+# return, with the accelerations -g (sin + mu cos) and -g (sin - mu cos).
 TURN_TIME, TURN_DISTANCE = 0.4542603826009345, 0.6813905739014018
 RETURN_TIME, RETURN_SPEED = 1.1062503408749726, 2.0901873265201623
 

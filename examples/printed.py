@@ -1,4 +1,4 @@
-"""What the examples share: a line of a computed value beside the expected one, and the command line."""
+"""Shared output and command line of the examples."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def show(what, computed, expected):
 
 
 def run_examples(text, examples, arguments=None):
-    """Runs those examples that are named, or all; each is a function that returns its run."""
+    """Run the named examples, or all; each example is a function that returns its run."""
     parser = argparse.ArgumentParser(description=text.splitlines()[0])
     parser.add_argument("names", nargs="*", help=f"any of {', '.join(examples)}; all when left out")
     parser.add_argument("--html", metavar="FOLDER", type=Path, help="folder for the replays")

@@ -1,5 +1,6 @@
-"""Oracles: what tests and benchmarks compare the package with, each independent of the core.
+"""Reference implementations for tests and benchmarks, each independent of the core.
 
-`dense` and `dense_friction` are mechanics of their own, `paper_road` is the paper letter by letter.
-The folder is no part of the installed package: tests/conftest.py and benchmarks/__main__.py find it.
+`dense` and `dense_friction` implement the mechanics separately. `paper_road` implements the equations of the
+paper as printed. The folder is not installed: tests/conftest.py and benchmarks/__main__.py add it to the
+path.
 """

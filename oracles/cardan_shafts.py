@@ -1,8 +1,8 @@
 """Chains of Cardan joints in closed form: angles, rates, accelerations and the torque at the input.
 
-Shaft k turns by angle_k about an axis of its own.  The cross between two of them has one pin on each, at
-right angles: p(angle_k) . r(angle_k+1) = 0, which is tan(out) = tan(in) cos(beta) where the first pin starts
-across both shafts.  The torque follows from the inertia that the input feels, by virtual work.
+Shaft k rotates by angle_k about its own axis.  The cross between two shafts has one pin on each shaft, at
+right angles: p(angle_k) . r(angle_k+1) = 0.  If the first pin is initially perpendicular to both shafts, this
+is tan(out) = tan(in) cos(beta).  Virtual work gives the torque from the effective inertia at the input.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-# Step of the five-point differences of the inertia by the angle: truncation and rounding both near 1e-11.
+# Step of the five-point differences by the angle [rad]: truncation and rounding are both near 1e-11.
 STEP = 1e-3
 
 
@@ -19,13 +19,13 @@ def _unit(x):
 
 
 def _across(axis, angle):
-    """A unit vector across an axis."""
+    """Return a unit vector perpendicular to an axis."""
     u = _unit(np.cross(axis, [0.3, 0.9, 0.2]))
     return np.cos(angle) * u + np.sin(angle) * np.cross(axis, u)
 
 
 def _turned(axis, vector, angle):
-    """A vector across the axis, turned about it by each angle, and its derivative by the angle."""
+    """Return a vector perpendicular to the axis, rotated by each angle, and its derivative by the angle."""
     side = np.cross(axis, vector)
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     return c * vector + s * side, c * side - s * vector
@@ -40,12 +40,12 @@ def _slope(function, angle):
 
 
 class Shafts:
-    """Shafts drawn by lot, joined by crosses, each in a bearing where the joints leave it free.
+    """Random shafts joined by crosses, with bearings for the shafts that the joints do not locate.
 
     Attributes:
-        model: pinocchio.Model with joints "input", and two of each cross.
-        bearings: frame and axis of each shaft that needs one, all but the first.
-        axes: of all shafts.
+        model: pinocchio.Model with a joint "input" and two joints for each cross.
+        bearings: frame and axis of each shaft that needs a bearing: all but the first two.
+        axes: unit vectors of all shafts.
     """
 
     def __init__(self, rng, crosses):
@@ -82,7 +82,7 @@ class Shafts:
                 self.bearings.append((f"shaft{k + 1}", self.axes[k + 1]))
 
     def angles(self, angle):
-        """Angles of all shafts, (crosses + 1, n), continuous from zero."""
+        """Return the angles of all shafts, (crosses + 1, n), continuous from zero."""
         found = [angle]
         for k, (own, other) in enumerate(self.pins):
             p, _ = _turned(self.axes[k], own, found[-1])
@@ -93,7 +93,7 @@ class Shafts:
         return np.array(found)
 
     def _pins(self, angle):
-        """Both pins of each cross and their derivatives by the input's angle; the ratios of all shafts."""
+        """Return the pins of each cross, their derivatives by the input angle, and all speed ratios."""
         angles, ratios, pins = self.angles(angle), [np.ones_like(angle)], []
         for k, (own, other) in enumerate(self.pins):
             p, dp = _turned(self.axes[k], own, angles[k])
@@ -103,7 +103,7 @@ class Shafts:
         return pins, np.array(ratios)
 
     def inertia(self, angle):
-        """That the input feels, (n,)."""
+        """Return the effective inertia at the input, (n,)."""
         pins, ratios = self._pins(angle)
         felt = self.shaft_inertia @ ratios**2
         for inertia, (p, r, dp, dr) in zip(self.cross_inertia, pins, strict=True):
@@ -113,7 +113,7 @@ class Shafts:
         return felt
 
     def motion(self, angle, rate, acceleration):
-        """Angles, rates, accelerations of all shafts, (crosses + 1, n); torque at the input, (n,)."""
+        """Return angles, rates and accelerations, (crosses + 1, n) each, and the input torque, (n,)."""
         _, ratios = self._pins(angle)
         change = _slope(lambda x: self._pins(x)[1], angle)
         torque = self.inertia(angle) * acceleration + 0.5 * _slope(self.inertia, angle) * rate**2

@@ -1,6 +1,6 @@
-"""Problems of contacts with Coulomb friction drawn by lot, and planar ones solved by trying all modes.
+"""Random contact problems with Coulomb friction, and enumeration of all modes of planar problems.
 
-Nothing here comes from the package: bodies are masses, inertias and points where they touch.
+The module is independent of the package: bodies are masses, inertias and contact points.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linprog
 
-# Part of what is in play by which a condition may be missed by rounding.
+# Violation of a condition that counts as rounding, relative to the terms of the condition.
 SLACK = 1e-9
-# Condition beyond which the forces of a combination are not told apart.
+# Condition number beyond which the forces of a combination are not unique.
 SHARED = 1e9
 
 
 @dataclass
 class ConeProblem:
-    """w = W f + w0 of contacts with `dim` rows each."""
+    """Contact problem w = W f + w0 with `dim` rows for each contact."""
 
     W: np.ndarray
     w0: np.ndarray
@@ -28,10 +28,10 @@ class ConeProblem:
 
 
 def random_problem(rng, *, planar=False, most_contacts=8, driven=False):
-    """One to four bodies of masses 1 to 1e6 that touch each other and the ground at points drawn by lot.
+    """Return a problem of one to four bodies that touch each other and the ground at random points.
 
-    W = H M^-1 H^T is rank-deficient where there are more rows than freedoms.  With w0 = H v there is a
-    solution (bodies at rest enter no contact), unless the surfaces are `driven` against each other.
+    Masses are 1 to 1e6.  W = H M^-1 H^T is rank-deficient if it has more rows than degrees of freedom.  A
+    solution exists for w0 = H v, unless the surfaces are `driven` against each other.
     """
     dim, dof = (2, 3) if planar else (3, 6)
     bodies, contacts = int(rng.integers(1, 5)), int(rng.integers(1, most_contacts + 1))
@@ -58,7 +58,7 @@ def random_problem(rng, *, planar=False, most_contacts=8, driven=False):
             rows = np.hstack([axes[:, ::2], turning[:, 1:2]]) if planar else np.hstack([axes, turning])
             H[c * dim : (c + 1) * dim, body * dof : (body + 1) * dof] = sign * rows
     v = rng.standard_normal(bodies * dof)
-    if rng.random() < 0.5:  # falling, as gravity has it
+    if rng.random() < 0.5:  # falling under gravity
         v = np.where(np.arange(bodies * dof) % dof == dim - 1, -9.81, v * rng.integers(0, 2))
     w0 = H @ v + driven * rng.standard_normal(contacts * dim)
     mu = np.where(rng.random(contacts) < 0.2, 0.0, rng.uniform(0.0, 2.0, contacts))
@@ -66,12 +66,12 @@ def random_problem(rng, *, planar=False, most_contacts=8, driven=False):
 
 
 def planar_solutions(problem, near):
-    """f of every combination of modes (open, stick, slip either way) that keeps all conditions.
+    """Return f of every combination of modes (open, stick, slip) that meets all conditions.
 
-    Where a combination leaves several, the one with w nearest to that of the forces `near`.
+    If f is not unique in a combination, returns the solution with w nearest to that of the forces `near`.
     """
     W, w0, mu = problem.W, problem.w0, problem.mu
-    unit = 1.0 / np.sqrt(np.repeat(np.diag(W).reshape(-1, 2).max(axis=1), 2))  # responses of about one
+    unit = 1.0 / np.sqrt(np.repeat(np.diag(W).reshape(-1, 2).max(axis=1), 2))  # W scaled to about 1
     size = np.abs(unit * w0).max() or 1.0
     W, w0, near = unit[:, None] * W * unit, unit * w0 / size, near / unit / size
     found = []
@@ -99,13 +99,13 @@ def planar_solutions(problem, near):
 
 
 def _forces(equal, positive, W, near):
-    """Forces of the equations and conditions with W f near W `near`, or None."""
+    """Return the solution of the equations and inequalities with W f nearest to W `near`, or None."""
     A, b = np.array([r for r, _ in equal]), -np.array([r0 for _, r0 in equal])
     G, h = np.array([r for r, _ in positive]), np.array([r0 for _, r0 in positive])
     if np.linalg.cond(A) < SHARED:
         f = np.linalg.solve(A, b)
         return f if (G @ f + h >= -SLACK * (1.0 + np.abs(G) @ np.abs(f))).all() else None
-    n, one = len(b), np.ones((len(b), 1))  # unknowns f, and the largest of |W (f - near)|, which is least
+    n, one = len(b), np.ones((len(b), 1))  # unknowns: f and the minimized maximum of |W (f - near)|
     conditions = np.vstack(
         [np.hstack([-G, np.zeros((len(h), 1))]), np.hstack([W, -one]), np.hstack([-W, -one])]
     )

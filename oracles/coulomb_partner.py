@@ -1,8 +1,8 @@
-"""A body of unit inertia rubbed by a partner that swings: between reversals its velocity is linear in time.
+"""Body of unit inertia moved by the friction of an oscillating partner, in closed form between mode changes.
 
-The partner has the velocity u(t) = cos(omega t + phase); dry friction of the limit c is all that moves the
-body.  While it slips with velocity w, dw/dt = -c sgn(w - u); it sticks while |du/dt| <= c.  What remains are
-the roots of w(t) - u(t), which are searched on a fine grid and in the dips between its points.
+The partner has the velocity u(t) = cos(omega t + phase).  Dry friction of the limit c is the only force on
+the body.  A body slipping at velocity w has dw/dt = -c sgn(w - u).  The body sticks while |du/dt| <= c.  The
+roots of w(t) - u(t) are located on a fine grid and at the minima between its points.
 """
 
 from __future__ import annotations
@@ -10,18 +10,18 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import brentq
 
-GRID = 1500  # points of a quarter of a swing: a dip between two of them is a parabola
-NEAR = 1e-4  # a least speed below this may be a dip through zero
+GRID = 1500  # points in a quarter period: a minimum between two points is close to a parabola
+NEAR = 1e-4  # a minimum of the slip speed below this value may cross zero
 ROUNDING = 1e-12
 
 
 class Partner:
-    """The exact motion.
+    """Exact motion of the body.
 
     Attributes:
         omega: angular frequency of the partner [rad/s].
         phase: its phase at t = 0 [rad].
-        limit: of the friction, over the inertia.
+        limit: friction limit over the inertia.
     """
 
     def __init__(self, omega, phase, limit):
@@ -34,10 +34,10 @@ class Partner:
         return -self.omega * np.sin(self.omega * t + self.phase)
 
     def body(self, w, duration):
-        """Velocity, way and number of reversals, sticks and slips of the body that starts with velocity w.
+        """Return the final velocity, the displacement and the number of mode changes of the body.
 
         Args:
-            w: velocity at t = 0.
+            w: velocity of the body at t = 0.
             duration: length of time [s].
         """
         t, way, changes = 0.0, 0.0, 0
@@ -64,7 +64,7 @@ class Partner:
         return np.sin(self.omega * t + self.phase)
 
     def _rest(self, t, end):
-        """Until when it sticks, and whether it gives way there."""
+        """Return the end of sticking, and whether the body begins to slip there."""
 
         def margin(s):
             return self.limit - abs(self.rate(s))
@@ -79,7 +79,7 @@ class Partner:
         return (brentq(margin, low, high, xtol=1e-15) if margin(low) > 0.0 else low), True
 
     def _slip(self, t, end, w, mode):
-        """Until when it slips, and whether it meets the partner's velocity there."""
+        """Return the end of slipping, and whether the slip velocity is zero there."""
 
         def gap(s):
             return mode * (w - mode * self.limit * (s - t) - self.velocity(s))
@@ -104,7 +104,7 @@ class Partner:
         if bracket is None:
             return end, False
         low, high = bracket
-        if gap(low) <= 0.0:  # it has just begun to slip: from where it does
+        if gap(low) <= 0.0:  # the slip velocity is still zero: starts at the first positive value
             ahead = [s for s in np.linspace(low, high, 50)[1:-1] if gap(s) > 0.0]
             if not ahead:
                 return low, True

@@ -1,7 +1,7 @@
-"""Reference mechanics in a few lines: body by body, dense, in world axes, by no algorithm of Pinocchio.
+"""Reference mechanics with dense matrices in world axes, body by body, without algorithms of Pinocchio.
 
-M = sum_i m_i J_c^T J_c + J_w^T I_i J_w, and the same sums with the accelerations at rest give the bias force.
-The constrained acceleration solves [M A^T; A 0] [a; -lam] = [F; b] as one dense system.
+M = sum_i m_i J_c^T J_c + J_w^T I_i J_w.  The same sums with the accelerations at zero joint acceleration give
+the bias force.  The constrained acceleration solves the dense system [M A^T; A 0] [a; -lam] = [F; b].
 """
 
 from __future__ import annotations
@@ -20,34 +20,34 @@ from .rows import rows_of_frames, skew
 
 Array = NDArray[np.float64]
 
-REDUNDANT = 1e-9  # part of a row that the others leave, when it depends on them
+REDUNDANT = 1e-9  # remainder of a redundant row, relative to its length
 
 
 def turned(axis: Array, angle: float) -> Array:
-    """Rotation matrix of an angle about a unit axis (Rodrigues)."""
+    """Return the rotation matrix of an angle about a unit axis (Rodrigues)."""
     K = skew(axis)
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
 
 
 def of_quaternion(x: Array) -> Array:
-    """Rotation matrix of the quaternion (x, y, z, w)."""
+    """Return the rotation matrix of the quaternion (x, y, z, w)."""
     u, w = x[:3], x[3]
     K = skew(u)
     return np.eye(3) + 2.0 * w * K + 2.0 * K @ K
 
 
 def quaternion_rate(x: Array, w: Array) -> Array:
-    """d/dt of the quaternion (x, y, z, w) that turns at w in its own axes."""
+    """Return the time derivative of the quaternion x for the angular velocity w in body axes."""
     return 0.5 * np.append(x[3] * w + np.cross(x[:3], w), -x[:3] @ w)
 
 
 class DenseTree:
-    """A tree of joints about or along one axis, balls, and floating bases on the ground.
+    """Tree of one-axis joints, spherical joints, and free-flyer joints attached to the world.
 
-    Called with a name, after `update`, it gives a `Frame`; None is the world.
+    After `update`, a call with a frame name returns a `Frame`; None is the world.
 
     Args:
-        model: pinocchio.Model; only its numbers are read.
+        model: pinocchio.Model, used for its parameters only.
     """
 
     def __init__(self, model: Any) -> None:
@@ -63,7 +63,7 @@ class DenseTree:
         self.frames = dict(frames)
         self.joints = {name: i for i, name in enumerate(model.names)}
         self.iq, self.iv = [j.idx_q for j in model.joints], [j.idx_v for j in model.joints]
-        self.kinds, self.axes = ["world"], [np.zeros(6)]  # axes: rate of place and of turning for v = 1
+        self.kinds, self.axes = ["world"], [np.zeros(6)]  # axes: linear and angular velocity for v = 1
         for joint in list(model.joints)[1:]:
             kind, axis = joint.shortname(), np.zeros(6)
             if kind in ("JointModelFreeFlyer", "JointModelSpherical"):
@@ -78,17 +78,17 @@ class DenseTree:
             self.axes.append(axis)
 
     def update(self, q: Array, v: Array) -> None:
-        """Placements, velocities, Jacobians and accelerations at zero joint acceleration."""
+        """Compute placements, velocities, Jacobians and accelerations at zero joint acceleration."""
         n, nv = self.n, self.nv
         self.q, self.v = q, v
         self.R, self.p = [np.eye(3)] * n, [np.zeros(3)] * n
-        self.w, self.u, self.dw, self.du = ([np.zeros(3)] * n for _ in range(4))  # turning, moving; rates
+        self.w, self.u, self.dw, self.du = ([np.zeros(3)] * n for _ in range(4))  # angular, linear; rates
         self.Jw, self.Jp = [np.zeros((3, nv))] * n, [np.zeros((3, nv))] * n
         for i in range(1, n):
             k, j, j0 = self.parents[i], self.iv[i], self.iq[i]
             R0, p0 = self.places[i]
             R, W = self.R[k] @ R0, skew(self.w[k])
-            slide, spin = R @ self.axes[i][:3], R @ self.axes[i][3:]  # zero but for joints of one axis
+            slide, spin = R @ self.axes[i][:3], R @ self.axes[i][3:]  # zero except for one-axis joints
             arm = self.R[k] @ p0
             if self.kinds[i] == "axis":
                 arm = arm + slide * q[j0]
@@ -101,12 +101,12 @@ class DenseTree:
                 w = self.w[k] + spin * v[j]
                 dw = self.dw[k] + W @ spin * v[j]
                 Jw[:, j], Jp[:, j] = spin, slide
-            elif self.kinds[i] == "ball":  # v in the moving axes
+            elif self.kinds[i] == "ball":  # v in body axes
                 R = R @ of_quaternion(q[j0 : j0 + 4])
                 spin = R @ v[j : j + 3]
                 w, dw = self.w[k] + spin, self.dw[k] + W @ spin
                 Jw[:, j : j + 3] = R
-            else:  # on the ground only: q = (place, quaternion), v in the moving axes
+            else:  # attached to the world only: q = (position, quaternion), v in body axes
                 p = p + R @ q[j0 : j0 + 3]
                 R = R @ of_quaternion(q[j0 + 3 : j0 + 7])
                 u, w = R @ v[j : j + 3], R @ v[j + 3 : j + 6]
@@ -116,7 +116,7 @@ class DenseTree:
             self.Jw[i], self.Jp[i] = Jw, Jp
 
     def mass_and_bias(self) -> tuple[Array, Array]:
-        """M, and the forces of gravity and of the motion itself."""
+        """Return M and the bias force of gravity and velocity."""
         M, h = np.diag(self.armature), np.zeros(self.nv)
         for i in range(1, self.n):
             mass, lever, inertia = self.bodies[i]
@@ -130,7 +130,7 @@ class DenseTree:
         return M, h
 
     def __call__(self, name: str | None) -> Frame:
-        """The frame of a name; None is the world."""
+        """Return the frame of a name; None is the world."""
         i, R, p = (0, np.eye(3), np.zeros(3)) if name is None else self.frames[name]
         arm, W = self.R[i] @ p, skew(self.w[i])
         return Frame(
@@ -145,17 +145,17 @@ class DenseTree:
         )
 
     def at(self, q: Array) -> DenseTree:
-        """The same tree elsewhere, at rest."""
+        """Return the same tree at another configuration, at rest."""
         other = DenseTree(self.model)
         other.update(q, np.zeros(self.nv))
         return other
 
     def dof(self, joint: str) -> int:
-        """Place of a joint's first velocity in v."""
+        """Return the index of a joint's first velocity in v."""
         return self.iv[self.joints[joint]]
 
     def moving(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """q with its quaternions at unit length, and dq/dt."""
+        """Return q with normalized quaternions, and dq/dt."""
         q, dq = q.copy(), np.zeros(self.nq)
         for i in range(1, self.n):
             j, j0 = self.iv[i], self.iq[i]
@@ -171,32 +171,32 @@ class DenseTree:
 
 
 class DenseScene:
-    """The motion of a scene's tree, constraints, forces and actuation; its laws are the caller's.
+    """Motion of a scene's tree, constraints, forces and actuation; the caller supplies the laws.
 
     Args:
-        scene: pn.Scene; its descriptions are read.
-        laws: (t, q, v) -> nonideal force C, (nv,); None for none.
+        scene: pn.Scene, used for its descriptions only.
+        laws: (t, q, v) -> nonideal force C, (nv,); None for zero.
     """
 
     def __init__(self, scene: Any, laws: Callable[[float, Array, Array], Array] | None = None) -> None:
         self.scene, self.laws, self.tree = scene, laws, DenseTree(scene.model)
         self.nv, self.nq = self.tree.nv, self.tree.nq
-        self.independent: list[int] | None = None  # rows, decided at the first state
+        self.independent: list[int] | None = None  # independent rows, selected at the first state
 
     def terms(self, t: float, q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
-        """M, F, A and b."""
+        """Return M, F, A and b."""
         self.tree.update(q, v)
         M, h = self.tree.mass_and_bias()
         return M, applied_force(self.scene, self.tree, t) - h, *rows_of_frames(self.scene, self.tree, t)
 
     def acceleration(self, t: float, q: Array, v: Array, held: Sequence[int] = ()) -> tuple[Array, Array]:
-        """Acceleration, and the force that every held degree of freedom needs to stay at rest.
+        """Return the acceleration, and the force that keeps each held degree of freedom at rest.
 
         Args:
             t: time [s].
             q: configuration.
             v: velocity.
-            held: degrees of freedom without acceleration.
+            held: degrees of freedom with zero acceleration.
         """
         M, force, A, b = self.terms(t, q, v)
         if self.laws is not None:
@@ -210,18 +210,18 @@ class DenseScene:
         return x[: self.nv], -x[self.nv + m - len(held) :]
 
     def rate(self, t: float, y: Array) -> Array:
-        """dy/dt of y = (q, v)."""
+        """Return dy/dt of y = (q, v)."""
         q, dq = self.tree.moving(y[: self.nq], y[self.nq :])
         return np.concatenate([dq, self.acceleration(t, q, y[self.nq :])[0]])
 
     def motion(self, q: Array, v: Array, times: Array, rtol: float = 1e-13) -> Array:
-        """Configurations at some times, by SciPy's DOP853, started anew at each of them.
+        """Integrate with SciPy's DOP853, restarted at each output time.
 
         Args:
             q: configuration at time zero.
             v: velocity at time zero.
-            times: [s], (k,).
-            rtol: relative tolerance; the absolute one is a tenth of it.
+            times: output times [s], (k,).
+            rtol: relative tolerance; the absolute tolerance is a tenth of it.
 
         Returns:
             Configurations, (k, nq).
@@ -237,7 +237,7 @@ class DenseScene:
 
 
 def _independent(A: Array) -> list[int]:
-    """Rows that span all rows, each of unit length."""
+    """Return the indices of independent rows that span all rows; rows are scaled to unit length."""
     length = np.linalg.norm(A, axis=1)
     long = np.flatnonzero(length > REDUNDANT * length.max(initial=0.0))
     if not len(long):

@@ -1,4 +1,4 @@
-"""Constant Coulomb friction on the dense reference: smooth between events, modes found by trying them all."""
+"""Constant Coulomb friction on the dense reference: smooth between events, modes by enumeration."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .modes import combinations
 
 Array = NDArray[np.float64]
 
-AT_REST = 1e-9  # a velocity below this at an event is zero [rad/s]
+AT_REST = 1e-9  # velocity below which a joint is at rest at an event [rad/s]
 MOST_EVENTS = 500
 
 
 class Friction:
-    """A tree of joints with one freedom each, some sliding (+1, -1), some held (0)."""
+    """Tree of one-axis joints in stick-slip modes: slipping (+1, -1) or sticking (0)."""
 
     def __init__(self, dense: DenseScene, coulomb: Array, viscous: Array) -> None:
         self.dense, self.coulomb, self.viscous = dense, coulomb, viscous
@@ -26,15 +26,15 @@ class Friction:
         dense.laws = lambda t, q, v: -coulomb * self.mode - viscous * v
 
     def held(self) -> list[int]:
-        """Joints at rest."""
+        """Return the sticking joints."""
         return [int(j) for j in np.flatnonzero(self.mode == 0.0)]
 
     def solve(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
-        """Acceleration, and friction force of every joint that is held."""
+        """Return the acceleration, and the friction force of each sticking joint."""
         return self.dense.acceleration(t, q, v, self.held())
 
     def choose(self, t: float, q: Array, v: Array) -> None:
-        """Modes of the joints at rest that contradict neither their limits nor their accelerations."""
+        """Select modes of the joints at rest that are consistent with their limits and accelerations."""
         resting = np.abs(v) <= AT_REST
         for modes in combinations(v, AT_REST):
             self.mode = np.array(modes, dtype=float)
@@ -46,12 +46,12 @@ class Friction:
 
 
 def friction_motion(dense: DenseScene, problem: Any, max_step: float) -> Array:
-    """Configurations at the problem's sample times, (k, nq).
+    """Return the configurations at the problem's sample times, (k, nq).
 
     Args:
-        dense: its mechanics, without friction.
-        problem: gives the initial state, the friction and the times.
-        max_step: of the integrator [s]; the interpolant that locates events is as good as this is short.
+        dense: mechanics of the problem without friction.
+        problem: initial state, friction and sample times.
+        max_step: maximum step of the integrator [s]; it bounds the error of event location.
     """
     friction = Friction(dense, problem.coulomb, problem.viscous)
     t, q, v = 0.0, problem.q0.copy(), problem.v0.copy()
@@ -91,7 +91,7 @@ def friction_motion(dense: DenseScene, problem: Any, max_step: float) -> Array:
         if which < len(sliding):
             v[sliding[which]] = 0.0
             friction.choose(t, q, v)
-        else:  # at its limit the joint gives way against the force that held it
+        else:  # a joint at its limit slips against its friction force
             k = which - len(sliding)
             force = friction.solve(t, q, v)[1][k]
             friction.mode[held[k]] = -np.sign(force)

@@ -1,4 +1,4 @@
-"""The core's rows against differences: A against d residual, b against d(A v)."""
+"""Check of the core's rows by differences: A against d residual, b against d(A v)."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ import pinocchio as pin
 
 from pin_nonideal.states.rows import holonomic_rows
 
-# Central differences of fourth order at this step: truncation 1e-14, rounding 1e-16 / 1e-3; with a margin for
-# the curvature of short levers.
+# Step and tolerance of fourth-order central differences.  Truncation is 1e-14 and rounding 1e-16 / 1e-3; the
+# tolerance leaves a margin for the curvature of short levers.
 STEP = 1e-3
 DIFFERENCES = 1e-6
-# Rows of a state that was projected are met to rounding.
+# Residual of a projected state, relative to the size of the rows.
 MET = 1e-12
-# Newton's method onto the rows squares the gap in each step; singular values below this part are rounding.
+# Newton's method converges quadratically; singular values below this relative size are rounding.
 NEWTON_STEPS = 12
 HELD = 1e-9
 
 
 def fourth_order(f):
-    """Derivative of f at 0."""
+    """Return the derivative of f at 0 by fourth-order central differences."""
     return (8.0 * (f(STEP) - f(-STEP)) - (f(2 * STEP) - f(-2 * STEP))) / (12.0 * STEP)
 
 
 def consistent(scene, rng, t, speed=1.0):
-    """A random state on the constraints: by Newton's method, or else by the scene's projection."""
+    """Return a random state on the constraints, by Newton's method or else by the scene's projection."""
     model = scene.model
     near = pin.integrate(model, scene.q0, 0.1 * rng.standard_normal(model.nv))
     v = speed * rng.standard_normal(model.nv)
@@ -33,12 +33,12 @@ def consistent(scene, rng, t, speed=1.0):
 
 
 def contact_opens(contact):
-    """Whether a contact may open."""
+    """Check if a contact can open."""
     return getattr(contact, "unilateral", True)
 
 
 def _on_rows(scene, q, v, t):
-    """A nearby state on the rows by Newton's method, or None where it does not converge."""
+    """Return a nearby state on the rows by Newton's method, or None if it does not converge."""
     runner, position = scene._compiled.program.runner(), holonomic_rows(scene._compiled.program)
     for _ in range(NEWTON_STEPS):
         A, _, phi, rate = rows_at(scene, runner, q, v, t)
@@ -65,11 +65,11 @@ def assert_rows_match_differences(scene, q, v, t, a):
     def moved(s, w, c=0.0):
         return pin.integrate(model, q, s * w + 0.5 * s * s * c)
 
-    # A: every row's rate is linear in v with A as its matrix.
+    # A: the rates of the rows are linear in v with the matrix A.
     for k, e in enumerate(np.eye(model.nv)):
         column = rows_at(scene, runner, q, v + e, t)[3] - rows_at(scene, runner, q, v, t)[3]
         np.testing.assert_allclose(column, A[:, k], atol=DIFFERENCES * size)
-    # Residual: it changes at the rate, along any motion; rows without a residual stay at zero.
+    # Residual: its time derivative is the rate, along any motion; rows without a residual keep zero.
     w = np.linspace(-1.0, 1.0, model.nv)
     there = rows_at(scene, runner, q, w, t)[3]
     change = fourth_order(lambda s: rows_at(scene, runner, moved(s, w), w, t + s)[2])

@@ -1,4 +1,4 @@
-"""Kinematics of a model's frames in world axes, by Pinocchio, and what moves with them."""
+"""Kinematics of a model's frames in world axes, by Pinocchio."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import pinocchio as pin
 
 @dataclass
 class Frame:
-    """A frame of a body, or of the world.
+    """Frame of a body or of the world.
 
     Attributes:
-        p: place of its origin.
-        R: its axes, as columns.
+        p: position of the origin.
+        R: axes of the frame, as columns.
         J: Jacobian of the origin's velocity, (3, nv).
         Jw: Jacobian of the angular velocity, (3, nv).
         u: velocity of the origin.
@@ -34,7 +34,7 @@ class Frame:
 
 
 class Frames:
-    """The frames of a model at one state; `data` is complete for (q, v) and zero acceleration."""
+    """Frames of a model at one state; `data` is computed for (q, v) and zero acceleration."""
 
     def __init__(self, model, q, v):
         self.model, self.data, self.q, self.v = model, model.createData(), q, v
@@ -43,7 +43,7 @@ class Frames:
         pin.updateFramePlacements(model, self.data)
 
     def __call__(self, name):
-        """The frame of a name; None is the world."""
+        """Return the frame of a name; None is the world."""
         nv, zero = self.model.nv, np.zeros(3)
         if name is None:
             return Frame(zero, np.eye(3), np.zeros((3, nv)), np.zeros((3, nv)), zero, zero, zero, zero)
@@ -54,9 +54,9 @@ class Frames:
         return Frame(p, R, J[:3], J[3:], u.linear, u.angular, du.linear, du.angular)
 
     def at(self, q):
-        """The frames of the same model elsewhere, at rest."""
+        """Return the frames of the same model at another configuration, at rest."""
         return Frames(self.model, q, np.zeros(self.model.nv))
 
     def dof(self, joint):
-        """Place of a joint's first velocity in v."""
+        """Return the index of a joint's first velocity in v."""
         return self.model.joints[self.model.getJointId(joint)].idx_v

@@ -1,7 +1,6 @@
-"""Conditions of friction at one instant of a run, by Pinocchio's inverse dynamics and the laws' closed forms.
+"""Friction conditions at one instant of a run, by Pinocchio's inverse dynamics and closed forms of the laws.
 
-Nothing here comes from the core but the motion and the multipliers that it recorded, and the matrix A, which
-is compared with differences elsewhere.
+The module takes the recorded motion, the multipliers and the matrix A from the core.  `differences` checks A.
 """
 
 from __future__ import annotations
@@ -14,17 +13,17 @@ import pinocchio as pin
 
 import pin_nonideal as pn
 
-# Part of the speeds in play that leaves a slip its direction.
+# Slip speed below which the slip direction is undefined, relative to 1 + the largest speed.
 UNDIRECTED = 1e-8
-# Part of the forces in play to which the equation of motion is balanced by what was recorded.
+# Residual of the equation of motion with recorded values, relative to its terms.
 BALANCED = 1e-9
-# Part of a limit by which shares of a load may pass it, and starts from which such shares are sought.
+# Relative excess of a shared friction force over its limit, and number of starts of the search.
 SHARED, STARTS = 1e-9, 20
 
 
 @dataclass
 class Instant:
-    """A state with the accelerations and multipliers of a motion through it."""
+    """State with the acceleration and the multipliers of a motion."""
 
     t: float
     q: np.ndarray
@@ -34,13 +33,13 @@ class Instant:
 
 
 class Conditions:
-    """Friction force, limit and slip velocity of every element of a scene, at instants of its runs.
+    """Friction force, limit and slip velocity of every friction element of a scene, at instants of its runs.
 
     Args:
-        scene: its laws, constraints and forces are of the kinds in tests/support/random_mechanisms.py.
-        slips: name of each element to a function (data, v) -> its slip velocity.
-        places: name of an element that is not all of its law in a joint or hinge, to that law's name and a
-            function (instant, wrenches) -> what its load adds to the constant part of the limit.
+        scene: scene with laws, constraints and forces of the kinds in tests/support/random_mechanisms.py.
+        slips: maps the name of each element to a function (data, v) -> slip velocity.
+        places: maps the name of an element that is one of several of its law to the name of the law and a
+            function (instant, wrenches) -> load-dependent part of the limit.
     """
 
     def __init__(self, scene, slips, places=None):
@@ -51,10 +50,10 @@ class Conditions:
         self.anchors = {c.name: c for c in scene.constraints}
 
     def at(self, run, i):
-        """Slip velocity, friction force and limit of each element, and the size of the forces in play.
+        """Return slip velocity, friction force and limit of each element, and the size of all forces.
 
         Returns:
-            slips, forces: arrays (dim,) by element; limits: numbers by element; size [N m or N].
+            slips, forces: arrays (dim,) by element. limits: numbers by element. size: [N m or N].
         """
         total = Instant(run.t[i], run.q[i], run.v[i], run.a[i], run.lam[i])
         pin.computeJointJacobians(self.model, self.data, total.q)
@@ -90,15 +89,15 @@ class Conditions:
         )
 
     def law_of(self, name):
-        """The law that an element belongs to."""
+        """Return the law of an element."""
         return self.laws[self.places[name][0] if name in self.places else name]
 
     def _share(self, friction, directions, slips, limits, modes, rows, speed, size):
-        """Forces of the elements that make up the generalized friction force.
+        """Return the forces of the elements, whose sum is the generalized friction force.
 
-        Those that slip in a clear direction follow their law.  What is left is shared among those that stick;
-        where they are redundant, with each other or with the constraints, any share within their limits will
-        do.
+        Elements with a defined slip direction follow their law.  The remainder acts at the other elements.
+        If these are redundant with each other or with constraints, any forces within their limits are
+        accepted.
         """
         forces, left, names = {}, friction.copy(), list(slips)
         for name, S, mode in zip(slips, directions, modes, strict=True):
@@ -129,26 +128,26 @@ class Conditions:
 
     @staticmethod
     def undirected(slip, speed):
-        """A slip of several directions that has just begun: rounding in v hides where it goes."""
+        """Check if a slip of several components is too slow for a direction: rounding in v dominates."""
         return len(slip) > 1 and np.linalg.norm(slip) <= UNDIRECTED * (1.0 + speed)
 
     def _stribeck(self, name, slip):
-        """Factor of the limit while it slips."""
+        """Return the Stribeck factor of the limit of a slipping element."""
         law = self.law_of(name)
         if isinstance(law, pn.UserFriction) or law.stribeck_velocity is None:
             return 1.0
         return 1.0 + (law.static_ratio - 1.0) * np.exp(-((np.linalg.norm(slip) / law.stribeck_velocity) ** 2))
 
     def kinetic_limit(self, name, slip, limits):
-        """Friction force while it slips."""
+        """Return the friction force of a slipping element."""
         return limits[name] * self._stribeck(name, slip)
 
     def static_limit(self, name, limits):
-        """Largest force with which an element can stick."""
+        """Return the largest friction force of a sticking element."""
         return limits[name] * getattr(self.law_of(name), "static_ratio", 1.0)
 
     def _limit(self, law, instant, loads):
-        """Limit for the load, before the static ratio or Stribeck's factor."""
+        """Return the load-dependent limit, without the static ratio and the Stribeck factor."""
         if isinstance(law, pn.UserFriction):
             return law.limit(instant.t, instant.q, instant.v, _Wrenches(self.model, loads["total"]))
         constant = law.coulomb + law.preload
@@ -174,7 +173,7 @@ class Conditions:
         return constant + law.mu * (law.radius * (radial + bending) + law.axial_radius * abs(axial))
 
     def _wrenches(self, instant, *, dragged):
-        """Wrench that each joint exerts on the body that it moves, in the joint's frame."""
+        """Return the wrench of each joint on its child body, in the joint frame."""
         outside = [pin.Force.Zero() for _ in range(self.model.njoints)]
 
         def push(frame, force, moment=(0.0, 0.0, 0.0)):
@@ -225,7 +224,7 @@ class Conditions:
         return -law.coefficient * speed ** (law.exponent - 1.0) * u if speed else np.zeros(3)
 
     def _smooth(self, instant, z):
-        """Generalized force of the laws that never stick."""
+        """Return the generalized force of the smooth laws and of viscous friction."""
         C, v, state = np.zeros(self.model.nv), instant.v, 0
         for law in self.scene.laws:
             if isinstance(law, pn.Drag):
@@ -250,14 +249,14 @@ class Conditions:
 
 
 def shares(A, b, dims, most, slipping):
-    """Forces f, and free multipliers behind them, with A (f, lam) = b and |f_e| <= most_e, or None.
+    """Return x = (f, lam) with A x = b, |f_e| <= most_e and free multipliers lam, or None.
 
     Args:
-        A: rows of full rank.
+        A: matrix of full row rank.
         b: right-hand side.
-        dims: directions of each element; their forces come first among the unknowns.
-        most: largest force of each element.
-        slipping: elements whose force is as large as that.
+        dims: number of components of each element; their forces are the first unknowns.
+        most: maximum force of each element.
+        slipping: whether the force of each element equals its maximum.
     """
     from scipy.optimize import least_squares, linprog
 
@@ -285,7 +284,7 @@ def shares(A, b, dims, most, slipping):
 
 
 class _Wrenches:
-    """Reactions as a user's law sees them."""
+    """Reactions in the interface of user-defined laws."""
 
     def __init__(self, model, forces):
         self.model, self.forces = model, forces
@@ -295,7 +294,7 @@ class _Wrenches:
 
 
 def _axis(joint):
-    """Axis of a joint of one degree of freedom in its frame."""
+    """Return the axis of a joint with one degree of freedom, in the joint frame."""
     motion = joint.createData()
     joint.calc(motion, np.zeros(joint.nq))
     S = np.asarray(motion.S).ravel()

@@ -1,4 +1,4 @@
-"""M and F of a scene: Pinocchio's mass matrix and bias forces, and given forces by frame Jacobians."""
+"""M and F of a scene: mass matrix and bias forces of Pinocchio, and applied forces by frame Jacobians."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ def mass_matrix(model, q):
 
 
 def given_force(scene, q, v, t):
-    """F = tau + sum J^T f - nle(q, v), (nv,)."""
+    """Compute F = tau + sum J^T f - nle(q, v), (nv,)."""
     bias = pin.nonLinearEffects(scene.model, scene.model.createData(), q, v)
     return applied_force(scene, Frames(scene.model, q, v), t) - bias
 
 
 def applied_force(scene, frames, t):
-    """tau + sum J^T f from the frames of any kinematics, (nv,)."""
+    """Compute tau + sum J^T f from the frames of any kinematics, (nv,)."""
     force = torque(scene.actuation, scene, frames.q, frames.v, t)
     return sum((generalized(f, frames, t, scene) for f in scene.forces), start=force)
 
 
 def torque(actuation, scene, q, v, t):
-    """What drives the joints, (nv,)."""
+    """Return the actuation torques, (nv,)."""
     model = scene.model
     if actuation is None:
         return np.zeros(model.nv)
@@ -46,14 +46,14 @@ def torque(actuation, scene, q, v, t):
 
 
 def _gain(model, gain):
-    """A number acts on joints of one degree of freedom."""
+    """Return gains, (nv,): a scalar gain applies to joints with one degree of freedom."""
     if np.ndim(gain):
         return np.asarray(gain, dtype=float)
     return np.concatenate([np.full(j.nv, gain if j.nv == 1 else 0.0) for j in list(model.joints)[1:]])
 
 
 def _difference(model, q, goal, gain):
-    """goal - q in the tangent space, of the joints that have a gain."""
+    """Return goal - q in the tangent space for joints with a gain, else zero."""
     found = np.zeros(model.nv)
     for joint in list(model.joints)[1:]:
         dofs = slice(joint.idx_v, joint.idx_v + joint.nv)
@@ -68,14 +68,14 @@ def _difference(model, q, goal, gain):
 
 @singledispatch
 def generalized(force, frames, t, scene):
-    """Generalized force of one given force, (nv,)."""
+    """Return the generalized force of one applied force, (nv,)."""
     raise TypeError(f"no generalized force is known for {force!r}")
 
 
 @generalized.register
 def _(force: pn.SpringDamper, frames, t, scene):
     one, two = frames(force.frame1), frames(force.frame2)
-    if force.frame2 is None:  # the world, where frame1 starts
+    if force.frame2 is None:  # world point at the initial position of frame1
         two.p = frames.at(scene.q0)(force.frame1).p
     gap = one.p - two.p
     length = np.linalg.norm(gap)
@@ -87,7 +87,7 @@ def _(force: pn.SpringDamper, frames, t, scene):
 @generalized.register
 def _(force: pn.JointSpring, frames, t, scene):
     joint = scene.model.joints[scene.model.getJointId(force.joint)]
-    # An endless joint keeps (cos, sin) of its angle; springs of the tests turn less than half a turn.
+    # An unbounded joint stores (cos, sin) of its angle. Springs of the tests rotate by less than half a turn.
     angle = frames.q[joint.idx_q]
     if joint.nq == 2:
         angle = np.arctan2(frames.q[joint.idx_q + 1], angle)

@@ -1,15 +1,15 @@
-"""Loops of hinges with one freedom, though rows that close them would hold more joints than they have.
+"""Overconstrained loops of hinges with one degree of freedom.
 
-The linkages of Goldberg, Myard, Sarrus and Bricard, and planar four-bars, drawn by lot.  Hinge k is a line
-through a point along a unit vector at zero angles; it joins body k - 1 to body k, body 0 is the ground, and
-the last hinge leads back to it.  The loop moves by its one freedom: with the hinges' screws in world axes as
-columns of J, and t the unit vector with J t = 0,
+Random linkages of Goldberg, Myard, Sarrus and Bricard, and planar four-bars.  Hinge k is a line through a
+point along a unit vector at zero angles.  It joins body k - 1 to body k.  Body 0 is the ground, and the last
+hinge joins the last body to the ground.  The columns of J are the hinges' screws in world axes, and t is the
+unit vector with J t = 0:
 
     v = t s,   t' = -J^+ (J' t),   J'_k = [sum_{i<k} J_i t_i, J_k],
     m s' = f - n s^2,   m = sum of (mass c'.c' + w.I w),   n = sum of (mass c'.c'' + w.I w')
 
-over all bodies: c is the center of mass, w the angular velocity, I the inertia about c, f the generalized
-force on s, and a prime the derivative along t.  [Lynch and Park, Modern Robotics, 2017, 5 and 8.]
+The sums run over all bodies.  c is the center of mass, w the angular velocity, I the inertia about c, f the
+generalized force on s, and a prime the derivative along t.  [Lynch and Park, Modern Robotics, 2017, 5 and 8.]
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ import numpy as np
 import pinocchio as pin
 from scipy.integrate import solve_ivp
 
-# Singular values of J by the largest one: of a freedom, and least of the others.
+# Singular values of J relative to the largest: maximum for the degree of freedom, minimum for the others.
 ZERO, APART = 1e-9, 0.02
-# Rate at which a gap that rounding left is closed [1/s], and the accuracy of the motion.
+# Rate of stabilization of the closure gap [1/s], and settings of the integrator.
 CLOSING = 20.0
 TIGHT = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-11}
 
 
 def _turn(axis, angle):
-    """Matrix of a turn about a unit vector."""
+    """Return the rotation matrix of an angle about a unit vector."""
     K = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
 
@@ -36,19 +36,19 @@ def _unit(x):
 
 
 class HingeLoop:
-    """A loop of hinges, and bodies between them.
+    """Loop of hinges and bodies.
 
     Attributes:
-        points: of the hinges where all angles are zero, (n, 3) [m].
-        axes: unit vectors, (n, 3).
-        masses: of bodies 1 to n - 1 [kg].
-        centers: of mass where all angles are zero, (n - 1, 3) [m].
-        inertias: about the centers, (n - 1, 3, 3) [kg m^2].
-        gravity: (3,) [m/s^2].
+        points: points of the hinges at zero angles, (n, 3) [m].
+        axes: unit vectors of the hinges at zero angles, (n, 3).
+        masses: masses of bodies 1 to n - 1 [kg].
+        centers: centers of mass at zero angles, (n - 1, 3) [m].
+        inertias: inertias about the centers of mass, (n - 1, 3, 3) [kg m^2].
+        gravity: gravity, (3,) [m/s^2].
     """
 
     def __init__(self, points, axes, rng, end=None):
-        """Draws the bodies; the last one closes the loop in the pose `end`, by default the identity."""
+        """Sample the bodies; the loop closes at the placement `end`, by default the identity."""
         self.end = (np.eye(3), np.zeros(3)) if end is None else end
         self.points, self.axes = np.array(points), np.array([_unit(a) for a in axes])
         self.count = len(self.points)
@@ -62,7 +62,7 @@ class HingeLoop:
         self.gravity = 5.0 * rng.standard_normal(3)
 
     def scaled(self, length):
-        """The same loop in another unit of length: its angles move alike."""
+        """Return the same loop in another unit of length; its angles have the same motion."""
         other = object.__new__(HingeLoop)
         other.__dict__.update(self.__dict__)
         for name in ("points", "centers", "gravity", "length"):
@@ -71,7 +71,10 @@ class HingeLoop:
         return other
 
     def model(self):
-        """A model with joints "hinge 1" to "hinge n - 1", frames "tip" and "ground" at the last hinge."""
+        """Return a model with joints "hinge 1" to "hinge n - 1".
+
+        The frames "tip" and "ground" are at the last hinge.
+        """
         model, parent, last = pin.Model(), 0, np.zeros(3)
         model.gravity.linear = self.gravity
         for k in range(self.count - 1):
@@ -85,7 +88,7 @@ class HingeLoop:
         return model
 
     def poses(self, q):
-        """Rotation and translation of every body after its hinge, (n, 3, 3) and (n, 3)."""
+        """Return rotation and translation of every body after its hinge, (n, 3, 3) and (n, 3)."""
         rotations, places = [], []
         R, x = np.eye(3), np.zeros(3)
         for point, axis, angle in zip(self.points, self.axes, q, strict=True):
@@ -97,7 +100,7 @@ class HingeLoop:
         return np.array(rotations), np.array(places)
 
     def lines(self, q):
-        """Points and axes of the hinges."""
+        """Return points and axes of the hinges at q, in world axes."""
         rotations, places = self.poses(q)
         before = np.concatenate([np.eye(3)[None], rotations[:-1]])
         moved = np.concatenate([np.zeros((1, 3)), places[:-1]])
@@ -105,12 +108,12 @@ class HingeLoop:
         return points, np.einsum("kij,kj->ki", before, self.axes)
 
     def screws(self, q):
-        """Angular velocity of each hinge and velocity of the point at the origin, in world axes, (6, n)."""
+        """Return the twists of the hinges at the world origin (angular, linear), in world axes, (6, n)."""
         points, axes = self.lines(q)
         return np.concatenate([axes, np.cross(points, axes)], axis=1).T
 
     def gap(self, q):
-        """Gap of the last body from the ground: rotation vector, and translation over the length, (6,)."""
+        """Return the closure gap (6,): rotation vector, and translation over the length."""
         R, x = (poses[-1] for poses in self.poses(q))
         return np.concatenate([pin.log3(R @ self.end[0]), (R @ self.end[1] + x) / self.length])
 
@@ -118,12 +121,12 @@ class HingeLoop:
         return columns / np.array([1.0, 1.0, 1.0, *[self.length] * 3])[:, None]
 
     def margin(self, q):
-        """Second smallest singular value of the screws by the largest: 0 where there is a second freedom."""
+        """Return the second smallest singular value of the screws over the largest; 0 at a second freedom."""
         sizes = np.linalg.svd(self._scale(self.screws(q)), compute_uv=False)
         return sizes[self.count - 2] / sizes[0]
 
     def close(self, q, steps=100):
-        """Angles near q at which the loop is closed after this many steps of Newton, or None."""
+        """Return angles near q that close the loop after at most `steps` Newton steps, or None."""
         for _ in range(steps):
             gap = self.gap(q)
             if np.abs(gap).max() < 1e-14:
@@ -133,7 +136,7 @@ class HingeLoop:
         return q if np.abs(self.gap(q)).max() < 1e-12 else None
 
     def along(self, q):
-        """t, t', c', c'', w, w' and rotation of each moving body, and the step that closes the gap."""
+        """Return t, t', c', c'', w, w' and rotation of each moving body, and the step that closes the gap."""
         n, (R, x), points, axes = self.count, self.poses(q), *self.lines(q)
         J = np.concatenate([axes, np.cross(points, axes)], axis=1).T
         U, sizes, Vt = np.linalg.svd(self._scale(J))
@@ -159,11 +162,11 @@ class HingeLoop:
         return t, dt, dc, ddc, w, dw, R[:-1], -solved(self.gap(q))
 
     def acceleration(self, q, v, damping=0.0):
-        """Accelerations of the hinges, (n,); damping acts on all hinges but the last [N m s]."""
+        """Return accelerations of the hinges, (n,); damping acts on all hinges but the last [N m s]."""
         return self._rates(q, v, damping)[1]
 
     def _rates(self, q, v, damping):
-        """The part of v along t, the acceleration, and the angles that close the gap."""
+        """Return the component of v along t, the acceleration, and the step that closes the gap."""
         t, dt, dc, ddc, w, dw, R, closing = self.along(q)
         speed = t @ v
         momentum = np.einsum("kij,kj->ki", R @ self.inertias @ R.transpose(0, 2, 1), w)
@@ -173,12 +176,12 @@ class HingeLoop:
         return t * speed, t * (f - n * speed**2) / m + dt * speed**2, closing
 
     def velocity(self, q, speed):
-        """Velocities of the hinges, (n,), the largest at this speed."""
+        """Return velocities of the hinges, (n,), scaled to the maximum `speed`."""
         t = self.along(q)[0]
         return t * speed / np.abs(t).max()
 
     def motion(self, q, v, times, damping=0.0):
-        """q and v at each time from 0 under weight and damping, (len(times), n) each; q is closed."""
+        """Return q and v at each time under gravity and damping, (len(times), n) each; starts at time 0."""
         n = self.count
 
         def rate(_, y):
@@ -189,9 +192,9 @@ class HingeLoop:
         return found[:, :n], found[:, n:]
 
     def driven(self, q, drive, times):
-        """q and v at each time where the first hinge moves as drive(t) tells, (angle, rate).
+        """Return q and v at each time for a first hinge that is driven by drive(t) -> (angle, rate).
 
-        None where it does not come that far: where its rate by that of the freedom is zero.
+        Returns None if the integration fails, for example where t[0], the rate of the first hinge, is zero.
         """
 
         def rate(time, y):
@@ -207,7 +210,7 @@ class HingeLoop:
 
 
 def _of_lengths(lengths, twists, rng):
-    """The loop of these lengths and twists of its links in a pose found by lot: points and axes, or None.
+    """Return points and axes of a loop of links with these lengths and twists, at a random pose, or None.
 
     [Denavit and Hartenberg, A kinematic notation for lower-pair mechanisms, 1955.]
     """
@@ -223,7 +226,10 @@ def _of_lengths(lengths, twists, rng):
 
 
 def goldberg(rng):
-    """Two Bennett linkages of which a link in common is left out. [Goldberg, New five-bar linkages, 1943.]"""
+    """Goldberg linkage: two Bennett linkages without their common link.
+
+    [Goldberg, New five-bar linkages, 1943.]
+    """
     twists = rng.uniform(0.3, 2.6, 3)
     a, b, c = rng.uniform(0.3, 0.8) * np.sin(twists)
     alpha, beta, gamma = twists
@@ -231,7 +237,7 @@ def goldberg(rng):
 
 
 def myard(rng):
-    """Two Bennett linkages that mirror each other.
+    """Myard linkage: two mirrored Bennett linkages.
 
     [Myard, Contribution à la géométrie des systèmes articulés, 1931.]
     """
@@ -241,20 +247,23 @@ def myard(rng):
 
 
 def sarrus(rng):
-    """Three parallel hinges, and three others that are parallel: the plate between them moves straight."""
+    """Sarrus linkage: two groups of three parallel hinges, which guide a plate along a straight line."""
     first, second = _unit(rng.standard_normal(3)), _unit(rng.standard_normal(3))
     return rng.uniform(-0.5, 0.5, (6, 3)), [first] * 3 + [second] * 3
 
 
 def line_symmetric(rng):
-    """Three hinges and their images under half a turn. [Bricard, Leçons de cinématique, 1927.]"""
+    """Line-symmetric linkage: three hinges and their images under half a turn.
+
+    [Bricard, Leçons de cinématique, 1927.]
+    """
     points, axes = rng.uniform(-0.5, 0.5, (3, 3)), rng.standard_normal((3, 3))
     half = np.diag([-1.0, -1.0, 1.0])
     return np.concatenate([points, points @ half]), np.concatenate([axes, axes @ half])
 
 
 def plane_symmetric(rng):
-    """Two hinges in a plane, and two pairs that mirror each other in it. [Bricard, 1927.]"""
+    """Plane-symmetric linkage: two hinges in a plane, and two pairs mirrored in it. [Bricard, 1927.]"""
     points, axes = rng.uniform(-0.5, 0.5, (4, 3)), rng.standard_normal((4, 3))
     mirror = np.diag([1.0, 1.0, -1.0])
     for k in (0, 3):
@@ -263,7 +272,10 @@ def plane_symmetric(rng):
 
 
 def trihedral(rng):
-    """Twists of right angles in turn to both sides, squares of lengths of equal sums. [Bricard, 1927.]"""
+    """Trihedral linkage: twists alternate between +-90 degrees. [Bricard, 1927.]
+
+    The squared lengths of links 1, 3, 5 and of links 2, 4, 6 have equal sums.
+    """
     while True:
         lengths = rng.uniform(0.2, 0.8, 6)
         last = lengths[0] ** 2 + lengths[2] ** 2 + lengths[4] ** 2 - lengths[1] ** 2 - lengths[3] ** 2
@@ -274,7 +286,7 @@ def trihedral(rng):
 
 
 def planar(rng):
-    """A four-bar in a plane."""
+    """Planar four-bar."""
     points, axis = rng.uniform(-0.5, 0.5, (4, 2)), _unit(rng.standard_normal(3))
     plane = np.linalg.svd(axis[None])[2][1:]
     return points @ plane, [axis] * 4
@@ -284,7 +296,7 @@ FAMILIES = (goldberg, myard, sarrus, line_symmetric, plane_symmetric, trihedral,
 
 
 def drawn(family, seed):
-    """A loop of a family that has one freedom where it is assembled."""
+    """Return a random loop of a family that has one degree of freedom at its assembly."""
     rng = np.random.default_rng([FAMILIES.index(family), seed])
     while True:
         lines = family(rng)

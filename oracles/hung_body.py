@@ -1,8 +1,8 @@
-"""A body on a rough ball pivot that swings until friction holds it, by equations of motion of its own.
+"""Body that swings on a ball pivot with friction until it comes to rest, by separate equations of motion.
 
-The friction torque of the pivot is -s w / |w| with s = constant + rub |f|, where f is the force of the pivot.
-SciPy's explicit Runge-Kutta method of order 8 integrates the angular velocity w down to a speed below the
-resolution of any sample; the last stretch is a straight line.
+The friction torque of the pivot is -s w / |w| with s = constant + rub |f|.  f is the force of the pivot.
+SciPy's explicit Runge-Kutta method of order 8 integrates the angular velocity w to a speed below the
+resolution of the samples.  The last phase is extrapolated linearly.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 SETTINGS = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14}
-LEAST = 1e-7  # part of the speed at the start, at which the straight line begins
+LEAST = 1e-7  # speed at which linear extrapolation begins, relative to the initial speed
 
 
 @dataclass
 class HungBody:
-    """A body on a rough ball pivot.
+    """Body on a ball pivot with friction.
 
     Attributes:
-        mass: of the body [kg].
-        center: of mass, from the pivot in body axes [m].
-        inertia: about the center of mass, in body axes [kg m^2].
-        gravity: in world axes [m/s^2].
-        constant: part of the friction torque that no load changes [N m].
-        rub: friction torque over the force of the pivot [m].
+        mass: mass of the body [kg].
+        center: center of mass from the pivot, in body axes [m].
+        inertia: inertia about the center of mass, in body axes [kg m^2].
+        gravity: gravity in world axes [m/s^2].
+        constant: load-independent part of the friction torque [N m].
+        rub: load-dependent friction torque over the force of the pivot [m].
     """
 
     mass: float
@@ -38,7 +38,7 @@ class HungBody:
     rub: float
 
     def acceleration(self, turn: Rotation, w: np.ndarray) -> np.ndarray:
-        """Angular acceleration in body axes [rad/s^2]."""
+        """Return the angular acceleration in body axes [rad/s^2]."""
         c, weight = self.center, turn.inv().apply(self.gravity)
         about_pivot = self.inertia + self.mass * (c @ c * np.eye(3) - np.outer(c, c))
         moment = self.mass * np.cross(c, weight) - np.cross(w, about_pivot @ w)
@@ -53,13 +53,13 @@ class HungBody:
         return free + s * slowing
 
     def rate(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Derivatives of the quaternion (x, y, z, w) and the angular velocity."""
+        """Return the derivatives of the quaternion (x, y, z, w) and of the angular velocity."""
         (x, b, z, r), w = y[:4], y[4:]
         turns = np.array([[r, -z, b], [z, r, -x], [-b, x, r], [-x, -b, -z]])
         return np.concatenate([0.5 * turns @ w, self.acceleration(Rotation.from_quat(y[:4]), w)])
 
     def rest(self, y: np.ndarray, duration: float) -> float | None:
-        """The time at which it comes to rest, or None within the duration."""
+        """Return the time at which the body comes to rest, or None if it moves until the end."""
         least = LEAST * np.linalg.norm(y[4:])
 
         def slow(t, y):
@@ -73,7 +73,7 @@ class HungBody:
         return run.t[-1] - w @ w / (w @ a)
 
     def states(self, y: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """At increasing times before the rest, each reached by a step of its own, (k, 7)."""
+        """Return the states at increasing times before rest, (k, 7); restarts the integrator each time."""
         found, t = [], 0.0
         for later in times:
             y = solve_ivp(self.rate, (t, later), y, **SETTINGS).y[:, -1]

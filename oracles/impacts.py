@@ -1,4 +1,4 @@
-"""Impacts of planar contacts by looking through all modes, with friction: Newton's law and Poisson's."""
+"""Impacts of planar contacts with friction by enumeration of all modes: Newton's and Poisson's laws."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ import itertools
 
 import numpy as np
 
-# Velocities and impulses of this part of the largest may have either sign.
+# Velocities and impulses below this size, relative to the largest, may have either sign.
 EDGE = 1e-9
 
 
 def percussions(W, u, mu, given):
-    """Impulses (normal, tangent a contact) on top of `given` normal ones, whose friction they hold as well.
+    """Return all impulses P (normal, tangential of each contact) in addition to `given` normal impulses.
 
-    Returns all solutions of 0 <= P_n, u_n+ >= 0 complementary, |P_t| <= mu (given + P_n) against the slip.
+    P solves 0 <= P_n complementary to u_n+ >= 0, with |P_t| <= mu (given + P_n) against the slip.
     """
     count = len(mu)
     normals, tangents = np.arange(0, 2 * count, 2), np.arange(1, 2 * count, 2)
     start = u + W[:, normals] @ given
     found = []
     for modes in itertools.product(itertools.product((False, True), (0, -1, 1)), repeat=count):
-        # Unknowns P; each contact gives two equations.
+        # Unknowns P, two equations for each contact.
         A, b = np.zeros((2 * count, 2 * count)), np.zeros(2 * count)
         for k, (closed, slip) in enumerate(modes):
             n, t = normals[k], tangents[k]
@@ -47,7 +47,7 @@ def percussions(W, u, mu, given):
 
 
 def velocities_after(W, u, mu, e, law):
-    """All that the law allows for the contacts' velocities after, (n, 2 contacts)."""
+    """Return all contact velocities after the impact that the law admits, (n, 2 contacts)."""
     count = len(mu)
     none, normals = np.zeros(count), np.arange(0, 2 * count, 2)
     if law == "newton":

@@ -1,7 +1,7 @@
-"""Trees in long double: accelerations by the articulated-body recursion in each body's own axes.
+"""Accelerations of trees in long double, by the articulated-body recursion in body axes.
 
-The recursion is Featherstone's, with 6 x 6 matrices and the products of velocity where they arise; nothing of
-it is shared with the core, whose sweeps run in world axes on the bias forces of the whole motion.
+The recursion is Featherstone's, with 6 x 6 matrices and velocity products at each body.  It shares no code
+with the core, which works in world axes and on the bias forces of the whole motion.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ def _unit(x: Long) -> Long:
 
 
 def _of_quaternion(x: Long) -> Long:
-    x = _unit(x)  # double precision gives it its length to 1e-16 only
+    x = _unit(x)  # in double precision its length is 1 only to 1e-16
     K = _skew(x[:3])
     return _long(np.eye(3)) + 2 * x[3] * K + 2 * K @ K
 
 
 def _motion_matrix(R: Long, p: Long) -> Long:
-    """Takes a motion (linear, angular) of the parent into the axes of a body at (R, p)."""
+    """Return the matrix that transforms a twist (linear, angular) of the parent to a body at (R, p)."""
     X = np.zeros((6, 6), dtype=np.longdouble)
     X[:3, :3] = X[3:, 3:] = R.T
     X[:3, 3:] = -R.T @ _skew(p)
@@ -75,10 +75,10 @@ class _Link:
 
 
 class LongTree:
-    """The tree of a Pinocchio model, whose composites are joints in a row with bodies of no mass between.
+    """Tree of a Pinocchio model; composite joints become chains of joints with massless bodies.
 
     Args:
-        model: pinocchio.Model; only its numbers are read.
+        model: pinocchio.Model, used for its parameters only.
     """
 
     def __init__(self, model: Any) -> None:
@@ -121,7 +121,7 @@ class LongTree:
 
     @staticmethod
     def _moved(link: _Link, q: Long) -> tuple[Long, Long]:
-        """Placement of a joint's moving frame."""
+        """Return rotation and translation of a joint's moving frame."""
         x, one, none = q[link.iq :], _long(np.eye(3)), _long(np.zeros(3))
         if link.kind == "pose":
             return _of_quaternion(x[3:7]), x[:3]
@@ -138,13 +138,13 @@ class LongTree:
         return _turned(ang, np.cos(angle), np.sin(angle)), lin * x[0]
 
     def acceleration(self, q: Any, v: Any, tau: Any, gravity: bool = True) -> Long:
-        """Acceleration without constraints.
+        """Return the acceleration without constraints.
 
         Args:
             q: configuration.
             v: velocity.
             tau: joint torques.
-            gravity: whether it acts.
+            gravity: whether gravity acts.
         """
         q, v, tau = _long(q), _long(v), _long(tau)
         n, armature, found = len(self.links), _long(self.model.armature), _long(np.zeros(self.model.nv))
@@ -160,9 +160,7 @@ class LongTree:
             P[i] = link.inertia.copy()
             p[i] = -turning.T @ (link.inertia @ velocity[i])
         U, D, u = ([None] * self.model.nv for _ in range(3))
-        for i in reversed(
-            range(n)
-        ):  # each dof by itself: blocks of several lose digits where bodies are light
+        for i in reversed(range(n)):  # one dof at a time: blocks lose digits if bodies are light
             link = self.links[i]
             for k in reversed(range(link.S.shape[1])):
                 dof, s = link.iv + k, link.S[:, k]
@@ -184,7 +182,7 @@ class LongTree:
         return found
 
     def constrained(self, q: Any, v: Any, tau: Any, A: Any, b: Any) -> Long:
-        """Acceleration under A a = b, of independent rows."""
+        """Return the acceleration under A a = b with independent rows."""
         A, free = _long(A), self.acceleration(q, v, tau)
         still = np.zeros(self.model.nv)
         response = np.array([self.acceleration(q, still, row, gravity=False) for row in A]).T
@@ -192,7 +190,7 @@ class LongTree:
 
 
 def _solver(S: Long) -> Any:
-    """Solution with a small matrix, by elimination with pivots."""
+    """Return a solver for a small matrix: x -> S^-1 x, by Gauss-Jordan elimination with pivoting."""
     inverse, n = np.hstack([S, _long(np.eye(len(S)))]), len(S)
     for k in range(n):
         best = k + int(np.argmax(np.abs(inverse[k:, k])))

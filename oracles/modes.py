@@ -1,4 +1,4 @@
-"""Modes of friction by trying them all: each element sticks (0) or slips forward (1) or backward (-1)."""
+"""Enumeration of stick-slip modes: each element sticks (0), slips forward (1) or slips backward (-1)."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-# Part of the forces or accelerations in play by which a condition may be missed by rounding.
+# Violation of a condition that counts as rounding, relative to the limits or to the accelerations.
 SLACK = 1e-9
-# Condition of W beyond which the forces of sticking elements are not told apart.
+# Condition number of W beyond which the forces of sticking elements are not unique.
 SHARED = 1e10
 
 
 def combinations(velocities: Iterable[float], at_rest: float = 0.0) -> Iterator[tuple[int, ...]]:
-    """Modes by velocity where there is one, all three where there is none.
+    """Return all combinations of modes: the sign of a nonzero slip velocity, all three modes at rest.
 
     Args:
         velocities: slip velocity of each element.
-        at_rest: largest velocity that counts as none.
+        at_rest: largest speed that counts as rest.
     """
     return itertools.product(*((0, 1, -1) if abs(u) <= at_rest else (int(np.sign(u)),) for u in velocities))
 
 
 def enumerate_modes(W, alpha0, limits):
-    """All combinations that keep every condition: (modes, f, alpha) of each."""
+    """Return (modes, f, alpha) of each combination that meets all conditions."""
     n = len(limits)
     size = np.abs(alpha0).max() + (np.abs(W) @ limits).max()
     found = []
@@ -37,7 +37,7 @@ def enumerate_modes(W, alpha0, limits):
         if len(S):
             WS = W[np.ix_(S, S)]
             if np.linalg.cond(WS) > SHARED:
-                continue  # another combination with fewer stuck elements gives the same motion
+                continue  # another combination with fewer sticking elements has the same motion
             f[S] = -np.linalg.solve(WS, alpha0[S, None] + W[np.ix_(S, B)] @ f[B])
         alpha = alpha0[:, None] + W @ f
         keeps = (np.abs(f) <= limits[:, None] * (1.0 + SLACK)).all(axis=0)

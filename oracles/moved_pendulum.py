@@ -1,7 +1,8 @@
-"""A pendulum under a cart that moves as prescribed: integrated by SciPy between the breaks of the motion.
+"""Pendulum on a cart with prescribed motion, integrated by SciPy between the breaks of the motion.
 
-With the angle from the vertical, the length L to the center of mass and the inertia J about the pivot,
-J angle'' = m L (x'' cos(angle) - g sin(angle)); where x' jumps by d, angle' jumps by m L cos(angle) d / J.
+The angle is measured from the vertical, L is the length to the center of mass and J the inertia about the
+pivot: J angle'' = m L (x'' cos(angle) - g sin(angle)).  If x' jumps by d, angle' jumps by
+m L cos(angle) d / J.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ CART_MASS = 2.0
 
 @dataclass
 class Pendulum:
-    """Length [m], mass [kg] and central inertia [kg m^2]."""
+    """Pendulum with length [m], mass [kg] and central inertia [kg m^2]."""
 
     length: float
     mass: float
@@ -38,7 +39,7 @@ class Pendulum:
         return model
 
     def motion(self, function: Callable, breaks, start, duration):
-        """(angle, rate) at the end, and the work that the jumps of the cart's rate have done."""
+        """Return (angle, rate) at the end, and the work done at the jumps of the cart's velocity."""
         lever = self.mass * self.length
         J = lever * self.length + self.inertia
         state, begin, work = np.array(start, float), 0.0, 0.0
@@ -60,7 +61,7 @@ class Pendulum:
         return state, work
 
     def kinetic(self, speed, state):
-        """Kinetic energy of cart and pendulum [J]."""
+        """Return the kinetic energy of cart and pendulum [J]."""
         angle, rate = state
         lever = self.mass * self.length
         J = lever * self.length + self.inertia

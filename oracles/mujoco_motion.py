@@ -1,7 +1,7 @@
-"""MuJoCo's own M, bias, forces and accelerations at a state, for scenes that were loaded from MJCF.
+"""MuJoCo's M, bias, forces and accelerations at a state, for scenes loaded from MJCF.
 
-Contacts and limits are switched off, dry friction is that of sliding, and equalities hold exactly: a dense
-KKT system of MuJoCo's own Jacobians.  What MuJoCo knows only in its velocities is turned into Pinocchio's.
+Contacts and limits are disabled, dry friction is sliding friction, and equalities hold exactly, by a dense
+KKT system of MuJoCo's Jacobians.  The results are transformed to Pinocchio's velocity coordinates.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import numpy as np
 OFF = mujoco.mjtDisableBit
 CONNECT, WELD, JOINT, TENDON = range(
     4
-)  # of MuJoCo's mjtEq; those after are of flexes, which no scene carries
-RANK = 1e-6  # rows and singular values below this part of the largest are none: frames are rounded to 1e-8
+)  # values of MuJoCo's mjtEq; later values are of flexes, which no scene has
+RANK = 1e-6  # rows and singular values below this relative size are zero: frames are rounded to 1e-8
 
 
 class Instant(NamedTuple):
-    """MuJoCo's terms in Pinocchio's velocities.
+    """MuJoCo's terms in Pinocchio's velocity coordinates.
 
     Attributes:
         q: configuration, (nq,).
@@ -27,8 +27,8 @@ class Instant(NamedTuple):
         M: mass matrix, (nv, nv).
         bias: Coriolis and gravity forces, (nv,).
         passive: springs, dampers, gravity compensation, fluid, (nv,).
-        actuator: forces of actuators, (nv,).
-        a: acceleration under all of them, sliding friction and exact equalities, (nv,).
+        actuator: actuator forces, (nv,).
+        a: acceleration under all forces, sliding friction and exact equalities, (nv,).
     """
 
     q: np.ndarray
@@ -41,7 +41,7 @@ class Instant(NamedTuple):
 
 
 def free_rotations(model, qpos):
-    """Block matrix T of qvel = T v, and the quaternion's rotation of each free joint by its first dof."""
+    """Return T of qvel = T v, and the rotation matrix of each free joint, keyed by its first dof."""
     T, turns = np.eye(model.nv), {}
     for j in np.flatnonzero(model.jnt_type == 0):
         at, dof = model.jnt_qposadr[j], model.jnt_dofadr[j]
@@ -60,7 +60,7 @@ def pinocchio_q(model, qpos):
 
 
 def mujoco_state(model, q, v):
-    """MuJoCo's qpos and qvel of Pinocchio's q and v."""
+    """Return MuJoCo's qpos and qvel for Pinocchio's q and v."""
     qpos = np.array(q)
     for j in np.flatnonzero(model.jnt_type <= 1):
         at = model.jnt_qposadr[j] + (3 if model.jnt_type[j] == 0 else 0)
@@ -69,21 +69,21 @@ def mujoco_state(model, q, v):
 
 
 def random_state(model, rng, spread=1.0):
-    """A random qpos around the reference, and a random qvel."""
+    """Return a random qpos around the reference, and a random qvel."""
     qpos = np.array(model.qpos0)
     mujoco.mj_integratePos(model, qpos, spread * rng.uniform(-1.0, 1.0, model.nv), 1.0)
     return qpos, rng.uniform(-1.0, 1.0, model.nv)
 
 
 def instant(model, qpos, qvel, ctrl=None, act=None, *, actuation=True):
-    """Everything at one state.
+    """Return MuJoCo's terms at one state.
 
     Args:
-        model: mujoco.MjModel; its flags are changed for the call.
+        model: mujoco.MjModel; its flags are changed during the call.
         qpos: MuJoCo's configuration.
         qvel: MuJoCo's velocity.
-        ctrl: controls; zero when None.
-        act: activations; zero when None.
+        ctrl: controls; None for zero.
+        act: activations; None for zero.
         actuation: whether actuators act.
     """
     flags = model.opt.disableflags
@@ -120,17 +120,17 @@ def _terms(model, data, flags):
     v = T.T @ data.qvel  # T is orthogonal
     armature = np.diag(model.dof_armature)
     a, bias = T.T @ acc, np.array(data.qfrc_bias)
-    for dof in turns:  # the axes of v turn with the body
+    for dof in turns:  # the axes of v rotate with the body
         spin = np.cross(v[dof + 3 : dof + 6], v[dof : dof + 3])
         a[dof : dof + 3] -= spin
-        rigid = M[:, dof : dof + 3] - armature[:, dof : dof + 3]  # which has no Coriolis force in MuJoCo
+        rigid = M[:, dof : dof + 3] - armature[:, dof : dof + 3]  # armature has no Coriolis force in MuJoCo
         bias += rigid @ (turns[dof] @ spin)
     forces = (T.T @ f for f in (bias, data.qfrc_passive, data.qfrc_actuator))
     return Instant(pinocchio_q(model, data.qpos), v, T.T @ M @ T, *forces, a)
 
 
 def kkt(M, force, A, b):
-    """Acceleration of M a = force + A^T lam, A a = b, of least Gauss deviation; rows may be redundant."""
+    """Return a of M a = force + A^T lam, A a = b, by Gauss's principle; rows may be redundant."""
     L = np.linalg.cholesky(M)
     free = np.linalg.solve(M, force)
     if len(b) == 0:
@@ -138,7 +138,7 @@ def kkt(M, force, A, b):
     B = np.linalg.solve(L, A.T).T
     scale = np.linalg.norm(B, axis=1)
     length = np.linalg.norm(A, axis=1)
-    scale[length < RANK * length.max(initial=0.0)] = np.inf  # rows that vanish: of a plane loop
+    scale[length < RANK * length.max(initial=0.0)] = np.inf  # zero rows of planar loops
     x = np.linalg.pinv(B / scale[:, None], rcond=RANK) @ ((b - A @ free) / scale)
     return free + np.linalg.solve(L.T, x)
 
@@ -151,11 +151,11 @@ def tendon_row(model, data, i):
 
 
 def equality_rows(model, data, flags):
-    """Rows of MuJoCo's active equalities, and the acceleration they ask for: minus the rows' rate times v."""
+    """Return the rows A of MuJoCo's active equalities, and b = -(dA/dt) v of A a = b."""
     if flags & (int(OFF.mjDSBL_EQUALITY) | int(OFF.mjDSBL_CONSTRAINT)) or model.neq == 0:
         return np.zeros((0, model.nv)), np.zeros(0)
     rows = _rows_at(model, data.qpos)
-    step = 1e-5  # of a central difference of fourth order, in time [s]
+    step = 1e-5  # step of a fourth-order central difference in time [s]
     rates = [_rows_at(model, _moved(model, data, h * step)) @ data.qvel for h in (-2, -1, 1, 2)]
     rate = (rates[0] - 8 * rates[1] + 8 * rates[2] - rates[3]) / (12 * step)
     return rows, -rate
@@ -200,9 +200,9 @@ def _equality(model, data, i):
 
 
 def _anchor_rows(model, data, kind, one, two, numbers, objtype):
-    """Differences of the velocities of the points, and of the bodies' spins, in world axes.
+    """Return rows of the relative velocity of the points and, for a weld, of the relative angular velocity.
 
-    On the manifold they span what any exact statement of the anchor spans.
+    The rows are in world axes.  On the manifold they span the same space as any exact form of the anchor.
     """
     if objtype == mujoco.mjtObj.mjOBJ_SITE:
         bodies = [model.site_bodyid[s] for s in (one, two)]
@@ -217,5 +217,5 @@ def _anchor_rows(model, data, kind, one, two, numbers, objtype):
         mujoco.mj_jac(model, data, jp, jr, point, body)
         jacobians.append((jp, jr))
     place = jacobians[0][0] - jacobians[1][0]
-    turns = kind == WELD and numbers[10] != 0.0  # the scale of its torques
+    turns = kind == WELD and numbers[10] != 0.0  # torque scale
     return place if not turns else np.vstack([place, jacobians[0][1] - jacobians[1][1]])

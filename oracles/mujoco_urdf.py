@@ -1,4 +1,4 @@
-"""MuJoCo's own reading of a URDF text: mass matrix and gravity forces in Pinocchio's velocities."""
+"""Mass matrix and gravity forces of a URDF text by MuJoCo, in Pinocchio's velocity coordinates."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-GRAVITY = (0.3, -0.7, -9.0)  # along no axis of a robot
-SLIDES, TURN = ("_TX", "_TY"), "_RZ"  # ends of MuJoCo's names of the parts of a planar joint
+GRAVITY = (0.3, -0.7, -9.0)  # not parallel to an axis of a robot
+SLIDES, TURN = ("_TX", "_TY"), "_RZ"  # suffixes of MuJoCo's joints of a planar joint
 
 
 def compiled(text):
-    """MuJoCo's model of a URDF text, shapes and mimic tags left out.
+    """Compile MuJoCo's model of a URDF text without its shapes and mimic tags.
 
     Args:
-        text: with unique joint names and inertias that bodies can have.
+        text: URDF text with unique joint names and physically valid inertias.
     """
     root = ElementTree.fromstring(text)
     for parent, tags in (("link", ("visual", "collision")), ("joint", ("mimic",))):
@@ -24,7 +24,7 @@ def compiled(text):
             for child in [c for c in element if c.tag in tags]:
                 element.remove(child)
     for origin in root.iter("origin"):
-        if "quat_xyzw" in origin.attrib:  # which MuJoCo does not read
+        if "quat_xyzw" in origin.attrib:  # not supported by MuJoCo
             quaternion = [float(x) for x in origin.attrib.pop("quat_xyzw").split()]
             origin.set("rpy", " ".join(map(repr, Rotation.from_quat(quaternion).as_euler("xyz").tolist())))
     extension = ElementTree.SubElement(root, "mujoco")
@@ -35,15 +35,15 @@ def compiled(text):
 
 
 def terms(model, names, positions):
-    """Mass matrix and gravity forces at a configuration.
+    """Return mass matrix and gravity forces at a configuration.
 
     Args:
-        model: from `compiled`.
-        names: of the joints, in the order that is asked for.
-        positions: by joint name: a number, or x, y and angle of a planar joint.
+        model: model from `compiled`.
+        names: joint names in the order of the result.
+        positions: by joint name, a number, or x, y and angle of a planar joint.
 
     Returns:
-        M, (nv, nv), and the gravity forces, (nv,); velocities of planar joints are in the axes of the body.
+        M, (nv, nv), and the gravity forces, (nv,); velocities of planar joints are in body axes.
     """
     data, order, turns = mujoco.MjData(model), [], []
     for name in names:

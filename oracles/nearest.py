@@ -1,7 +1,7 @@
-"""The consistent configuration nearest to a given one, by SciPy's general optimizers from many starts.
+"""Nearest consistent configuration, by SciPy's general optimizers from many starts.
 
-min d^T M(q) d over residual(q + d) = 0, in coordinates in which the metric is the identity; SLSQP takes its
-derivatives by differences and knows nothing of the package.
+The problem is min d^T M(q) d subject to residual(q + d) = 0, in coordinates in which the metric is the
+identity.  SLSQP computes the derivatives of the residual by finite differences.
 """
 
 from __future__ import annotations
@@ -12,27 +12,27 @@ from scipy.optimize import least_squares, minimize
 
 from .given import mass_matrix
 
-CLOSED = 1e-8  # part of the residuals' size at which a configuration counts as closed
+CLOSED = 1e-8  # residual of a closed configuration, relative to `size`
 
 
 def distance(model, q, other):
-    """Length of the move from q to another configuration, in the metric of M(q)."""
+    """Return the distance from q to another configuration, in the metric of M(q)."""
     d = pin.difference(model, q, other)
     return float(np.sqrt(d @ mass_matrix(model, q) @ d))
 
 
 def nearest_by_search(model, q, residual, size=1.0, starts=8, spread=0.5, unit=1.0, seed=0):
-    """The least distance at which any start ends on the constraints, and the configuration there.
+    """Return the smallest distance to the constraints over all starts, and the configuration.
 
     Args:
         model: pinocchio.Model.
-        q: where from, (nq,).
+        q: initial configuration, (nq,).
         residual: q -> phi, (m,).
-        size: of a large residual.
-        starts: q itself, and random moves from it.
-        spread: of those [units].
-        unit: a long move of each coordinate, a number or (nv,).
-        seed: of the random moves.
+        size: scale of the residual.
+        starts: number of starts: q and random perturbations of q.
+        spread: standard deviation of the perturbations [units].
+        unit: scale of each coordinate, a number or (nv,).
+        seed: seed of the perturbations.
     """
     rng = np.random.default_rng(seed)
     scale = np.linalg.inv(np.linalg.cholesky(mass_matrix(model, q)).T)  # d = scale x
@@ -61,17 +61,17 @@ def nearest_by_search(model, q, residual, size=1.0, starts=8, spread=0.5, unit=1
 
 
 def nearest_outside(model, q, residual, gaps, size):
-    """The least distance from q to where residuals are zero and no gap is negative, from q alone.
+    """Return the smallest distance from q to a configuration without residual or penetration, from one start.
 
     Args:
         model: pinocchio.Model.
-        q: where from, (nq,).
+        q: initial configuration, (nq,).
         residual: q -> phi, (m,), m may be zero.
         gaps: q -> gap, (k,).
-        size: of a large gap: the depth at q.
+        size: scale of the gaps: the penetration at q.
 
     Returns:
-        The distance, and by how much of the size the place there misses.
+        The distance, and the largest violation of the conditions there, relative to `size`.
     """
     scale = size * np.linalg.inv(np.linalg.cholesky(mass_matrix(model, q)).T)  # d = scale x
 

@@ -1,8 +1,8 @@
-"""Dry friction with a limit for each way of slip, by SciPy between events and by enumeration of modes there.
+"""Dry friction with a limit for each direction of slip: SciPy between events, enumeration of modes at events.
 
-M a = F(t, q, v) + D^T f with a constant M and constant directions D: f_i = -forward_i while D_i v > 0,
-f_i = backward_i while D_i v < 0, and D_i a = 0 with -ratio_i forward_i <= f_i <= ratio_i backward_i while it
-sticks.
+M a = F(t, q, v) + D^T f with a constant M and constant directions D.  f_i = -forward_i while D_i v > 0, and
+f_i = backward_i while D_i v < 0.  A sticking element has D_i a = 0 and
+-ratio_i forward_i <= f_i <= ratio_i backward_i.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 TIGHT = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
-SLACK = 1e-9  # by which rounding may miss a condition
+SLACK = 1e-9  # violation that counts as rounding, relative to 1 + the largest force
 
 
 class OneWayFriction:
-    """A system of such elements.
+    """System with direction-dependent friction elements.
 
     Args:
         M: mass matrix, (n, n).
         force: (t, q, v) -> F, (n,).
         D: directions, (m, n).
-        forward: limits against slip along the directions, (m,).
-        backward: limits against slip the other way, (m,).
+        forward: friction limits for slip along the directions, (m,).
+        backward: friction limits for slip against the directions, (m,).
         ratio: static over kinetic friction, (m,).
     """
 
@@ -33,7 +33,7 @@ class OneWayFriction:
         self.forward, self.backward, self.ratio = map(np.asarray, (forward, backward, ratio))
 
     def solve(self, t, q, v, modes):
-        """Acceleration and friction forces in modes of +1, -1 and 0."""
+        """Return acceleration and friction forces for modes +1, -1 (slipping) and 0 (sticking)."""
         n, stuck = len(self.M), [i for i, mode in enumerate(modes) if mode == 0]
         f = np.where(np.array(modes) > 0, -self.forward, self.backward)
         f[stuck] = 0.0
@@ -45,11 +45,11 @@ class OneWayFriction:
         return x[:n], f
 
     def margin(self, f):
-        """By how much each force is inside its static limits."""
+        """Return the distance of each force to its nearer static limit; negative outside."""
         return np.minimum(f + self.ratio * self.forward, self.ratio * self.backward - f)
 
     def modes_at(self, t, q, v, modes, resting, breaking=None):
-        """The modes of the elements at rest that all conditions allow, a little later."""
+        """Select modes of the elements at rest that meet all conditions just after t."""
         scale = 1.0 + np.abs(self.force(t, q, v)).max()
         for choice in product((0, 1, -1), repeat=len(resting)):
             trial = list(modes)
@@ -68,7 +68,7 @@ class OneWayFriction:
         raise RuntimeError("no modes")
 
     def run(self, q, v, times):
-        """States at the given times, and the number of events."""
+        """Return the states at the given times, and the number of events."""
         q, v, n = np.array(q, float), np.array(v, float), len(self.M)
         slip = self.D @ v
         resting = [i for i in range(len(slip)) if slip[i] == 0.0]
@@ -99,7 +99,7 @@ class OneWayFriction:
                 events += 1
                 hit = next(i for i, at in enumerate(found.t_events) if len(at))
                 stuck = [i for i, mode in enumerate(modes) if mode == 0]
-                if modes[hit] != 0:  # comes to rest: with all that stick already
+                if modes[hit] != 0:  # projects v: the hit element and all sticking elements are at rest
                     S = self.D[[*stuck, hit]]
                     v = v - np.linalg.solve(self.M, S.T) @ np.linalg.solve(
                         S @ np.linalg.solve(self.M, S.T), S @ v

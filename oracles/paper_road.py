@@ -1,7 +1,6 @@
-"""The paper's own road, written out letter by letter, and two roads that share nothing with it.
+"""The equations of the paper as printed, and independent solutions of the same problem.
 
-Plain and slow on purpose: the symmetric root of M, V by Gram-Schmidt, J by inversion.  Tests compare the
-package with these.
+The code is simple rather than fast: the symmetric root of M, V by Gram-Schmidt, J by inversion.
 """
 
 from __future__ import annotations
@@ -11,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Gram-Schmidt drops a vector when this part of its length is left; the random problems of the tests have
-# redundant rows whose remainder is rounding, 1e-15, and independent ones that keep more than 1e-3.
+# Relative length at which Gram-Schmidt drops the remainder of a vector.  In the random problems of the tests,
+# redundant rows have a remainder of about 1e-15, and independent rows of more than 1e-3.
 DEPENDENT = 1e-9
 
 
@@ -23,7 +22,7 @@ class Forces(NamedTuple):
 
 
 class Letters(NamedTuple):
-    """The intermediates of the paper."""
+    """Intermediate matrices of the paper."""
 
     root: np.ndarray  # M^(1/2)
     B: np.ndarray
@@ -39,7 +38,7 @@ def symmetric_root(M):
 
 
 def gram_schmidt(vectors, basis):
-    """Orthonormal vectors that extend `basis` to the span of both; each is projected twice."""
+    """Return orthonormal vectors that extend `basis` to the span of both; each vector is projected twice."""
     basis = list(basis)
     found = []
     for vector in vectors:
@@ -54,7 +53,7 @@ def gram_schmidt(vectors, basis):
 
 
 def null_basis(B):
-    """V, (n, n - k): orthonormal columns with B V = 0, Eqs. (12)-(14)."""
+    """Return V, (n, n - k): orthonormal columns with B V = 0, Eqs. (12)-(14)."""
     n = B.shape[1]
     columns = gram_schmidt(np.eye(n), gram_schmidt(B, []))  # Eqs. (12)-(14)
     return np.array(columns).reshape(-1, n).T
@@ -71,7 +70,7 @@ def letters(M, A, V=None):
 
 
 def paper_road(M, F, A, b, C, V=None):
-    """Eqs. (38)-(40) as printed."""
+    """Solve by Eqs. (38)-(40) as printed."""
     root, B, _, J, _, _ = letters(M, A, V)
     n = len(M)
     a_free = np.linalg.solve(M, F)  # Eq. (1)
@@ -81,7 +80,7 @@ def paper_road(M, F, A, b, C, V=None):
 
 
 def stacked_road(M, F, A, b, C):
-    """The normal equations of the stacked set, Eq. (15), inverted in blocks by Eqs. (20)-(24).
+    """Solve the normal equations of the stacked system, Eq. (15), with the block inverse of Eqs. (20)-(24).
 
     [I  -I ]                 [a_s    ]
     [B   0 ] [qdd_s; F_s] =  [b      ]
@@ -98,7 +97,7 @@ def stacked_road(M, F, A, b, C):
 
 
 def generalized_inverse_road(M, F, A, b, C):
-    """The 2002 form, Eqs. (47)-(49)."""
+    """Solve by the 2002 form, Eqs. (47)-(49)."""
     root = symmetric_root(M)
     B = A @ np.linalg.inv(root)
     B_plus = np.linalg.pinv(B, rcond=DEPENDENT) if B.size else B.T
@@ -109,7 +108,7 @@ def generalized_inverse_road(M, F, A, b, C):
 
 
 def kkt_road(M, F, A, b, C):
-    """Dense KKT system in (a, lam) by least squares, which gives the shortest lam.  Returns (forces, lam)."""
+    """Solve the dense KKT system in (a, lam) by least squares.  Returns (forces, lam of minimum norm)."""
     n, m = len(M), len(A)
     K = np.block([[M, -A.T], [A, np.zeros((m, m))]])
     ideal = np.linalg.lstsq(K, np.concatenate([F, b]), rcond=DEPENDENT)[0]
@@ -119,7 +118,7 @@ def kkt_road(M, F, A, b, C):
 
 
 def exact_road(M, F, A, b, C):
-    """The KKT system of independent rows in rational numbers: exact for the floats given, rounded once."""
+    """Solve the KKT system of independent rows in rational numbers: exact for the inputs, rounded once."""
     n, m = len(M), len(A)
     K = np.block([[M, -A.T], [A, np.zeros((m, m))]])
     right = np.column_stack([np.concatenate([F, b]), np.concatenate([C, np.zeros(m)])])

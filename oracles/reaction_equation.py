@@ -1,9 +1,8 @@
-"""The implicit reaction equation y = g(y) of slipping friction by inverse dynamics, and all its roots.
+"""Implicit reaction equation y = g(y) of slipping friction by inverse dynamics, and all its roots.
 
-y holds the friction limit of each element.  Given y, everything slips the way that its velocity says, the
-motion is affine in y, and so is every load vector: g_i(y) = c_i + sum_k w_k |b_k + P_k y|.  The roots come
-from a dense scan of all y >= 0, mapped onto a unit box, and from Newton's method in every cell of it where
-all components change their sign.
+y contains the friction limit of each element.  Given y, each element slips along its velocity, and the
+motion and every load vector are affine in y: g_i(y) = c_i + sum_k w_k |b_k + P_k y|.  A dense scan covers all
+y >= 0, mapped onto a unit box.  Newton's method starts in every cell where all components change sign.
 """
 
 from __future__ import annotations
@@ -18,20 +17,20 @@ from .frames import Frames
 from .given import applied_force, mass_matrix
 from .rows import rows
 
-# Points of the scan along each axis, by the number of unknowns: some 10^4 values of g in all.
+# Points of the scan along each axis, by the number of unknowns: about 10^4 values of g in total.
 SCAN = {1: 4001, 2: 101, 3: 25}
-MOST_CELLS = 150  # of those, by lot
-STARTS = 40  # of Newton's method beside the scan
+MOST_CELLS = 150  # cells of the scan, sampled at random
+STARTS = 40  # random starts of Newton's method in addition to the scan
 SOLVED = 1e-12  # relative residual of a root
-SAME = 1e-7  # relative distance of two roots that are one
-# Beside a number of solutions that changes: a determinant, or a scan's least residual, of this size or less.
+SAME = 1e-7  # relative distance below which two roots are one
+# Determinant or smallest residual of a scan below which the number of solutions is uncertain.
 DOUBTFUL = 1e-4
-UNLOADED = 1e-10  # friction limit of a bearing that nothing loads [N m or N]
+UNLOADED = 1e-10  # friction limit of an unloaded bearing [N m or N]
 
 
 @dataclass
 class Equation:
-    """c and, for each norm of a load, its element, weight w, offset b (3,) and columns P (3, n)."""
+    """Constants c and, for each norm of a load, its element, weight w, offset b (3,) and columns P (3, n)."""
 
     constant: np.ndarray
     element: list[int] = field(default_factory=list)
@@ -44,14 +43,14 @@ class Equation:
         return len(self.constant)
 
     def image(self, y):
-        """g at many points, (m, n)."""
+        """Return g at many points, (m, n)."""
         g = np.broadcast_to(self.constant, y.shape).copy()
         for i, w, b, P in zip(self.element, self.weight, self.offset, self.columns, strict=True):
             g[:, i] += w * np.linalg.norm(b + y @ P.T, axis=1)
         return g
 
     def slope(self, y):
-        """dg/dy at one point."""
+        """Return dg/dy at one point."""
         J = np.zeros((self.n, self.n))
         for i, w, b, P in zip(self.element, self.weight, self.offset, self.columns, strict=True):
             load = b + P @ y
@@ -59,18 +58,18 @@ class Equation:
         return J
 
     def steepest(self):
-        """Largest size of dg_i/dy_j over all y."""
+        """Return an upper bound of |dg_i/dy_j| over all y."""
         L = np.zeros((self.n, self.n))
         for i, w, P in zip(self.element, self.weight, self.columns, strict=True):
             L[i] += w * np.linalg.norm(P, axis=0)
         return L
 
     def scale(self):
-        """Friction of the loads that are there without any."""
+        """Return g(0), the limits for loads without friction, at least 1e-12."""
         return np.maximum(self.image(np.zeros((1, self.n)))[0], 1e-12)
 
     def polished(self, y):
-        """The root that Newton's method finds from y, or None."""
+        """Return the root that Newton's method reaches from y, or None."""
         for _ in range(60):
             residual = self.image(y[None])[0] - y
             if not np.isfinite(residual).all() or np.abs(y).max() > 1e12:
@@ -84,13 +83,13 @@ class Equation:
         return None
 
     def leaves_unloaded(self):
-        """Whether friction alone would load some bearing: what rounding leaves there may go any way."""
+        """Check if some bearing is unloaded without friction: rounding then decides its load direction."""
         return bool((self.image(np.zeros((1, self.n))) < UNLOADED).any())
 
     def roots(self, rng, others=()):
-        """All solutions y, (k, n), and whether their number is in doubt by rounding or the scan's width.
+        """Return all solutions y, (k, n), and whether their number is uncertain.
 
-        Newton's method starts from `others` too: solutions that someone claims.
+        Newton's method also starts from `others`, solutions from another source.
         """
         scale, points = self.scale(), SCAN[self.n]
         axis = (np.arange(points) + 0.31) / points
@@ -121,10 +120,10 @@ class Equation:
 
 
 def equation(scene, q, v, t=0.0):
-    """The equation of a scene in which every frictional element slips.
+    """Return the equation of a scene in which every friction element slips.
 
     Args:
-        scene: with JointFriction at joints of the tree, or at hinge anchors and nowhere else.
+        scene: scene with JointFriction at joints of the tree, or at hinge anchors only.
         q: configuration.
         v: velocity.
         t: time [s].
@@ -148,12 +147,12 @@ def equation(scene, q, v, t=0.0):
 
 
 def acceleration(scene, q, v, y, t=0.0):
-    """Of the motion under friction of these limits."""
+    """Return the acceleration under friction with the limits y."""
     return _loads(scene, q, v, t, -np.asarray(_slips(scene, q, v)).T @ y)[1]
 
 
 def _speed(scene, law, q, v):
-    """Slip velocity of an element."""
+    """Return the slip velocity of an element."""
     anchor = {c.name: c for c in scene.constraints}.get(law.joint)
     if anchor is None:
         joint = scene.model.joints[scene.model.getJointId(law.joint)]
@@ -162,14 +161,14 @@ def _speed(scene, law, q, v):
 
 
 def _turning(scene, anchor, q, v):
-    """Row of the relative turning rate about a hinge anchor's axis."""
+    """Return the row of the relative angular velocity about the axis of a hinge anchor."""
     frames = Frames(scene.model, q, v)
     one, two = frames(anchor.frame1), frames(anchor.frame2)
     return one.R[:, 2] @ (one.Jw - two.Jw)
 
 
 def _slips(scene, q, v):
-    """Generalized direction of each element's slip, (n, nv)."""
+    """Return the generalized slip direction of each element, (n, nv)."""
     anchors = {c.name: c for c in scene.constraints}
     found = []
     for law in scene.laws:
@@ -185,7 +184,7 @@ def _slips(scene, q, v):
 
 
 def _loads(scene, q, v, t, C):
-    """(weight, vector) of each norm in each element's load, and the acceleration, under the force C."""
+    """Return (weight, vector) of each norm in each load, and the acceleration, under the force C."""
     model, data = scene.model, scene.model.createData()
     M, given = mass_matrix(model, q), applied_force(scene, Frames(model, q, v), t)
     bias = pin.nonLinearEffects(model, data, q, v)
@@ -224,7 +223,7 @@ def _joint_loads(model, law, f):
 
 
 def _axis(joint):
-    """Of a joint of one degree of freedom, in its own frame."""
+    """Return the axis of a joint with one degree of freedom, in the joint frame."""
     data = joint.createData()
     joint.calc(data, np.zeros(joint.nq), np.zeros(joint.nv))
     S = np.asarray(data.S).reshape(6, -1)[:, 0]
@@ -233,6 +232,6 @@ def _axis(joint):
 
 
 def _anchor_loads(law, lam):
-    axial = np.array([0.0, 0.0, lam[2]])  # hinges of the anchors turn about z
+    axial = np.array([0.0, 0.0, lam[2]])  # the hinge axis of the anchors is z
     bends = [(law.mu * law.radius / law.span, np.array([*lam[3:], 0.0]))] if law.span else []
     return [(law.mu * law.radius, np.array([*lam[:2], 0.0])), *bends, (law.mu * law.axial_radius, axial)]

@@ -1,4 +1,4 @@
-"""What joints carry, by Pinocchio's recursive Newton-Euler pass, with loops cut."""
+"""Joint wrenches of cut loops, by Pinocchio's recursive Newton-Euler algorithm."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pinocchio as pin
 
 
 class CutTree:
-    """A model at one state and its motion, with forces on its bodies added one by one.
+    """Model with a state, an acceleration and external forces.
 
     Wrenches are [force; moment] about a point, in world axes.
     """
@@ -19,33 +19,33 @@ class CutTree:
         self.external = [pin.Force.Zero() for _ in range(model.njoints)]
 
     def placement(self, frame):
-        """World placement of a frame, or of a joint's."""
+        """Return the world placement of a frame."""
         return self.data.oMf[self.model.getFrameId(frame)]
 
     def joint(self, frame):
-        """Index of the joint whose body a frame is on."""
+        """Return the index of a frame's parent joint."""
         return self.model.frames[self.model.getFrameId(frame)].parentJoint
 
     def velocity(self, frame):
-        """Of a frame's origin, world axes."""
+        """Return the velocity of a frame's origin, in world axes."""
         of = self.model.getFrameId(frame)
         return pin.getFrameVelocity(self.model, self.data, of, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).linear
 
     def push(self, joint, wrench, point):
-        """Adds a wrench on the body of a joint."""
+        """Add a wrench on the body of a joint."""
         at_point = pin.SE3(np.eye(3), np.asarray(point, dtype=float))
         in_world = at_point.act(pin.Force(np.asarray(wrench, dtype=float)))
         self.external[joint] += self.data.oMi[joint].actInv(in_world)
 
     def push_frames(self, frame1, frame2, wrench):
-        """The same on the body of frame1 at its origin, the opposite on that of frame2 (None: the world)."""
+        """Add a wrench at frame1's origin on its body, and the opposite on frame2's (None: the world)."""
         point = self.placement(frame1).translation
         for frame, sign in ((frame1, 1.0), (frame2, -1.0)):
             if frame is not None:
                 self.push(self.joint(frame), sign * np.asarray(wrench), point)
 
     def generalized(self, frame1, frame2, wrench):
-        """The generalized force of such a pair, (nv,)."""
+        """Return the generalized force of the wrench pair of `push_frames`, (nv,)."""
         pin.computeJointJacobians(self.model, self.data, self.state[0])
         point, total = self.placement(frame1).translation, np.zeros(self.model.nv)
         for frame, sign in ((frame1, 1.0), (frame2, -1.0)):
@@ -59,6 +59,6 @@ class CutTree:
         return total
 
     def joint_wrenches(self):
-        """What crosses each joint onto its body, in the joint's axes about its origin, (njoints - 1, 6)."""
+        """Return the wrench of each joint on its body, in the joint frame, (njoints - 1, 6)."""
         pin.rnea(self.model, self.data, *self.state, self.external)
         return np.array([self.data.f[i].vector for i in range(1, self.model.njoints)])

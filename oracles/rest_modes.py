@@ -1,8 +1,7 @@
-"""All motions that dry friction allows a tree of joints at rest: every combination of modes, loads scanned.
+"""All motions of a tree of joints at rest with dry friction: enumeration of modes and a scan of the loads.
 
-A joint that rubs sticks, or slips one way with the friction that its own load gives.  Loads are sums of
-lengths of vectors, each linear in the friction forces; what is linear comes from Pinocchio's M and inverse
-dynamics alone.
+A joint with friction sticks, or slips in one direction with the friction of its load.  Loads are sums of
+norms of vectors that are affine in the friction forces.  Pinocchio's M and inverse dynamics give the vectors.
 """
 
 from __future__ import annotations
@@ -13,18 +12,18 @@ import numpy as np
 import pinocchio as pin
 from scipy.optimize import brentq
 
-GRID = 600  # points of a scan of one load, from nothing to without end
+GRID = 600  # points of a scan of one load, from zero to infinity
 HALVINGS = 60
-# Distance to the next case, as part of what is compared, below which rounding or the scan may decide.
+# Relative margin of a condition below which rounding or the scan may decide.
 CLOSE = 1e-5
 
 
 class CloseError(Exception):
-    """Two cases lie too near each other to be told apart."""
+    """Two cases are too close to be distinguished."""
 
 
 def joint_axis(model, joint):
-    """Axis of a joint of one freedom, in its frame."""
+    """Return the axis of a joint with one degree of freedom, in the joint frame."""
     data = model.joints[joint].createData()
     model.joints[joint].calc(data, pin.neutral(model)[model.joints[joint].idx_q :][: model.joints[joint].nq])
     S = np.asarray(data.S).ravel()
@@ -32,7 +31,7 @@ def joint_axis(model, joint):
 
 
 def bearing(model, law, wrench):
-    """Vectors whose lengths add up to the load of a bearing, from the wrench (force, moment) in its joint."""
+    """Return vectors whose norms add up to the load of a bearing, from its joint wrench (force, moment)."""
     joint = model.getJointId(law.joint)
     axis, f, m = joint_axis(model, joint), wrench[:3], wrench[3:]
     across = np.eye(3) - np.outer(axis, axis)
@@ -44,12 +43,12 @@ def bearing(model, law, wrench):
 
 
 class RestingTree:
-    """A tree at rest whose named joints rub: slip accelerations and loads, linear in the friction forces.
+    """Tree at rest with joint friction: slip accelerations and load vectors are affine in the friction.
 
     Attributes:
         W, alpha0: slip accelerations are alpha0 + W f.
-        constants: limits without any load.
-        loads: of each joint a list of (vector without friction, matrix) whose lengths add up.
+        constants: limits without load.
+        loads: for each joint, pairs (vector without friction b, matrix B); its load is the sum of |b + B f|.
         a0, response: accelerations are a0 + response f.
     """
 
@@ -75,7 +74,7 @@ class RestingTree:
         ]
 
     def limits(self, f):
-        """Kinetic limits under friction forces f, (n,) or (n, k)."""
+        """Return the kinetic limits under friction forces f, (n,) or (n, k)."""
         f = np.asarray(f)
         column = f.reshape(len(self.alpha0), -1)
         out = [
@@ -85,10 +84,10 @@ class RestingTree:
         return np.array(out).reshape(f.shape)
 
     def solutions(self):
-        """(modes, f) of all motions.
+        """Return (modes, f) of all motions.
 
         Raises:
-            CloseError: a case is too near another one.
+            CloseError: a case is too close to another case.
         """
         found = []
         for modes in itertools.product((0, 1, -1), repeat=len(self.alpha0)):
@@ -103,10 +102,10 @@ class RestingTree:
         return found
 
     def forces(self, modes):
-        """Friction forces of all motions in which what sticks stays and what slips is at its limit."""
+        """Return friction forces that hold sticking joints and are at the limit in slipping joints."""
         S, B = np.flatnonzero(modes == 0), np.flatnonzero(modes)
 
-        def of(y):  # limits y of what slips, (len(B), k)
+        def of(y):  # y: limits of slipping joints, (len(B), k)
             f = np.zeros((len(modes), y.shape[1]))
             f[B] = -modes[B, None] * y
             if len(S):
@@ -121,7 +120,12 @@ class RestingTree:
 
 
 def fixed_points(image, n, size):
-    """All y >= 0 with y = image(y), whose components are convex; n at most 2."""
+    """Return all y >= 0 with y = image(y) for convex components of image; n is at most 2.
+
+    Raises:
+        ValueError: n is larger than 2.
+        CloseError: the scan cannot resolve the roots.
+    """
     if n == 0:
         return [np.zeros(0)]
     if n == 1:
@@ -134,7 +138,7 @@ def fixed_points(image, n, size):
     found = []
 
     def inner(y0, branch):
-        """The limit of the second that goes with limits of the first, on one of two branches."""
+        """Return the limit of the second joint for limits of the first, on one of two branches."""
         return convex_roots(lambda y1: image(np.array([y0, y1]))[1], len(y0), size)[branch]
 
     for branch in (0, 1):
@@ -156,14 +160,14 @@ def fixed_points(image, n, size):
         low = np.nanmin(np.abs(values) / (grid + size), initial=np.inf)
         if low < CLOSE and not len(found):
             raise CloseError
-        for k in np.flatnonzero(seen[:-1] != seen[1:]):  # where both branches meet and end
+        for k in np.flatnonzero(seen[:-1] != seen[1:]):  # both branches meet and end there
             if abs(values[k if seen[k] else k + 1]) < 0.02 * (size + grid[k]):
                 raise CloseError
     return found
 
 
 def refined(function, grid):
-    """The grid with more points about dips of |function| and ends of its domain."""
+    """Return the grid, refined at minima of |function| and at ends of its domain."""
     values = np.abs(function(grid))
     dips = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])) + 1
     ends = np.flatnonzero(np.isfinite(values[1:]) != np.isfinite(values[:-1]))
@@ -172,11 +176,11 @@ def refined(function, grid):
 
 
 def convex_roots(s, count, size):
-    """Both y >= 0 with y = s(y), nan where there is none; s is convex in each of its `count` components."""
+    """Return both y >= 0 with y = s(y), else nan; s is convex in each of its `count` components."""
 
     def left(t):
         y = size * t / (1.0 - t)
-        return (y - s(y)) * (1.0 - t)  # as homogeneous functions have it: concave along t as well
+        return (y - s(y)) * (1.0 - t)  # perspective of a concave function: concave in t
 
     low, high = np.zeros(count), np.full(count, 1.0 - 1e-9)
     golden = (np.sqrt(5.0) - 1.0) / 2.0

@@ -1,4 +1,4 @@
-"""Chains of rods: the mechanism of most closed forms."""
+"""Chains of rods, the mechanism of most closed forms."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-SLENDER = 1e-3  # moment of a rod about its own axis, as part of the one across
+SLENDER = 1e-3  # axial over transverse moment of inertia of a rod
 
 
 def rods(
@@ -20,16 +20,16 @@ def rods(
     model: Any = None,
     start: Any = (0.0, 0.0, 0.0),
 ) -> Any:
-    """A chain of uniform slender rods; joints `name`0, `name`1, ..., and a frame `name`tip at its end.
+    """Return a chain of slender rods with joints `name`0, `name`1, ... and a frame `name`tip at its end.
 
     Args:
-        lengths: of the rods [m].
-        masses: of the rods [kg]; None for 1 each.
+        lengths: lengths of the rods [m].
+        masses: masses of the rods [kg]; None for 1 each.
         along: unit vector of the rods at zero angles.
-        joint: pinocchio joint between them; None for a hinge about y.
-        name: what names of joints and of the frame begin with.
+        joint: pinocchio joint of each rod; None for a hinge about y.
+        name: prefix of the names of joints and frame.
         model: pinocchio.Model to add the chain to; None for a new one, with gravity along -z.
-        start: where the first joint is.
+        start: position of the first joint [m].
     """
     if model is None:
         model = pin.Model()

@@ -1,7 +1,7 @@
-"""A and b of every kind of constraint from the frames' Jacobians and accelerations: nothing of the core.
+"""A and b of every kind of constraint from frame Jacobians and accelerations, without the core.
 
-Each kind differentiates its own residual or rate by hand.  The formulas hold on the constraints, where what
-is held is zero.
+Each kind has the analytic derivatives of its residual or rate.  The formulas hold for states on the
+constraints, with zero residual.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ def skew(x):
 
 
 def rows(scene, q, v, t):
-    """A, (m, nv), and b, (m,), of all constraints and contacts in the order of `lam`."""
+    """Return A, (m, nv), and b, (m,), of all constraints and contacts in the order of `lam`."""
     return rows_of_frames(scene, Frames(scene.model, q, v), t)
 
 
 def rows_of_frames(scene, frames, t):
-    """The same from the frames of any kinematics."""
+    """Return A and b of all constraints and contacts from the frames of any kinematics."""
     found = [of_kind(c, frames, t, scene) for c in (*scene.constraints, *scene.contacts)]
     A, b = [np.zeros((0, scene.model.nv))], [np.zeros(0)]
     for part, right in found:
@@ -38,7 +38,7 @@ def rows_of_frames(scene, frames, t):
 
 
 def _relative(one, two):
-    """Place of `one` in the axes of `two`: Jacobian of its rate, and second derivative at rest."""
+    """Return Jacobian and bias (Jdot v) of the position of `one` in the axes of `two`."""
     d, u = one.p - two.p, one.u - two.u
     J = two.R.T @ (one.J - two.J + skew(d) @ two.Jw)
     drift = one.du - two.du - cross(two.dw, d) - 2.0 * cross(two.w, u) + cross(two.w, cross(two.w, d))
@@ -46,14 +46,14 @@ def _relative(one, two):
 
 
 def _turning(one, two):
-    """Angular velocity of `one` against `two` in the axes of `two`: Jacobian, and derivative at rest."""
+    """Return Jacobian and bias (Jdot v) of the relative angular velocity in the axes of `two`."""
     drift = one.dw - two.dw - cross(two.w, one.w - two.w)
     return two.R.T @ (one.Jw - two.Jw), two.R.T @ drift
 
 
 @singledispatch
 def of_kind(c, frames, t, scene):
-    """A and b of one constraint or contact."""
+    """Return A and b of one constraint or contact."""
     raise TypeError(f"no rows are known for {c!r}")
 
 
@@ -85,7 +85,7 @@ def _(c: pn.HingeAnchor, frames, t, scene):
 @of_kind.register
 def _(c: pn.Distance, frames, t, scene):
     one, two = frames(c.frame1), frames(c.frame2)
-    if c.frame2 is None:  # the world, where frame1 starts
+    if c.frame2 is None:  # world point at the initial position of frame1
         two.p = frames.at(scene.q0)(c.frame1).p
     d, u = one.p - two.p, one.u - two.u
     length = np.linalg.norm(d)

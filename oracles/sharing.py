@@ -1,4 +1,4 @@
-"""How redundant rows share their load, dense: least norm, and whether all that should press can."""
+"""Loads of redundant rows by dense methods: minimum norm, and feasibility of compressive loads."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from .given import given_force, mass_matrix
 from .rows import rows
 from .solutions import kkt_acceleration
 
-HELD = 1e-9  # part of the largest singular value below which A holds nothing
+HELD = 1e-9  # rank tolerance of A, relative to the largest singular value
 
 
 def least_norm(A, force):
-    """The shortest lam with A^T lam = force, copies and all."""
+    """Return lam of minimum norm with A^T lam = force, for all rows including duplicates."""
     return np.linalg.lstsq(A.T, force, rcond=HELD)[0]
 
 
 def pressing_rows(scene):
-    """Rows of `lam` whose sign tells whether something presses: normals of contacts and of rolling."""
+    """Return the indices in `lam` of the normal forces of contacts and of rolling."""
     slices = list(scene.constraint_slices.values())
     said = [*scene.constraints, *scene.contacts]
     found = []
@@ -33,14 +33,14 @@ def pressing_rows(scene):
 
 
 def constraint_force(scene, q, v, t):
-    """A, and the force of constraint M a - F of the motion without laws, by a dense system."""
+    """Return A, and the constraint force M a - F of the motion without laws, by a dense system."""
     A, b = rows(scene, q, v, t)
     M, F = mass_matrix(scene.model, q), given_force(scene, q, v, t)
     return A, M @ kkt_acceleration(M, F, A, b) - F
 
 
 def largest_least_load(A, force, pressing):
-    """The largest s such that all pressing rows can carry s or more at once, by a linear program."""
+    """Return the largest s such that all `pressing` rows can carry at least s, by a linear program."""
     lam = least_norm(A, force)
     _, s, Vt = np.linalg.svd(A.T)
     Z = Vt[np.count_nonzero(s > HELD * s[0]) :].T

@@ -1,8 +1,8 @@
-"""Slip that begins at rest without a drop of the limit, by equations of motion of its own and a stiff solver.
+"""Slip onset without a drop of the limit, by separate equations of motion and a stiff solver.
 
-A plate on feet slides in its plane, a ball on a pivot turns: with the slip velocities u_e and the limits s_e
-the friction is -s_e u_e / |u_e|.  SciPy's implicit Runge-Kutta method follows the direction of slip from a
-speed far below what the tolerance sees.
+A plate on feet slides in its plane, or a body rotates on a ball joint.  For slip velocities u_e and limits
+s_e the friction is -s_e u_e / |u_e|.  SciPy's implicit Runge-Kutta method integrates from an initial speed
+far below the tolerance.
 """
 
 from __future__ import annotations
@@ -15,19 +15,17 @@ from scipy.optimize import brentq, minimize
 from scipy.spatial.transform import Rotation
 
 GRAVITY = 9.81
-FIRST_SPEED = 1e-9  # of slip, along the direction in which it begins
-DISTANCE = 1e-11  # of the search for forces within the limits
-HELD = 1e-9  # part of the weight that forces found may leave unbalanced
-AT_LIMIT = 1e-5  # part of a limit by which a foot holds that does not slip
-BEGINS = (
-    1e-3  # part of a limit by which a foot holds that begins to slip: limits are tried beside the true ones
-)
-NOISE = 1e-10  # part of the loads that a dense solution leaves
+FIRST_SPEED = 1e-9  # initial slip speed, along the onset direction
+DISTANCE = 1e-11  # tolerance of the search for forces within the limits
+HELD = 1e-9  # part of the weight that the forces may leave unbalanced
+AT_LIMIT = 1e-5  # relative margin to the limit beyond which a foot sticks
+BEGINS = 1e-3  # relative margin to the limit within which a foot begins to slip
+NOISE = 1e-10  # relative residual of a dense solution
 SETTINGS = {"method": "Radau", "rtol": 1e-9, "atol": 1e-13}
 
 
 def shortest_pushes(tilts, needed, least):
-    """The shortest x >= 0 with tilts x = needed, by trying which are zero; `least` where there is none."""
+    """Return x >= 0 of minimum norm with tilts x = needed, by enumeration of zeros; else `least`."""
     n = len(least)
     size = np.abs(least).max()
     for count in range(1, n):
@@ -43,7 +41,7 @@ def shortest_pushes(tilts, needed, least):
 
 
 def solved(lack, x):
-    """Zero of a function that is piecewise linear, by Newton's method from x."""
+    """Return a zero of a piecewise linear function by Newton's method from x."""
     for _ in range(50):
         now = lack(x)
         step = 1e-6 * np.abs(x).max()
@@ -55,19 +53,18 @@ def solved(lack, x):
 
 
 class Plate:
-    """A body that three feet or more hold to a level plane, under a wrench that moves with it.
+    """Body with at least three feet on a level plane, under a wrench at a body-fixed point.
 
-    Feet stand below the center of mass, loaded by least norm over those that share the load: of all loads, or
-    of those that do not pull.
+    The normal forces of the feet are the minimum-norm solution: of all loads, or of nonnegative loads.
 
     Attributes:
-        feet: places of the feet (n, 3) in the body [m], all of the same height.
+        feet: positions of the feet in the body [m], (n, 3), all at the same height.
         mu: coefficient of friction of all feet.
         wrench: function of time: force and couple in world axes [N, N m].
-        at: where the force acts [m].
-        mass: of the body [kg].
-        inertia: about each axis [kg m^2].
-        pulls: whether feet are kept where they would have to pull.
+        at: point of application of the force in the body [m].
+        mass: mass of the body [kg].
+        inertia: moment of inertia about each axis [kg m^2].
+        pulls: whether the contacts are bilateral, with tension allowed.
     """
 
     def __init__(self, feet, mu, wrench, at, mass=10.0, inertia=0.3, pulls=True):
@@ -76,14 +73,14 @@ class Plate:
         self.mu, self.wrench, self.mass, self.inertia = mu, wrench, mass, inertia
 
     def given(self, t, angle):
-        """Feet in the axes of the plane; force and moment about the center of mass."""
+        """Return feet in the axes of the plane, and force and moment about the center of mass."""
         turn = Rotation.from_rotvec([0.0, 0.0, angle])
         force, couple = np.reshape(self.wrench(t), (2, 3))
         moment = couple + np.cross(turn.apply(self.at), force)
         return turn.apply(self.feet), force - [0.0, 0.0, self.mass * GRAVITY], moment
 
     def loads(self, feet, force, moment, friction):
-        """Normal forces of least norm that balance what turns the plate over, for friction forces (n, 2)."""
+        """Return minimum-norm normal forces that balance the plate under friction forces (n, 2)."""
         tilts = np.vstack([np.ones(len(feet)), feet[:, 1], -feet[:, 0]])
         h = feet[:, 2]
         by_friction = np.array([0.0, -(h * friction[:, 1]).sum(), (h * friction[:, 0]).sum()])
@@ -92,7 +89,7 @@ class Plate:
         return least if self.pulls or least.min() >= 0.0 else shortest_pushes(tilts, needed, least)
 
     def acceleration(self, t, angle, directions):
-        """Of x, y and the angle where the feet slip in these directions (n, 2); and the loads."""
+        """Return accelerations of x, y and the angle for slip directions (n, 2), and the loads."""
         feet, force, moment = self.given(t, angle)
 
         def lack(loads):
@@ -105,10 +102,9 @@ class Plate:
         return np.array([*(force[:2] + friction.sum(axis=0)) / self.mass, turning / self.inertia]), loads
 
     def sharings(self, t, angle, spin, directions, mu):
-        """All loads of kept feet that slip in these directions, and rub where they pull as well.
+        """Return all loads of bilateral feet for slip directions; friction acts under tension, too.
 
-        A foot whose direction is not a number is held: what it is given turns the plate about it.  One that
-        all of its limit holds begins to slip against its friction.
+        A foot with a nan direction sticks.  A sticking foot at its limit begins to slip against its friction.
         """
         found = self._sharings(t, angle, spin, directions, mu)
         for loads, friction in found:
@@ -120,7 +116,7 @@ class Plate:
         return [loads for loads, _ in found]
 
     def _sharings(self, t, angle, spin, directions, mu):
-        """Loads and friction where some feet slip and the others are held."""
+        """Return loads and friction for some slipping feet and the others sticking."""
         feet, force, moment = self.given(t, angle)
         unit = np.nan_to_num(directions)
         held = np.flatnonzero(np.isnan(directions).any(axis=1))
@@ -152,9 +148,10 @@ class Plate:
         return np.column_stack([v[0] - v[2] * feet[:, 1], v[1] + v[2] * feet[:, 0]])
 
     def excess(self, t):
-        """Least part of the limits by which some foot passes its own while all rest, and the forces.
+        """Return the smallest relative excess over the limits with which all feet rest, and the forces.
 
-        Kept feet have the loads of least norm; feet that cannot pull have any that hold.
+        The excess is negative if forces within the limits hold the plate. Kept feet have minimum-norm loads;
+        feet that cannot pull have any loads that hold.
         """
         feet, force, moment = self.given(t, 0.0)
         if not self.pulls:
@@ -186,7 +183,7 @@ class Plate:
             )
 
         found = search(1.0)
-        if found.x[-1] > 1.0:  # worse than where it began, or that was no start
+        if found.x[-1] > 1.0:  # the search diverged or its start was infeasible: repeats with more slack
             found = min(found, search(2.0 * found.x[-1]), key=lambda one: one.x[-1])
         return found.x[-1], size * found.x[:-1].reshape(n, 2)
 
@@ -227,18 +224,18 @@ class Plate:
         return found.x[-1] / self.mu, size * found.x[: 2 * n].reshape(n, 2)
 
     def give_way(self, latest):
-        """The instant at which no forces within the limits hold the plate any more."""
+        """Return the time after which no forces within the limits hold the plate."""
         return brentq(lambda t: min(self.excess(t)[0], 1.0), 0.0, latest, xtol=1e-12)
 
     def onset(self, start):
-        """Directions in which feet begin to slip when the plate gives way; not a number where one holds."""
+        """Return the slip directions of the feet at slip onset; nan for a foot that sticks."""
         friction = self.excess(start)[1]
         size = np.linalg.norm(friction, axis=1)
         at_limit = size > (1.0 - AT_LIMIT) * self.mu * np.abs(self.loads(*self.given(start, 0.0), friction))
         return np.where(at_limit[:, None], -friction / size[:, None], np.nan)
 
     def run(self, start, duration, **settings):
-        """State (x, y, angle and their rates) a time after it gave way."""
+        """Return the state (x, y, angle and their rates) `duration` after slip onset."""
         directions = -self.excess(start)[1]
         directions /= np.linalg.norm(directions, axis=1)[:, None]
         rows = np.array([self.slip(0.0, e).ravel() for e in np.eye(3)]).T
@@ -258,15 +255,15 @@ class Plate:
 
 
 class Ball:
-    """A body on a ball joint at the origin, rubbed by mu radius times the force in the joint, under a moment.
+    """Body on a ball joint at the origin with the friction limit mu radius times the joint force.
 
     Attributes:
-        mass: [kg].
-        center: of mass, in the body [m].
-        inertia: (3, 3) about the center of mass [kg m^2].
+        mass: mass [kg].
+        center: center of mass, in the body [m].
+        inertia: inertia about the joint, (3, 3) [kg m^2]; the constructor takes it about the center of mass.
         lever: mu radius [m].
         wrench: function of time: force at `end` and couple in world axes [N, N m].
-        end: where the force acts, in the body [m].
+        end: point of application of the force, in the body [m].
     """
 
     def __init__(self, mass, center, inertia, lever, wrench, end):
@@ -277,7 +274,7 @@ class Ball:
         )
 
     def acceleration(self, t, turn, omega, friction):
-        """Of the angle (body axes) under a friction moment, and the size of the force in the joint."""
+        """Return the angular acceleration (body axes) under friction, and the norm of the joint force."""
         force, couple = np.reshape(self.wrench(t), (2, 3))
         force, couple = turn.inv().apply(force), turn.inv().apply(couple)
         weight = turn.inv().apply([0.0, 0.0, -self.mass * GRAVITY])
@@ -287,7 +284,7 @@ class Ball:
         return alpha, np.linalg.norm(self.mass * place - weight - force)
 
     def slipping(self, t, turn, omega, direction):
-        """Acceleration where the joint slips in a direction: the limit is a fixed point."""
+        """Return the acceleration for slip in a direction, with the limit by fixed-point iteration."""
         limit = 0.0
         for _ in range(100):
             alpha, load = self.acceleration(t, turn, omega, -limit * direction)
@@ -297,7 +294,7 @@ class Ball:
         return alpha
 
     def holding(self, t, turn):
-        """The friction moment that holds the body at rest, and its limit."""
+        """Return the friction moment that holds the body at rest, and its limit."""
         none, _ = self.acceleration(t, turn, np.zeros(3), np.zeros(3))
         moment = -self.inertia @ none
         return moment, self.lever * self.acceleration(t, turn, np.zeros(3), moment)[1]
@@ -310,7 +307,7 @@ class Ball:
         return brentq(margin, first, last, xtol=1e-14)
 
     def run(self, turn, start, duration, **settings):
-        """Rotation and angular velocity (body axes) a time after the body gave way."""
+        """Return quaternion and angular velocity (body axes) `duration` after slip onset."""
 
         def rate(t, y):
             here = Rotation.from_quat(y[:4])

@@ -1,4 +1,4 @@
-"""The core's solutions of Eq. (40) against dense systems whose M, F, A and b share nothing with it."""
+"""Check of the core's solutions of Eq. (40) against dense systems with independent M, F, A and b."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from .differences import MET, rows_at
 from .given import given_force, mass_matrix
 from .rows import rows
 
-# One dense factorization of a KKT matrix of condition 1e4; multipliers carry its square.
+# Tolerances of a dense KKT solution of condition 1e4; multipliers have the squared condition.
 KKT = 1e-10
 MULTIPLIERS = 1e-8
 
 
 def assert_same_terms(scene, q, v, t, core_F, F, A, b):
-    """The core's F, A and b are those of Pinocchio's frames, up to rounding of the terms of their sums."""
+    """Assert that the core's F, A and b equal those of Pinocchio's frames, up to rounding of their terms."""
     still = given_force(scene, q, np.zeros_like(v), t)
     size = np.abs(F).max() + np.abs(F - still).max() + np.abs(still).max()
     np.testing.assert_allclose(core_F, F, rtol=0, atol=MET * size)
@@ -28,14 +28,14 @@ def assert_same_terms(scene, q, v, t, core_F, F, A, b):
 
 
 def kkt_acceleration(M, force, A, b):
-    """a of the dense system [M -A^T; A 0] (a, lam) = (force, b), independent rows, refined in long double."""
+    """Solve [M -A^T; A 0] (a, lam) = (force, b) for a with independent rows, refined in long double."""
     from scipy.linalg import qr
 
     n = len(M)
-    d = 1.0 / np.sqrt(np.diag(M))  # units that make rows and columns alike
+    d = 1.0 / np.sqrt(np.diag(M))  # scales rows and columns to similar size
     A, b = A * d, b.copy()
     length = np.linalg.norm(A, axis=1)
-    long = length > 1e-9 * length.max(initial=0.0)  # others vanish, up to the rounding of the kinematics
+    long = length > 1e-9 * length.max(initial=0.0)  # other rows are zero up to rounding of the kinematics
     A, b = A[long] / length[long, None], b[long] / length[long]
     if len(A):
         B = np.linalg.solve(np.linalg.cholesky(M * np.outer(d, d)), A.T)
@@ -52,12 +52,12 @@ def kkt_acceleration(M, force, A, b):
 
 
 def assert_solves_its_rows(scene, q, v, t, modes=None):
-    """Acceleration, split of the forces, multipliers and rank; returns the core's answer."""
+    """Assert acceleration, ideal and nonideal forces, multipliers and rank; returns the core's solution."""
     raw = scene._compiled.program.runner().solve(q, v, t, None, modes)
     M, F = mass_matrix(scene.model, q), given_force(scene, q, v, t)
     A, b = rows(scene, q, v, t)
     assert_same_terms(scene, q, v, t, raw.F, F, A, b)
-    C = raw.C  # held to the laws by friction_conditions
+    C = raw.C  # checked by friction_conditions
     a = kkt_acceleration(M, F + C, A, b)
     in_play = np.abs(a).max() + np.abs(np.linalg.solve(M, F + C)).max()
     np.testing.assert_allclose(raw.a, a, rtol=0, atol=KKT * in_play)

@@ -1,7 +1,7 @@
-"""When a body on feet gives way: the largest load that some friction within the feet's limits holds.
+"""Slip onset of a body on feet: the largest load that friction within the limits of the feet can hold.
 
-The normal forces are those that the plane exerts on a rigid body, shared by least norm among more than three
-feet, as the package documents; friction tilts the body and changes them, linearly.
+The normal forces of more than three feet are the minimum-norm solution, as the package documents.  The moment
+of friction changes the normal forces linearly.
 """
 
 from __future__ import annotations
@@ -11,19 +11,19 @@ from scipy.optimize import minimize
 
 from .slow_slip import Plate
 
-FEASIBLE = 1e-9  # [N], which forces may lack of what holds
+FEASIBLE = 1e-9  # largest violation of a feasible solution [N]
 
 
 class Stance:
-    """Feet of one body on the plane z = 0.
+    """Body with feet on the plane z = 0 under a growing load.
 
     Args:
-        feet: their places about the center of mass, (n, 3).
-        weight: of the body [N].
-        mu: friction that holds, static over kinetic included.
-        load: force of the growing load per second, at `at` [N/s].
-        at: where it acts, about the center of mass.
-        couple: moment of the load per second [N m/s].
+        feet: positions relative to the center of mass [m], (n, 3).
+        weight: weight of the body [N].
+        mu: static coefficient of friction.
+        load: rate of the force at `at` [N/s].
+        at: point of application relative to the center of mass [m].
+        couple: rate of the moment [N m/s].
     """
 
     def __init__(self, feet, weight, mu, load, at, couple):
@@ -52,20 +52,21 @@ class Stance:
         return self.normal0 + self.normal_t * t + self.normal_f @ f
 
     def plate(self, mu):
-        """The same as it slides, a plate of 10 kg."""
+        """Return the sliding body as a plate of 10 kg."""
         return Plate(self.feet, mu, lambda t: np.concatenate([self.load * t, self.turning * t]), self.at)
 
     def gives_way(self, guess):
-        """The time, the normal forces then, and what they lack; the latest of several searches.
+        """Return the time of slip onset, the normal forces then, and their violation.
 
-        The set of times is convex, but a search may end before its optimum, whose forces then lack nothing.
+        The result is the latest time of six searches.
+        The feasible set of times is convex, but a search may end at a feasible time before the optimum.
         """
         found = [self.search(part * guess) for part in (0.1, 0.3, 0.6, 1.0, 2.0, 3.0)]
         held = [each for each in found if each[2] <= FEASIBLE]
         return max(held, key=lambda each: each[0]) if held else min(found, key=lambda each: each[2])
 
     def search(self, guess):
-        """The same, from one guess of the time."""
+        """Return the result of one search, from a guess of the time."""
         n = len(self.feet)
         against = np.array([self.load[0], self.load[1], self.couple[2]])
 

@@ -1,7 +1,7 @@
-"""A screw and its nut as two free bodies between which one flank of the thread presses and rubs.
+"""Screw and nut as two free bodies with contact and friction at one flank of the thread.
 
-The flank pushes with N >= 0 along its normal and rubs with mu N along the thread, both forces resolved by the
-angles of the thread as in any textbook on machine elements.  Nothing is written in coordinates of a coupling.
+The flank has a normal force N >= 0 and friction mu N along the thread.  Both forces are resolved by the
+angles of the thread as in textbooks on machine elements, without the coordinates of a coupling.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ import numpy as np
 
 @dataclass
 class Screw:
-    """A screw that turns about its axis, and a nut that moves along it.
+    """Screw that rotates about its axis, and nut that translates along the axis.
 
     Attributes:
         J: inertia of the screw [kg m^2].
         m: mass of the nut [kg].
         radius: mean radius of the thread [m].
-        lead_angle: of the thread [rad].
-        pressure_angle: of the flank in the normal section [rad].
+        lead_angle: lead angle of the thread [rad].
+        pressure_angle: pressure angle of the flank in the normal section [rad].
         mu: coefficient of friction.
     """
 
@@ -33,16 +33,16 @@ class Screw:
 
     @property
     def ratio(self):
-        """Way of the nut over angle of the screw [m/rad]."""
+        """Return the travel of the nut per angle of the screw [m/rad]."""
         return self.radius * np.tan(self.lead_angle)
 
     def directions(self):
-        """(Force on the nut, torque on the screw) of a unit of N, and of one of friction that slows them."""
+        """Return (force on the nut, torque on the screw) of unit N, and of unit friction against motion."""
         c, s, flank = np.cos(self.lead_angle), np.sin(self.lead_angle), np.cos(self.pressure_angle)
         return np.array([flank * c, -flank * s * self.radius]), np.array([-s, -c * self.radius])
 
     def sliding(self, force, torque, sign):
-        """Every (acceleration of the screw, flank force) at this sign of turning; negative: other flank."""
+        """Return all (screw acceleration, flank force) at this sign of rotation; negative: other flank."""
         normal, rub = self.directions()
         found = []
         for flank in (1.0, -1.0):
@@ -54,7 +54,7 @@ class Screw:
         return found
 
     def holds(self, force, torque):
-        """Friction over mu N that keeps it at rest: it sticks while this is at most 1."""
+        """Return the friction for rest over mu N: the screw sticks if the ratio is at most 1."""
         normal, rub = self.directions()
         N, friction = np.linalg.solve(np.column_stack([normal, rub]), [-force, -torque])
         return abs(friction) / (self.mu * abs(N))

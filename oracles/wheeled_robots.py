@@ -1,6 +1,6 @@
-"""Robots on wheels that roll without slip, and where their wheels take them: planar kinematics.
+"""Robots on wheels that roll without slip, and their planar kinematics.
 
-The models are Pinocchio's; their motion is integrated by SciPy from the no-slip conditions alone.
+The models are Pinocchio's.  SciPy integrates their motion from the no-slip conditions only.
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ import pinocchio as pin
 from scipy.integrate import solve_ivp
 
 KINDS = ("differential", "casters", "ackermann", "omni")
-# Tolerance of the reference: a hundredth of the tightest that is asked for.
+# Tolerance of the reference: a hundredth of the tightest tolerance of a test.
 REFERENCE = 1e-13
 
 
 @dataclass
 class Robot:
-    """A robot and its motion.
+    """Robot and its motion.
 
     Attributes:
         model: pinocchio.Model with a joint "base".
-        wheels: of each `Rolling`: frame and radius.
-        moved: of each prescribed joint: name and function of time.
+        wheels: frame and radius of each `Rolling`.
+        moved: name and function of time of each prescribed joint.
         omni: rows A of omnidirectional wheels, A v = 0, or None.
-        q0: on the plane.
+        q0: initial configuration, with the wheels on the plane.
         rate: t, (x, y, heading, swivels) -> their rates.
         y0: (x, y, heading, swivels) at the start.
-        swivels: joints whose angles follow x, y and heading in y.
+        swivels: names of the joints whose angles follow x, y and heading in y.
     """
 
     model: pin.Model
@@ -42,7 +42,7 @@ class Robot:
     swivels: list[str] = field(default_factory=list)
 
     def reference(self, duration):
-        """(x, y, heading, swivels) at the end, and the length of the way."""
+        """Return (x, y, heading, swivels) at the end, and the path length."""
 
         def rate(t, y):
             slopes = self.rate(t, y[:-1])
@@ -54,7 +54,7 @@ class Robot:
         return run.y[:-1, -1], run.y[-1, -1]
 
     def place(self, q):
-        """(x, y, heading, swivels) of a configuration."""
+        """Return (x, y, heading, swivels) of a configuration."""
         angles = [q[self.model.joints[self.model.getJointId(name)].idx_q] for name in self.swivels]
         if self.model.nvs[1] == 3:
             return np.array([q[0], q[1], np.arctan2(q[3], q[2]), *angles])
@@ -62,7 +62,7 @@ class Robot:
         return np.array([q[0], q[1], np.arctan2(R[1, 0], R[0, 0]), *angles])
 
     def miss(self, q, duration):
-        """Largest difference from the reference, as a part of the way or of one."""
+        """Return the largest difference from the reference, over max(1, path length)."""
         end, way = self.reference(duration)
         apart = self.place(q) - end
         apart[2] = np.angle(np.exp(1j * apart[2]))
@@ -110,7 +110,7 @@ def _start(robot, radius):
 
 
 def differential(rng, functions, casters=0):
-    """Two wheels on one axle, each with a motion of its own, and casters that follow."""
+    """Return a robot with two independently driven wheels on one axle, and passive casters."""
     radius, track = rng.uniform(0.03, 0.3), rng.uniform(0.1, 0.6)
     model, base, mass = _chassis(rng, track, radius, free=casters > 0 and rng.random() < 0.5)
     light = mass * 10.0 ** rng.uniform(-3.0, -0.5)
@@ -137,7 +137,9 @@ def differential(rng, functions, casters=0):
         a, b = left(t)[1], right(t)[1]
         v, turn = radius * (a + b) / 2, radius * (b - a) / track
         slopes = [v * np.cos(state[2]), v * np.sin(state[2]), turn]
-        for (x, y, trail), angle in zip(places, state[3:], strict=True):  # its axle does not slip sideways
+        for (x, y, trail), angle in zip(
+            places, state[3:], strict=True
+        ):  # the caster does not slip along its axle
             across = -np.sin(angle) * (v - turn * y) + np.cos(angle) * turn * x
             slopes.append(-turn - across / trail)
         return slopes
@@ -147,7 +149,7 @@ def differential(rng, functions, casters=0):
 
 
 def _steering(angle, length, offset):
-    """Rate of a wheel beside the middle, so that all axles meet in one point: t -> jet."""
+    """Return t -> (angle, rate, acceleration) of a wheel at an offset; all axles meet in one point."""
 
     def function(t):
         d, d1, d2 = angle(t)
@@ -164,7 +166,7 @@ def _steering(angle, length, offset):
 
 
 def ackermann(rng, functions, drives=True):
-    """A car of four wheels; one of the rear ones drives, or none does and the steering stands still."""
+    """Return a four-wheel car: one rear wheel drives, or no wheel drives and the steering is fixed."""
     sinusoid, polynomial = functions
     radius, track, length = rng.uniform(0.05, 0.3), rng.uniform(0.3, 0.8), rng.uniform(0.5, 1.5)
     model, base, mass = _chassis(rng, track, radius)
@@ -195,7 +197,7 @@ def ackermann(rng, functions, drives=True):
 
 
 def omni(rng, functions):
-    """Three omnidirectional wheels: each binds the velocity along its own plane alone."""
+    """Return a robot with three omnidirectional wheels, each with one constraint along its plane."""
     radius = rng.uniform(0.03, 0.1)
     model, base, mass = _chassis(rng, 0.3, radius)
     light = mass * 10.0 ** rng.uniform(-3.0, -1.0)
@@ -219,7 +221,7 @@ def omni(rng, functions):
 
 
 def robot(rng, kind, functions):
-    """One of KINDS; `functions` are the package's `sinusoid` and `polynomial`."""
+    """Return a robot of one of KINDS; `functions` are the package's `sinusoid` and `polynomial`."""
     if kind == "casters":
         return differential(rng, functions, casters=int(rng.integers(1, 3)))
     return {"differential": differential, "ackermann": ackermann, "omni": omni}[kind](rng, functions)

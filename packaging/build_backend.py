@@ -1,10 +1,10 @@
 """Build backend: scikit-build-core with three additions for source installs.
 
-- A Python older than 3.10 ends in an error that says so, before pip looks for wheels that do not exist.
+- A Python older than 3.10 raises an error with advice, before pip searches for wheels that do not exist.
 - A line on the terminal announces a full compile; pip shows no output of a successful build.
 - Object files are reused. pip makes each isolated environment in a new temporary folder, and
-  scikit-build-core discards a build folder that was configured from another one. No object file of this
-  package depends on that folder (pin_nonideal/_core/CMakeLists.txt), so the build folder is kept.
+  scikit-build-core discards a build folder that was configured from another environment. No object file of
+  this package depends on the environment (pin_nonideal/_core/CMakeLists.txt), so the build folder is kept.
 """
 
 import json
@@ -29,7 +29,7 @@ import scikit_build_core.build as backend  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 CORE = ROOT / "pin_nonideal" / "_core"
-PROCESSOR_SECONDS = 300.0  # of a whole build, as measured by `pin-nonideal bench build`
+PROCESSOR_SECONDS = 300.0  # processor time of a whole build, measured by `pin-nonideal bench build`
 
 get_requires_for_build_sdist = backend.get_requires_for_build_sdist
 get_requires_for_build_wheel = backend.get_requires_for_build_wheel
@@ -40,13 +40,13 @@ build_sdist = backend.build_sdist
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
-    """Builds a wheel; see PEP 517."""
+    """Build a wheel; see PEP 517."""
     _prepare()
     return backend.build_wheel(wheel_directory, config_settings, metadata_directory)
 
 
 def build_editable(wheel_directory, config_settings=None, metadata_directory=None):
-    """Builds a wheel for an editable install; see PEP 660."""
+    """Build a wheel for an editable install; see PEP 660."""
     _prepare()
     return backend.build_editable(wheel_directory, config_settings, metadata_directory)
 
@@ -60,17 +60,17 @@ def _prepare():
 
 
 def _keep_objects(info):
-    """Names this environment as the one that configured a build folder."""
+    """Set this environment as the one that configured a build folder."""
     try:
         content = json.loads(info.read_text(encoding="utf-8"))
         content["skbuild_path"] = os.fspath(Path(backend.__file__).parent.parent.resolve())
         info.write_text(json.dumps(content, indent=2), encoding="utf-8")
     except (OSError, ValueError, TypeError):
-        pass  # scikit-build-core then starts anew
+        pass  # scikit-build-core then discards the folder
 
 
 def _announce():
-    """One line on the terminal, if there is one: what is compiled, and about how long it takes here."""
+    """Print number of sources and expected compile time, also to the terminal if there is one."""
     sources = len(list(CORE.rglob("*.cpp")))
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     minutes = max(1, round(PROCESSOR_SECONDS / processors / 60.0 + 0.5))

@@ -1,4 +1,4 @@
-"""The oracles of the checkout, importable by name; Ctrl-C as in a terminal; the files that runs write."""
+"""Import of the oracles, default handling of Ctrl-C, and a fixture for files that runs write."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-# Shells let what they start in the background, and its children, ignore Ctrl-C.
+# Shells make background processes and their children ignore Ctrl-C.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _import_oracles() -> None:
-    """`oracles` from its folder: the checkout on sys.path would hide the installed package and its core."""
+    """Import `oracles` from its folder: the checkout on sys.path would hide the installed package."""
     file = Path(__file__).resolve().parent.parent / "oracles" / "__init__.py"
     spec = importlib.util.spec_from_file_location("oracles", file)
     assert spec is not None
@@ -31,7 +31,7 @@ _import_oracles()
 
 @pytest.fixture
 def kept(monkeypatch):
-    """Every file that a run writes, in order."""
+    """Return a list of every file that a run writes, in order."""
     from pin_nonideal.simulation import checkpoint
 
     written = []

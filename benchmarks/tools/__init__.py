@@ -1,4 +1,4 @@
-"""What computes the motions: this package and what a user would pick instead, each with its best settings."""
+"""Tools that compute the motions: this package and its alternatives, each with its best settings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a tool of the accuracy benchmark offers."""
+"""Interface of a tool of the accuracy benchmark."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Outcome:
-    """End of one run.
+    """Result of one run.
 
     Attributes:
-        q: configurations at the sample times as Pinocchio orders them, (k, nq); None when the run failed.
-        steps: steps really made.
-        asked: steps that a fixed step asks for; None for adaptive methods.
-        failure: what went wrong, empty when nothing did.
-        v: velocity at the end as Pinocchio orders it, (nv,).
+        q: configurations at the sample times in Pinocchio's order, (k, nq); None if the run failed.
+        steps: number of completed steps.
+        asked: number of steps of a fixed-step method; None for adaptive methods.
+        failure: failure message, empty if there is none.
+        v: velocity at the end in Pinocchio's order, (nv,).
     """
 
     q: Array | None
@@ -33,19 +33,19 @@ class Outcome:
 
     @property
     def complete(self) -> bool:
-        """Whether the run reached its end with all its steps."""
+        """Check if the run reached its end with all its steps."""
         return not self.failure and self.q is not None and (self.asked is None or self.steps == self.asked)
 
 
 @dataclass(frozen=True)
 class Setting:
-    """One way to run a tool.
+    """Setting of a tool.
 
     Attributes:
-        family: method; settings of a family get finer from one to the next.
-        label: the setting within its family.
-        steps: fixed steps it takes; None for adaptive methods.
-        values: what the tool needs to know.
+        family: method; the settings of a family are ordered from coarse to fine.
+        label: name of the setting within its family.
+        steps: number of fixed steps; None for adaptive methods.
+        values: parameters of the tool.
     """
 
     family: str
@@ -58,32 +58,32 @@ class Setting:
 
 
 class Tool(Protocol):
-    """A simulator.  `prepare` does what a user does once; what it returns is timed."""
+    """Simulator.  `prepare` does the setup of a problem and returns the function that is timed."""
 
     name: str
     title: str
 
     def missing(self) -> str | None:
-        """Why it cannot run here, or None."""
+        """Return the reason why the tool cannot run, or None."""
 
     def settings(self, problem: Any) -> list[Setting]:
-        """Settings worth trying; none when the tool cannot state the problem."""
+        """Return the settings to try; empty if the tool cannot represent the problem."""
 
     def prepare(self, problem: Any, setting: Setting, samples: int = 1) -> Callable[[], Outcome]:
-        """A function that runs the problem once from its start.
+        """Return a function that runs the problem once from its start.
 
         Args:
-            problem: what to compute.
-            setting: how.
-            samples: configurations wanted, at equal times up to the end; 1 is timed, more tell the error.
+            problem: problem to compute.
+            setting: setting of the tool.
+            samples: number of configurations at equidistant times; 1 for timing, more for the error.
         """
 
 
 def needs(package: str) -> str | None:
-    """Why a tool cannot run that needs an optional package."""
+    """Return the reason why a tool cannot run without an optional package, or None."""
     return None if importlib.util.find_spec(package) else f"{package} is not installed"
 
 
 def tolerances(first: int, last: int) -> list[float]:
-    """From 10^-first to 10^-last by factors of about three, so that none wins by where its grid lies."""
+    """Return tolerances from 10^-first to 10^-last by factors of about three."""
     return [float(f"{10.0 ** (-0.5 * k):.0e}") for k in range(2 * first, 2 * last + 1)]

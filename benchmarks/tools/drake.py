@@ -1,4 +1,4 @@
-"""Drake: a continuous MultibodyPlant under its error-controlled Runge-Kutta methods."""
+"""Drake: a continuous MultibodyPlant with error-controlled Runge-Kutta methods."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ LARGEST_STEP = 0.1  # [s]
 
 
 class Drake:
-    """Trees of revolute joints; its loops exist for discrete plants of first order only."""
+    """Drake for trees of revolute joints; it has loops for discrete first-order plants only."""
 
     name = "drake"
     title = "Drake"
 
     def missing(self) -> str | None:
-        """Why it cannot run here, or None."""
+        """Return the reason why the tool cannot run, or None."""
         return needs("pydrake")
 
     def settings(self, problem: Any) -> list[Setting]:
-        """Settings worth trying."""
+        """Return the settings to try."""
         revolute = all("JointModelR" in j.shortname() for j in problem.model.joints[1:])
         extras = (problem.hold, problem.coulomb, problem.viscous, problem.torque)
         if not revolute or problem.anchors or problem.springs or any(extra is not None for extra in extras):
@@ -39,13 +39,13 @@ class Drake:
         ]
 
     def prepare(self, problem: Any, setting: Setting, samples: int = 1) -> Callable[[], Outcome]:
-        """A function that runs the problem once from its start."""
+        """Return a function that runs the problem once from its start."""
         from pydrake.multibody.parsing import Parser
         from pydrake.multibody.plant import MultibodyPlant
         from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
         from pydrake.systems.framework import DiagramBuilder
 
-        logging.getLogger("drake").setLevel(logging.ERROR)  # tags of MJCF that it leaves out, all empty
+        logging.getLogger("drake").setLevel(logging.ERROR)  # warnings on unsupported MJCF tags, all empty
         builder = DiagramBuilder()
         plant = builder.AddSystem(MultibodyPlant(time_step=0.0))
         Parser(plant).AddModelsFromString(mjcf(problem.model, problem.q0), "xml")

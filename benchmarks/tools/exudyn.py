@@ -1,4 +1,4 @@
-"""Exudyn: a kinematic tree in minimal coordinates under its compiled adaptive Runge-Kutta methods."""
+"""Exudyn: a kinematic tree in minimal coordinates with compiled Runge-Kutta methods."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ import numpy as np
 
 from .base import Outcome, Setting, needs, tolerances
 
-# Of the duration: below, the step control has met rounding, and would go on with this step for hours.
+# Minimum step relative to the duration: below it, rounding limits step control and runs take hours.
 SMALLEST_STEP = 1e-6
 
 
 class Exudyn:
-    """Trees of revolute joints and nothing else; loops would need its redundant formulations."""
+    """Exudyn for trees of revolute joints only; loops would need its redundant formulations."""
 
     name = "exudyn"
     title = "Exudyn"
 
     def missing(self) -> str | None:
-        """Why it cannot run here, or None."""
+        """Return the reason why the tool cannot run, or None."""
         return needs("exudyn")
 
     def settings(self, problem: Any) -> list[Setting]:
-        """Settings worth trying."""
+        """Return the settings to try."""
         revolute = all(
             j.shortname() in ("JointModelRX", "JointModelRY", "JointModelRZ")
             for j in problem.model.joints[1:]
@@ -39,7 +39,7 @@ class Exudyn:
         return adaptive + fixed
 
     def prepare(self, problem: Any, setting: Setting, samples: int = 1) -> Callable[[], Outcome]:
-        """A function that runs the problem once from its start."""
+        """Return a function that runs the problem once from its start."""
         import exudyn
 
         mbs = tree(exudyn, problem)
@@ -62,12 +62,12 @@ class Exudyn:
 
         def run_to(end: float, steps: int | None) -> Outcome:
             integration.endTime = end
-            integration.numberOfSteps = steps or 1  # adaptive: the largest step it may take is the whole
+            integration.numberOfSteps = steps or 1  # adaptive: no maximum step
             mbs.systemData.SetODE2Coordinates(q0, configuration=initial)
             mbs.systemData.SetODE2Coordinates_t(v0, configuration=initial)
             try:
                 done = mbs.SolveDynamic(settings, solverType=method)
-            except Exception as error:  # its own exceptions have no common root
+            except Exception as error:  # its exceptions have no common base class
                 return Outcome(None, 0, failure=str(error).splitlines()[0])
             made = int(mbs.sys["dynamicSolver"].it.currentStepIndex) - 1
             if done is False:
@@ -76,7 +76,7 @@ class Exudyn:
             return Outcome(np.array(q)[None, :], made, steps, v=np.array(v))
 
         def run() -> Outcome:
-            """Each sample is the end of a run of its own: an adaptive step does not stop elsewhere."""
+            """Run the problem once for each sample: adaptive steps stop at the end of a run only."""
             outcome, found = Outcome(None, 0), []
             for k in range(1, samples + 1):
                 steps = None if setting.steps is None else setting.steps * k // samples
@@ -90,7 +90,7 @@ class Exudyn:
 
 
 def tree(exudyn: Any, problem: Any) -> Any:
-    """The problem's model as one kinematic tree."""
+    """Return the problem's model as one kinematic tree."""
     from exudyn.itemInterface import NodeGenericODE2, ObjectKinematicTree
 
     model = problem.model

@@ -1,4 +1,4 @@
-"""MuJoCo: its integrators with the soft constraints of its defaults, and as stiff as its step allows."""
+"""MuJoCo: its integrators with default soft constraints, and with constraints as stiff as the step allows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .base import Outcome, Setting, needs
 
 Array = NDArray[np.float64]
 
-# Steps over the length of a problem, multiples of the number of samples.
+# Numbers of steps of a run, multiples of the number of samples.
 STEPS = (
     50,
     80,
@@ -40,7 +40,7 @@ SOLVER_TOLERANCE = 1e-12
 
 
 def states(problem: Any) -> Any:
-    """MuJoCo's model of a problem, and where Pinocchio's coordinates are in its own."""
+    """Return MuJoCo's model of a problem."""
     import mujoco
 
     text = mjcf(
@@ -52,21 +52,21 @@ def states(problem: Any) -> Any:
         problem.coulomb,
         problem.viscous,
     )
-    mujoco.set_mju_user_warning(lambda text: None)  # divergence is counted; it need not be told at every run
+    mujoco.set_mju_user_warning(lambda text: None)  # divergence is counted instead
     return mujoco.MjModel.from_xml_string(text)
 
 
 class Coordinates:
-    """Maps configurations and velocities of a pinocchio.Model to MuJoCo's and back.
+    """Map of configurations and velocities between a pinocchio.Model and MuJoCo.
 
-    MuJoCo may order joints otherwise; its quaternions begin with their real part, and the linear velocity of
-    its free joints is in world axes.
+    MuJoCo may have another order of joints.  Its quaternions begin with the real part.  The linear velocity
+    of its free joints is in world axes.
     """
 
     def __init__(self, model: Any, mj: Any) -> None:
-        self.q_places: list[int] = []  # of Pinocchio's coordinates among MuJoCo's
+        self.q_places: list[int] = []  # indices of Pinocchio's coordinates in MuJoCo's
         self.v_places: list[int] = []
-        self.free: list[tuple[int, int]] = []  # where free joints begin in q and in v
+        self.free: list[tuple[int, int]] = []  # first indices of free joints in q and v
         for i in range(1, model.njoints):
             joint, other = model.joints[i], mj.joint(model.names[i])
             is_free = joint.shortname() == "JointModelFreeFlyer"
@@ -76,7 +76,7 @@ class Coordinates:
                 self.free.append((joint.idx_q, joint.idx_v))
 
     def there(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """The state in MuJoCo's coordinates."""
+        """Return the state in MuJoCo's coordinates."""
         x, u, v = np.empty_like(q), np.empty_like(v), v.copy()
         for iq, iv in self.free:
             v[iv : iv + 3] = rotation(q, iq) @ v[iv : iv + 3]
@@ -84,7 +84,7 @@ class Coordinates:
         return x, u
 
     def back(self, x: Array, u: Array) -> tuple[Array, Array]:
-        """The state in Pinocchio's coordinates."""
+        """Return the state in Pinocchio's coordinates."""
         q, v = x[self.q_places], u[self.v_places]
         for iq, iv in self.free:
             v[iv : iv + 3] = rotation(q, iq).T @ v[iv : iv + 3]
@@ -92,7 +92,7 @@ class Coordinates:
 
 
 def rotation(q: Array, start: int) -> Array:
-    """Of the free joint whose coordinates begin at `start`."""
+    """Return the rotation matrix of the free joint with coordinates from `start`."""
     import pinocchio as pin
 
     matrix: Array = pin.Quaternion(q[start + 3 : start + 7]).matrix()
@@ -100,7 +100,7 @@ def rotation(q: Array, start: int) -> Array:
 
 
 def lighten(mj: Any) -> None:
-    """Leaves out what none of the problems needs: collisions, limits, the search for islands."""
+    """Disable features that no problem needs: collisions, limits, islands."""
     import mujoco
 
     bits = mujoco.mjtDisableBit
@@ -108,24 +108,24 @@ def lighten(mj: Any) -> None:
 
 
 def stiffen(mj: Any, h: float) -> None:
-    """Constraints as stiff as the step allows: solref 2 h, impedance near one, a solver that converges."""
+    """Make constraints as stiff as the step h allows: solref 2 h, impedance near 1, tight tolerance."""
     mj.opt.tolerance = SOLVER_TOLERANCE
     mj.eq_solref[:], mj.eq_solimp[:] = (2.0 * h, 1.0), STIFF_IMPEDANCE
     mj.dof_solref[:], mj.dof_solimp[:] = (2.0 * h, 1.0), STIFF_IMPEDANCE
 
 
 class MuJoCo:
-    """mj_step in one call."""
+    """MuJoCo with all steps between two samples in one call of mj_step."""
 
     name = "mujoco"
     title = "MuJoCo"
 
     def missing(self) -> str | None:
-        """Why it cannot run here, or None."""
+        """Return the reason why the tool cannot run, or None."""
         return needs("mujoco")
 
     def settings(self, problem: Any) -> list[Setting]:
-        """Settings worth trying."""
+        """Return the settings to try."""
         constrained = bool(problem.anchors) or problem.coulomb is not None
         families = [("RK4", True), ("Euler", True)]
         if constrained:
@@ -139,7 +139,7 @@ class MuJoCo:
         return found
 
     def prepare(self, problem: Any, setting: Setting, samples: int = 1) -> Callable[[], Outcome]:
-        """A function that runs the problem once from its start."""
+        """Return a function that runs the problem once from its start."""
         import mujoco
 
         mj = states(problem)
@@ -165,7 +165,7 @@ class MuJoCo:
             for _ in range(samples):
                 mujoco.mj_step(mj, data, nstep=steps // samples)
                 found.append(coordinates.back(data.qpos, data.qvel))
-            # On divergence it resets itself and counts a warning: the steps really made are those since then.
+            # MuJoCo resets a diverged state and counts a warning: data.time starts again at zero.
             made = round(data.time / mj.opt.timestep)
             bad = [w.name for w in resets(mujoco) if data.warning[w.value].number]
             if bad:
@@ -176,6 +176,6 @@ class MuJoCo:
 
 
 def resets(mujoco: Any) -> list[Any]:
-    """Warnings after which MuJoCo starts again from its initial state."""
+    """Return the warnings after which MuJoCo resets to its initial state."""
     kinds = mujoco.mjtWarning
     return [kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC]

@@ -1,4 +1,4 @@
-"""pin_nonideal itself, through its public door."""
+"""pin_nonideal through its public interface."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from .base import Outcome, Setting, tolerances
 
 
 class Package:
-    """pn.simulate with its adaptive methods."""
+    """Adaptive methods of pn.simulate."""
 
     name = "pin_nonideal"
     title = "pin_nonideal"
 
     def missing(self) -> str | None:
-        """Why it cannot run here, or None."""
+        """Return the reason why the tool cannot run, or None."""
         return None
 
     def settings(self, problem: Any) -> list[Setting]:
-        """Settings worth trying."""
+        """Return the settings to try."""
         del problem
         return [
             Setting(method, f"rtol {rtol:.0e}", values={"rtol": rtol, "atol": rtol})
@@ -32,7 +32,7 @@ class Package:
         ]
 
     def prepare(self, problem: Any, setting: Setting, samples: int = 1) -> Callable[[], Outcome]:
-        """A function that runs the problem once from its start."""
+        """Return a function that runs the problem once from its start."""
         scene = problem.scene()
         scene.initial_state()
         settings = {"method": setting.family, "output_dt": problem.duration / samples, **setting.values}

@@ -1,7 +1,7 @@
-"""The loop a user of Pinocchio writes in C++: Boost.odeint over constraintDynamics or aba, compiled.
+"""Compiled C++ loop around Pinocchio: Boost.odeint with constraintDynamics or aba.
 
-Of the two builds (instantiations of the wheel, and compiled anew from its headers) the one is taken whose
-evaluation is faster.  Nothing is called from Python between start and end.
+The tool selects the faster of two builds: with the instantiations of the wheel, or compiled from its headers.
+No Python code runs between start and end.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .base import Outcome, Setting, tolerances
 from .pinocchio_scipy import anchors, proximal
 
 MOST_EVALUATIONS = 1_000_000
-# Evaluations that tell which build is faster.
+# Number of evaluations for the selection of the build.
 TRIED = 2000
 METHODS = (("fehlberg78", 13), ("dopri5", 9), ("bulirsch_stoer", 13))
 
@@ -29,13 +29,13 @@ class PinocchioOdeint:
     title = "Pinocchio + Boost.odeint (C++ loop)"
 
     def missing(self) -> str | None:
-        """Why it cannot run here, or None."""
+        """Return the reason why the tool cannot run, or None."""
         if any(build_peers.load(name) for name in build_peers.NAMES):
             return None
         return "the C++ peers are not built (pin-nonideal bench build-peers)"
 
     def settings(self, problem: Any) -> list[Setting]:
-        """Settings worth trying; none of problems with a floating base, springs, friction or a control."""
+        """Return the settings to try; empty with a floating base, springs, friction or position control."""
         stated = (problem.hold, problem.coulomb, problem.viscous)
         if problem.model.nq != problem.model.nv or problem.springs or any(s is not None for s in stated):
             return []
@@ -46,7 +46,7 @@ class PinocchioOdeint:
         ]
 
     def prepare(self, problem: Any, setting: Setting, samples: int = 1) -> Callable[[], Outcome]:
-        """A function that runs the problem once from its start."""
+        """Return a function that runs the problem once from its start."""
         peer = fastest(problem)
         nv, rtol = problem.model.nv, setting.values["rtol"]
         q0, v0 = np.array(problem.q0), np.array(problem.v0)
@@ -66,7 +66,7 @@ class PinocchioOdeint:
 
 
 def fastest(problem: Any) -> Any:
-    """The build whose evaluation is faster at the problem's start."""
+    """Return the build with the faster evaluation at the problem's initial state."""
     modules = [module for module in map(build_peers.load, build_peers.NAMES) if module is not None]
     peers = [m.Peer(problem.model, anchors(problem), proximal(problem).mu, 1) for m in modules]
     q, v = np.array(problem.q0), np.array(problem.v0)

@@ -1,6 +1,6 @@
-"""The loop a user of Pinocchio writes, at its best: SciPy over pin.aba or pin.constraintDynamics.
+"""Optimized Python loop around Pinocchio: SciPy with pin.aba or pin.constraintDynamics.
 
-Data, constraint models and buffers are made once; LSODA runs through `odeint`, whose loop is compiled.
+Data, constraint models and buffers are created once.  LSODA runs through `odeint`, which has a compiled loop.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from .base import Outcome, Setting, tolerances
 
 Array = NDArray[np.float64]
 
-# Proximal term of constraintDynamics where rows are redundant (a planar loop closed with three rows has one);
-# its manual suggests 1e-12, and the error in the acceleration is 1e-13 relative then.
+# Proximal term of constraintDynamics for redundant rows, such as one of the three rows of a planar loop.  The
+# manual of Pinocchio recommends 1e-12.  The relative error of the acceleration is then 1e-13.
 REDUNDANT_MU = 1e-12
 MOST_EVALUATIONS = 200_000
 
 
 def anchors(problem: Any) -> list[Any]:
-    """The problem's anchors as Pinocchio's rigid constraint models."""
+    """Return the problem's anchors as Pinocchio's rigid constraint models."""
     model = problem.model
     data = model.createData()
     pin.framesForwardKinematics(model, data, problem.q0)
@@ -48,7 +48,7 @@ def anchors(problem: Any) -> list[Any]:
 
 
 def containers(models: list[Any]) -> tuple[Any, Any]:
-    """Constraint models and their data in Pinocchio's own vectors: lists would be copied at every call."""
+    """Return constraint models and data in Pinocchio's vectors: lists would be copied at every call."""
     kept, data = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
     for model in models:
         kept.append(model)
@@ -57,7 +57,7 @@ def containers(models: list[Any]) -> tuple[Any, Any]:
 
 
 def is_redundant(problem: Any) -> bool:
-    """Whether an anchor holds a plane, which Pinocchio closes with all three rows."""
+    """Check if an anchor has fewer than three axes: Pinocchio constrains all three, with a redundant row."""
     return any(len(getattr(anchor, "axes", "xyz")) < 3 for anchor in problem.anchors)
 
 
@@ -72,17 +72,17 @@ class PinocchioSciPy:
     title = "Pinocchio + SciPy (Python loop)"
 
     def missing(self) -> str | None:
-        """Why it cannot run here, or None."""
+        """Return the reason why the tool cannot run, or None."""
         return None
 
     def settings(self, problem: Any) -> list[Setting]:
-        """Settings worth trying."""
+        """Return the settings to try."""
         del problem
         tried = [Setting("LSODA", f"rtol {r:.0e}", values={"rtol": r}) for r in tolerances(3, 13)]
         return tried + [Setting("DOP853", f"rtol {r:.0e}", values={"rtol": r}) for r in tolerances(3, 13)]
 
     def prepare(self, problem: Any, setting: Setting, samples: int = 1) -> Callable[[], Outcome]:
-        """A function that runs the problem once from its start."""
+        """Return a function that runs the problem once from its start."""
         rate = equation(problem)
         y0 = np.concatenate([problem.q0, problem.v0])
         rtol, nq = setting.values["rtol"], problem.model.nq
@@ -108,7 +108,7 @@ class PinocchioSciPy:
             return Outcome(y[1:, :nq], steps, v=y[-1, nq:])
 
         def copied(t: float, y: Array) -> Array:
-            """SciPy's own methods keep what they get, and know no limit of steps."""
+            """Return a copy of the rate, which SciPy stores; raise TimeoutError after MOST_EVALUATIONS."""
             nonlocal count
             count += 1
             if count > MOST_EVALUATIONS:
@@ -138,7 +138,7 @@ class PinocchioSciPy:
 
 
 def equation(problem: Any) -> Callable[[float, Array], Array]:
-    """dy/dt of y = (q, v), in one array that is written again at every call."""
+    """Return a function that computes dy/dt of y = (q, v) in an array that every call overwrites."""
     model = problem.model
     data, nq, nv = model.createData(), model.nq, model.nv
     models, datas = containers(anchors(problem))
@@ -170,7 +170,7 @@ def equation(problem: Any) -> Callable[[float, Array], Array]:
 
 
 def base_rate(q: Array, v: Array) -> list[float]:
-    """Rates of place and quaternion of a floating base; plain floats are faster than arrays of three."""
+    """Return rates of position and quaternion of a floating base; floats are faster than small arrays."""
     _, _, _, x, y, z, w = q[:7].tolist()
     a, b, c, p, r, s = v[:6].tolist()
     tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
@@ -182,7 +182,7 @@ def base_rate(q: Array, v: Array) -> list[float]:
 
 
 def forces(problem: Any, data: Any) -> Callable[[Array, Array], Array] | None:
-    """Joint torques that depend on the state; None without any."""
+    """Return a function of the state-dependent joint torques, or None."""
     model, parts = problem.model, []
     still = np.zeros(model.nv) if problem.torque is None else problem.torque
     if problem.hold is not None:
@@ -201,7 +201,7 @@ def forces(problem: Any, data: Any) -> Callable[[Array, Array], Array] | None:
 
 
 def spring_torque(model: Any, data: Any, spring: Any) -> Callable[[Array, Array], Array]:
-    """Torque of an undamped spring from the Jacobians of its ends."""
+    """Return a function of the joint torque of an undamped spring, by the Jacobians of its ends."""
     one, two = model.getFrameId(spring.frame1), model.getFrameId(spring.frame2)
     world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 

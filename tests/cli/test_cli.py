@@ -1,4 +1,4 @@
-"""The command `pin-nonideal`: what it prints, what it writes, its exit codes, and what Ctrl-C leaves."""
+"""The command `pin-nonideal`: output, files, exit codes and the effect of Ctrl-C."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ import pin_nonideal as pn
 from pin_nonideal.cli.main import EXIT_ERROR, EXIT_INTERRUPTED, main
 from pin_nonideal.cli.run import parameters
 
-# A short piece of motion: the command is tested here, the motion elsewhere.
+# Short motion: other tests check the motion itself.
 SHORT = ["--duration", "0.05"]
-# Time for the run to leave its first step behind, and to stop and write its files after Ctrl-C.
+# Time for the first step of the run, and time to stop and write files after Ctrl-C.
 HEAD_START_SECONDS = 1.0
 STOP_SECONDS = 30.0
 
 
 def error_line(capsys: pytest.CaptureFixture[str]) -> str:
-    """Standard error, which must be one line."""
+    """Return standard error, which must be one line."""
     text = capsys.readouterr().err
     assert text.count("\n") == 1
     return text.rstrip("\n")
@@ -44,7 +44,7 @@ class TestRun:
         run = pn.Trajectory.load(path)
         assert run.t[-1] == pytest.approx(0.05, abs=1e-15)
         assert len(run.t) == 6
-        assert run.F_ideal is None  # nothing is recorded that was not asked for
+        assert run.F_ideal is None  # not requested
 
     def test_record(self, tmp_path: Path) -> None:
         path = tmp_path / "run.npz"
@@ -177,7 +177,7 @@ class TestErrors:
         assert pn.Trajectory.load(path).t[-1] == computed.t[-1]
 
 
-# The command, with a word on standard output when the run begins: Ctrl-C is sent after it.
+# The command prints a word when the run begins. The test then sends Ctrl-C.
 COMMAND = """
 import sys
 import pin_nonideal as pn
@@ -198,7 +198,7 @@ class TestInterrupt:
     @pytest.mark.skipif(os.name != "posix", reason="signals")
     def test_ctrl_c_keeps_what_was_computed(self, tmp_path: Path) -> None:
         path = tmp_path / "run.npz"
-        # Far more time than the test waits; a sample a second, so that the file stays small.
+        # The duration exceeds the wait of the test. One sample a second keeps the file small.
         words = ["run", "four_bar", "--duration", "1e7", "--output-dt", "1", "--save", str(path)]
         process = subprocess.Popen(
             [sys.executable, "-c", COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -1,4 +1,4 @@
-"""The commands beside `run`: states by name, resume, replay, sweep, equilibrium, info, completion."""
+"""Other commands than `run`: states by name, resume, replay, sweep, equilibrium, info, completion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Boxes of collision models that touch spheres, capsules and boxes: closed forms, and Coal's distances."""
+"""Contacts of boxes with spheres, capsules and boxes, against closed forms and Coal's distances."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pin_nonideal as pn
 
 from ..support.mechanisms import GRAVITY, body, empty, frame
 
-# Where corners rest whose edges are rounded by a thousandth of the box.
+# Height of resting corners with edges rounded by a thousandth of the box.
 ROUNDED = 2e-3
 
 
@@ -20,7 +20,7 @@ def place(x=0.0, y=0.0, z=0.0, rpy=(0.0, 0.0, 0.0)):
 
 
 def pair(shape, fixed, at=None, mass=1.0, inertia=0.02, **more):
-    """A free body of one shape, and another shape that is fixed in the world."""
+    """Return a free body of one shape, and another shape fixed in the world."""
     model, geometry = empty((0.0, 0.0, -GRAVITY)), pin.GeometryModel()
     joint = body(model, 0, pin.JointModelFreeFlyer(), "free", mass, inertia=inertia * np.eye(3))
     frame(model, "middle", joint)
@@ -48,7 +48,7 @@ def test_lands_on_top(shape, height, order):
 
 
 def test_a_ball_rolls_down_a_block_and_off_its_edge():
-    """On a block that leans by 0.2 rad: 5/7 g sin, and it leaves where the edge has turned it."""
+    """On a slope of 0.2 rad the acceleration is 5/7 g sin; the ball leaves at the edge."""
     r, lean = 0.1, 0.2
     scene = pair(
         coal.Sphere(r), coal.Box(2.0, 1.0, 0.2), place(rpy=(0.0, lean, 0.0)), inertia=0.4 * r * r, mu=0.9
@@ -66,7 +66,7 @@ def test_a_ball_rolls_down_a_block_and_off_its_edge():
 
 @pytest.mark.parametrize("mu", [0.2, 0.4])
 def test_a_box_on_a_leaning_box(mu):
-    """At 0.3 rad it slides for tan 0.3 > mu, and stays else."""
+    """At 0.3 rad the box slides if tan 0.3 > mu, else it sticks."""
     lean = 0.3
     scene = pair(coal.Box(0.2, 0.2, 0.1), coal.Box(2.0, 1.0, 0.2), place(rpy=(0.0, lean, 0.0)), mu=mu)
     up = np.array([np.sin(lean), 0.0, np.cos(lean)])
@@ -80,7 +80,7 @@ def test_a_box_on_a_leaning_box(mu):
 
 
 def test_a_long_box_rests_across_the_edges_of_a_narrow_one():
-    """Edges cross there: four places carry it, none of them a corner of the upper one."""
+    """Edges cross: four contact points carry the box, none of them a corner of the upper box."""
     scene = pair(coal.Box(1.0, 0.1, 0.1), coal.Box(0.3, 1.0, 0.2), mu=0.5)
     run = pn.simulate(scene, 1.0, q=[0.02, 0.0, 0.15, 0, 0, 0, 1], record="forces")
     assert np.abs(run.v[-1]).max() < 1e-12
@@ -90,7 +90,7 @@ def test_a_long_box_rests_across_the_edges_of_a_narrow_one():
 
 @pytest.mark.parametrize("reach", [-1.0, 1.0])
 def test_a_box_tips_over_the_edge(reach):
-    """Its middle a little inside or outside of what carries it."""
+    """The center is slightly inside or outside of the support."""
     scene = pair(coal.Box(0.4, 0.2, 0.1), coal.Box(1.0, 1.0, 0.2), mu=0.5)
     q = [0.5 + reach * ROUNDED, 0.0, 0.15, 0, 0, 0, 1]
     now = scene.solve(np.array(q), np.zeros(6))
@@ -106,7 +106,7 @@ def distance(run, k, shape, fixed):
 
 @pytest.mark.parametrize("seed", range(9))
 def test_tumbling_bodies_do_not_enter_a_box(seed):
-    """Thrown at it with spin, and never deeper than 1e-8 m by Coal's distance, boxes less their rounding."""
+    """Penetration stays below 1e-8 m by Coal's distance of boxes without their rounding."""
     rng = np.random.default_rng(seed)
     size = rng.uniform(0.1, 0.5, 3)
     shape = (coal.Sphere(0.1), coal.Capsule(0.06, 0.3), coal.Box(*size))[seed % 3]

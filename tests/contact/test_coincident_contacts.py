@@ -1,4 +1,4 @@
-"""Contacts of one place act as one: declared several times by hand, or where places of two shapes meet."""
+"""Coincident contacts act as one contact: declared several times, or coincident points of two shapes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..geometry.test_geometry_pairs import convex
 from ..geometry.test_solid_contacts import pair, thrown
 from ..support.mechanisms import GRAVITY, body, empty, frame
 
-# What tolerances of steps leave of a difference, beside motions of the order of a meter.
+# Difference of motions of the order of a meter at the tolerances of the steps.
 SAME = 1e-12
 METHODS = {"dop853": {"rtol": 1e-10, "atol": 1e-12}, "moreau": {"method": "moreau", "dt": 1e-3}}
 
@@ -36,14 +36,14 @@ RADIUS = 0.1
 
 
 def bounces_and_rolls(count):
-    """A ball with spin: flight, impacts, sliding, and rolling from there."""
+    """Return a ball with spin: flight, impacts, sliding and rolling."""
     ball = pn.PointContact("middle", radius=RADIUS, mu=0.3, restitution=0.4)
     v = [1.0, 0.4, 0.0, 2.0, -3.0, 1.0]
     return free([ball], count, 0.4 * RADIUS**2 * np.eye(3), q0=[0, 0, 0.3, 0, 0, 0, 1], v0=v)
 
 
 def slides_to_rest(count):
-    """A box on four corners, which sticks from then on."""
+    """Return a box on four corners that slides to rest."""
     corners = [c for c in pn.box_contacts("middle", (0.4, 0.2, 0.2), mu=0.5) if c.offset[2] < 0.0]
     inertia = np.diag([0.0067, 0.0167, 0.0167])
     return free(corners, count, inertia, q0=[0, 0, 0.1, 0, 0, 0, 1], v0=[1.5, 0, 0, 0, 0, 0])
@@ -56,7 +56,7 @@ def stands_on_a_slope(count):
 
 
 def rolls_off(count):
-    """A ball that rolls on a lying cylinder until it leaves it."""
+    """Return a ball that rolls on a horizontal cylinder until it leaves the cylinder."""
     place = {"length": 4.0, "below": 0.9, "radius1": RADIUS, "rpy": (0.5 * np.pi, 0.0, 0.0)}
     contact = pn.CylinderContact("middle", "ground", mu=5.0, **place)
     start, speed = 0.3, 0.8
@@ -105,7 +105,7 @@ def test_stops_declared_twice(method):
 
 
 def test_a_capsule_falls_on_a_corner():
-    """Across the tip where four edges of a mesh meet: one of the places that meet there takes the impact."""
+    """One of the coincident points at the tip of four mesh edges takes the impact."""
     tip = [[0, 0, 0.2], [0.3, 0, -0.2], [-0.3, 0, -0.2], [0, 0.3, -0.2], [0, -0.3, -0.2]]
     scene = pair(coal.Capsule(0.04, 0.3), convex(tip), mu=0.4)
     turned = pin.Quaternion(pin.rpy.rpyToMatrix(0.0, 0.5 * np.pi, 0.3)).coeffs()
@@ -124,14 +124,14 @@ def test_capsules_that_come_to_a_corner(seed):
 
 
 def test_places_that_differ_are_kept():
-    """Corners of a cube beside one that stands twice: four carry it, as without the copy."""
+    """Four corners of a cube carry the load, with or without a duplicate corner."""
     corners = [c for c in pn.box_contacts("middle", (0.2, 0.2, 0.2), mu=0.5) if c.offset[2] < 0.0]
     again = replace(corners[0], name="again")
     rougher = replace(corners[1], mu=0.7, name="rougher")
     scene = free(corners, 1, 0.0067 * np.eye(3), q0=[0, 0, 0.1, 0, 0, 0, 1])
     scene = pn.Scene(scene.model, contacts=[*corners, again, rougher], q0=scene.q0)
     run = pn.simulate(scene, 0.1, record="forces")
-    assert run.closed[-1].sum() == 5  # one of them rubs otherwise
+    assert run.closed[-1].sum() == 5  # one contact has another friction
     assert run.lam[-1].sum() == pytest.approx(GRAVITY, rel=1e-12)
 
 
@@ -141,7 +141,7 @@ def slider(*coefficients):
 
 
 def test_copies_that_a_run_tells_apart():
-    """Friction given by the run: what was declared alike shares the load as what was declared so."""
+    """Duplicates with friction from run parameters share the load like duplicates with equal declarations."""
     names = slider(0.2, 0.2).contact_names
     given = {names[1]: {"mu": [0.2, 0.4]}}
     alike, apart = pn.rollout(slider(0.2, 0.2), None, None, 0.1, parameters=given)
@@ -161,7 +161,7 @@ def test_places_that_resist_spinning_otherwise_are_kept():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_cube_on_a_cube(method):
-    """Edges on edges, corners on faces: of all places that meet in a point one, and nothing drifts."""
+    """One contact remains of the coincident points of edges and faces, and the cube does not drift."""
     size = 0.2
     model, geometry = empty(), pin.GeometryModel()
     for k in range(2):

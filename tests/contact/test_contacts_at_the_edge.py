@@ -1,4 +1,4 @@
-"""Contacts at the edge of what numbers tell: starts that touch with hardly any velocity."""
+"""Contacts near rounding: initial contact with very small velocity."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ import pin_nonideal as pn
 from ..support.mechanisms import body, empty, frame
 
 G = 9.81
-# A flight of this height is rounding of a scene of one meter, see `low_flight` of the core.
+# Height of a flight within rounding for a scene of one meter, see `low_flight` of the core.
 LOW = 4e-12
 SIZES = (0.2, 0.3, 0.1)
 
 
 def resting(kind: str, **contact: Any) -> pn.Scene:
-    """A body that touches the ground: a ball of 0.1 m, or a box."""
+    """Return a body in contact with the ground: a ball of 0.1 m, or a box."""
     model = empty()
     joint = body(model, 0, pin.JointModelFreeFlyer(), "body", 1.0, inertia=np.diag([0.01, 0.012, 0.015]))
     frame(model, "middle", joint, pin.SE3.Identity())
@@ -36,7 +36,7 @@ def resting(kind: str, **contact: Any) -> pn.Scene:
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("kind", ["ball", "box"])
 def test_what_touches_and_hardly_moves_rests(kind: str, restitution: float, speed: float) -> None:
-    """With restitution of 1 it would bounce 1e12 times in half a second, lower than rounding."""
+    """With restitution 1 the body would bounce 1e12 times in half a second, below rounding."""
     scene = resting(kind, mu=0.7, restitution=restitution)
     run = pn.simulate(
         scene, 0.5, v=[0.0, 0.0, speed, 0.0, 0.0, 0.0], record=("forces", "energy"), max_wall=20.0
@@ -49,7 +49,7 @@ def test_what_touches_and_hardly_moves_rests(kind: str, restitution: float, spee
 
 
 def test_what_bounces_higher_than_rounding_goes_on() -> None:
-    """An elastic ball of 3e-4 m/s strikes every 2 v / g = 6e-5 s, and keeps its energy."""
+    """An elastic ball of 3e-4 m/s bounces every 2 v / g = 6e-5 s and keeps its energy."""
     speed, duration = 3e-4, 0.02001
     run = pn.simulate(
         resting("ball", restitution=1.0), duration, v=[0.0, 0.0, speed, 0.0, 0.0, 0.0], record="energy"

@@ -1,4 +1,4 @@
-"""Cylinders, cones, disks and ellipsoids on planes, beside closed forms."""
+"""Cylinders, cones, disks and ellipsoids on planes, against closed forms."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from ..support.same_run import assert_same_run
 from ..support.seeds import ranges
 
 RADIUS, LENGTH = 0.1, 0.3
-DEPTH = 1e-10  # [m], that nothing sinks below the plane
+DEPTH = 1e-10  # maximum penetration of the plane [m]
 TIGHT = {"rtol": 1e-11, "atol": 1e-12}
 
 
 def scene(shape, inertia, *, gravity=(0.0, 0.0, -GRAVITY), **more):
-    """A free body of 1 kg over a half-space, whose rims are those of the contacts."""
+    """Return a free body of 1 kg over a half-space, with the rims of its contacts."""
     model, geometry = empty(gravity), pin.GeometryModel()
     joint = body(model, 0, pin.JointModelFreeFlyer(), "free", 1.0, inertia=np.diag(inertia))
     frame(model, "middle", joint)
@@ -56,7 +56,7 @@ def test_a_can_lands_on_its_face(radius):
 
 
 def test_a_lying_cylinder_slips_and_then_rolls():
-    """Spun at w0: a third of the rim's speed is left, after R w0 / (3 mu g)."""
+    """From the spin w0 a third of the rim speed is left after R w0 / (3 mu g)."""
     mu, spin = 0.5, 10.0
     start = state(pin.rpy.rpyToMatrix(-0.5 * np.pi, 0.0, 0.0), RADIUS)
     run = pn.simulate(cylinder(mu=mu), 1.0, q=start, v=[0, 0, 0, 0, 0, spin])
@@ -70,7 +70,7 @@ def test_a_lying_cylinder_slips_and_then_rolls():
 @pytest.mark.parametrize("azimuth", [0.0, 0.4, 1.0, 2.2, 4.0])
 @pytest.mark.parametrize("lever", [0.89, 1.02])
 def test_a_can_tips_over_its_rim(azimuth, lever):
-    """Where its weight points beyond the rim, whichever way it faces; inside the face's points it stands."""
+    """The can tips if its weight acts outside the rim, in any direction, and stands inside the manifold."""
     slope = np.arctan(lever * 2.0 * RADIUS / LENGTH)
     pull = GRAVITY * np.sin(slope)
     gravity = (pull * np.cos(azimuth), pull * np.sin(azimuth), -GRAVITY * np.cos(slope))
@@ -82,7 +82,7 @@ def test_a_can_tips_over_its_rim(azimuth, lever):
 
 
 def test_a_can_that_rocks_comes_to_rest_on_its_face():
-    """Let go on its rim at 0.2 rad: it never sinks, loses energy only, and stands still in the end."""
+    """Released on its rim at 0.2 rad, the can does not penetrate, dissipates energy, and comes to rest."""
     tilt = np.array([0.12, 0.16, 0.0])
     q = state(pin.exp3(tilt), 0.5 * LENGTH * np.cos(0.2) + RADIUS * np.sin(0.2))
     run = pn.simulate(cylinder(mu=0.8), 3.0, q=q, record="energy")
@@ -92,7 +92,7 @@ def test_a_can_that_rocks_comes_to_rest_on_its_face():
 
 
 def coin(lean, yaw_rate, spin, *, mu=2.0):
-    """A thin disk about y, leant from the vertical about x, that rolls: its contact point is at rest."""
+    """Return a thin rolling disk about y, tilted from the vertical about x."""
     r = 0.5
     model = empty((0.0, 0.0, -GRAVITY))
     joint = body(
@@ -107,7 +107,7 @@ def coin(lean, yaw_rate, spin, *, mu=2.0):
 
 
 def assert_steady(run, height):
-    """It keeps its height, and its contact point neither slips nor lifts."""
+    """Assert that the height is constant and the contact point sticks."""
     assert np.abs(run.q[:, 2] - height).max() < 1e-8
     assert not run.events
     assert run.closed.all()
@@ -115,7 +115,7 @@ def assert_steady(run, height):
 
 @pytest.mark.parametrize(("lean", "yaw_rate"), [(0.2, 1.5), (0.5, -2.0), (1.0, 3.0)])
 def test_a_coin_rolls_round_in_a_circle(lean, yaw_rate):
-    """5/4 W^2 sin cos + 3/2 W s cos + g/R sin = 0: the lean stays (thin disk, textbook)."""
+    """5/4 W^2 sin cos + 3/2 W s cos + g/R sin = 0: the lean is constant (thin disk, textbook)."""
     drive = 1.25 * yaw_rate**2 * np.sin(lean) * np.cos(lean) + GRAVITY / 0.5 * np.sin(lean)
     spin = -drive / (1.5 * yaw_rate * np.cos(lean))
     steady, q, v = coin(lean, yaw_rate, spin)
@@ -124,7 +124,7 @@ def test_a_coin_rolls_round_in_a_circle(lean, yaw_rate):
 
 @pytest.mark.parametrize("angle", [0.05, 0.3, 0.8])
 def test_a_coin_wobbles_about_its_middle(angle):
-    """Euler's disk: W^2 = 4 g / (R sin a) at the angle a to the floor; its middle stays (Moffatt 2000)."""
+    """Euler's disk: W^2 = 4 g / (R sin a) at the angle a to the floor; the center is fixed (Moffatt 2000)."""
     yaw_rate = np.sqrt(4.0 * GRAVITY / (0.5 * np.sin(angle)))
     steady, q, v = coin(0.5 * np.pi - angle, yaw_rate, -yaw_rate * np.cos(angle))
     run = pn.simulate(steady, 3.0 * 2.0 * np.pi / yaw_rate, q=q, v=v, record="forces", **TIGHT)
@@ -134,7 +134,7 @@ def test_a_coin_wobbles_about_its_middle(angle):
 
 
 def test_a_cylinder_spins_in_a_groove():
-    """Both walls of 45 degrees rub: loads, deceleration and the instant of rest, after which it sticks."""
+    """Both walls at 45 degrees have friction: loads, deceleration, and time of rest."""
     mu, spin, r = 0.3, 40.0, 0.05
     lying = cylinder(r, 0.1)
     geometry = pin.GeometryModel()
@@ -166,7 +166,7 @@ def test_a_wheel_that_spins_upright_rolls_straight():
 
 
 def test_a_cone_lies_on_its_side():
-    """On its tip and its rim, which stands back by 1e-3 r: its middle is at r h / (2 sqrt(r^2 + h^2))."""
+    """On tip and rim, which is inset by 1e-3 r, the center is at r h / (2 sqrt(r^2 + h^2))."""
     r, h = RADIUS, LENGTH
     turn = np.pi - np.arctan2(h, r)
     height = 0.5 * r * h / np.hypot(r, h)
@@ -180,7 +180,7 @@ def test_a_cone_lies_on_its_side():
 @pytest.mark.parametrize("spin", [0.0, 3.0, 80.0, 600.0])
 @pytest.mark.parametrize("method", ["dop853", "dopri5"])
 def test_no_touch_is_leapt_over(spin, method):
-    """A cylinder that spins end over end: the first root of the gap of its lower rim, in closed form."""
+    """A cylinder spins end over end: the first root of its lower rim's gap has a closed form."""
     drop, tilt = 1.0, 0.3
     falling = scene(coal.Cylinder(RADIUS, LENGTH), (0.01, 0.01, 0.01))
 
@@ -223,7 +223,7 @@ SHAPES = {
         2.4 * np.array([a[1] ** 2 + a[2] ** 2, a[0] ** 2 + a[2] ** 2, a[0] ** 2 + a[1] ** 2]),
     ),
 }
-# The one of these bodies whose sliding rims have no motion, or several, by the laws of Coulomb.
+# Body with no or several solutions of Coulomb's law at its sliding rims.
 PARADOX = {("cylinder", 84)}
 
 
@@ -239,7 +239,7 @@ def dropped(kind, seed):
 @pytest.mark.parametrize("kind", SHAPES)
 @pytest.mark.parametrize("seeds", ranges(6, 12, 300))
 def test_dropped_at_random(kind, seeds):
-    """None else fails, hangs or sinks, by the gaps of its places; every sixth is repeated bit by bit."""
+    """No other run fails, hangs or penetrates; every sixth run is repeated bit by bit."""
     for seed in seeds:
         if (kind, seed) in PARADOX:
             continue

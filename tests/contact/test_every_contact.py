@@ -1,7 +1,7 @@
-"""Every kind of contact there is, and everything that shows, plots, keeps or resumes what it does.
+"""All kinds of contacts in simulation, replay, plots, files and checkpoints.
 
-A body of 1 kg slides along three axes: it falls by 1 cm on something fixed, bounces, slides and rests.  All
-of it is in closed form: the gap, the place that touches, the normal there, and the weight at the end.
+A body of 1 kg on three slides falls by 1 cm on a fixed shape, bounces, slides and rests.  Gap, contact point,
+normal and final weight have closed forms.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ from ..support.same_run import assert_same_run
 KINDS = get_args(contacts.Contact)
 G, DROP, SIDEWAYS = 9.81, 0.01, 0.05
 ALL = ("forces", "energy", "laws", "reactions", "tau", "a")
-ROUNDING = 1e-9  # of places and gaps of some 0.3 m, and of forces of some 10 N at rest
+ROUNDING = 1e-9  # positions and gaps of about 0.3 m, and forces of about 10 N at rest
 CUBE = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-0.2, 0.2)]
 RUBS: dict[str, Any] = {"mu": 0.5, "restitution": 0.3}
 
 
 @dataclass(frozen=True)
 class Case:
-    """A contact of "body", which slides along x, y and z, with "base" in the world's origin.
+    """Contact of "body", which slides along x, y and z, with "base" at the world's origin.
 
     Attributes:
-        contact: its description.
-        gap: of the body's place q.
-        place: that touches, of q; None of a contact without one.
-        normal: along which it presses the body, of q.
-        rows: rows of `lam`: the first carries the weight.
+        contact: description of the contact.
+        gap: function q -> gap.
+        place: function q -> contact point; None for a contact without a contact point.
+        normal: function q -> direction of the force on the body.
+        rows: number of rows of `lam`; the first carries the weight.
     """
 
     contact: Any
@@ -56,12 +56,12 @@ class Case:
 
     @property
     def row(self) -> str:
-        """Name of its row."""
+        """Return the name of the contact's row."""
         return "it lower" if isinstance(self.contact, pn.JointLimit) else "it"
 
 
 def below(radius: float) -> Callable[[Any], Any]:
-    """The lowest point of a body that reaches so far down."""
+    """Return a function of the lowest point of a body with this radius."""
     return lambda q: q - [0.0, 0.0, radius]
 
 
@@ -139,7 +139,7 @@ FLAT = {
 
 
 def made(case: Case) -> pn.Scene:
-    """The body 1 cm above what it falls on."""
+    """Return the scene with the body 1 cm above the fixed shape."""
     model, last = pin.Model(), 0
     model.name = "falling"
     for joint, name in ((pin.JointModelPX(), "x"), (pin.JointModelPY(), "y"), (pin.JointModelPZ(), "z")):
@@ -154,7 +154,7 @@ def made(case: Case) -> pn.Scene:
 
 @pytest.fixture(scope="module", params=KINDS, ids=lambda kind: kind.__name__)
 def case(request: Any) -> Case:
-    """A kind that is added needs its line above."""
+    """Return the case of a kind; a new kind needs an entry in the table."""
     return FLAT[request.param]
 
 
@@ -166,7 +166,7 @@ def run(case: Case) -> Any:
 def test_it_strikes_where_the_fall_ends_and_carries_the_weight_at_rest(case: Case, run: Any) -> None:
     strike = next(event for event in run.events if event.kind == "impact")
     assert strike.element == case.row
-    # A gap of 1 cm on the top of something round is 1e-6 m more: it is 0.5 mm aside by then.
+    # A gap of 1 cm over a round shape grows by 1e-6 m, since the body moves 0.5 mm sideways.
     assert strike.time == pytest.approx(np.sqrt(2.0 * DROP / G), abs=1e-4)
     assert strike.impulse[0] == pytest.approx(1.3 * np.sqrt(2.0 * DROP * G), rel=1e-3)
     rows = run.scene.constraint_slices[case.row]
@@ -175,7 +175,7 @@ def test_it_strikes_where_the_fall_ends_and_carries_the_weight_at_rest(case: Cas
 
 
 def test_forces_of_contacts_are_those_on_the_body(case: Case, run: Any) -> None:
-    """Newton's second law, sample by sample; a stop and a gap of the user's have no force at a place."""
+    """Newton's second law holds at each sample; stops and user gaps have no force at a point."""
     if case.place is None:
         assert "it" not in run.contact_forces
         return
@@ -219,7 +219,7 @@ def test_arrows_act_where_it_touches(case: Case, run: Any) -> None:
         arrow for arrow in arrows_of(run, motion, touches_of(run, motion)) if arrow.name.startswith("it")
     ]
     assert arrows
-    if case.place is None:  # along the joints that it moves
+    if case.place is None:  # generalized force
         (arrow,) = [found for found in arrows if found.joint == run.scene.model.getJointId("z")]
         rows = run.scene.constraint_slices[case.row]
         np.testing.assert_allclose(arrow.values[:, 2], motion.of(run.lam[:, rows.start]), atol=ROUNDING * G)
@@ -241,20 +241,20 @@ def test_marks_and_modes_are_where_it_touches(case: Case, run: Any) -> None:
     places = np.array([case.place(q) for q in motion.q])
     np.testing.assert_allclose(motion.local(body, places), element.point, atol=ROUNDING)
     np.testing.assert_allclose(element.axis, [case.normal(q) for q in motion.q], atol=ROUNDING)
-    if mark.path is None:  # the middle of a sphere stays on its body
+    if mark.path is None:  # a sphere's center is fixed to its body
         np.testing.assert_allclose(mark.point1, np.zeros(3), atol=ROUNDING)
     else:
         np.testing.assert_allclose(mark.path, motion.local(body, places), atol=ROUNDING)
     slides = np.abs(motion.of(run.v)[:, 0]) > 1e-3
     loaded = (element.normal > 1e-3) & (motion.part == 0.0)
     np.testing.assert_allclose(element.share[slides & loaded], 1.0, atol=1e-6)
-    normal = case.normal(run.q[-1])  # where it rests: a slope of tan(a) takes as much of mu
+    normal = case.normal(run.q[-1])  # the slope at rest uses tan(a) of mu
     assert element.share[-1] == pytest.approx(np.hypot(*normal[:2]) / normal[2] / RUBS["mu"], abs=1e-6)
     assert element.normal[-1] == pytest.approx(G * normal[2], rel=1e-6)
 
 
 def test_kept_contacts_and_stops_without_names_are_told_apart() -> None:
-    """The core has kept contacts before those that open; a stop has a row at each of its ends."""
+    """Bilateral contacts precede unilateral contacts in the core; a stop has one row per end."""
     scene = made(FLAT[contacts.BoxContact])
     groups = [
         [
@@ -284,7 +284,7 @@ def browser() -> Iterator[Any]:
 
 
 def test_pages_show_it(case: Case, run: Any, browser: Any, tmp_path: Path) -> None:
-    """The page draws the arrow, the ring in its mode, and a flash as it strikes."""
+    """The page draws the force arrow, the ring in the color of its mode, and a flash at impact."""
     page = Watched(browser, pn.replay(run, tmp_path / "run.html"))
     page.run("() => replay.seek(0.59)")
     (value,) = [arrow["value"] for arrow in page.run("() => replay.forces") if arrow["name"].startswith("it")]
@@ -292,7 +292,7 @@ def test_pages_show_it(case: Case, run: Any, browser: Any, tmp_path: Path) -> No
     if case.place is not None:
         end = run.q[-1] if isinstance(case.contact, pn.PointContact) else case.place(run.q[-1])
         mark = page.run("() => replay.poses().marks.it[0]")
-        np.testing.assert_allclose(mark, end, atol=1e-6)  # places are in numbers of 32 bits
+        np.testing.assert_allclose(mark, end, atol=1e-6)  # positions are 32-bit numbers
         strike = next(event.time for event in run.events if event.kind == "impact")
         page.run("time => replay.seek(time)", strike - 1e-3)
         assert page.run("() => replay.flashes") == 0

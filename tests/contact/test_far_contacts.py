@@ -1,4 +1,4 @@
-"""Contacts that are far away are not looked at: what comes near is found all the same."""
+"""Contacts with wide gaps are skipped without missing a touch."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from ..support.mechanisms import GRAVITY, body, empty, frame, hinge
 from ..support.same_run import assert_same_run
 from ..support.seeds import seeds
 
-INSTANT = 1e-9  # of the time itself
+INSTANT = 1e-9  # relative error of a time
 
 
 def flying(contacts, q0, v0, gravity=GRAVITY):
-    """A point of 1 kg that moves along the axes of the world, and a target that stands still."""
+    """Return a point of 1 kg that moves along the world axes, and a fixed target."""
     model = empty((0.0, 0.0, -gravity))
     joint = body(model, 0, pin.JointModelTranslation(), "point", 1.0)
     frame(model, "tip", joint)
@@ -33,7 +33,7 @@ def first(run, kind="impact"):
 @pytest.mark.parametrize("height", [1e-3, 1.0, 1e2, 1e4])
 @pytest.mark.parametrize("speed", [-300.0, 0.0, 50.0])
 def test_a_fall_ends_on_the_floor(height, speed):
-    """Others that stay far do not hide it."""
+    """Other contacts with wide gaps have no effect."""
     floor = pn.PointContact("tip")
     others = [pn.PointContact("tip", height=-1e5 * (k + 1), name=f"below {k}") for k in range(5)]
     scene = flying([*others, floor], [0.0, 0.0, height], [0.0, 0.0, speed])
@@ -45,7 +45,7 @@ def test_a_fall_ends_on_the_floor(height, speed):
 @pytest.mark.parametrize("method", ["dop853", "dopri5", "rk4"])
 @pytest.mark.parametrize("miss", [-1e-6, 1e-6])
 def test_a_fast_point_grazes_a_small_ball(method, miss):
-    """1 mm across, 100 m away, 1 km/s."""
+    """The ball has a diameter of 1 mm and 100 m distance; the point has 1 km/s."""
     radius = 0.5e-3
     ball = pn.SphereContact("target", "tip", radius)
     scene = flying([ball], [-100.0, radius + miss, 0.0], [1e3, 0.0, 0.0], gravity=0.0)
@@ -59,7 +59,7 @@ def test_a_fast_point_grazes_a_small_ball(method, miss):
 
 
 def test_a_long_arm_comes_round():
-    """Its tip is far from the plane most of the time, and strikes it once in each turn."""
+    """The tip is far from the plane most of the time, and touches it once in each turn."""
     model = empty((0.0, 0.0, 0.0))
     arm = body(model, 0, hinge(0, 1, 0), "arm", 1.0, inertia=np.eye(3))
     frame(model, "tip", arm, pin.SE3(np.eye(3), np.array([10.0, 0.0, 0.0])))
@@ -74,7 +74,7 @@ def test_a_long_arm_comes_round():
 
 
 def far_shapes(count):
-    """A ball over a floor, and so many other shapes around that it does not come near."""
+    """Return a ball over a floor, and `count` other shapes that stay far away."""
     model, geometry = empty((0.0, 0.0, -GRAVITY)), pin.GeometryModel()
     ball = body(model, 0, pin.JointModelFreeFlyer(), "ball", 1.0, inertia=0.02 * np.eye(3))
     shapes = [coal.Sphere(0.25), coal.Box(0.5, 0.4, 0.3), coal.Cylinder(0.2, 0.4), coal.Cone(0.2, 0.4)]
@@ -92,7 +92,7 @@ def far_shapes(count):
 
 @pytest.mark.parametrize("count", [4, 40, 400])
 def test_pairs_that_are_far_change_no_bit(count):
-    """It bounces, slips, rolls and rests as if they were not there."""
+    """The motion of the ball is bitwise the same without the far shapes."""
     alone, among = (pn.simulate(far_shapes(k), 3.0) for k in (0, count))
     np.testing.assert_array_equal(alone.t, among.t)
     np.testing.assert_array_equal(alone.q, among.q)
@@ -102,7 +102,7 @@ def test_pairs_that_are_far_change_no_bit(count):
 
 
 def test_resumed_among_far_ones(kept, tmp_path):
-    """From states in flight and at rest the run goes on bit by bit: what has come near by then is known."""
+    """A run resumed in flight or at rest is bitwise the same: checkpoints store the monitored contacts."""
     path, scene = tmp_path / "run", far_shapes(40)
     alone = pn.simulate(scene, 2.0)
     assert_same_run(alone, pn.simulate(scene, 2.0, checkpoint=path, checkpoint_interval=0.0))
@@ -114,12 +114,12 @@ def test_resumed_among_far_ones(kept, tmp_path):
 
 KINDS = ("revolute y", "revolute unaligned", "prismatic z", "helical x", "planar", "spherical", "free flyer",
          "translation", "universal", "endless z")  # fmt: skip
-TIMES = np.linspace(0.0, 1.5, 3001)  # [s], at which the oracle looks
-ALIKE = 1e-6  # [m or rad], to which two runs at a tolerance of 1e-9 are one motion
+TIMES = np.linspace(0.0, 1.5, 3001)  # sample times of the oracle [s]
+ALIKE = 1e-6  # difference of two runs at a tolerance of 1e-9 [m or rad]
 
 
 def random_contacts(model, q, rng, count):
-    """Points, balls and stops around a tree, open a bit or a long way, and their gaps by Pinocchio."""
+    """Return points, balls and stops around a tree with small or wide gaps, and the gaps by Pinocchio."""
     data = model.createData()
     names = [f.name for f in model.frames if f.name.endswith("tip")]
     index = model.getFrameId
@@ -168,8 +168,8 @@ def random_contacts(model, q, rng, count):
 
 @pytest.mark.parametrize("seed", seeds(range(16)))
 def test_the_first_of_many_touches(seed):
-    """Random trees among contacts near and far: by the motion without them, looked at each 0.5 ms, none
-    closes before the first touch, and one does there.
+    """The first touch agrees with the motion without contacts, sampled each 0.5 ms: no gap closes before
+    the first touch, and one closes there.
     """
     rng = np.random.default_rng(seed)
     model = random_trees.tree(rng.choice(KINDS, int(rng.integers(2, 6))).tolist(), rng, gravity=False)
@@ -191,7 +191,7 @@ def test_the_first_of_many_touches(seed):
     end = TIMES[int(below.argmax())] if below.any() else TIMES[-1]
     try:
         run = pn.simulate(pn.Scene(model, contacts=contacts), end, **tight)
-    except pn.RunError as error:  # what follows a touch of bodies without shapes is another matter
+    except pn.RunError as error:  # the motion after the touch is not tested
         run = error.trajectory
     touch = first(run)
     assert (touch is not None) or not below.any()
@@ -201,7 +201,7 @@ def test_the_first_of_many_touches(seed):
 
 
 def tied(away):
-    """Two bodies on slides, a rod between them, so far from the origin; a foot on one of them."""
+    """Return two bodies on slides with a rod between them, at a distance from the origin, and one foot."""
     model = empty()
     for name, x in (("foot", 0.0), ("head", 0.5)):
         here = pin.SE3(np.eye(3), np.array([away + x, 0.0, 0.0]))
@@ -214,7 +214,7 @@ def tied(away):
 @pytest.mark.parametrize("speed", [0.0, -0.5])
 @pytest.mark.parametrize("away", [0.0, 100.0])
 def test_what_touches_at_the_start_does_not_depend_on_runs_before(away, speed):
-    """A gap within 1e-10 of the loop's distance from the origin is closed at the start, whoever asks."""
+    """An initial gap within 1e-10 of the distance from the origin is closed, whatever ran before."""
     gap = 0.5e-10 * max(1.0, away)
     scene = tied(away)
     assert scene.solve([gap, gap], [0.0, 0.0]).closed.all()

@@ -1,4 +1,4 @@
-"""Newton's and Poisson's law of restitution, beside an enumeration of all modes and closed forms."""
+"""Newton's and Poisson's laws of restitution, against enumeration of all modes and closed forms."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ROUNDING = 1e-11
 
 
 def struck(corners, inertia, v, mu, e, law, mass=1.0):
-    """The impacts at t = 0 of corners that all lie on the floor."""
+    """Return the impact events at t = 0 of corners that lie on the floor."""
     model = planar(mass, inertia, corners, (0.0, 0.0, 0.0))
     for k in range(len(corners)):
         frame(model, f"floor {k}", 0, pin.SE3(np.eye(3), np.array([0.0, 0.0, corners[k][1]])))
@@ -32,14 +32,14 @@ def struck(corners, inertia, v, mu, e, law, mass=1.0):
 
 
 def rows(corners):
-    """Normal and tangent of each corner, on (x, z, turn about y)."""
+    """Return normal and tangent rows of each corner for (x, z, rotation about y)."""
     return np.array([row for x, z in corners for row in ([0.0, 1.0, -x], [1.0, 0.0, z])])
 
 
 @pytest.mark.parametrize("law", ["newton", "poisson"])
 @pytest.mark.parametrize("seed", seeds(range(25)))
 def test_random_impacts(law, seed):
-    """One or two corners of a body strike together; all that the modes allow is known."""
+    """One or two corners collide at once; the enumeration gives all solutions."""
     rng = np.random.default_rng(seed)
     count = 1 + seed % 2
     corners = [(x, z) for x, z in rng.uniform(-1.0, 1.0, (count, 2)) - [0.0, 1.2]]
@@ -54,12 +54,12 @@ def test_random_impacts(law, seed):
 
 
 def test_poisson_in_closed_form():
-    """A rod's end that slides forward all through: both phases push alike, (1 + e) times the first."""
+    """A rod's end slides forward through both phases; the impulse is (1 + e) times that of compression."""
     half, angle, mu, e = 0.5, np.deg2rad(60.0), 0.2, 0.6
     x, z = -half * np.cos(angle), -half * np.sin(angle)
     inertia, v = half**2 / 3.0, np.array([4.0, -1.0, 0.0])
     _, (impact,) = struck([(x, z)], inertia, v, [mu], [e], "poisson")
-    normal = 1.0 + x * x / inertia + mu * x * z / inertia  # rate of u_n to a unit of P_n, P_t = -mu P_n
+    normal = 1.0 + x * x / inertia + mu * x * z / inertia  # change of u_n by unit P_n with P_t = -mu P_n
     P = (1.0 + e) / normal
     assert impact.impulse == pytest.approx([P, -mu * P, 0.0], abs=ROUNDING)
     assert impact.energy_change == pytest.approx(
@@ -69,7 +69,7 @@ def test_poisson_in_closed_form():
 
 @pytest.mark.parametrize("seed", range(10))
 def test_without_friction_both_laws_agree(seed):
-    """Three corners with one e that all approach."""
+    """Three approaching corners have the same e."""
     rng = np.random.default_rng(100 + seed)
     corners = [(x, -1.0) for x in rng.uniform(-1.0, 1.0, 3)]
     v = np.array([0.3, -1.5, rng.uniform(-1.0, 1.0)])
@@ -79,7 +79,7 @@ def test_without_friction_both_laws_agree(seed):
 
 
 class TestKane:
-    """A double pendulum strikes a rough floor: Newton's law hands out energy, Poisson's does not.
+    """A double pendulum strikes a rough floor: energy grows by Newton's law, not by Poisson's.
 
     After Kane and Levinson, Dynamics: Theory and Applications, 1985, problem 5.
     """
@@ -115,7 +115,7 @@ class TestKane:
 
 @pytest.mark.parametrize("seed", seeds(range(20)))
 def test_poisson_gains_no_energy(seed):
-    """Three corners with friction and restitutions of their own, struck together."""
+    """Three corners with different friction and restitution collide at once."""
     rng = np.random.default_rng(200 + seed)
     corners = [(x, z) for x, z in rng.uniform(-1.0, 1.0, (3, 2)) - [0.0, 1.2]]
     v = rng.normal(size=3)
@@ -129,7 +129,7 @@ def test_poisson_gains_no_energy(seed):
 
 
 def on_belt(law):
-    """A block that bounces on a belt which a prescribed motion pulls, on an arm whose joint sticks."""
+    """Return a block that bounces on a belt with prescribed motion, on an arm with a sticking joint."""
     model = empty()
     frame(model, "belt", body(model, 0, pin.JointModelPX(), "drive", 1.0))
     joint = body(model, 0, pin.JointModelPX(), "x", 0.0)
@@ -151,7 +151,7 @@ def on_belt(law):
 
 @pytest.mark.parametrize("law", ["newton", "poisson"])
 def test_energy_is_booked(law):
-    """Through a prescribed motion and a sticking joint, and by a pickled scene as well."""
+    """The energy ledger closes with a prescribed motion and a sticking joint, and for a pickled scene."""
     run = pn.simulate(on_belt(law), 1.0, record="energy")
     assert sum(event.kind == "impact" for event in run.events) > 2
     assert np.abs(run.energy["balance"]).max() < 1e-8
@@ -165,7 +165,7 @@ def test_unknown_law():
 
 
 def between_plates(law):
-    """A point that rises from a floor at which it is, under a ceiling that it touches."""
+    """Return a point that leaves a floor under a ceiling that touches it."""
     model = empty()
     frame(model, "point", body(model, 0, pin.JointModelPZ(), "z", 1.0))
     contacts = [
@@ -188,7 +188,7 @@ def test_no_rebound_where_another_contact_is_in_the_way():
 
 @pytest.mark.parametrize("e", [0.5, 0.8, 1.0])
 def test_struck_onto_a_plane_that_it_was_leaving(e):
-    """A mass leaves the floor by 2e-12 m as a heavier one strikes it: it is back within a picosecond."""
+    """A heavier mass strikes a mass 2e-12 m above the floor, which touches again within a picosecond."""
     model = empty((0.0, 0.0, 0.0))
     for name, mass in (("lower", 1.0), ("upper", 10.0)):
         frame(model, name, body(model, 0, pin.JointModelPZ(), f"{name} slide", mass))
@@ -204,5 +204,5 @@ def test_struck_onto_a_plane_that_it_was_leaving(e):
     lost = sum(event.energy_change for event in first)
     assert np.abs(run.energy["balance"]).max() < ROUNDING * 125.5
     np.testing.assert_allclose(lost, run.energy["impacts"][-1], rtol=ROUNDING)
-    if e > 0.5:  # else the floor's rebound is stopped short of it
+    if e > 0.5:  # else the rebound of the floor ends before it
         np.testing.assert_allclose(run.v[-1], [-e * together] * 2, rtol=ROUNDING)

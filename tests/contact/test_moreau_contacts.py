@@ -1,4 +1,4 @@
-"""Time stepping with contacts that open: order, rest without creep, bounces, penetration, ledger."""
+"""Time stepping with unilateral contacts: order, rest without creep, bounces, penetration, ledger."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..support.same_run import assert_same_run
 
 
 def box(mu, angle=0.0, restitution=0.0):
-    """A box of 0.4 x 0.2 x 0.2 m on a slope of this angle."""
+    """Return a box of 0.4 x 0.2 x 0.2 m on a slope of this angle."""
     model = empty((GRAVITY * np.sin(angle), 0.0, -GRAVITY * np.cos(angle)))
     joint = body(model, 0, pin.JointModelFreeFlyer(), "box", 2.0, inertia=np.diag([0.013, 0.033, 0.033]))
     frame(model, "middle", joint)
@@ -21,12 +21,12 @@ def box(mu, angle=0.0, restitution=0.0):
     return pn.Scene(model, contacts=corners)
 
 
-# What corners of a foot may miss the laws by: the velocities in play by which they contradict each other.
+# Violation of the laws at the corners of a foot, which redundancy makes inconsistent, relative to velocities.
 UNCHANGEABLE = 1e-7
-# Part of an impulse that is summed up from samples of a force, one a step.
+# Relative error of an impulse that is summed up from force samples, one per step.
 STEPPED = 0.05
 
-# Feet, friction, and levers of resistance to spinning and to rolling [m].
+# Number of feet, friction, and lever arms of torsional and rolling resistance [m].
 TURNED = [(2, 0.7, 0.05, 0.02), (3, 0.3, 0.0, 0.002), (3, 0.7, 0.005, 0.002), (4, 0.7, 0.005, 0.002)]
 
 ON_PLANE = [0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]
@@ -41,11 +41,11 @@ def test_a_sliding_box_has_order_one():
         run = pn.simulate(box(0.5), 0.5, q=ON_PLANE, v=[1.0, 0, 0, 0, 0, 0], method="moreau", dt=dt)
         errors.append(abs(run.q[-1, 0] - stop))
         assert np.abs(run.v[-1]).max() == 0.0
-    assert max(errors / steps) < 1.0  # [m/s]: a step's own change of the motion
+    assert max(errors / steps) < 1.0  # [m/s]: change of motion in a step
 
 
 def test_landings_are_of_order_one():
-    """A ball that bounces, beside its parabolas: the mean of many heights, as landings fall anywhere."""
+    """The mean error of many drop heights has order one, since impacts occur anywhere in a step."""
     contact = pn.PointContact("mass", restitution=0.7)
     scene = pn.Scene(point_mass("Z"), contacts=[contact])
     steps, errors = 4e-3 / 2.0 ** np.arange(6), []
@@ -61,7 +61,7 @@ def test_landings_are_of_order_one():
 
 
 def bounced(height, restitution, duration):
-    """Height after this time of a ball that was dropped."""
+    """Return the height of a dropped ball after this time."""
     speed = np.sqrt(2.0 * GRAVITY * height)
     left = duration - speed / GRAVITY
     while left > 0.0:
@@ -74,7 +74,7 @@ def bounced(height, restitution, duration):
 
 
 def test_a_tumbling_drop_converges_with_order_one():
-    """A box that lands on one corner, e = 0, beside the event-driven run."""
+    """A box lands on one corner with e = 0; the reference is the event-driven run."""
     scene = box(0.6)
     turned = pin.Quaternion(pin.rpy.rpyToMatrix(0.3, 0.5, 0.2)).coeffs()
     q = np.concatenate([[0.0, 0.0, 0.35], turned])
@@ -101,7 +101,7 @@ def test_a_box_on_a_slope_rests_or_slides(slope, rests):
 
 @pytest.mark.parametrize("feet", [4, 6, 8, 12])
 def test_a_pushed_table_slides(feet):
-    """Feet on a circle share the load in several ways; v = (F / m - mu g) t whichever of them carry none."""
+    """The loads of feet on a circle are not unique, but v = (F / m - mu g) t for all of them."""
     model = empty()
     joint = body(model, 0, pin.JointModelFreeFlyer(), "table", 10.0, inertia=0.3 * np.eye(3))
     turn = 2.0 * np.pi * np.arange(feet) / feet
@@ -116,7 +116,7 @@ def test_a_pushed_table_slides(feet):
     q = [0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0]
     run = pn.simulate(scene, duration, q=q, method="moreau", dt=1e-3, output_dt=0.05, record="energy")
     rate = push / 10.0 - mu * GRAVITY
-    rounding = 1e-12  # of a few hundred steps, in m/s and m
+    rounding = 1e-12  # rounding of several hundred steps [m/s and m]
     assert np.abs(run.v[:, 0] - rate * run.t).max() < rounding
     assert np.abs(run.q[:, 0] - 0.5 * rate * run.t**2).max() < rounding
     assert np.abs(run.v[:, 1:]).max() < rounding
@@ -126,7 +126,7 @@ def test_a_pushed_table_slides(feet):
 
 @pytest.mark.parametrize("count", [4, pytest.param(20, marks=pytest.mark.slow)])
 def test_random_tables_slide_without_a_halt(count):
-    """Pushed and turned on 4 to 12 feet: what the scheme itself takes is far below the joules that slide."""
+    """On 4 to 12 feet, numerical dissipation is far below the kinetic energy of several joules."""
     rng, taken = np.random.default_rng(0), []
     for _ in range(count):
         feet, model = int(rng.integers(4, 13)), empty()
@@ -141,12 +141,12 @@ def test_random_tables_slide_without_a_halt(count):
         q = [0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0]
         run = pn.simulate(scene, 0.3, q=q, method="moreau", dt=1e-3, output_dt=0.3, record="energy")
         taken.append(np.abs(run.energy["projection"]).max())
-    assert max(taken) < 1e-4  # [J]; a foot that halted the table by mistake took up to 2 J
+    assert max(taken) < 1e-4  # [J]; a foot that wrongly sticks dissipates up to 2 J
 
 
 @pytest.mark.parametrize("count", [3, 30])
 def test_contacts_far_off_change_no_bit(count):
-    """A whirling pendulum over floors that it does not reach, and one that it does."""
+    """A rotating pendulum reaches one floor; other floors are too far away."""
     model = empty()
     half, whole = np.array([0.0, 0.0, -0.5]), pin.SE3(np.eye(3), np.array([0.0, 0.0, -1.0]))
     rod = {"lever": half, "inertia": np.diag([0.08, 0.08, 0.01])}
@@ -172,7 +172,7 @@ def test_a_ball_bounces_and_rests(restitution):
     fall = np.sqrt(2.0 / GRAVITY)
     landed = run.t[1:][np.argmax(np.diff(run.v[:, 0]) > 0.0)]
     assert landed == pytest.approx(fall, abs=2e-3)
-    assert run.q.min() >= -1e-3 * np.sqrt(2.0 * GRAVITY)  # one step's approach
+    assert run.q.min() >= -1e-3 * np.sqrt(2.0 * GRAVITY)  # approach in one step
     height = run.q[run.t > landed + 1e-6, 0].max()
     assert height == pytest.approx(restitution**2, abs=0.02)
     assert abs(run.q[-1, 0]) < 1e-9
@@ -196,7 +196,7 @@ def test_a_resumed_run_is_bitwise_the_same(kept, tmp_path):
 
 @pytest.mark.parametrize("count", [20, pytest.param(1000, marks=pytest.mark.stress)])
 def test_random_bodies_dropped(count):
-    """1 to 8 points of a body fall on a plane: no NaN, no hang, penetration within one step's approach."""
+    """1 to 8 points of a body fall on a plane: no NaN, no hang, penetration below the approach in one step."""
     rng = np.random.default_rng(0)
     deepest, failed = 0.0, []
     for k in range(count):
@@ -231,9 +231,9 @@ def test_random_bodies_dropped(count):
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_humanoid_lands_on_its_soles(seed):
-    """Corners of soles and dry friction in all joints share the loads; what the laws miss is told and small.
+    """Corners of soles and dry joint friction share the loads; the violation is reported and small.
 
-    The ground gives what gravity takes and what the momentum gains from one end to the other.
+    The impulse of the ground equals the impulse of gravity plus the change of momentum.
     """
     robot, soles, edges = pn.load("talos"), ("left_sole_link", "right_sole_link"), np.array([0.2, 0.1, 0.02])
     model, data = robot.model, robot.model.createData()
@@ -268,7 +268,7 @@ def at(place):
 @pytest.mark.parametrize("height", [-0.25, 0.0])
 @pytest.mark.parametrize("feet", [3, 6, 7, 8, 9])
 def test_feet_that_carry_nothing_slide_with_the_others(feet, height, method):
-    """x = a t^2 / 2 under a push beyond mu m g; of many feet in a plane some carry nothing."""
+    """x = a t^2 / 2 under a force above mu m g; some of many feet in a plane have zero load."""
     model, mass, mu, push = empty((0.0, 0.0, -GRAVITY)), 10.0, 0.7, 90.0
     table = body(model, 0, pin.JointModelFreeFlyer(), "table", mass, inertia=0.3 * np.eye(3))
     turn = 2.0 * np.pi * np.arange(feet) / feet
@@ -288,7 +288,7 @@ def test_feet_that_carry_nothing_slide_with_the_others(feet, height, method):
 @pytest.mark.parametrize("dt", [1e-3, 5e-4, 2.5e-4])
 @pytest.mark.parametrize(("feet", "mu", "torsional", "rolling"), TURNED)
 def test_feet_that_resist_turning_come_to_rest(feet, mu, torsional, rolling, dt):
-    """A table that slides, turns and drops onto a foot or two: what resists follows the loads."""
+    """A table slides, rotates and drops onto one or two feet; resistance is load-dependent."""
     model = empty()
     joint = body(model, 0, pin.JointModelFreeFlyer(), "table", 2.0, inertia=0.05 * np.eye(3))
     resists = {"mu": mu, "torsional": torsional, "rolling": rolling}

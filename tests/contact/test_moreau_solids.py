@@ -1,4 +1,4 @@
-"""Cylinders, cones and boxes in time stepping: what a step enters it leaves again, whatever the masses."""
+"""Cylinders, cones and boxes in time stepping: bounded penetration for all mass ratios."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..support.seeds import seeds
 HERE = pin.SE3.Identity()
 FLOOR = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
 DT = 1e-3
-# Radii of rounding by which shapes as they are may be nearer than their contacts.
+# Difference between true shapes and their contacts, in radii of rounding.
 ROUNDED_OFF = 6.0
 
 
@@ -28,7 +28,7 @@ def solid(rng, kinds=("cylinder", "cone", "box")):
 
 
 def size(shape):
-    """Of the ball around it."""
+    """Return the radius of the bounding ball of a shape."""
     if isinstance(shape, coal.Halfspace):
         return 0.0
     if isinstance(shape, coal.Box):
@@ -37,7 +37,7 @@ def size(shape):
 
 
 class Drop:
-    """A random solid above the floor or another solid, nearly flat or turned any way, and its throw."""
+    """Random solid above the floor or another solid, nearly flat or in any orientation, with its velocity."""
 
     def __init__(self, seed):
         rng = np.random.default_rng(seed)
@@ -64,7 +64,7 @@ class Drop:
         self.v = np.concatenate([turn.T @ down, rng.normal(size=3) * rng.choice([0.0, 1.0, 5.0])])
 
     def approach(self, v):
-        """Of any of its points in a step, at the most."""
+        """Return an upper bound of the approach of any point in a step [m]."""
         return DT * (np.linalg.norm(v[:3]) + self.reach * np.linalg.norm(v[3:]) + DT * GRAVITY)
 
     def depth(self, q):
@@ -74,7 +74,7 @@ class Drop:
         run = pn.simulate(self.scene, 0.8, q=self.q, v=self.v, method="moreau", dt=DT)
         assert np.isfinite(run.q).all()
         rounding = max(getattr(c, "radius2", 0.0) for c in self.scene.contacts)
-        fastest = 0.0  # so far: what has been entered stays so until it is left
+        fastest = 0.0  # maximum so far: penetration lasts until separation
         for q, v in zip(run.q, run.v, strict=True):
             fastest = max(fastest, self.approach(v))
             assert self.depth(q) <= fastest + ROUNDED_OFF * rounding
@@ -82,7 +82,7 @@ class Drop:
 
 @pytest.mark.parametrize("seed", seeds(range(40)))
 def test_random_solids(seed):
-    """By Coal's distance none enters another by more than it approaches in a step; no run fails."""
+    """Penetration by Coal's distance is below the approach in one step, and no run fails."""
     Drop(seed).check()
 
 
@@ -100,7 +100,7 @@ def test_many_random_solids():
 @pytest.mark.parametrize("ratio", [1.0, 1e2, 1e6])
 @pytest.mark.parametrize("seed", [2, 3])
 def test_a_heavy_box_falls_on_a_light_one(seed, ratio):
-    """Which stands on the floor; where the modes of a step's end allow no motion an event says so."""
+    """The light box stands on the floor; an event reports steps without consistent modes at their end."""
     rng, q, height = np.random.default_rng(seed), [], 0.0
     model, geometry = empty((0.0, 0.0, -GRAVITY)), pin.GeometryModel()
     geometry.addGeometryObject(pin.GeometryObject("floor", 0, HERE, FLOOR))
@@ -119,7 +119,7 @@ def test_a_heavy_box_falls_on_a_light_one(seed, ratio):
     assert np.isfinite(run.q).all()
     runner, fastest = scene._compiled.program.runner(), 0.0
     corners = [i for i, c in enumerate(scene.contacts) if isinstance(c, pn.PointContact)]
-    for x, v in zip(run.q, run.v, strict=True):  # of what is on the floor
+    for x, v in zip(run.q, run.v, strict=True):  # box on the floor
         fastest = max(
             fastest, *(np.linalg.norm(u[:3]) + 0.35 * np.linalg.norm(u[3:]) for u in (v[:6], v[6:]))
         )

@@ -1,4 +1,4 @@
-"""Contacts with planes of bodies that move, beside closed forms."""
+"""Contacts with planes of moving bodies, against closed forms."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ROUNDING = 1e-12
 
 
 def test_a_ball_on_a_turntable_runs_in_a_circle():
-    """It rolls, and its velocity turns at 2/7 of the table's rate (Weltner, Am. J. Phys. 47, 1979, 984)."""
+    """The velocity rotates at 2/7 of the table's rate (Weltner, Am. J. Phys. 47, 1979, 984)."""
     r, omega = 0.05, 3.0
     model = empty((0.0, 0.0, -GRAVITY))
     frame(model, "table", body(model, 0, pin.JointModelRZ(), "turn", 1.0, inertia=np.eye(3)))
@@ -30,7 +30,7 @@ def test_a_ball_on_a_turntable_runs_in_a_circle():
     assert run.events == []
     rate = 2.0 / 7.0 * omega
     turned = pin.exp3(np.array([0.0, 0.0, rate * 5.0]))
-    radius = np.cross(v, up) / rate  # from the middle of the circle
+    radius = np.cross(v, up) / rate  # from the center of the circle
     expected = x - radius + turned @ radius
     assert run.q[-1, 1:4] == pytest.approx(expected, abs=1e-8)
 
@@ -38,7 +38,7 @@ def test_a_ball_on_a_turntable_runs_in_a_circle():
 @pytest.mark.parametrize("speed", [0.5, -0.5])
 @pytest.mark.parametrize("e", [0.0, 0.6])
 def test_a_ball_strikes_a_plank_on_a_pivot(e, speed):
-    """P (1/m + d^2/J) = (1 + e) v of approach, the plank turning to or from it."""
+    """P (1/m + d^2/J) = (1 + e) v with approach velocity v; the plank rotates to or from the ball."""
     m, J, d, r = 0.7, 0.3, 0.4, 0.05
     model = empty((0.0, 0.0, 0.0))
     frame(model, "plank", body(model, 0, pin.JointModelRY(), "pivot", 1.0, inertia=J * np.eye(3)))
@@ -54,7 +54,7 @@ def test_a_ball_strikes_a_plank_on_a_pivot(e, speed):
 
 
 class TestBoxOnTable:
-    """A box of 0.2 m by 0.5 m on a table that accelerates: it slides from mu g on, and tips from b/h g on."""
+    """A box of 0.2 m by 0.5 m on an accelerated table: it slides above mu g and tips above b/h g."""
 
     def solve(self, acceleration, mu):
         model = empty((0.0, 0.0, -GRAVITY))

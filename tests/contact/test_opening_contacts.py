@@ -1,4 +1,4 @@
-"""Contacts that open, strike and rest, beside closed forms and published references.
+"""Unilateral contacts with impacts and rest, against closed forms and published references.
 
 Numbers come from the references named in each class: textbook closed forms evaluated with 30 digits,
 Housner's rocking block (Bull. Seism. Soc. Am. 53, 1963, 403), quadratures of energy integrals, and impact
@@ -19,7 +19,7 @@ import pin_nonideal as pn
 from ..support.mechanisms import GRAVITY, TIGHT, at, body, empty, frame, planar, point_mass
 from ..support.same_run import assert_same_run
 
-TIME = 1e-9  # [s], to which instants of references hold
+TIME = 1e-9  # tolerance of reference times [s]
 ROUNDING = 1e-12
 
 
@@ -86,7 +86,7 @@ class TestBouncingBall:
 
 @pytest.mark.parametrize("method", ["dop853", "dopri5", "rk4", "semi_implicit_euler"])
 def test_nothing_is_leapt_over(method):
-    """A sphere of 1 mm at 100 m/s above a plane: the first step is as long as the method likes."""
+    """A sphere of 1 mm at 100 m/s above a plane: the first step has no upper bound."""
     contact = pn.PointContact("mass", radius=1e-3, restitution=0.5)
     scene = pn.Scene(point_mass("Z"), contacts=[contact], q0=[1.0], v0=[-100.0])
     step = {} if method.startswith("dop") else {"dt": 0.05}
@@ -96,7 +96,7 @@ def test_nothing_is_leapt_over(method):
 
 
 def test_a_spinning_rod_does_not_step_through():
-    """A hinge turns without any force, so steps have no end; the rod's tip meets the plane in every turn."""
+    """Steps are unbounded without forces, but the rod's tip meets the plane in every turn."""
     model = empty((0.0, 0.0, 0.0))
     joint = body(model, 0, pin.JointModelRY(), "spin", 1.0, inertia=np.eye(3))
     frame(model, "tip", joint, pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0])))
@@ -248,7 +248,7 @@ class TestJointLimit:
         run = pn.simulate(scene, 10.0 if stop == 0.25 else 5.6, record="forces", rtol=1e-11, atol=1e-12)
         known = self.CASES[stop]
         assert at(run, "impact")[: len(known)] == pytest.approx(known, abs=TIME)
-        if stop == 0.25:  # it comes to rest on its stop
+        if stop == 0.25:  # the pendulum comes to rest on its stop
             assert run.v[-1] == 0.0
             assert run.lam[-1] == pytest.approx([2.42703284028687], abs=1e-9)
 
@@ -318,7 +318,7 @@ class TestPercussion:
     ],
 )
 def test_chains_of_balls(count, e, gap, after, times):
-    """The first of equal balls arrives at 1 m/s; touching ones are struck together, others one by one."""
+    """The first of equal balls arrives at 1 m/s; touching balls collide at once, others one by one."""
     model = empty((0.0, 0.0, 0.0))
     for k in range(count):
         frame(model, f"ball {k}", body(model, 0, pin.JointModelPX(), f"x{k}", 1.0))
@@ -336,7 +336,7 @@ def test_chains_of_balls(count, e, gap, after, times):
 
 
 class TestTable:
-    """A table on four legs, its weight at (x, y): loads of least norm among those that press."""
+    """A table on four legs with its weight at (x, y): minimum-norm nonnegative loads."""
 
     A, B, WEIGHT = 0.4, 0.3, 98.1
     LEGS = tuple(itertools.product((0.4, -0.4), (0.3, -0.3)))
@@ -385,7 +385,7 @@ def test_methods_that_know_no_contacts_that_open():
 
 
 def test_the_report_names_contacts_and_stops():
-    """Stops that are used are no limits that the motion may pass."""
+    """Limits with stops are not reported as limits that the motion may exceed."""
     model = TestJointLimit.model()
     model.lowerPositionLimit[0], model.upperPositionLimit[0] = -0.5, 2.0
     text = pn.Scene(model, contacts=[pn.JointLimit("swing", name="stop")]).report()
@@ -396,7 +396,7 @@ def test_the_report_names_contacts_and_stops():
 
 
 def test_open_contacts_are_no_rows():
-    """In flight a scene moves as one without contacts, bit by bit; its start takes an evaluation more."""
+    """In flight a scene is bitwise the same as without contacts; its start takes one more evaluation."""
     plain = pn.simulate(pn.Scene(point_mass("XYZ"), q0=[0.0, 0.0, 1.0], v0=[1.0, 0.0, 3.0]), 0.5)
     contact = pn.PointContact("mass", mu=0.5)
     flying = pn.simulate(
@@ -409,7 +409,7 @@ def test_open_contacts_are_no_rows():
 
 
 def test_dropped_on_a_conveyor():
-    """A point mass on a belt of 1.5 m/s, e = 0.5: bounces drag it along until it rests."""
+    """A point mass falls on a belt of 1.5 m/s with e = 0.5: friction at impacts accelerates it."""
     model = empty()
     frame(model, "belt", body(model, 0, pin.JointModelPX(), "drive", 1.0))
     joint = body(model, 0, pin.JointModelPX(), "x", 0.0)
@@ -428,7 +428,7 @@ def test_dropped_on_a_conveyor():
 
 @pytest.mark.parametrize(("part", "holds"), [(1.0 + 1e-9, True), (1.0 - 1e-9, False)])
 def test_a_gripper(part, holds):
-    """Two fingers press a block of 0.5 kg, mu = 0.6: it is held from m g / (2 mu) on, without any creep."""
+    """Two fingers with mu = 0.6 hold a block of 0.5 kg above m g / (2 mu), without creep."""
     model, force = empty(), part * 0.5 * GRAVITY / 1.2
     joint = body(model, 0, pin.JointModelPX(), "x", 0.0)
     joint = body(model, joint, pin.JointModelPZ(), "z", 0.5)
@@ -462,7 +462,7 @@ def test_a_stack_with_a_heavy_top():
 
 
 def test_a_deep_start_is_refused():
-    """A millimeter is a pose rounded, and is moved out; more than a hundredth of the scene is a mistake."""
+    """A penetration of 1 mm is corrected; more than a hundredth of the scene's size raises an error."""
     scene = pn.Scene(point_mass("Z"), contacts=[pn.PointContact("mass", name="foot")])
     q, _ = scene.project([-1e-3])
     assert abs(q[0]) < 1e-14

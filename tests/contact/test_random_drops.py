@@ -1,4 +1,4 @@
-"""Random bodies with one to eight contacts dropped on the floor: they bounce, rattle, slide and rest."""
+"""Random bodies with one to eight contacts dropped on the floor: impacts, chatter, sliding and rest."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..support.mechanisms import body, empty, frame
 from ..support.same_run import assert_same_run
 from ..support.seeds import ranges, seeds
 
-DEPTH = 1e-10  # [m], that no contact sinks below its plane
+DEPTH = 1e-10  # maximum penetration [m]
 
 
 def dropped(seed, *, plastic=False):
@@ -37,7 +37,7 @@ def dropped(seed, *, plastic=False):
 
 
 def deepest(scene, run):
-    """How far any contact lies below its plane in any sample, by Pinocchio's kinematics alone [m]."""
+    """Return the largest penetration of any contact in any sample, by Pinocchio's kinematics only [m]."""
     data, depth = scene.model.createData(), 0.0
     frames = [scene.model.getFrameId(contact.frame) for contact in scene.contacts]
     for q in run.q:
@@ -51,18 +51,18 @@ RATTLING = [10, 13, 31, 75, 82, 88, 120, 128, 133, 149, 178, 181, 195, 246, 286,
 
 @pytest.mark.parametrize("seed", seeds(RATTLING))
 def test_contacts_that_rattle_come_to_rest(seed):
-    """Two or more bounce in turn, ever lower: each end of a series throws another up again."""
+    """Two or more contacts chatter in alternation: the end of one series makes another contact rebound."""
     scene = dropped(seed)
     run = pn.simulate(scene, 3.0, record="energy", max_steps=20000)
     assert deepest(scene, run) < DEPTH
     assert "chatter" not in {e.kind for e in run.events}
-    # [J], what the error of the steps leaves of 5 to 50.
+    # Error of the steps, relative to 5 to 50 J.
     assert np.abs(run.energy["balance"]).max() < 1e-5 * run.energy["total"][0]
 
 
 @pytest.mark.parametrize("those", ranges(10, 60, 1000))
 def test_random_bodies_dropped(those, kept, tmp_path):
-    """None fails, hangs or sinks; every tenth is repeated, and resumed from a state in flight, bit by bit."""
+    """No run fails, hangs or penetrates; every tenth is repeated and resumed in flight bit by bit."""
     path = tmp_path / "run"
     for seed in those:
         scene = dropped(seed)
@@ -95,7 +95,7 @@ def test_plastic_impacts_never_gain():
 
 
 def test_resumed_in_flight(kept, tmp_path):
-    """From checkpoints written in flight, between impacts and at rest the run goes on bit by bit."""
+    """Runs resumed from checkpoints in flight, between impacts and at rest are bitwise the same."""
     path, scene, record = tmp_path / "run", dropped(13), ("energy", "forces")
     alone = pn.simulate(scene, 3.0, record=record)
     assert_same_run(alone, pn.simulate(scene, 3.0, record=record, checkpoint=path, checkpoint_interval=0.0))

@@ -1,4 +1,4 @@
-"""Random articulated bodies strike random planes: what each impact takes, beside Pinocchio's mass matrix."""
+"""Impacts of random articulated bodies on random planes: energy by Pinocchio's mass matrix."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pin_nonideal as pn
 
 from ..support.mechanisms import body, empty, frame
 
-ROUNDING = 1e-12  # part of the works in an impact that rounding may make a gain of
-BOOKED = 1e-9  # part of the kinetic energy, the larger of before and after, to which an impact's works add up
+ROUNDING = 1e-12  # energy gain by rounding, relative to the works of an impact
+BOOKED = 1e-9  # relative error of the sum of works; reference: larger kinetic energy before or after
 JOINTS = (pin.JointModelFreeFlyer, pin.JointModelSpherical, pin.JointModelRX, pin.JointModelRevoluteUnaligned)
 
 
@@ -20,7 +20,7 @@ def turn(draw):
 
 
 def about_to_strike(draw, elastic):
-    """A tree of one to six bodies with one to four contacts that touch planes of any direction."""
+    """Return a tree of one to six bodies with one to four closed contacts with planes of any direction."""
     model, joint = empty(), 0
     for k in range(int(draw.integers(1, 7))):
         kind = JOINTS[int(draw.integers(len(JOINTS)))] if k else JOINTS[0]
@@ -55,7 +55,7 @@ def about_to_strike(draw, elastic):
     return pn.Scene(model, contacts=contacts, q0=q)
 
 
-# Behind the impact planes of all directions may hold a body in several ways, or crush it.
+# After the impact, planes of all directions may have several solutions or none.
 BEHIND_IMPACT = (
     pn.FrictionParadoxError,
     pn.FrictionConvergenceError,
@@ -65,7 +65,7 @@ BEHIND_IMPACT = (
 
 
 def impact(scene, v, **options):
-    """Events of the impact at the start; what ends the motion right behind it is no matter here."""
+    """Return the events of the impact at the start; errors right after it are ignored."""
     try:
         run = pn.simulate(scene, 1e-9, v=v, **options)
     except BEHIND_IMPACT as error:
@@ -79,7 +79,7 @@ def kinetic(scene, v):
 
 
 def impacts(count, elastic, velocities=20):
-    """So many random impacts, each with its scene and velocity."""
+    """Yield random impacts with their scene and velocity."""
     found = 0
     for seed in range(count):
         draw = np.random.default_rng(seed)
@@ -100,7 +100,7 @@ FEW_AND_MANY = [1000, pytest.param(100000, marks=pytest.mark.stress)]
 
 @pytest.mark.parametrize("count", FEW_AND_MANY)
 def test_plastic_impacts_never_gain(count):
-    """Of e = 0: Coulomb's cone takes energy alone, and what it takes is what the kinetic energy loses."""
+    """For e = 0 friction only dissipates, and its work equals the change of kinetic energy."""
     most, missed = 0.0, 0.0
     for scene, _, events in impacts(count, 0.0):
         works = np.array([e.energy_change for e in events])
@@ -114,7 +114,7 @@ def test_plastic_impacts_never_gain(count):
 
 @pytest.mark.parametrize("count", FEW_AND_MANY)
 def test_every_gain_is_told(count):
-    """Of e > 0, where Newton's law with friction may gain: events say how much, and `strict` ends the run."""
+    """For e > 0 Newton's law with friction may gain energy: events report it, and `strict` ends the run."""
     gains, missed = 0, 0.0
     for scene, v, events in impacts(count, 1.0):
         works = np.array([e.energy_change for e in events])

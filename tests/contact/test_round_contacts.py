@@ -1,4 +1,4 @@
-"""Spheres and capsules that touch, beside closed forms."""
+"""Contacts of spheres and capsules, against closed forms."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def place(x=0.0, y=0.0, z=0.0):
 
 
 def planar_ball(mass, inertia):
-    """A ball in the x-z plane that turns about y, frame "ball" in its middle; frame "hub" of the world."""
+    """Return a planar ball in the x-z plane with a frame "ball" at its center, and a world frame "hub"."""
     model = empty((0.0, 0.0, -GRAVITY))
     joint = body(model, 0, pin.JointModelPX(), "x", 0.0)
     joint = body(model, joint, pin.JointModelPZ(), "z", 0.0)
@@ -31,7 +31,7 @@ def planar_ball(mass, inertia):
 
 
 def leaving_angle(model, contact, distance, start, spin):
-    """Angle from the top at which a ball that starts there with a little speed leaves the hub."""
+    """Return the angle from the top at which a ball leaves the hub, from a start with small speed."""
     q = [distance * np.sin(start), distance * np.cos(start), 0.0]
     speed = 1e-9 + np.sqrt(2.0 * GRAVITY * distance * (1.0 - np.cos(start)) / (1.0 + spin))
     v = [speed * np.cos(start), -speed * np.sin(start), speed / 0.1 * (spin > 0.0)]
@@ -43,23 +43,23 @@ def leaving_angle(model, contact, distance, start, spin):
 
 
 def test_a_ball_slides_off_a_sphere_at_two_thirds():
-    """Without friction it leaves where cos = 2/3 of the start's height (energy and N = 0)."""
+    """Without friction the ball leaves at cos = 2/3 of the initial height (energy and N = 0)."""
     contact = pn.SphereContact("ball", "hub", 0.1, 0.9)
     start = 0.2
     angle = leaving_angle(planar_ball(1.0, 0.004), contact, 1.0, start, 0.0)
-    # The start's speed is that of a fall from the top, so the energy is that of a start at rest on it.
+    # The initial speed is that of a fall from the top, so the energy equals that of rest at the top.
     assert np.cos(angle) == pytest.approx(2.0 / 3.0, abs=1e-8)
 
 
 def test_a_ball_rolls_off_a_sphere_at_ten_seventeenths():
-    """Rolling (I = 2/5 m r^2) it leaves where cos = 10/17, if friction suffices to the end: mu is 1e6."""
+    """A rolling ball (I = 2/5 m r^2) leaves at cos = 10/17; mu = 1e6 prevents slip."""
     contact = pn.SphereContact("ball", "hub", 0.1, 0.9, mu=1e6)
     angle = leaving_angle(planar_ball(1.0, 0.4 * 0.01), contact, 1.0, 0.2, 0.4)
     assert np.cos(angle) == pytest.approx(10.0 / 17.0, abs=1e-6)
 
 
 def test_two_touching_balls_share_an_impact():
-    """1 m/s into two touching ones: -1/3, 2/3, 2/3 with e = 1, all at once."""
+    """A ball of 1 m/s strikes two touching balls at once: -1/3, 2/3, 2/3 m/s with e = 1."""
     model = empty((0.0, 0.0, 0.0))
     for k, x in enumerate((-0.5, 0.0, 0.2)):
         joint = body(model, 0, pin.JointModelPX(), f"x{k}", 1.0, place=place(x))
@@ -71,7 +71,7 @@ def test_two_touching_balls_share_an_impact():
 
 
 def test_a_fast_small_sphere_does_not_pass_a_thin_wall():
-    """1 mm at 100 m/s into a sphere of 1 mm."""
+    """A sphere of 1 mm at 100 m/s strikes a sphere of 1 mm."""
     model = planar_ball(1.0, 1e-6)
     scene = pn.Scene(model, contacts=[pn.SphereContact("ball", "hub", 5e-4, 5e-4)])
     run = pn.simulate(scene, 0.1, q=[0.0, 2.0, 0.0], v=[0.0, -100.0, 0.0])
@@ -86,7 +86,7 @@ def free_body(mass=1.0, inertia=0.02):
 
 
 def test_crossed_capsules_stop_each_other():
-    """One falls across another one that is fixed, over its middle, and rests there."""
+    """A capsule falls across the center of a fixed capsule and rests there."""
     model = free_body()
     frame(model, "bar", 0, place())
     along_x, along_y = ((-0.5, 0.0, 0.0), (0.5, 0.0, 0.0)), ((0.0, -0.5, 0.0), (0.0, 0.5, 0.0))
@@ -113,7 +113,7 @@ def test_bad_descriptions(make, message):
 
 
 def test_friction_of_an_impact_turns_a_ball_to_rolling():
-    """A spinning ball falls on top of a fixed one: 2/7 of its spin is left (I = 2/5 m r^2)."""
+    """A spinning ball falls on a fixed ball: 2/7 of its spin is left (I = 2/5 m r^2)."""
     model = planar_ball(1.0, 0.4 * 0.01)
     scene = pn.Scene(model, contacts=[pn.SphereContact("ball", "hub", 0.1, 0.9, mu=10.0)])
     run = pn.simulate(scene, 0.2, q=[0.0, 1.05, 0.0], v=[0.0, 0.0, 7.0])
@@ -122,7 +122,7 @@ def test_friction_of_an_impact_turns_a_ball_to_rolling():
 
 
 def capsule_distance(run, k, half1, half2):
-    """The same distance by Coal, whose shapes are capsules along z."""
+    """Return the distance by Coal, whose capsules are along z."""
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     first, second = coal.Capsule(0.05, 2.0 * half1), coal.Capsule(0.1, 2.0 * half2)
     at = pin.XYZQUATToSE3(run.q[k])
@@ -132,7 +132,7 @@ def capsule_distance(run, k, half1, half2):
 
 @pytest.mark.parametrize("seed", seeds(range(12)))
 def test_tumbling_capsules_do_not_pass_through_each_other(seed):
-    """Thrown at a fixed one, with spin: it strikes, never deeper than 1e-8 m by Coal's distance."""
+    """A capsule with spin strikes a fixed capsule; penetration is below 1e-8 m by Coal's distance."""
     rng = np.random.default_rng(seed)
     model = free_body()
     frame(model, "bar", 0, place())

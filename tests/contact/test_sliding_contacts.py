@@ -1,4 +1,4 @@
-"""Contacts that slide in two directions come to rest or start to roll, against closed forms."""
+"""Contacts that slide in two directions until rest or rolling, against closed forms."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pin_nonideal as pn
 
 from ..support.mechanisms import GRAVITY, TIGHT, assert_close, at_events, body, empty, point_mass
 
-# Of the references, for times and states of events.
+# Tolerance of times and states of events.
 EVENT = 1e-9
 
 
@@ -30,7 +30,7 @@ class TestBallThatSlidesThenRolls:
 
     @staticmethod
     def ball(c, mass, radius, mu, slides):
-        """On three slides and a ball joint, or as one free body, whose velocities are in its own axes."""
+        """Return a ball on three slides and a ball joint, or as a free body with velocities in body axes."""
         model = point_mass(mass=0.0) if slides else empty()
         joint = pin.JointModelSpherical() if slides else pin.JointModelFreeFlyer()
         inertia = c * mass * radius**2 * np.eye(3)
@@ -40,7 +40,7 @@ class TestBallThatSlidesThenRolls:
 
     @staticmethod
     def velocity(run, k):
-        """Velocity of the center and spin, in world axes."""
+        """Return velocity of the center and angular velocity, in world axes."""
         model, data = run.scene.model, run.scene.model.createData()
         pin.forwardKinematics(model, data, run.q[k], run.v[k])
         return pin.getFrameVelocity(model, data, model.getFrameId("ball"), pin.LOCAL_WORLD_ALIGNED)
@@ -64,7 +64,7 @@ class TestBallThatSlidesThenRolls:
     @pytest.mark.parametrize("rtol", [1e-12, 1e-11, 1e-10])
     @pytest.mark.parametrize("slides", [True, False])
     def test_billiard_with_side_spin(self, slides, rtol):
-        """u0 = v0 + w0 x (-r z); t_f = 2 |u0|/(7 mu g), v_f = v0 - (2/7) u0, a parabola up to there."""
+        """u0 = v0 + w0 x (-r z), t_f = 2 |u0|/(7 mu g), v_f = v0 - (2/7) u0; a parabola until t_f."""
         scene = self.ball(0.4, 0.17, 0.0285, 0.2, slides)
         start = [2.0, 0.0, 0.0, -30.0, 10.0, 0.0]
         run = pn.simulate(scene, 0.5, v=start, rtol=rtol, atol=0.1 * rtol)
@@ -79,7 +79,7 @@ class TestBallThatSlidesThenRolls:
 @pytest.mark.parametrize("across", [0.0, 0.7, -1.3])
 @pytest.mark.parametrize("options", [{}, TIGHT, {"method": "rk4", "dt": 0.01}, {"method": "rk4", "dt": 0.1}])
 def test_puck_comes_to_rest(across, options):
-    """Constant deceleration mu g against the velocity, whatever its direction: any method is exact."""
+    """Constant deceleration mu g against the velocity in any direction: all methods are exact."""
     start = np.array([2.0, across, 0.0])
     speed = np.linalg.norm(start)
     scene = pn.Scene(point_mass(), contacts=[pn.PointContact("mass", mu=0.2)])
@@ -89,7 +89,7 @@ def test_puck_comes_to_rest(across, options):
     assert_close(run.q[-1], 0.5 * speed / (0.2 * GRAVITY) * start, EVENT)
 
 
-# A side force m c below mu m g turns the slip; mu g |v| + c v_y falls at the rate (mu g)^2 - c^2, to zero.
+# A lateral force m c below mu m g rotates the slip; mu g |v| + c v_y decreases to zero at (mu g)^2 - c^2.
 CURVE_TIME = 0.2 * GRAVITY * 2.0 / ((0.2 * GRAVITY) ** 2 - 1.0)
 
 
@@ -120,12 +120,12 @@ print(*[f"{event.kind} {event.time:.6f}" for event in run.events])
 
 @pytest.mark.parametrize("dt", [0.01, 0.001])
 def test_fixed_steps_find_the_rest_of_a_curving_slide(dt):
-    """In a process of its own with a limit of time: events that recur at an instant must not hang a run."""
+    """Run in a separate process with a time limit: repeated events at one instant must not hang."""
     command = [sys.executable, "-c", CURVING % dt]
     done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=True)
     kind, time = done.stdout.split()
     assert kind == "stick"
-    # The direction of slip turns fast at the end, which costs rk4 its order.
+    # The slip direction rotates fast at the end, which reduces the order of rk4.
     assert abs(float(time) - CURVE_TIME) < 0.1 * dt
 
 
@@ -140,7 +140,7 @@ LIFTS = [
 @pytest.mark.parametrize("mu", [0.0, 0.1])
 @pytest.mark.parametrize(("method", "options", "late"), LIFTS)
 def test_a_pull_is_reported_when_it_begins(method, options, late, mu):
-    """A lift that grows as 30 N/s takes the weight of 1 kg at g / 30."""
+    """A lift of 30 N/s balances the weight of 1 kg at g / 30."""
     scene = pn.Scene(
         point_mass(),
         contacts=[pn.PointContact("mass", mu=mu, unilateral=False)],
@@ -153,7 +153,7 @@ def test_a_pull_is_reported_when_it_begins(method, options, late, mu):
 
 
 def test_time_stepping_keeps_the_books_of_a_slip_that_turns():
-    """A force across the slip turns it by more than a half circle; friction only ever takes energy."""
+    """A lateral force rotates the slip by more than a half circle; friction only dissipates."""
     scene = pn.Scene(
         point_mass(),
         contacts=[pn.PointContact("mass", mu=0.05, unilateral=False, name="rub")],
@@ -164,11 +164,11 @@ def test_time_stepping_keeps_the_books_of_a_slip_that_turns():
     run = pn.simulate(scene, 1.5, method="moreau", dt=1e-3, **options)
     assert run.energy["rub"][-1] == pytest.approx(fine.energy["rub"][-1], rel=1e-2)  # first order
     assert (np.diff(run.energy["rub"]) <= 0.0).all()
-    assert np.abs(run.energy["balance"]).max() < 1e-8  # J of 2; what a step of 1 ms misses is of third order
+    assert np.abs(run.energy["balance"]).max() < 1e-8  # of 2 J; the error of a 1 ms step has third order
 
 
 def table(places, height=0.0, **keywords):
-    """A body of 1 kg that stands on contacts, its center at a height above them."""
+    """Return a body of 1 kg on contacts, with its center at a height above them."""
     model = pin.Model()
     joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "table")
     inertia = pin.Inertia(1.0, np.array([0.0, 0.0, height]), np.diag([0.1, 0.1, 0.15]))
@@ -183,7 +183,7 @@ def table(places, height=0.0, **keywords):
 
 @pytest.mark.parametrize("dt", [0.02, 0.003])
 def test_friction_in_time_stepping_only_takes_energy(dt):
-    """A mass on a spring that rubs turns inside of steps, whose mean velocity then goes with the friction."""
+    """A mass on a spring with friction reverses inside steps, with mean velocity along the friction."""
     model = empty()
     body(model, 0, pin.JointModelPX(), "slide", 1.0)
     rub = pn.JointFriction("slide", coulomb=0.3, name="rub")
@@ -191,13 +191,13 @@ def test_friction_in_time_stepping_only_takes_energy(dt):
     run = pn.simulate(scene, 5.0, method="moreau", dt=dt, record="energy")
     assert kinds(run).count("reverse") > 3
     assert (np.diff(run.energy["rub"]) <= 0.0).all()
-    assert np.abs(run.energy["balance"]).max() < 1e-12  # J of 5
+    assert np.abs(run.energy["balance"]).max() < 1e-12  # of 5 J
 
 
 @pytest.mark.parametrize("legs", [3, 4])
 @pytest.mark.parametrize("speed", [0.0, 1.0])
 def test_a_table_on_more_contacts_than_it_needs(legs, speed):
-    """Nine or twelve rows on six freedoms: stands still, or slides as one point would, by mu g t^2 / 2."""
+    """Nine or twelve rows on six degrees of freedom: the table sticks, or slides as a point would."""
     corners = [(0.3, 0.3), (-0.3, 0.3), (-0.3, -0.3), (0.3, -0.3)][:legs]
     scene = table(corners, v0=[speed, 0.0, 0.0, 0.0, 0.0, 0.0])  # centered on the ground: no tilting moment
     run = pn.simulate(scene, 0.2, rtol=1e-10)
@@ -211,9 +211,9 @@ TRIPOD = [(0.3, 0.0), (-0.15, 0.26), (-0.15, -0.26)]
 @pytest.mark.parametrize("ratio", [1.0, 1.3])
 @pytest.mark.parametrize("options", [{}, {"rtol": 1e-10}, {"method": "rk4", "dt": 0.01}])
 def test_three_legs_break_away_together(options, ratio):
-    """A growing force along x: nothing tells the legs' shares apart, and none yields before all must.
+    """Under a growing force along x the friction of the legs is not unique, and all legs slip at once.
 
-    The legs' loads differ, and change with the tilting moment; what holds is mu m g in any case.
+    The legs' loads differ and change with the tilting moment, but the total limit is mu m g.
     """
     scene = table(TRIPOD, 0.1, static_ratio=ratio, actuation=lambda t, q, v: [t, 0.0, 0.0, 0.0, 0.0, 0.0])
     limit = 0.3 * ratio * GRAVITY
@@ -224,7 +224,7 @@ def test_three_legs_break_away_together(options, ratio):
 
 
 def test_a_body_that_rocks_on_two_contacts():
-    """Slides, sticks and breaks away again about the line through both contacts, without chatter."""
+    """The body slides, sticks and slips again about the line through both contacts, without chatter."""
     scene = table(TRIPOD[:2], 0.1, v0=[1.0, 0.5, 0.0, 0.0, 0.0, 2.0])
     run = pn.simulate(scene, 3.0, record="energy")
     assert set(kinds(run)) >= {"stick", "slip"}
@@ -238,7 +238,7 @@ def test_a_body_that_rocks_on_two_contacts():
 @pytest.mark.parametrize("options", [{}, {"method": "moreau", "dt": 1e-2}])
 @pytest.mark.parametrize("mu", [0.0, 0.5])
 def test_a_contact_that_nothing_presses(mu, options):
-    """On a plane along which the point moves, whatever it does: no row, no load, no friction, no pull."""
+    """The point always moves in the plane: the contact has no row, load, friction or tension."""
     model = point_mass("XZ")
     wall = pn.PointContact("mass", mu=mu, normal="y", unilateral=False, name="wall")
     scene = pn.Scene(model, contacts=[wall], v0=[1.0, 2.0])

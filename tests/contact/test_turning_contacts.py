@@ -1,4 +1,4 @@
-"""Torsional and rolling resistance where a body touches a plane, against closed forms and a dense sphere."""
+"""Torsional and rolling resistance of contacts with a plane, against closed forms and a dense sphere."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def ball(v, *, contact=None, rolling=None, forces=(), slope=0.0, J=None, plane=None, **options):
-    """A ball of RADIUS on a plane that slopes about y; v in world axes: (velocity, angular velocity)."""
+    """Return a ball of RADIUS on a plane tilted about y; v is (velocity, angular velocity) in world axes."""
     model = empty((GRAVITY * np.sin(slope), 0.0, -GRAVITY * np.cos(slope)))
     J = 0.4 * MASS * RADIUS**2 if J is None else J
     index = body(model, 0, pin.JointModelFreeFlyer(), "ball", MASS, inertia=J * np.eye(3))
@@ -40,7 +40,7 @@ def ball(v, *, contact=None, rolling=None, forces=(), slope=0.0, J=None, plane=N
 
 
 def rolling_along(angle, speed):
-    """Velocity and angular velocity of a ball that rolls in a direction."""
+    """Return velocity and angular velocity of a ball that rolls in a direction."""
     along = np.array([np.cos(angle), np.sin(angle), 0.0])
     return [*(speed * along), *(speed / RADIUS * np.cross(UP, along))]
 
@@ -108,7 +108,7 @@ class TestRolling:
         )
 
     def test_moving_plane_of_other_axes(self, way):
-        """The axes of the plane's frame decide nothing."""
+        """The orientation of the plane's frame has no effect."""
         turned = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, 1.1), np.array([3.0, 1.0, 0.0]))
         options = WAYS[way](rolling=self.LEVER, torsional=0.001)
         v = [*rolling_along(0.3, 1.0)[:5], 4.0]
@@ -117,7 +117,7 @@ class TestRolling:
 
 
 def test_disk_that_rolls_upright():
-    """A wheel of Rolling comes to rest like the ball, by its own moment of inertia."""
+    """A wheel of Rolling comes to rest like the ball, with its moment of inertia."""
     model = empty()
     index = body(model, 0, pin.JointModelFreeFlyer(), "wheel", MASS, inertia=np.diag([0.006, 0.011, 0.006]))
     frame(model, "hub", index)
@@ -133,7 +133,7 @@ def test_disk_that_rolls_upright():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_modes_that_are_prescribed_go_the_way_of_the_velocity(seed):
-    """`solve(modes=)` with the modes of the velocity itself changes nothing, whichever way it goes."""
+    """`solve(modes=)` with the modes of the velocity has the same result for either direction."""
     v = np.random.default_rng(seed).normal(0.0, 1.0, 6)
     scene = ball(v, contact={"mu": 0.3, "torsional": 0.004, "rolling": 0.002})
     q, v = scene.project(scene.q0, v)
@@ -142,13 +142,13 @@ def test_modes_that_are_prescribed_go_the_way_of_the_velocity(seed):
 
 
 class TestSphereOfItsOwn:
-    """Sliding, spinning and rolling at once, beside Newton's and Euler's equations of the sphere."""
+    """Simultaneous sliding, spinning and rolling, against Newton's and Euler's equations of the sphere."""
 
     MU, TORSIONAL, LEVER = 0.2, 0.004, 0.006
     J = 0.4 * MASS * RADIUS**2
 
     def rate(self, t, y):
-        """(velocity, angular velocity)' while nothing sticks."""
+        """Return the derivative of (velocity, angular velocity) while all elements slip."""
         v, w = y[:3], y[3:]
         weight, arm = MASS * GRAVITY, -RADIUS * UP
         u = v + np.cross(w, arm)
@@ -176,7 +176,7 @@ class TestSphereOfItsOwn:
 
 
 def test_the_order_of_a_list_decides_nothing():
-    """Four feet that spin and slide on their spots."""
+    """Four feet spin and slide."""
     feet = [(0.3, 0.2, -0.1), (0.3, -0.2, -0.1), (-0.3, -0.2, -0.1), (-0.3, 0.2, -0.1)]
     model = empty()
     index = body(
@@ -207,7 +207,7 @@ def test_refused(make, key):
 
 @pytest.mark.parametrize(("method", "order"), [("rk4", 4), ("semi_implicit_euler", 1), ("moreau", 1)])
 def test_fixed_steps(method, order):
-    """They come to the same rest, schemes of first order with an error in proportion to the step."""
+    """All methods reach the same rest; first-order schemes have an error proportional to the step."""
     scene = again(ball(rolling_along(0.3, 0.6), contact={"mu": 0.8, "rolling": 0.004, "unilateral": False}))
     rest = pn.simulate(scene, 3.0, **TIGHT).q[-1, :2]
     missed = []
@@ -221,7 +221,7 @@ def test_fixed_steps(method, order):
 
 @pytest.mark.parametrize("tie", ["contact", "anchor"])
 def test_loads_of_time_stepping(tie):
-    """What velocities add to a load is added in full: a ball that spins as it slides, a stone that whirls."""
+    """Velocity-dependent loads act in full: a ball that slides with spin, a rotating stone."""
     if tie == "contact":
         scene = ball([1.0, 0.5, 0.0, 20.0, -5.0, 30.0], contact={"mu": 0.2, "unilateral": False})
     else:

@@ -1,4 +1,4 @@
-"""Cylinders and cones with each other: gaps with a proof and beside Coal's, what rests, rolls and flies."""
+"""Contacts between cylinders and cones: gaps with a proof and by Coal, rest, rolling and flight."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ from ..support.same_run import assert_same_run
 
 PAIRS = [("cylinder", "cylinder"), ("cylinder", "cone"), ("cone", "cone")]
 ROUNDING = 0.01  # [m]
-PROVED = 1e-13  # [m], by which what shows that no points are nearer may miss the gap: rounding
-COAL = 1e-6  # [m], by which Coal, which iterates, missed distances of disks in 1 of 1,000 places
-NEAR = 1e-4  # [m]: Coal's distances of what is nearer are asked for no digits
-LINE = 1e-3  # [m], radius of what Coal takes for a segment or a point
+PROVED = 1e-13  # rounding of the separating planes that prove a gap [m]
+COAL = 1e-6  # error of Coal's iterative distance of disks in 1 of 1,000 placements [m]
+NEAR = 1e-4  # [m]: smaller distances of Coal are not compared
+LINE = 1e-3  # radius of Coal's segments and points [m]
 THIN = 1e-12  # [m]
-# Radii of rounding by which the shapes as they are may be nearer than their contacts: rims stand back and are
-# rounded, 1.3 at a right angle, and the tip by 1 / sin of half its angle, on both bodies.
+# Difference between true shapes and their contacts, in radii of rounding.  Rims are inset and rounded, 1.3 at
+# a right angle, and the tip by 1 / sin of half its angle, on both bodies.
 ROUNDED_OFF = 6.0
-DEPTH = 1e-10  # [m], that nothing enters another
-LEDGER = 1e-5  # [J], of some 20, that step control at its default leaves
+DEPTH = 1e-10  # maximum penetration [m]
+LEDGER = 1e-5  # energy error of default step control, of about 20 J [J]
 CONE = coal.Cone(0.1, 0.3)
 FLOOR = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
 
 
 def at(frame, xyz, rpy, q):
-    """Where something on a frame is while the free body is at q."""
+    """Return the placement of a shape on a frame for the free body at q."""
     there = HERE if frame == "universe" else pin.XYZQUATToSE3(q)
     return there * pin.SE3(pin.rpy.rpyToMatrix(*rpy), np.array(xyz))
 
 
 def both(c, q):
-    """Both solids of a contact: half the length and the radii, and where they are."""
+    """Return both solids of a contact: half length, radii and placement."""
     places = at(c.frame1, c.xyz1, c.rpy1, q), at(c.frame2, c.xyz2, c.rpy2, q)
     return [
         (np.array(solid) * [0.5, 1.0, 1.0], at)
@@ -58,7 +58,7 @@ def both(c, q):
 
 
 def reach(solid, place, direction):
-    """Largest component of its points along a direction: of its rims."""
+    """Return the largest component of a solid's points along a direction, at its rims."""
     half, *radii = solid
     axis = place.rotation[:, 2]
     across = np.linalg.norm(direction - direction.dot(axis) * axis)
@@ -69,7 +69,7 @@ def reach(solid, place, direction):
 @pytest.mark.parametrize("rounding", [None, ROUNDING])
 @pytest.mark.parametrize("kinds", PAIRS)
 def test_gaps_with_a_proof(kinds, rounding):
-    """At 1,000 random placements: planes between which no points are, as far apart; and Coal's distance."""
+    """At 1,000 random placements, separating planes at the distance of the gap prove it; Coal agrees."""
     scene, _ = pair(*kinds, rounding=rounding)
     runner, compared = scene._compiled.program.runner(), 0
     chosen = [(i, c) for i, c in enumerate(scene.contacts) if isinstance(c, pn.RevolvedContact)]
@@ -81,7 +81,7 @@ def test_gaps_with_a_proof(kinds, rounding):
             if exact < NEAR:
                 continue
             (solid1, place1), (solid2, place2) = both(c, q)
-            # Of the normal, which the row has of the free body.
+            # Sign of the normal: the row refers to the free body.
             sign = 1.0 if c.frame2 == "universe" else -1.0
             n = sign * (pin.XYZQUATToSE3(q).rotation @ A.reshape(-1, 6)[i, :3])
             between = -reach(solid1, place1, -n) - reach(solid2, place2, n)
@@ -92,7 +92,7 @@ def test_gaps_with_a_proof(kinds, rounding):
 
 
 def as_coal(c, q):
-    """What a contact stands for: two of Coal's shapes, where they are, and the radius around both."""
+    """Return a contact's two shapes for Coal, their placements, and the radius around both."""
 
     def revolved(solid):
         length, below, above = solid
@@ -117,7 +117,7 @@ def as_coal(c, q):
 
 @pytest.mark.parametrize("kinds", PAIRS)
 def test_gaps_beside_coal(kinds):
-    """Of each place of contact, at some random placements."""
+    """Compare each contact point at random placements."""
     scene, _ = pair(*kinds, rounding=ROUNDING)
     runner, worst, compared = scene._compiled.program.runner(), 0.0, 0
     for q in placements(np.random.default_rng(3), 12):
@@ -134,7 +134,7 @@ def test_gaps_beside_coal(kinds):
 
 @pytest.mark.parametrize("kinds", PAIRS)
 def test_nothing_is_left_out(kinds):
-    """The shapes as they are never come nearer than their contacts tell, but for what rims are rounded by."""
+    """The distance of the true shapes is at least the contact gap, up to the rounding of rims."""
     scene, places = pair(*kinds)
     by = max(c.radius2 for c in scene.contacts)
     runner, less, most = scene._compiled.program.runner(), 0.0, 0.0
@@ -158,7 +158,7 @@ def turned(x=0.0, y=0.0, z=0.0):
 
 
 def resting(thing, fixed, starts, mu=0.5):
-    """Free bodies of 1 kg with one shape, that touch each other in a row and all that is fixed."""
+    """Return free bodies of 1 kg with one shape that touch each other and a fixed shape."""
     model, geometry, contacts = empty((0.0, 0.0, -GRAVITY)), pin.GeometryModel(), []
     for i, (block, place) in enumerate(fixed):
         geometry.addGeometryObject(pin.GeometryObject(f"block{i}", 0, place, block))
@@ -175,8 +175,8 @@ def lying(x=0.0, y=0.0):
     return pin.SE3(pin.rpy.rpyToMatrix(0.5 * np.pi, 0.0, 0.0), np.array([x, y, 0.0]))
 
 
-BACK = 2.0 * PASSED_ON * LEAST_ROUNDING * 0.1  # [m], by which both sides stand back where they cross
-# What rests on what that is fixed, where, and at how many places at the least.
+BACK = 2.0 * PASSED_ON * LEAST_ROUNDING * 0.1  # inset of both sides at their crossing [m]
+# Shape, fixed shape, placement, and minimum number of contact points.
 AT_REST = {
     "can on can": (CAN, coal.Cylinder(0.1, 0.4), HERE, [0.0, 0.0, 0.35, *LEVEL], 8),
     "can half on can": (CAN, coal.Cylinder(0.1, 0.4), HERE, [0.06, 0.03, 0.35, *LEVEL], 3),
@@ -194,7 +194,7 @@ AT_REST = {
 
 @pytest.mark.parametrize("what", AT_REST)
 def test_what_rests(what):
-    """It stays where it is, with a velocity of zero, and what carries it presses with its weight."""
+    """The body stays at rest with zero velocity, and the contact force equals its weight."""
     thing, fixed, place, start, least = AT_REST[what]
     run = resting(thing, [(fixed, place)], [start])
     assert np.abs(run.v).max() == 0.0
@@ -204,7 +204,7 @@ def test_what_rests(what):
 
 
 def test_a_can_in_the_valley_between_two():
-    """Which lie along it: their normals lean by 0.6 of a right-angled triangle's 3, 4 and 5."""
+    """The cans are parallel; the normals have the slope of a 3-4-5 triangle."""
     run = resting(CAN, [(CAN, lying(-0.12)), (CAN, lying(0.12, 0.05))], [[0.0, 0.02, 0.16, *LYING]], mu=0.0)
     assert np.abs(run.v).max() == 0.0
     assert 0.8 * run.lam[-1].sum() == pytest.approx(GRAVITY, abs=1e-9)
@@ -238,8 +238,8 @@ def test_a_stack_of_three():
 
 @pytest.mark.parametrize(("part", "falls"), [(0.99, False), pytest.param(1.05, True, marks=pytest.mark.slow)])
 def test_a_can_over_the_rim_of_another(part, falls):
-    """It stands as long as its weight points at chords that both faces share, and falls beyond the rim."""
-    turn = np.pi / 8.0  # so that chords cross the way to the rim
+    """The can stands while its weight acts inside chords of both faces, and falls beyond the rim."""
+    turn = np.pi / 8.0  # rotates the chords across the direction to the rim
     reach = 0.1 if falls else FACE_CIRCLE * 0.1 * np.cos(turn)
     below = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, turn), np.zeros(3))
     run = resting(CAN, [(CAN, below)], [[part * reach, 0.0, 0.3, *turned(z=turn)]])
@@ -251,7 +251,7 @@ def test_a_can_over_the_rim_of_another(part, falls):
 
 @pytest.mark.parametrize("lean", [0.3, -0.5])
 def test_a_can_stands_on_the_rim_of_another(lean):
-    """Held upright on a slide: its lower rim comes to rest on the upper one of a can that leans."""
+    """A can on a vertical slide comes to rest with its lower rim on the upper rim of a tilted can."""
     model, geometry = empty((0.0, 0.0, -GRAVITY)), pin.GeometryModel()
     joint = body(model, 0, pin.JointModelPZ(), "slide", 1.0, inertia=0.02 * np.eye(3))
     geometry.addGeometryObject(pin.GeometryObject("can", joint, HERE, CAN))
@@ -270,9 +270,9 @@ def test_a_can_stands_on_the_rim_of_another(lean):
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_a_can_rolls_over_a_can_that_lies_crosswise(order):
-    """Without slipping: a block on a cylinder, by an integration of its own."""
+    """Rolling without slip; the reference is a separate integration of a block on a cylinder."""
     size, thick, inertia = 0.4, 0.1, 0.03
-    by = PASSED_ON * LEAST_ROUNDING * thick  # by which sides stand back
+    by = PASSED_ON * LEAST_ROUNDING * thick  # inset of the sides
     radius, half = size - by, thick - by
 
     def rate(_, y):
@@ -300,7 +300,7 @@ def test_a_can_rolls_over_a_can_that_lies_crosswise(order):
 
 
 def thrown(kinds, seed):
-    """One at the other, either of them free, and the start."""
+    """Return the scene with either body free, and the start."""
     rng = np.random.default_rng(seed)
     toward = rng.normal(size=3)
     toward /= np.linalg.norm(toward)
@@ -314,7 +314,7 @@ def thrown(kinds, seed):
 @pytest.mark.parametrize("kinds", PAIRS)
 @pytest.mark.parametrize("seeds", [range(4), pytest.param(range(200), marks=pytest.mark.stress)], ids=len)
 def test_thrown_bodies_do_not_enter(kinds, seeds):
-    """With spin: no place of contact, and the ledger of energy closes; the first is repeated bit by bit."""
+    """No contact point of a spinning body penetrates, and the energy ledger closes; repeated bit by bit."""
     struck = 0
     for seed in seeds:
         scene, start = thrown(kinds, seed)

@@ -1,4 +1,4 @@
-"""Gaps that the user gives as functions, beside the package's own contacts and closed forms."""
+"""Gaps as user functions, against the package's contacts and closed forms."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def events(run, *kinds):
 
 
 def on_floor(**more):
-    """The plane z = 0 under the point mass of three sliding joints."""
+    """Return the plane z = 0 under a point mass on three sliding joints."""
     return pn.UserContact(
         lambda t, q, v, data: ([[0.0, 0.0, 1.0]], [0.0]),
         gap=lambda t, q: q[2],
@@ -30,7 +30,7 @@ def on_floor(**more):
 
 @pytest.mark.parametrize("impact", ["newton", "poisson"])
 def test_a_plane_is_a_point_contact(impact):
-    """Thrown askew: bounces, slips and sticks at the same times and places."""
+    """An oblique throw bounces, slips and sticks at the same times and positions."""
     start = {"q0": [0.0, 0.0, 0.5], "v0": [1.0, -0.7, 0.3]}
     numbers = {"mu": 0.3, "restitution": 0.6, "static_ratio": 1.2}
     own, known = (
@@ -52,7 +52,7 @@ def test_a_plane_is_a_point_contact(impact):
 
 
 def hill(mu=0.0):
-    """A circle of 1 m in the x-z plane, about the origin."""
+    """Return a circle of 1 m in the x-z plane, about the origin."""
 
     def rows(t, q, v, data):
         r = np.hypot(*q)
@@ -91,7 +91,7 @@ def test_sticks_on_a_hill_up_to_the_angle_of_friction(side):
 
 
 def test_a_table_that_moves():
-    """A ball falls on a table that goes up and down: the first landing by a root, the law of Newton there."""
+    """A ball falls on an oscillating table: the first impact time is a root, with Newton's law there."""
     amplitude, omega, e = 0.1, 8.0, 0.4
     contact = pn.UserContact(
         lambda t, q, v, data: ([[1.0]], [-amplitude * omega**2 * np.sin(omega * t)]),

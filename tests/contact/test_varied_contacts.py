@@ -1,4 +1,4 @@
-"""Closed forms of contacts at random parameters: what holds at one choice of numbers holds at others."""
+"""Closed forms of contacts at random parameters."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from ..support.mechanisms import GRAVITY, TIGHT, at, body, decades, empty, frame
 from ..support.seeds import seeds
 
 DRAWS = 20
-TIME = 1e-9  # [s], to which instants of references hold
+TIME = 1e-9  # tolerance of reference times [s]
 ROUNDING = 1e-12
-SIDE = 1e-9  # of a threshold, relative or in radians
+SIDE = 1e-9  # distance to a threshold, relative or [rad]
 
 each_draw = pytest.mark.parametrize("draw", seeds(range(DRAWS)))
 
 
 @each_draw
 def test_a_ball_bounces_to_rest(draw):
-    """Flights shrink by e, so that their instants have a limit; mass, height and gravity are any."""
+    """Flight times decrease by the factor e, so that impact times converge; other parameters are random."""
     rng = np.random.default_rng([1, draw])
     e, height, gravity = rng.uniform(0.2, 0.9), decades(rng, 1e-2, 20.0), rng.uniform(1.6, 25.0)
     model = point_mass("Z", mass=decades(rng, 1e-3, 1e3), gravity=(0.0, 0.0, -gravity))
@@ -40,7 +40,7 @@ def test_a_ball_bounces_to_rest(draw):
 
 
 def test_a_hundred_flights():
-    """The last flights are a millionth of the steps tried; their impacts lie on the plane as well."""
+    """The last flights are a millionth of the trial steps; their impacts also lie on the plane."""
     e, height, gravity = 0.878, 4.54, 5.12
     model = point_mass("Z", gravity=(0.0, 0.0, -gravity))
     scene = pn.Scene(model, contacts=[pn.PointContact("mass", restitution=e)], q0=[height])
@@ -55,11 +55,11 @@ def test_a_hundred_flights():
 
 @each_draw
 def test_a_ladder_leaves_its_wall(draw):
-    """At sin = 2/3 sin of its start; the instant is a quadrature of the energy integral."""
+    """The ladder leaves at sin = 2/3 sin of its start, at a time by quadrature of the energy integral."""
     rng = np.random.default_rng([2, draw])
     half, mass, start = decades(rng, 0.2, 5.0), decades(rng, 0.1, 100.0), rng.uniform(0.3, 1.5)
     leaves = np.arcsin(2.0 / 3.0 * np.sin(start))
-    # The angle is start - u^2: the speed's root at the start leaves the integrand.
+    # The substitution angle = start - u^2 removes the singularity of the integrand at the start.
     rate = 1.5 * GRAVITY / half
     time, _ = quad(
         lambda u: 2.0 / np.sqrt(rate * np.cos(start - 0.5 * u * u) * np.sinc(0.5 * u * u / np.pi)),
@@ -80,7 +80,7 @@ def test_a_ladder_leaves_its_wall(draw):
 @each_draw
 @pytest.mark.parametrize("side", [-SIDE, SIDE])
 def test_a_box_at_its_thresholds(draw, side):
-    """It slides beyond tan = mu, and tips beyond tan = b/h where friction would hold it."""
+    """The box slides beyond tan = mu, and tips beyond tan = b/h if friction holds it."""
     rng = np.random.default_rng([3, draw])
     b, h, mass = decades(rng, 0.05, 1.0), decades(rng, 0.05, 1.0), decades(rng, 0.1, 100.0)
     ratio, moves = b / h, side > 0.0
@@ -101,7 +101,7 @@ def test_a_box_at_its_thresholds(draw, side):
 
 @each_draw
 def test_a_table(draw):
-    """Within the rhombus of the legs' middles the loads of least norm are linear in the weight's place."""
+    """Inside the rhombus of the legs' midpoints minimum-norm loads are linear in the weight's position."""
     rng = np.random.default_rng([4, draw])
     a, b, mass = decades(rng, 0.1, 2.0), decades(rng, 0.1, 2.0), decades(rng, 0.1, 1e3)
     share = rng.uniform(0.0, 0.95)
@@ -127,7 +127,7 @@ def test_a_table(draw):
 
 @each_draw
 def test_a_stack(draw):
-    """Each bears what is above it, at mass ratios up to a thousand either way."""
+    """Each body carries the weight above it, at mass ratios from 1/1000 to 1000."""
     rng = np.random.default_rng([5, draw])
     masses = [decades(rng, 1.0, 1e3) for _ in range(rng.integers(2, 7))]
     model = empty()
@@ -146,7 +146,7 @@ def test_a_stack(draw):
 @each_draw
 @pytest.mark.parametrize("side", [-SIDE, SIDE])
 def test_a_gripper(draw, side):
-    """Two fingers hold a block from m g / (2 mu) on, without any creep."""
+    """Two fingers hold a block above m g / (2 mu), without creep."""
     rng = np.random.default_rng([6, draw])
     mass, mu, finger = decades(rng, 0.01, 10.0), decades(rng, 0.1, 2.0), decades(rng, 0.01, 10.0)
     force = (1.0 + side) * mass * GRAVITY / (2.0 * mu)
@@ -172,7 +172,7 @@ def test_a_gripper(draw, side):
 
 @each_draw
 def test_percussion(draw):
-    """A rod that swings onto a stop at s: the impulse is (1 + e) I w / s."""
+    """A rod that swings onto a stop at s has the impulse (1 + e) I w / s."""
     rng = np.random.default_rng([7, draw])
     length, mass, speed = decades(rng, 0.1, 10.0), decades(rng, 0.1, 100.0), decades(rng, 0.1, 30.0)
     e, s = rng.uniform(0.0, 1.0), length * rng.uniform(0.1, 1.0)
@@ -189,13 +189,13 @@ def test_percussion(draw):
 
 @each_draw
 def test_a_pendulum_on_its_stop(draw):
-    """The first two impacts on a stop: quadratures of the energy integral, from rest and from the rebound."""
+    """The times of the first two impacts on a stop are quadratures of the energy integral."""
     rng = np.random.default_rng([8, draw])
     length, start, stop = decades(rng, 0.1, 10.0), rng.uniform(0.5, 1.5), rng.uniform(-0.3, 0.3)
     e, square = rng.uniform(0.3, 1.0), GRAVITY / length
 
     def half_swing(top):
-        """Time from rest at the angle top to the stop."""
+        """Return the time from rest at the angle `top` to the stop."""
         value, _ = quad(
             lambda u: 2.0 / np.sqrt(square * np.sin(top - 0.5 * u * u) * np.sinc(0.5 * u * u / np.pi) * 2.0),
             0.0,

@@ -1,4 +1,4 @@
-"""Mechanisms that share nothing: each runs as it does alone, whatever stands beside it."""
+"""Decoupled mechanisms: each has the same run as alone."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LOADED: dict[str, Any] = {"mu": 0.1, "radius": 0.05}
 
 
 def pendulums(which: list[int], law: dict[str, Any], **said: Any) -> tuple[pn.Scene, np.ndarray]:
-    """Double pendulums side by side, their joints by turns; the k-th is the same in any company."""
+    """Return independent double pendulums with interleaved joints; the k-th is the same in any selection."""
     model, tips, q = pin.Model(), {}, {}
     shapes = np.random.default_rng(3).uniform(0.3, 0.6, (50, 2))
     angles = np.random.default_rng(4).uniform(0.0, 2.0, (50, 2))
@@ -55,7 +55,7 @@ def test_each_runs_as_it_does_alone(law: dict[str, Any]) -> None:
         events += [(event.time, event.kind, event.element) for event in one.events]
         steps += one.stats.steps
     assert [(event.time, event.kind, event.element) for event in whole.events] == sorted(events)
-    assert whole.stats.steps == steps  # and not the steps of all at the events of all
+    assert whole.stats.steps == steps  # events of one mechanism add no steps to others
 
 
 def test_what_is_recorded_moves_nothing() -> None:
@@ -105,7 +105,7 @@ def test_what_acts_on_both_makes_one_of_two(said: dict[str, Any], groups: list[l
 
 
 def test_loops_stay_closed() -> None:
-    """A row in each: the end of the second link keeps below the first joint."""
+    """Each mechanism has one row: the end of the second link stays below the first joint."""
     which = [0, 1, 2]
     rods = [pn.PointAnchor(f"end1 of {k}", axes="x") for k in which]
     law = {"coulomb": 0.05}

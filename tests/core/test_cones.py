@@ -10,12 +10,12 @@ import pin_nonideal as pn
 from oracles.cone_problems import planar_solutions, random_problem
 from pin_nonideal._core import ConeSolver
 
-# What the laws may be missed by, as part of what is in play.
+# Relative violation of the laws.
 KEPT = 1e-10
-# Two solutions are one: part of the velocities in play.
+# Relative difference of velocities below which two solutions are one.
 SAME = 1e-8
 GRAVITY = 9.81
-TINY = 1e-150  # beside bodies that fall together nothing is in play
+TINY = 1e-150  # guard for bodies in common free fall, where all terms are zero
 
 
 def solve(problem, **more):
@@ -23,7 +23,7 @@ def solve(problem, **more):
 
 
 def misses(problem, f):
-    """Largest miss of the laws by f, computed here: parts of velocities, of forces and of powers in play."""
+    """Return the largest relative violation of the laws by f, in velocities, forces and powers."""
     W, w0, mu, dim = problem.W, problem.w0, problem.mu, problem.dim
     w, speed = W @ f + w0, np.maximum(np.abs(W) @ np.abs(f), np.abs(w0).max()) + TINY
     force = np.abs(f).max() + TINY
@@ -38,7 +38,7 @@ def misses(problem, f):
 
 
 def check_certificate(problem, found):
-    """The proof, step by step."""
+    """Check each step of the proof."""
     W, w0, mu, dim, y = problem.W, problem.w0, problem.mu, problem.dim, found.certificate
     unit = np.sqrt(np.repeat(np.diag(W).reshape(-1, dim).max(axis=1), dim))
     W, w0 = W / unit / unit[:, None], w0 / unit / np.abs(w0 / unit).max()
@@ -75,7 +75,7 @@ def test_random_problems_are_solved(count):
 
 @pytest.mark.parametrize("count", [400, pytest.param(20_000, marks=pytest.mark.stress)])
 def test_driven_problems_are_solved_or_refused(count):
-    """Surfaces that are driven against each other: the laws hold, or a proof says why not."""
+    """For surfaces driven against each other, the laws hold or a proof shows that no solution exists."""
     rng = np.random.default_rng(1)
     count_of = dict.fromkeys(("solved", "infeasible", "jammed", "failed"), 0)
     for k in range(count):
@@ -97,7 +97,7 @@ def test_driven_problems_are_solved_or_refused(count):
 )
 @pytest.mark.parametrize("driven", [False, True])
 def test_planar_problems_against_enumeration(count, driven):
-    """Where all modes are tried the motion is one of those found; where there is none it is refused."""
+    """The solution is one of the enumerated solutions; problems without solution are rejected."""
     rng = np.random.default_rng(2 + driven)
     several = 0
     for _ in range(count):
@@ -120,13 +120,13 @@ def test_planar_problems_against_enumeration(count, driven):
 def table(load_x, load_y, a=0.4, b=0.3, weight=98.1):
     """Four legs at (+-a, +-b) under a load: rows of normals on the plate, and the load."""
     corners = np.array([[a, b], [-a, b], [-a, -b], [a, -b]])
-    H = np.column_stack([np.ones(4), corners[:, 1], -corners[:, 0]])  # rise, turns about x and y
+    H = np.column_stack([np.ones(4), corners[:, 1], -corners[:, 0]])  # heave, rotations about x and y
     return H, np.array([-weight, -weight * load_y, weight * load_x])
 
 
 @pytest.mark.parametrize("place", [(0.0, 0.0), (0.1, 0.05), (0.2, 0.15), (0.25, 0.2), (0.39, 0.29)])
 def test_a_table_shares_its_load_by_least_norm(place):
-    """Loads are the shortest that press: non-negative least squares with the equations weighed heavily."""
+    """Loads are the minimum-norm nonnegative solution: nonnegative least squares with weighted equations."""
     H, load = table(*place)
     found = pn.cone_complementarity(H @ H.T, H @ load, 0.0, dims=1)
     heavy = 1e7
@@ -144,7 +144,7 @@ def test_a_table_shares_its_load_by_least_norm(place):
 
 
 def test_least_norm_under_friction():
-    """A box on four rough corners pushed below its limit: a quarter of weight and push each."""
+    """Each corner of a box pushed below its limit carries a quarter of weight and push."""
     corners = np.array([[s, t, -0.5] for s in (1, -1) for t in (1, -1)]) * 0.2
     axes = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     H = np.vstack([np.hstack([axes, np.cross(c, axes)]) for c in corners])
@@ -177,14 +177,14 @@ def test_a_stack_of_unlike_masses():
 
 
 def test_dry_friction_of_a_joint_beside_a_contact():
-    """A rubbing slider carries what its limit allows, the contact the rest."""
+    """A slider with friction carries its limit, the contact the remaining load."""
     # A mass pressed down by 10 N on a slider with 4 N of friction along the same line.
     H = np.array([[1.0], [1.0]])
     found = pn.cone_complementarity(H @ H.T, H @ [-10.0], 0.3, dims=[1], limits=[4.0])
     assert found.status == "solved"
     assert abs(found.f.sum() - 10.0) < 1e-13
     assert abs(found.f[1]) <= 4.0
-    np.testing.assert_allclose(found.f, [6.0, 4.0], rtol=1e-12)  # the shortest within the limit
+    np.testing.assert_allclose(found.f, [6.0, 4.0], rtol=1e-12)  # minimum norm within the limit
     slides = pn.cone_complementarity(np.eye(1), [-10.0], [], limits=[4.0])
     np.testing.assert_allclose((slides.f, slides.w), ([4.0], [-6.0]))
     assert slides.modes == ("slip",)
@@ -207,7 +207,7 @@ def test_a_warm_start_takes_no_more_steps():
 
 
 def test_no_motion_where_plates_crush():
-    """Two plates that approach with a body between them: no forces keep them apart."""
+    """Two approaching plates crush a body between them: no forces separate them."""
     H = np.array([[1.0], [-1.0]])
     found = pn.cone_complementarity(H @ H.T, [-1.0, -1.0], 0.0, dims=1)
     assert found.status == "infeasible"
@@ -215,7 +215,7 @@ def test_no_motion_where_plates_crush():
 
 
 def test_painleve_without_a_solution():
-    """A contact that slips as its rod turns it in: w_n = W f + w0 with W < 0 (no symmetric W has that)."""
+    """A slipping contact of a rod has w_n = W f + w0 with W < 0, which no symmetric W has."""
     found = pn.cone_complementarity([[-1.0]], [-1.0], 0.0, dims=1)
     assert found.status == "infeasible"
     assert found.certificate[0] > 0.0

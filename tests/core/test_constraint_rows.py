@@ -1,4 +1,4 @@
-"""Rows A a = b of every kind of constraint against differences, and what the core solves with them."""
+"""Rows A a = b of every kind of constraint against differences, and solutions of the core with them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from oracles.solutions import assert_solves_its_rows
 from ..support.random_trees import AXIS, attach, place_of, state, three_trees
 from ..support.row_cases import ROBOTS, TREES, kept
 
-# Pinocchio's constraintDynamics ends its own iteration at 1e-12 of the accelerations.
+# Pinocchio's constraintDynamics ends its iteration at a relative error of 1e-12.
 PINOCCHIO = 1e-9
 
 
@@ -39,7 +39,7 @@ def test_each_robot(name):
 
 
 def material_velocity(model, q, v, frame, point):
-    """Velocity of the point of a frame's body that is at `point` in the world; zero for the world."""
+    """Return the velocity of the body-fixed point at `point` in the world; zero for the world."""
     if frame is None:
         return np.zeros(3)
     data = model.createData()

@@ -1,4 +1,4 @@
-"""Deep trees, whose factor comes from the articulated-body recursion, in long double; locks and loops too."""
+"""Deep trees with the articulated-body factorization, against long double, with locked joints and loops."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from oracles.long_recursion import LongTree
 from ..support.random_trees import AXIS, JOINTS, add, state
 from ..support.seeds import seeds
 
-# Rounding of one evaluation, relative to the largest acceleration: sweeps along three hundred links, whose
-# angles carry it themselves.
+# Rounding of one evaluation relative to the largest acceleration, for sweeps along 300 links with rounded
+# angles.
 ROUNDING = 2e-12
-# In a ring, whose rows hold sums along all links: A and b are rounded themselves.
+# Rounding in a ring: A and b contain rounded sums along all links.
 LOOP = 2e-11
-# Beside another algorithm in double precision, which loses more.
+# Difference from another algorithm in double precision, which has more rounding.
 BESIDE = 1e-9
 PARTS = [
     "revolute x",
@@ -35,12 +35,12 @@ KNOWN = [*PARTS, "free flyer", "translation", "endless unaligned", "prismatic un
 
 @pytest.fixture(params=["core", "pinocchio"])
 def terms(request):
-    """Who computes kinematics and inertias."""
+    """Return the provider of kinematics and inertias."""
     return request.param
 
 
 def chain(n, length=0.1, turn=0.0, axes="xyz"):
-    """Equal links in a row; joints turn about the axes one after another."""
+    """Return a chain of equal links with cycling joint axes."""
     model, parent = pin.Model(), 0
     kinds = {"x": pin.JointModelRX, "y": pin.JointModelRY, "z": pin.JointModelRZ}
     for i in range(n):
@@ -56,7 +56,7 @@ def chain(n, length=0.1, turn=0.0, axes="xyz"):
 
 
 def deep_tree(rng, kinds=KNOWN, joints=70, branches=2):
-    """A trunk of joints with branches at its end, or with more than two anywhere, beside a small tree."""
+    """Return a trunk with branches at its end, or with more than two anywhere, and a small separate tree."""
     model, trunk = pin.Model(), 0
     for k in range(joints):
         trunk = add(model, f"j{k}", str(rng.choice(kinds)), trunk, rng, mass=float(rng.uniform(0.2, 3.0)))
@@ -91,7 +91,7 @@ def test_acceleration_of_a_chain(n, terms):
 @pytest.mark.parametrize("seed", range(3))
 def test_acceleration_with_every_joint_the_recursion_knows(seed, terms):
     rng = np.random.default_rng(seed)
-    model = deep_tree(rng, branches=2 if terms == "pinocchio" else 5)  # crba asks for joints branch by branch
+    model = deep_tree(rng, branches=2 if terms == "pinocchio" else 5)  # crba needs joints branch by branch
     scene, exact = pn.Scene(model, terms=terms), LongTree(model)
     q, v = state(model, rng, spread=0.3)
     tau = rng.standard_normal(model.nv)
@@ -117,7 +117,7 @@ def unit_rows(dofs, nv):
 
 
 def test_joints_that_stick_are_locked(terms):
-    """Rows of their dofs in long double; what holds them is what inverse dynamics asks."""
+    """Locked dofs are rows in long double; the friction forces equal those of inverse dynamics."""
     rng = np.random.default_rng(8)
     model = deep_tree(rng, ["revolute x", "revolute y", "spherical"], 60)
     held = [model.joints[i].idx_v for i in range(1, model.njoints) if model.joints[i].nv == 1][::3]
@@ -193,7 +193,7 @@ def test_given_forces_and_drag_enter_as_wrenches(terms):
 
 
 def test_what_joints_carry(terms):
-    """Recursive Newton-Euler of Pinocchio, in the axes of each joint."""
+    """Joint wrenches equal Pinocchio's recursive Newton-Euler results, in the axes of each joint."""
     rng = np.random.default_rng(2)
     model = deep_tree(rng, ["revolute x", "prismatic y", "spherical"], 60)
     scene = pn.Scene(model, terms=terms)
@@ -222,7 +222,7 @@ def test_energy_balance():
 
 
 def test_steps_are_those_that_the_motion_needs():
-    """No more than DOP853 of SciPy takes with Pinocchio's aba, but for the rules of the step control."""
+    """The number of steps is that of SciPy's DOP853 with Pinocchio's aba, up to rules of step control."""
     model = chain(80, axes="y")
     q, v, data = np.full(80, 0.002), np.zeros(80), model.createData()
 

@@ -20,17 +20,17 @@ from ..support.random_trees import state, tree
 from ..support.row_cases import ROBOTS, kept
 from ..support.seeds import seeds
 
-# Sums over the bodies of a tree in another order.
+# Rounding of sums over bodies in another order.
 ROUNDING = 1e-12
-# Runs at a tolerance of 1e-12 against ones at 1e-13: a hundred steps of it, through the growth of errors in a
-# fraction of a second.
+# Difference of runs at tolerances of 1e-12 and 1e-13: a hundred steps with error growth in a fraction of a
+# second.
 SAME = 1e-9
-# Friction runs are started anew at every event, whose time carries the tolerance.
+# Friction runs restart at every event, whose time has the error of the tolerance.
 SAME_ACROSS_EVENTS = 1e-8
 
 
 def assert_same_instant(scene, q, v, t):
-    """M, F and the acceleration; C is the core's, which friction_conditions holds to the laws."""
+    """Assert M, F and the acceleration; C is the core's, which friction_conditions checks."""
     runner = scene._compiled.program.runner()
     raw = runner.solve(q, v, t)
     dense = DenseScene(scene, lambda t, q, v: raw.C)
@@ -60,7 +60,7 @@ def test_instants_of_random_mechanisms(seed):
 
 
 def smooth(scene):
-    """The scene without its laws."""
+    """Return the scene without its laws."""
     what = ("constraints", "contacts", "forces", "actuation", "q0", "v0")
     return pn.Scene(scene.model, **{key: getattr(scene, key) for key in what})
 
@@ -101,7 +101,7 @@ def test_runs_of_random_mechanisms_without_friction(seed):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_runs_of_random_trees_with_constant_friction(seed):
-    """Joints stick and slip; the dense motion tries all modes at each event."""
+    """Joints stick and slip; the dense motion enumerates all modes at each event."""
     print("seed", seed)
     rng = np.random.default_rng(seed)
     n = 2 + seed % 3

@@ -1,4 +1,4 @@
-"""run.at: the run between its steps, at the order of the steps; which samples lie on the asked grid."""
+"""Dense output run.at at the order of the steps, and samples on the requested grid."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FIELDS = ("q", "v", "a", "F_ideal", "F_nonideal", "lam", "tau", "violation", "mo
 
 
 def pendulum():
-    """Two links that swing far."""
+    """Return two links with large swings."""
     model = pin.Model()
     joint, place = 0, pin.SE3.Identity()
     for name in ("upper", "lower"):
@@ -41,10 +41,10 @@ def test_the_polynomial_goes_through_its_points(points):
 
 
 def error_between(scene, method, length, exact, times):
-    """Largest error at times between the steps of a run in steps of that length."""
+    """Return the largest error between the steps of a run with this step size."""
     if method == "rk4":
         run = pn.simulate(scene, times[-1], method=method, dt=length, record="dense")
-    else:  # steps as the tolerance asks for, told by their number
+    else:  # adaptive steps: the step size follows from their number
         run = pn.simulate(scene, times[-1], method=method, rtol=length, atol=length, record="dense")
     found = run.at(times)
     error = max(np.abs(found.q - exact.q).max(), np.abs(found.v - exact.v).max())
@@ -53,7 +53,7 @@ def error_between(scene, method, length, exact, times):
 
 @pytest.mark.parametrize("method", ["dop853", "dopri5", "rk4"])
 def test_order_between_the_steps(method):
-    """The error of dop853 at any time falls with the eighth power of the step, as that of its steps does."""
+    """The error of dop853 decreases with the eighth power of the step, between steps as well."""
     scene, times = pendulum(), np.linspace(0.03, 2.0, 41)
     exact = pn.simulate(scene, times[-1], rtol=1e-13, atol=1e-14, record="dense").at(times)
     lengths = {"dop853": (1e-5, 1e-9), "dopri5": (1e-4, 1e-8), "rk4": (0.04, 0.005)}[method]
@@ -88,7 +88,7 @@ def test_dense_output_changes_nothing():
     "method", ["dop853", "dopri5", "rk4", "Radau", "BDF", "LSODA", "semi_implicit_euler", "moreau"]
 )
 def test_samples_by_every_method_are_those_of_the_run(method):
-    """At the times of the run's own samples, with all that it recorded; on the constraints in between."""
+    """Dense output equals the run at its samples, with all recorded data, and meets constraints between them."""
     scene = pn.load("rough_four_bar")
     dt = None if method not in ("rk4", "semi_implicit_euler", "moreau") else 0.005
     record = ("a", "forces", "energy", "reactions", "power", "dense")
@@ -115,13 +115,13 @@ def test_one_time_gives_one_sample():
     assert sample.q.shape == (run.scene.model.nq,)
     np.testing.assert_array_equal(sample.lam, several.lam[0])
     assert sample.energy["total"] == several.energy["total"][0]
-    assert abs(sample.energy["balance"]) < 1e-8  # of the whole run, wherever the sample lies
+    assert abs(sample.energy["balance"]) < 1e-8  # balance from the start of the run
     assert len(several) == 2
     assert len(run.at([])) == 0
 
 
 def test_held_torques_are_those_of_the_step():
-    """A sampled controller is not asked again, and its torque is that of the step."""
+    """Dense output does not call a sampled controller and returns the torque of the step."""
     calls = []
 
     def control(t, q, v):
@@ -138,7 +138,7 @@ def test_held_torques_are_those_of_the_step():
 
 
 def test_at_an_event_the_step_behind_it_is_taken():
-    """A block slides, comes to rest and stays."""
+    """A block slides to rest and sticks."""
     model = pin.Model()
     model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "slide")
     model.appendBodyToJoint(1, pin.Inertia(1.0, np.zeros(3), np.eye(3)), pin.SE3.Identity())

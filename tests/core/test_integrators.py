@@ -1,4 +1,4 @@
-"""Observed orders, dense output, output times, energy ledger and what a run must not depend on."""
+"""Observed orders, dense output, output times, energy ledger and independence of runs."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ..support.random_trees import state, tree
 from ..support.row_cases import TREES, parallel_cranks
 
 TIGHT = {"rtol": 1e-13, "atol": 1e-14}
-# Errors below this are not those of the steps: the reference, a hundred steps of order 8, rounds by 1e-13.
+# Error floor: the reference, a hundred steps of order 8, has rounding of 1e-13.
 FLOOR = 5e-13
-# An observed order may be this much below the method's: the next terms of the error at the steps used.
+# Difference of observed and theoretical order by higher terms of the error.
 ORDER = 0.7
 
 
@@ -54,14 +54,14 @@ FREE = [case for case in CASES if case in ("spherical", "free flyer", "planar", 
 
 
 def length_at_start():
-    """Of the scene whose distance moves: its length is this times 1 + 0.1 sin(3 t)."""
+    """Return the initial distance l; the scene's distance is l (1 + 0.1 sin(3 t))."""
     return CASES["moving length"][0]().constraints[0].length.offset
 
 
 def fixed_steps(make, q, v, duration, method, n, **options):
-    """A run in n equal steps.
+    """Run n equal steps.
 
-    Adaptive methods are held to them by a control that is sampled at every step, and accept any error.
+    A control that is sampled at every step fixes the steps of adaptive methods, which accept any error.
     """
     h = duration / n
     if method not in ("dop853", "dopri5"):
@@ -73,15 +73,15 @@ def fixed_steps(make, q, v, duration, method, n, **options):
 
 
 def gap(model, one, two):
-    """Largest difference of two runs over their common samples, in tangent coordinates."""
+    """Return the largest difference of two runs over common samples, in tangent coordinates."""
     q = [np.abs(pin.difference(model, a, b)).max() for a, b in zip(one.q, two.q, strict=True)]
     return max(max(q), float(np.abs(one.v - two.v).max()))
 
 
 def observed_order(case, method, ladder, **grid):
-    """Order between the finest grid with an error above the reference's and a grid of a third of its steps.
+    """Return the order between the finest grid with an error above the floor and a grid with a third of its steps.
 
-    Nearer grids would show the chance in which direction their errors point as much as the order.
+    The random direction of errors would affect the order between closer grids.
     """
     make, q, v = CASES[case]
     reference = fixed_steps(make, q, v, 1.0, "dop853", 100, **grid)
@@ -129,7 +129,7 @@ def test_errors_follow_the_tolerance(case, method):
         run = pn.simulate(make(), 2.0, q, v, output_dt=2.0, method=method, rtol=rtol, atol=rtol)
         errors.append(gap(make().model, run, reference))
         steps.append(run.stats.steps)
-        assert errors[-1] < 1e3 * rtol  # a hundred steps, and a motion that pulls errors apart
+        assert errors[-1] < 1e3 * rtol  # a hundred steps with error growth
     assert steps[0] < steps[1] < steps[2]
     assert errors[2] < 1e-2 * errors[0]
 
@@ -167,7 +167,7 @@ def test_without_output_dt_every_step_is_a_sample():
 
 
 def test_the_clock_of_a_scene_starts_at_t0():
-    """A run from t0 continues one that ends there: functions of time, control samples and tables."""
+    """A run from t0 continues a run that ends at t0: functions of time, control samples and tables."""
     base = TREES["distance sinusoid"](np.random.default_rng(0))
     model = base.model
     controls = {
@@ -220,7 +220,7 @@ def test_the_energy_ledger_closes(case):
     assert np.abs(run.energy["balance"]).max() < 1e-9 * size
     if case in FREE:
         assert np.ptp(run.energy["total"]) < 1e-9 * size
-    elif case != "moving length":  # ideal constraints that stand still do no work, nor does projection
+    elif case != "moving length":  # scleronomic ideal constraints and projection do no work
         assert np.abs(run.energy["constraints"]).max() < 1e-8 * size
         assert np.abs(run.energy["projection"]).max() < 1e-8 * size
         assert np.ptp(run.energy["total"]) < 1e-8 * size
@@ -261,7 +261,7 @@ def test_a_driven_scene_with_springs_drag_and_friction_closes_its_ledger():
 
 
 def test_three_parallel_cranks_swing_as_one_pendulum():
-    """Redundant rows are independent off the constraints; the motion obeys one equation."""
+    """Redundant rows are independent off the constraints; the motion has one equation."""
     scene = parallel_cranks()
     radius, rod, bar = 0.3, 1.0, 2.0
     turning = 3 * (1e-3 + rod * radius**2 / 4) + bar * radius**2
@@ -283,7 +283,7 @@ def test_three_parallel_cranks_swing_as_one_pendulum():
 
 
 def loops():
-    """Two anchors and a coupling on three trees."""
+    """Return two anchors and a coupling on three trees."""
     base = TREES["point between trees"](np.random.default_rng(5))
     first = {name: base.model.joints[base.model.getJointId(name)].idx_q for name in ("a1", "c1")}
     follower = np.arctan2(base.q0[first["c1"] + 1], base.q0[first["c1"]])
@@ -299,7 +299,7 @@ def final(base, constraints, q=None, v=None):
     return run, q, v
 
 
-# Two runs at rtol 1e-10 that round differently.
+# Difference of two runs at rtol 1e-10 with different rounding.
 SAME_RUN = 1e-8
 
 

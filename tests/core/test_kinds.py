@@ -1,4 +1,4 @@
-"""Each kind of constraint is known wherever it must be, and its formulas serve any kind of numbers."""
+"""Each kind of constraint is complete in the core and in Python, and its formulas are generic in the scalar."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CORE = ROOT / "pin_nonideal" / "_core"
 DATA = Path(__file__).parents[1] / "data"
 KINDS = get_args(constraints.Constraint)
 HEADERS = [path for room in ("rows", "gaps") for path in sorted((CORE / "constraints" / room).glob("*.hpp"))]
-# What a kind's C++ struct must say of itself.
+# Required members of a kind's C++ struct.
 MEMBERS = (
     "static constexpr const char* name",
     "static constexpr Role role",
@@ -66,7 +66,7 @@ class TestDescription:
 
 
 def structs() -> dict[str, str]:
-    """Name of each kind of row, and its name in Python; templates are listed by their instances."""
+    """Return the name of each kind of row and its name in Python; templates are listed by instance."""
     found = {}
     for header in HEADERS:
         source = header.read_text()
@@ -93,7 +93,7 @@ class TestStruct:
 
 
 def compiled(source: str, *options: str) -> subprocess.CompletedProcess[str]:
-    """A source of tests/data through the compiler, with the headers of the core and Eigen's."""
+    """Compile a source of tests/data with the headers of the core and Eigen."""
     compiler = shutil.which(os.environ.get("CXX", "c++"))
     prefix = next((p for p in Path(pin.__file__).parents if p.name == "cmeel.prefix"), Path())
     eigen = prefix / "include" / "eigen3"
@@ -131,7 +131,7 @@ class TestLaw:
 
 
 def test_every_law_of_the_core_is_bound() -> None:
-    """Those of the variant; a law that reads reactions, or forgets its states, does not compile."""
+    """All laws of the variant are bound; a law that reads reactions or omits its states does not compile."""
     header = (CORE / "forces" / "laws.hpp").read_text()
     (variant,) = re.findall(r"using Law = std::variant<([^>]*)>", header)
     for name in re.findall(r"\w+", variant):

@@ -1,4 +1,4 @@
-"""Methods of integration are data: the stepping routine takes a table that the package does not have."""
+"""Integration methods are data: the stepping routine works with an external Butcher table."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_a_new_table_needs_no_other_line(tmp_path):
     output = subprocess.run([program], check=True, capture_output=True, text=True).stdout
     errors = np.array([line.split() for line in output.splitlines()], dtype=float)
     orders = np.log2(errors[:-1] / errors[1:])
-    # At the end, inside, and the estimate of one step: 3, 3 and 3, the last as the local error of order 2.
+    # Order at the end, inside, and of the one-step estimate: all 3, the last as local error of order 2.
     np.testing.assert_allclose(orders, 3.0, atol=0.15)
 
 

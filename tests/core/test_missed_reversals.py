@@ -1,4 +1,4 @@
-"""A slip that reverses and comes back inside one step is an event, of every kind of element."""
+"""Slip that reverses twice inside one step is an event, for all kinds of elements."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from oracles.coulomb_partner import Partner
 
 from ..support.mechanisms import body, empty, frame
 
-# The motion is exact between events but for the tolerance of the step control, which friction magnifies
-# by the number of events; a missed reversal is an error of 1e-3 and more.
+# Allowed error in tolerances.  The error between events is the tolerance of step control, and grows with the
+# number of events.  A missed reversal is an error of at least 1e-3.
 ALLOWED = 1e3
 DURATION = 2.0
 
 
 def rotor(model, drive):
-    """A driven rotor about z, and its prescribed motion."""
+    """Return a driven rotor about z, and its prescribed motion."""
     joint = body(model, 0, pin.JointModelRZ(), "rotor", 1.0, inertia=np.eye(3))
     return joint, [pn.PrescribedMotion("rotor", drive)]
 
@@ -65,7 +65,7 @@ def contact(drive, u, w, c):
 
 
 def v0_of(index, size=7):
-    """The row that takes one velocity out."""
+    """Return the row that selects one velocity."""
     row = np.zeros(size)
     row[index] = 1.0
     return row
@@ -75,7 +75,7 @@ KINDS = {"joint": joint_between, "hinge": hinge_anchor, "user": user_friction, "
 
 
 def wrong(kind, seed, rtol):
-    """How far the body's velocity at the end is off, over what the tolerance allows."""
+    """Return the error of the body's final velocity over the allowed error."""
     rng = np.random.default_rng(seed)
     omega, phase, w = rng.uniform(2.0, 40.0), rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-1.5, 1.5)
     c = rng.uniform(0.05, 1.0) if rng.random() < 0.5 else rng.uniform(0.05, 20.0)
@@ -92,7 +92,7 @@ CASES = [(kind, rtol) for kind in KINDS for rtol in (1e-8, 1e-6)]
 
 @pytest.mark.parametrize("seed", [13, 91, 178, 351, 556, 809, 860])
 def test_a_contact_that_slips_for_less_than_a_step(seed):
-    """At a loose tolerance a step may hold both the beginning and the end of a slip."""
+    """At a loose tolerance one step may contain the start and the end of a slip."""
     assert wrong("contact", seed, 1e-6) < 1.0
 
 

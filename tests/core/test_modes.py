@@ -23,10 +23,10 @@ LARGEST = 8
 
 
 def random_program(rng, n, rank):
-    """W of given rank with rows of very unequal size, accelerations that forces can cause, and limits."""
+    """Return W of given rank with badly scaled rows, accelerations in its range, and limits."""
     half = rng.standard_normal((n, rank)) * 10.0 ** rng.uniform(-1.0, 1.0, (n, 1))
     W = half @ half.T
-    # What friction cannot move is not accelerated either: slip speeds that depend on each other do so always.
+    # alpha0 lies in the range of W: dependent slip velocities have dependent accelerations.
     alpha0 = W @ rng.standard_normal(n) * 10.0 ** rng.uniform(-0.5, 1.0)
     return W, alpha0, rng.exponential(1.0, n)
 
@@ -63,9 +63,9 @@ class TestProgram:
 
     @pytest.mark.parametrize("seed", seeds(range(60)))
     def test_accelerations_that_no_force_causes(self, seed):
-        """alpha0 has a part outside the range of W, as at a dead point: then some of the redundant slip.
+        """alpha0 is not in the range of W, as at a dead point: some redundant elements slip.
 
-        The conditions are those of the minimum of a convex program: none other keeps them.
+        The conditions are those of the minimum of a convex program, so the solution is unique.
         """
         print("seed", seed)
         rng = np.random.default_rng(3000 + seed)
@@ -83,7 +83,7 @@ class TestProgram:
 
     @pytest.mark.parametrize("n", range(1, LARGEST + 1))
     def test_copies_share(self, n):
-        """n equal brakes on one wheel hold what one brake of the sum of their limits holds."""
+        """n equal brakes on one wheel act like one brake with the sum of their limits."""
         W, limits = np.full((n, n), 2.0), np.linspace(0.5, 1.0, n)
         total = limits.sum()
         for part, alpha in ((1.0 - 1e-9, 0.0), (1.5, total)):
@@ -94,7 +94,7 @@ class TestProgram:
 
     @pytest.mark.parametrize("seed", seeds(range(60)))
     def test_elements_of_several_directions(self, seed):
-        """Disks and balls: |f| <= s, and f = -s alpha/|alpha| or alpha = 0; a convex program has no other."""
+        """Disks and balls: |f| <= s, and f = -s alpha/|alpha| or alpha = 0, unique by convexity."""
         print("seed", seed)
         rng = np.random.default_rng(2000 + seed)
         dims = [int(d) for d in rng.integers(1, 4, 1 + seed % 4)]
@@ -111,9 +111,9 @@ class TestProgram:
 
     @pytest.mark.parametrize("seed", seeds(range(120)))
     def test_shares_that_are_all_at_their_limits(self, seed):
-        """A load at the limit of what disks and balls can hold, or beside it by 1e-12 to 0.1 of that.
+        """The load is at the limit of disks and balls, or differs by a relative 1e-12 to 0.1.
 
-        Both |f| = s and alpha = 0 hold there, or all but: the place where elements break away.
+        At slip onset both |f| = s and alpha = 0 hold.
         """
         print("seed", seed)
         rng = np.random.default_rng(4000 + seed)
@@ -135,7 +135,7 @@ class TestProgram:
 
 
 class RandomTree:
-    """Revolute and prismatic joints with load-dependent friction in each; some joints at rest, others not."""
+    """Revolute and prismatic joints with load-dependent friction; some joints are at rest."""
 
     def __init__(self, seed, n):
         rng = np.random.default_rng(seed)
@@ -163,7 +163,7 @@ class RandomTree:
         self.tau = rng.standard_normal(n) * rng.exponential(2.0)
 
     def limits(self, a):
-        """Kinetic limit of each joint from the wrench of pin.rnea in the joint's frame."""
+        """Return the kinetic limit of each joint from the wrench of pin.rnea in the joint frame."""
         data = self.model.createData()
         pin.rnea(self.model, data, self.q, self.v, a)
         axis = np.array([0.36, 0.48, 0.8])
@@ -181,7 +181,7 @@ class RandomTree:
         return np.array(limits)
 
     def keeps(self, modes, solution):
-        """Do these modes keep their conditions?"""
+        """Check if modes meet their conditions."""
         limits, friction, a = self.limits(solution.a), solution.F_nonideal, solution.a
         for mode, law, limit, f, slip in zip(modes, self.laws, limits, friction, a, strict=True):
             if mode == 0:
@@ -196,9 +196,9 @@ class RandomTree:
 class TestScenes:
     @pytest.mark.parametrize("seed", seeds(range(60)))
     def test_random_trees(self, seed):
-        """solve finds modes that keep every condition, and no other combination does.
+        """solve returns modes that meet every condition, and no other combination does.
 
-        With static friction above kinetic friction an element may do either: the one found is among them.
+        With static friction above kinetic friction several combinations may be valid, including the result.
         """
         print("seed", seed)
         tree = RandomTree(seed, 2 + seed % 4)
@@ -219,7 +219,7 @@ class TestScenes:
 
     @pytest.mark.parametrize("seed", seeds(range(20)))
     def test_linkage_of_one_freedom(self, seed):
-        """Three rubbing pins of a four-bar hold or let go together: |n . F| against sum |n_k| limit_k.
+        """Three pins of a four-bar stick or slip together: |n . F| against sum |n_k| limit_k.
 
         n is the motion that the loop allows.
         """
@@ -263,7 +263,7 @@ def five_bar():
 
 
 class Loop:
-    """The five-bar without its drives: two freedoms, friction that follows the load in two of its pins."""
+    """Five-bar without drives: two degrees of freedom, load-dependent friction in two pins."""
 
     AXIS = np.array([0.0, -1.0, 0.0])
 
@@ -281,9 +281,9 @@ class Loop:
         self.tau = 0.2 * rng.standard_normal(4)
 
     def friction_and_limits(self, s):
-        """Friction torque of each rubbing pin and its limit, from the equation of motion and pin.rnea.
+        """Return friction torque and limit of each pin, from the equation of motion and pin.rnea.
 
-        The anchor pulls at the tips: lam, in the axes of frame2, on frame1's body, and back on the other.
+        The anchor exerts lam, in the axes of frame2, on frame1's body, and the opposite on frame2's body.
         """
         model, data, rest = self.model, self.model.createData(), np.zeros(4)
         pin.framesForwardKinematics(model, data, self.q)
@@ -308,7 +308,7 @@ class Loop:
 
 @pytest.mark.parametrize("seed", seeds(range(40)))
 def test_loop(seed):
-    """At rest, under random torques: solve finds the one combination that keeps every condition."""
+    """At rest under random torques solve returns the unique combination that meets every condition."""
     print("seed", seed)
     loop = Loop(seed)
     rest = np.zeros(4)

@@ -1,4 +1,4 @@
-"""An evaluation takes no memory from the heap: counted by a malloc that is loaded before the C library's."""
+"""Evaluations allocate no heap memory, counted by a preloaded malloc."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ CONES = [f"cones {k} {warm}" for k in range(6) for warm in (False, True)]
 
 @pytest.fixture(scope="module")
 def counts(tmp_path_factory):
-    """Allocations of 10 and of 1010 evaluations, by robot."""
+    """Return the allocations of 10 and of 1010 evaluations, by robot."""
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None or not sys.platform.startswith("linux"):
         pytest.skip("needs a C compiler and glibc")
@@ -183,5 +183,5 @@ def test_a_contact_problem_allocates_nothing(counts, name):
 @pytest.mark.parametrize("name", STEPS)
 def test_a_step_of_time_stepping_allocates_nothing(counts, name):
     few, many = counts[name]
-    between = 0.1  # a step: what the interpreter takes as it looks for Ctrl-C every few of them
+    between = 0.1  # per step: the interpreter allocates in its check for Ctrl-C every few steps
     assert many - few < between * 300, f"{(many - few) / 300} allocations a step"

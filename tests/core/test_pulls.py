@@ -1,4 +1,4 @@
-"""Contacts and wheels that are kept: where some of them must pull, beside a linear program."""
+"""Tension events of bilateral contacts and wheels, against a linear program."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from oracles.sharing import constraint_force, largest_least_load, least_norm, pr
 from ..support.mechanisms import GRAVITY, assert_close, body, empty, frame
 from ..support.seeds import seeds
 
-# Of the loads: products of a dozen numbers, through a least-squares solution.
+# Rounding of loads: products of a dozen numbers and a least-squares solution.
 ROUNDING = 1e-9
-# Of the time at which a load passes zero, which a step knows to its tolerance.
+# Error of the time at which a load is zero, by the tolerance of a step.
 INSTANT = 1e-8
 
 
@@ -26,7 +26,7 @@ def kinds(run):
 
 
 def stance(seed, mu=0.0, wrench=None):
-    """A body on three to eight feet of one plane, under a wrench that grows until it must tip."""
+    """Return a body on three to eight feet in a plane, under a wrench that grows until the body tips."""
     rng = np.random.default_rng(seed)
     model = empty()
     joint = body(model, 0, pin.JointModelFreeFlyer(), "body", 10.0, inertia=0.3 * np.eye(3))
@@ -51,7 +51,7 @@ def stance(seed, mu=0.0, wrench=None):
 
 
 def check_instant(scene, run):
-    """The first pull is where a linear program says that not all can press any longer."""
+    """Check that the first tension event is at the end of feasible compressive loads by a linear program."""
     pulls = [event.time for event in run.events if event.kind == "pull"]
     pressing = pressing_rows(scene)
     margin = [
@@ -97,14 +97,14 @@ def test_many_stances(block):
         except AssertionError as error:
             failed.append((seed, str(error)[:200]))
     assert not failed
-    assert pulled >= 90  # some never do: what grows presses them down
+    assert pulled >= 90  # in some cases the growing load is compressive
 
 
 @pytest.mark.parametrize(
     "method", [{}, {"method": "dopri5"}, {"method": "rk4", "dt": 0.01}, {"method": "moreau", "dt": 0.01}]
 )
 def test_a_table_tips_over_two_of_its_legs(method):
-    """Four legs of equal loads tell of no pull; the resultant leaves the table at a known instant."""
+    """Tension begins when the resultant leaves the table, at a known time, despite equal initial loads."""
     model = empty()
     joint = body(model, 0, pin.JointModelFreeFlyer(), "table", 10.0, inertia=0.3 * np.eye(3))
     corners = [(0.3, 0.2), (0.3, -0.2), (-0.3, -0.2), (-0.3, 0.2)]
@@ -124,7 +124,7 @@ def test_a_table_tips_over_two_of_its_legs(method):
     pulls = [event for event in run.events if event.kind == "pull"]
     late = 0.01 if method.get("method") == "moreau" else INSTANT
     assert -INSTANT < pulls[0].time - instant < late
-    # Its resultant goes toward +x, so it is the other two that must pull.
+    # The resultant moves toward +x, so the other two legs have tension.
     assert {event.element for event in pulls[:2]} == {"PointContact(leg2)", "PointContact(leg3)"}
     assert_close(run.lam[0], weight / 4.0, 1e-9)
 
@@ -133,7 +133,7 @@ def test_a_table_tips_over_two_of_its_legs(method):
 
 
 def cart(force):
-    """A cart on four wheels that roll, pulled by a force high above its center."""
+    """Return a cart on four rolling wheels, with a force high above its center."""
     model = empty()
     frame_joint = body(
         model,
@@ -167,7 +167,7 @@ def test_wheels_pull_when_the_cart_must_rear_up(side):
 
 
 def test_a_wheel_alone_reports_its_pull():
-    """Lifted by a force that grows with 30 N/s, 1 kg weighs nothing after g/30."""
+    """A lift of 30 N/s balances the weight of 1 kg after g/30."""
     model = empty()
     joint = body(model, 0, pin.JointModelFreeFlyer(), "ball", 1.0, inertia=0.01 * np.eye(3))
     assert joint == 1

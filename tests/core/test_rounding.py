@@ -1,4 +1,4 @@
-"""Step control knows its floor: accelerations have rounding, and no step meets a tolerance below it."""
+"""Rounding floor of step control: no step meets a tolerance below the rounding of accelerations."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from oracles.long_recursion import LongTree
 from ..support.mechanisms import body, empty
 from ..support.same_run import assert_same_run
 
-# A sample of rounding beside the largest of a run's: so many times less, and more.
+# Bounds of a sample of rounding relative to the largest of a run.
 FAR_BELOW, FAR_ABOVE = 0.01, 20.0
-# Steps after which a run is held to its rounding (run/rounding.cpp).
+# Number of steps after which a run uses its rounding floor (run/rounding.cpp).
 MANY_STEPS = 20_000
 
 
 def arm_with_a_finger(finger: float, reach: float = 10.0) -> pin.Model:
-    """Its inertias about one point keep (finger / reach)^2 of their digits."""
+    """Return an arm whose inertias about one point keep (finger / reach)^2 of their digits."""
     model = empty()
     heavy, light = np.diag([1.0, 80.0, 80.0]), np.diag([1e-10] * 3)
     arm = body(
@@ -36,7 +36,7 @@ START = {"q": np.array([0.1, 0.2]), "v": np.zeros(2)}
 
 
 def in_long_double(model: pin.Model, duration: float, rtol: float):
-    """The same by SciPy's DOP853, whose accelerations have no rounding to speak of."""
+    """Integrate by SciPy's DOP853 with accelerations of negligible rounding."""
     tree, nv = LongTree(model), model.nv
 
     def rate(t, y):
@@ -59,7 +59,7 @@ def test_tolerances_below_rounding_cost_no_more_steps(method):
         told = f"limited by rounding: {run.stats.limited_by_rounding} of {run.stats.steps} steps"
         assert (told in str(run)) == (run.stats.limited_by_rounding > 0)
     assert runs[1e-14].stats.limited_by_rounding > 0
-    # Without a floor all but the first take more than 100,000.
+    # Without a floor all runs except the first take more than 100,000 steps.
     assert max(run.stats.steps for run in runs.values()) < 1.5 * MANY_STEPS
 
 
@@ -67,9 +67,9 @@ def test_steps_are_those_of_accelerations_without_rounding():
     model = arm_with_a_finger(1e-3)
     exact = in_long_double(model, 0.1, 1e-10)
     run = pn.simulate(pn.Scene(model), 0.1, **START, rtol=1e-10, atol=1e-10)
-    # A tolerance far below rounding; noise makes lengths of steps vary.
+    # The tolerance is far below rounding, and noise changes step sizes.
     assert run.stats.steps < MANY_STEPS + 5.0 * (exact.t.size - 1)
-    # What rounding of a does in this time, and no more.
+    # The error is bounded by the effect of rounding of a over this time.
     largest = np.abs(run.v).max()
     assert np.abs(run.v[-1] - exact.y[2:, -1]).max() < 100.0 * run.stats.rounding * largest
 

@@ -1,4 +1,4 @@
-"""The bits of a motion follow from scene, state and method, not from what ran before or what is recorded."""
+"""Determinism: scene, state and method define all bits of a motion, independent of earlier runs and records."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SECONDS = 0.05
 
 
 def ended(scene, **options):
-    """A run, as far as it came."""
+    """Return a run, or the trajectory of a failed run."""
     try:
         return pn.simulate(scene, SECONDS, **options)
     except pn.PinNonidealError as error:
@@ -28,7 +28,7 @@ def ended(scene, **options):
 
 
 def assert_same_motion(one, other):
-    """States and events; what was recorded of them may differ."""
+    """Assert equal states and events; recorded fields may differ."""
     for key in ("t", "q", "v", "z", "modes"):
         np.testing.assert_array_equal(getattr(one, key), getattr(other, key), err_msg=key, strict=True)
     assert one.events == other.events
@@ -62,7 +62,7 @@ def test_random_mechanisms(seed, options):
 
 @pytest.mark.parametrize("seed", seeds(range(24)))
 def test_evaluations(seed):
-    """Of one state, after any other, and with everything that a solution tells beside the acceleration."""
+    """An evaluation does not depend on earlier states, nor on the other fields of a solution."""
     m, other = mechanism(seed), mechanism(seed)
     rng = np.random.default_rng(seed)
     tau = rng.standard_normal(m.scene.model.nv)
@@ -77,7 +77,7 @@ def test_evaluations(seed):
 
 @pytest.mark.parametrize("name", ["panda_friction", "four_bar", "belt_oscillator"])
 def test_short_runs_keep_nothing_of_each_other(name):
-    """Each has its own numbers, whatever ran or failed in the same place before, on threads too."""
+    """Runs are independent of earlier or failed runs in the same workspace, on threads as well."""
     scene, fresh = pn.load(name), pn.load(name)
     short = {"method": "semi_implicit_euler", "dt": 1e-3, "progress": False}
     q, v = scene.initial_state()
@@ -100,7 +100,7 @@ def test_short_runs_keep_nothing_of_each_other(name):
 
 
 def test_a_run_that_failed_leaves_a_clean_place():
-    """The next run with the same options is that of a new scene."""
+    """The next run with the same options equals the run of a new scene."""
     calls = {"fails": True}
 
     def push(t, q, v):

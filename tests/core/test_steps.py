@@ -1,4 +1,4 @@
-"""Steps for loops of one's own and runs as arrays: the same motion as `simulate` gives, bit for bit."""
+"""Single steps for user loops and runs as arrays: bitwise the same motion as `simulate`."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_step_is_that_of_simulate(scene: pn.Scene, method: str) -> None:
     runs = driven(scene, tau)
     for _ in range(5):
         run = pn.simulate(runs, 2e-3, q=q, v=v, method=method, dt=2e-3)
-        on_q, on_v = run.q[0], run.v[0]  # the state is put on the constraints first
+        on_q, on_v = run.q[0], run.v[0]  # the state is projected first
         q_next, v_next = scene.step(on_q, on_v, tau, 2e-3, method=method)
         assert (q_next == run.q[-1]).all()
         assert (v_next == run.v[-1]).all()
@@ -79,7 +79,7 @@ def test_stepper_goes_on_as_one_run(scene: pn.Scene, method: str) -> None:
         run = pn.simulate(scene, 0.2, method=method, output_dt=0.01)
     run = run.samples(run.grid)
     assert stepper.t == pytest.approx(0.2, abs=1e-14)
-    same = 1e-11 if fixed else 1e-6  # periods end steps: another course of them, to the tolerance
+    same = 1e-11 if fixed else 1e-6  # periods end steps, so step sizes differ
     assert np.abs(np.array([q for q, _ in states]) - run.q[1:]).max() < same * max(1.0, np.abs(run.q).max())
     assert np.abs(np.array([v for _, v in states]) - run.v[1:]).max() < same * max(1.0, np.abs(run.v).max())
 
@@ -127,7 +127,7 @@ def test_arrays_are_the_samples_of_simulate(scene: pn.Scene, method: str, thread
 
 
 def test_arrays_keep_failures_apart() -> None:
-    """A run that would need more steps than it may take fails alone."""
+    """Only the run that exceeds its maximum number of steps fails."""
     scene = pn.load("four_bar")
     q, _ = scene.initial_state()
     speeds = np.array([0.0, 4000.0, 0.0])[:, None] * np.ones(scene.model.nv)
@@ -143,7 +143,7 @@ def test_arrays_keep_failures_apart() -> None:
 
 
 def test_a_loop_of_many_steps_goes_on() -> None:
-    """Each step is a run of its own for what ends runs that get nowhere."""
+    """Each step is a separate run for the checks that end runs without progress."""
     scene = pn.load("loaded_joint")
     q, v = scene.initial_state()
     first = scene.step(q, v, None, 1e-6)

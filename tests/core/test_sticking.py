@@ -1,4 +1,4 @@
-"""What sticks has no velocity at all while the load stays below the limit, and lets go at the limit."""
+"""Sticking elements have exactly zero velocity below the limit, and slip at the limit."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ from ..support.mechanisms import (
 
 
 def arm(laws, angles=(0.5,), actuation=None, forces=()):
-    """A chain of rods of 1 kg and 1 m that hang from the first pin; joints "pin0", "pin1", ..."""
+    """Return a hanging chain of rods of 1 kg and 1 m with joints "pin0", "pin1", ..."""
     model = rods(np.ones(len(angles)), along=(0.0, 0.0, -1.0), joint=hinge(0.0, -1.0, 0.0), name="pin")
     return pn.Scene(model, laws=laws, q0=angles, actuation=actuation, forces=forces)
 
 
 def rotor(law, actuation, mass=2.0, inertia=0.3):
-    """A balanced wheel on a horizontal pin, which carries its weight; nothing turns it but a torque."""
+    """Return a balanced wheel on a horizontal pin, which carries the weight, under a torque."""
     model = empty()
     body(model, 0, hinge(0.0, 1.0, 0.0), "pin", mass, inertia=inertia * np.eye(3))
     return pn.Scene(model, laws=[law], actuation=actuation)
 
 
-# Closed loops are put back on their constraints, which may round a position once.
+# Projection of closed loops may round a position once.
 ROUNDING = 1e-13
 
 
 class AtRest:
-    """Scenes whose load stays below the limit of friction."""
+    """Scenes with a load below the friction limit."""
 
     @staticmethod
     def arm_dry():
-        return arm([pn.JointFriction("pin0", coulomb=3.0)])  # carries m g l/2 sin(0.5) = 2.4
+        return arm([pn.JointFriction("pin0", coulomb=3.0)])  # load m g l/2 sin(0.5) = 2.4
 
     @staticmethod
     def arm_loaded():
@@ -57,7 +57,7 @@ class AtRest:
 
     @staticmethod
     def trembling_arm():
-        """A torque that swings up to 0.9 of the limit."""
+        """Return an arm under an oscillating torque up to 0.9 of the limit."""
         return arm([pn.JointFriction("pin0", coulomb=1.0)], (0.0,), lambda t, q, v: [0.9 * np.sin(3.0 * t)])
 
     @staticmethod
@@ -87,7 +87,7 @@ class AtRest:
 
     @staticmethod
     def cut_pin(frames=("arm", "ground")):
-        """A free body on a hinge anchor that rubs."""
+        """Return a free body on a hinge anchor with friction."""
         model = empty()
         body(model, 0, pin.JointModelFreeFlyer(), "arm", 1.0, lever=(0.1, 0.2, -0.5), inertia=0.1 * np.eye(3))
         frame(model, "ground", 0)
@@ -106,7 +106,7 @@ class AtRest:
 
     @staticmethod
     def four_bar_held_twice():
-        """Two stuck pins and one degree of freedom: how they share the load is open, but nothing moves."""
+        """Return two sticking pins with one degree of freedom: the loads are not unique, but nothing moves."""
         return AtRest.four_bar("crank_joint", "rocker_joint")
 
     @staticmethod
@@ -150,7 +150,7 @@ class TestRest:
             scene = rotor(pn.JointFriction("pin", **law), [part * limit])
             assert scene.solve([0.0], [0.0]).modes.tolist() == [expected]
             run = pn.simulate(scene, 100.0)
-            # a = 1e-9 limit/I; what is at rest counts as rest exactly.
+            # a = 1e-9 limit/I: rest is exact.
             assert_close(run.v[-1, 0], expected * 1e-9 * limit / 0.3 * 100.0, 1e-12)
 
 
@@ -177,7 +177,7 @@ METHODS = [
 
 
 class TestBreakAway:
-    """A torque that grows as rate t moves the wheel when it reaches the static limit."""
+    """A torque rate t moves the wheel when it reaches the static limit."""
 
     @pytest.mark.parametrize("options", METHODS)
     @pytest.mark.parametrize("rate", [0.1, 1.0, 37.0])
@@ -192,7 +192,7 @@ class TestBreakAway:
     @pytest.mark.parametrize("options", METHODS)
     @pytest.mark.parametrize("limits", [(1.0, 1.0), (1.0, 3.0), (0.1, 1.0, 2.0)])
     def test_brakes_on_geared_wheels(self, limits, options):
-        """One freedom and several brakes: together they hold the sum of their limits."""
+        """Several brakes on one degree of freedom hold the sum of their limits."""
         model, n = empty(), len(limits)
         for k in range(n):
             body(model, 0, pin.JointModelRY(), f"wheel{k}", 1.0, inertia=np.eye(3))
@@ -206,13 +206,13 @@ class TestBreakAway:
         assert len(run.events) == n
         assert_close([event.time for event in run.events], total, 1e-9 * total)
         assert np.abs(run.v[run.t < 0.999 * total]).max() == 0.0
-        # n alpha = t - total: exact for all but the first-order method, which is off by half a step
+        # n alpha = t - total: exact except for the first-order method, with an error of half a step
         order_one = options.get("method") == "semi_implicit_euler"
         assert_close(run.v[-1, 0], (0.5 * total) ** 2 / (2.0 * n), 0.01 * total if order_one else 1e-9)
 
     @pytest.mark.parametrize("options", [{}, TIGHT, {"output_dt": 0.1}, {"method": "dopri5"}])
     def test_load_that_swings_past_the_limit(self, options):
-        """A wheel under 1.1 sin t and a limit of 1 moves at sin t = 1/1.1, in every half period."""
+        """A wheel under 1.1 sin t with the limit 1 begins to move at sin t = 1/1.1 in every half period."""
         law = pn.JointFriction("pin", coulomb=1.0)
         run = pn.simulate(rotor(law, lambda t, q, v: [1.1 * np.sin(t)], inertia=1.0), 19.0, **options)
         first = np.arcsin(1.0 / 1.1)
@@ -222,17 +222,17 @@ class TestBreakAway:
     @pytest.mark.parametrize("excess", [1e-3, 1e-5, 1e-7])
     @pytest.mark.parametrize("options", [{}, TIGHT, {"method": "rk4", "dt": 0.01}])
     def test_load_that_hardly_passes_the_limit(self, options, excess):
-        """For sqrt(2 excess) / 3 s on either side of its peak, far less than a step."""
+        """The load exceeds the limit for sqrt(2 excess) / 3 s on each side of its peak, far less than a step."""
         law = pn.JointFriction("pin", coulomb=1.0, static_ratio=1.5)
         scene = rotor(law, lambda t, q, v: [1.5 * (1.0 + excess) * np.sin(3.0 * t)], inertia=1.0)
         run = pn.simulate(scene, 1.0, **options)
         assert run.events[0].kind == "slip"
-        # The time at which the load is known to 1e-12 is known worse as it passes ever slower.
+        # For a load error of 1e-12 the time error grows as the load rate decreases.
         assert_close(run.events[0].time, np.arcsin(1.0 / (1.0 + excess)) / 3.0, 1e-9)
 
     @pytest.mark.parametrize("width", [0.01, 0.1, 1.0])
     def test_pulse_after_a_long_rest(self, width):
-        """A torque 3 exp(-((t - 50) / width)^2) against a limit of 1, after 50 s in which nothing happens."""
+        """A torque 3 exp(-((t - 50) / width)^2) exceeds the limit 1 after 50 s at rest."""
         law = pn.JointFriction("pin", coulomb=1.0)
         scene = rotor(law, lambda t, q, v: [3.0 * np.exp(-(((t - 50.0) / width) ** 2))], inertia=1.0)
         run = pn.simulate(scene, 60.0)
@@ -240,7 +240,7 @@ class TestBreakAway:
         assert_close(run.events[0].time, 50.0 - width * np.sqrt(np.log(3.0)), 1e-9)
 
     def test_floor_that_shakes(self):
-        """The same through the motion of the ground: |x''| = 1.1 |sin t| against mu g = 1."""
+        """The ground moves with |x''| = 1.1 |sin t| against mu g = 1."""
         model = empty()
         ground = body(model, 0, pin.JointModelPX(), "ground", 1.0)
         body(model, ground, pin.JointModelPX(), "rider", 1.0)
@@ -255,7 +255,7 @@ class TestOrder:
     """Observed orders of dop853 (order 8) over runs with events, from error against number of steps."""
 
     def test_across_turns(self):
-        """A pendulum with constant friction in the pivot: its third turn, against the closed form."""
+        """The third reversal of a pendulum with constant friction in the pivot has a closed form."""
         turn, turn_time = -0.8336202985738322, 3.220318773990451
         model = empty()
         body(model, 0, hinge(0.0, -1.0, 0.0), "pivot", 1.0, lever=(0.0, 0.0, -1.0))
@@ -272,7 +272,7 @@ class TestOrder:
         assert errors[-1] < 1e-9
 
     def test_across_sticking(self):
-        """A mass on a belt behind a hardening spring, cycles of stick and slip, against a tight run."""
+        """Stick-slip cycles of a mass on a belt with a hardening spring, against a tight run."""
         model = empty()
         belt = body(model, 0, pin.JointModelPX(), "belt", 1.0)
         body(model, belt, pin.JointModelPX(), "mass", 1.0)
@@ -295,10 +295,10 @@ class TestOrder:
 
 
 class TestModesAndLoads:
-    """A load may change with the mode: what is decided must hold for the loads that follow from it."""
+    """Loads may depend on modes: selected modes must be consistent with their loads."""
 
     def test_a_limit_on_ideal_reactions_is_the_same_in_every_mode(self):
-        """The ideal motion knows no friction, so sticking does not change its reactions."""
+        """The ideal motion has no friction, so sticking does not change its reactions."""
         laws = [pn.JointFriction(f"pin{i}", mu=0.3, radius=0.05, reaction="ideal") for i in range(2)]
         scene = arm(laws, (0.4, 0.3))
         runner, rest = scene._compiled.program.runner(), np.zeros(2)
@@ -311,9 +311,9 @@ class TestModesAndLoads:
 
     @pytest.mark.parametrize("share", [0.5, 0.9, 0.99])
     def test_slowly_converging_limits(self, share):
-        """A block held on a slope by a push that its own friction relieves: mu k is close to 1.
+        """A push holds a block on a slope, and friction reduces its load: mu k is close to 1.
 
-        Friction T along (1, -k) with N = m g - push + k T: it holds while |T| = m a_x <= mu N.
+        With friction T along (1, -k) and N = m g - push + k T, the block sticks while |T| = m a_x <= mu N.
         """
         k, mu = 2.0, share / 2.0
         model = empty()
@@ -333,9 +333,9 @@ class TestModesAndLoads:
 
     @pytest.mark.parametrize("dt", [2e-3, 1e-3, 5e-4])
     def test_time_stepping_beside_a_loop(self, dt):
-        """One motor of a five-bar comes to rest and holds, an elbow rubs on: as the located events have it.
+        """One motor of a five-bar comes to rest and sticks while an elbow slips, as with located events.
 
-        The error of time stepping falls with its step.
+        The error of time stepping decreases with its step.
         """
         robot = pn.load("five_bar")
         laws = [pn.JointFriction("motor1", coulomb=50.0), pn.JointFriction("elbow2", mu=0.1, radius=0.01)]
@@ -357,7 +357,7 @@ class TestModesAndLoads:
     ],
 )
 def test_a_joint_that_sticks_while_others_move(law):
-    """Its velocity is exactly zero at every sample, by whichever law it sticks."""
+    """The velocity is exactly zero at every sample, for each law."""
     run = pn.simulate(arm([law], (0.0, 1.0)), 5.0, v=[1.0, -2.0], output_dt=0.01)
     stuck = run.modes[:, 0] == 0
     assert stuck.sum() > 100
@@ -367,7 +367,7 @@ def test_a_joint_that_sticks_while_others_move(law):
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 def test_slip_that_turns_in_a_dead_point_stops_nothing(rtol):
-    """A crank that goes round: its rocker rests for an instant, where friction in its pin cannot hold it."""
+    """The rocker of a rotating crank is at rest for an instant, where friction in its pin cannot hold it."""
     lengths = (0.3, 0.8, 0.6)
     model, joint = empty(), 0
     for k, length in enumerate(lengths):

@@ -1,4 +1,4 @@
-"""M, bias forces and free acceleration, by both providers, against Pinocchio's own algorithms from Python."""
+"""M, bias forces and free acceleration of both providers, against Pinocchio's algorithms."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from ..support.mechanisms import body, empty
 from ..support.random_trees import AXIS, JOINTS, add, placement, state, tree
 from ..support.refusals import refuses
 
-# Two algorithms in double precision on trees of a few dozen joints: sums in another order.
+# Rounding of sums in another order, on trees of a few dozen joints.
 ROUNDING = 1e-12
-# The acceleration carries the rounding of M times its condition, which stays below 1e4 in these models.
+# Rounding of M times its condition, which is below 1e4 in these models.
 SOLVED = 1e-9
 
 
 @pytest.fixture(params=["core", "pinocchio"])
 def terms(request):
-    """Who computes M and the bias forces."""
+    """Return the provider of M and the bias forces."""
     return request.param
 
 
@@ -76,7 +76,7 @@ ANGLES += [-3.0, 6.3, *np.linspace(-50.0, 50.0, 1001), 1e4 * np.pi, -7.5e5, 7.99
 
 @pytest.mark.parametrize("together", [1, 4, 6])
 def test_cosines_and_sines_of_all_angles(together, terms):
-    """Gravity's moment on a body at distance 1, however many joints turn together."""
+    """Gravity's moment on a body at distance 1, for any number of joints."""
     model = empty()
     for k in range(together):
         body(model, 0, pin.JointModelRY(), f"j{k}", 1.0, lever=(1.0, 0.0, 0.0), inertia=np.eye(3))
@@ -137,7 +137,7 @@ def test_example_robots(name, terms):
 
 
 def test_a_robot_far_from_the_origin_keeps_its_digits(terms):
-    """A floating base moved by 10 km: M, bias and acceleration are those of the robot at home."""
+    """M, bias and acceleration of a floating base do not change with a shift of 10 km."""
     rng = np.random.default_rng(4)
     kinds = ["free flyer", "revolute x", "spherical", "prismatic unaligned", "universal", "revolute z"]
     model = tree(kinds, rng, parents=[0, 1, 2, 1, 4, 5])
@@ -155,7 +155,7 @@ def test_a_robot_far_from_the_origin_keeps_its_digits(terms):
 
 @pytest.mark.parametrize("slides", [["prismatic x", "prismatic y", "prismatic z"], ["translation"]])
 def test_a_robot_that_slid_far_keeps_its_digits(slides, terms):
-    """A base carried by sliding joints: the reference point follows the first joint that turns."""
+    """The reference point of a base on sliding joints follows the first revolute joint."""
     rng = np.random.default_rng(9)
     kinds = [*slides, "revolute z", "spherical", "prismatic x", "universal"]
     n = len(slides)
@@ -186,7 +186,7 @@ def test_quaternions_that_are_not_quite_unit_do_not_change_the_motion(terms):
 
 
 def test_a_composite_of_more_than_six_freedoms(terms):
-    """Seven directions of one body: M has no inverse but for the armature."""
+    """With seven directions of one body M is singular without armature."""
     rng = np.random.default_rng(10)
     joint = pin.JointModelComposite(pin.JointModelFreeFlyer())
     joint.addJoint(pin.JointModelRX(), placement(rng))

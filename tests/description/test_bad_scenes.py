@@ -1,4 +1,4 @@
-"""What a scene cannot be made of: each gives a named error, in these words."""
+"""Invalid scenes raise named errors with exact messages."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def test_a_scene_needs_a_model():
 
 
 def spoil(**parts):
-    """Two links of which something is wrong."""
+    """Build a scene of two links with invalid parts."""
     model = tree(["revolute x", "revolute y"], np.random.default_rng(1))
     if "inertia" in parts:
         model.inertias[2] = pin.Inertia(*parts["inertia"])

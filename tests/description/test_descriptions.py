@@ -1,4 +1,4 @@
-"""Descriptions are checked at the door: what is accepted is normalized, what is refused says why."""
+"""Validation of descriptions: valid values are normalized, invalid values raise an error with the reason."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Friction that cannot be is refused at the door: what must hold, what came and what to do."""
+"""Errors of invalid friction: requirement, given value and remedy."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def with_law(robot, law, constraints=()):
 
 
 def single(kind, law):
-    """A body on one joint, "joint"."""
+    """Return a body on one joint, "joint"."""
     model = pin.Model()
     model.addJoint(0, kind, pin.SE3.Identity(), "joint")
     model.appendBodyToJoint(1, pin.Inertia(1.0, np.zeros(3), np.eye(3)), pin.SE3.Identity())
@@ -49,7 +49,7 @@ def single(kind, law):
 
 
 class TestNumbers:
-    """Of the descriptions themselves, before any scene."""
+    """Errors of descriptions without a scene."""
 
     @pytest.mark.parametrize("key", ["coulomb", "mu", "radius", "axial_radius", "preload", "viscous"])
     def test_joint_friction(self, key):
@@ -126,7 +126,7 @@ class TestNumbers:
 
 
 class TestPlaces:
-    """Of what a law acts on."""
+    """Errors of the element that a law acts on."""
 
     LAWS = {  # noqa: RUF012
         "JointFriction": lambda name: pn.JointFriction(name, mu=0.1, radius=0.02),
@@ -224,7 +224,7 @@ class TestPlaces:
 
 
 class TestFiles:
-    """Of robot.yaml and URDF."""
+    """Errors of robot.yaml and URDF."""
 
     @pytest.mark.parametrize(
         ("entry", "words", "error"),
@@ -276,7 +276,7 @@ class TestFiles:
 
 
 class TestFunctions:
-    """Of what a user's own friction returns; its function is named."""
+    """Errors of return values of user friction, with the name of its function."""
 
     @pytest.mark.parametrize(
         ("direction", "limit", "words"),

@@ -1,4 +1,4 @@
-"""Functions of the user are called near starts of runs only, and wrong derivatives end the first of them."""
+"""User functions are checked near the start of runs only, and wrong derivatives end the first run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pin_nonideal as pn
 from ..support.mechanisms import body, empty
 from ..support.refusals import refuses
 
-NEAR = 0.6  # distance of calls from the circle of radius one, steps of the search and probes included
+NEAR = 0.6  # distance of calls from the unit circle, including search steps and probes
 
 
 def plane():
@@ -22,7 +22,7 @@ def plane():
 
 
 class Circle:
-    """x^2 + y^2 = 1 as a distance, which has no direction in the middle; keeps where it was called."""
+    """Constraint x^2 + y^2 = 1 as a distance, which is singular at the center; records its calls."""
 
     def __init__(self, bias=1.0):
         self.bias, self.called = bias, []
@@ -138,7 +138,7 @@ def test_wrong_derivatives_end_a_scene_with_a_start(what):
 
 
 def test_a_drive_may_end_before_any_instant_but_those_of_the_run():
-    """A function of time that is defined for the tenth of a second that the run takes."""
+    """A function of time is defined for the 0.1 s of the run only."""
 
     def pulse(t):
         if not -1e-3 <= t <= 0.101:

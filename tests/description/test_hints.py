@@ -1,4 +1,4 @@
-"""A hint of an error names a way that is open: none leads back to where it came from."""
+"""Hints of errors name a valid remedy, and no remedy leads back to the same error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..support.refusals import refuses
 
 
 def stiff_on_the_ground(**parts):
-    """A block on the ground with a finger whose damping is a million times its inertia."""
+    """Return a block on the ground with a finger whose damping is a million times its inertia."""
     model = empty()
     block = body(model, 0, pin.JointModelPZ(), "block", 1.0)
     body(model, block, pin.JointModelRX(), "finger", 1e-6, lever=(0.0, 1e-3, 0.0))

@@ -15,22 +15,22 @@ from ..support.mechanisms import GRAVITY, TIGHT, assert_close, body, dof, empty,
 from ..support.random_trees import state, tree
 from ..support.small_robots import ARM, folder, joint, link, robot
 
-# Forces and torques of size one that take a handful of operations.
+# Rounding of forces and torques of size one after a few operations.
 ROUNDING = 1e-14
-# Closed forms of motion at the step control of TIGHT, over some hundred steps.
+# Error of motions at the tolerances of TIGHT, over about a hundred steps.
 MOTION = 1e-10
 VELOCITIES = (0.0, 1e-3, -1e-3, 0.1, -0.1, 1.0, -1.0, 40.0, -40.0)
 
 
 def nonideal(scene, q, v):
-    """C of a scene without constraints, where it is all of the force of constraint."""
+    """Return C of a scene without constraints, equal to the nonideal force."""
     s = scene.solve(q, v)
     assert not s.F_ideal.any()
     return s.F_nonideal
 
 
 def slider(laws, **rest):
-    """A mass of 1 kg on a level slide along x, without weight."""
+    """Return a mass of 1 kg on a horizontal slide along x, without gravity."""
     model = empty(np.zeros(3))
     body(model, 0, pin.JointModelPX(), "mass", 1.0)
     return pn.Scene(model, laws=laws, **rest)
@@ -226,7 +226,7 @@ class TestViscous:
         body(model, 0, joints[kind], "pin", 1.0, lever=(0.1, 0.2, 0.3), inertia=0.1 * np.eye(3))
         v = np.array([3.0, -1.0, 0.5])[: model.nv]
         scene = pn.Scene(model, laws=[pn.JointFriction("pin", viscous=0.7)])
-        assert scene.element_names == []  # nothing that could stick
+        assert scene.element_names == []  # no friction elements
         assert_close(nonideal(scene, pin.neutral(model), v), -0.7 * v, ROUNDING)
 
     def test_decay(self):

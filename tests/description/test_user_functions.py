@@ -1,4 +1,4 @@
-"""Functions passed by the user that raise or return nonsense in mid-run: named, and no sample is lost."""
+"""User functions that raise or return invalid values during a run: the error names them, samples are kept."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LATE = 0.5
 
 
 def later(good, bad):
-    """A function that is fine at first and fails from t = 0.5 s on."""
+    """Return a function that fails from t = 0.5 s."""
 
     def call(t, *rest):
         if t <= LATE:
@@ -146,12 +146,12 @@ def test_what_fails_in_mid_run_is_named_and_the_samples_are_kept(case):
     error = caught.value
     run = error.trajectory
     np.testing.assert_allclose(run.t, 0.1 * np.arange(len(run)), atol=1e-12)
-    assert 0.1 <= run.t[-1] < LATE + 0.11  # a sampled control looks at its clock at the next sample
+    assert 0.1 <= run.t[-1] < LATE + 0.11  # a sampled control is called at the next sample
     assert error.time == pytest.approx(run.t[-1])
     assert np.isfinite(run.q).all()
     if "raise" in message:
         assert error.__cause__ is not None
-    # The scene itself is as good as before.
+    # The scene remains valid.
     assert len(pn.simulate(scene, 0.2, rtol=1e-6, output_dt=0.1)) == 3
 
 
@@ -312,7 +312,7 @@ def test_functions_of_time_that_pass(function):
 
 
 def test_arrays_that_a_function_keeps_stay_as_they_were():
-    """The core calls with the same arrays again, unless somebody has them: whole, as a view, in a list."""
+    """The core reuses argument arrays unless the function keeps them: whole, as a view, or in a list."""
     kept, views, told = [], [], []
 
     def torque(t, q, v):
@@ -322,7 +322,7 @@ def test_arrays_that_a_function_keeps_stay_as_they_were():
         return np.zeros(3)
 
     def touched(t, q, v):
-        q[:] = v[:] = np.nan  # what it does to them concerns nobody
+        q[:] = v[:] = np.nan  # changes of the arguments have no effect
         return np.zeros(3)
 
     q0 = np.array([0.1, 0.2, 0.3])

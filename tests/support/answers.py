@@ -1,4 +1,4 @@
-"""Answers of the public functions about a case, by name, and their comparison."""
+"""Results of the public functions for a case, by name, and their comparison."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from .symmetries import Image, independent
 
 # Rounding of sums of some hundred products, through factors of matrices with condition up to 1e6.
 AT_ONCE = 1e-8
-# Runs at rtol 1e-9: its local errors, some hundred of them, times the growth of nearby motions.
+# Runs at rtol 1e-9: several hundred local errors, times the growth of nearby motions.
 OF_RUNS = 1e-6
-# Roots found by Newton's method or by halving to 1e-9, where the stiffness is 1e-3 of the largest.
+# Roots by Newton's method or by bisection to 1e-9, with a stiffness of 1e-3 of the largest.
 OF_SEARCHES = 1e-6
-# Some hundred steps of a method of first order that are taken otherwise.
+# Several hundred different steps of a first-order method.
 OF_FIRST_ORDER = 3e-2
-# Values below this part of a reference value, such as gravity times a mass of 1 kg, are rounding.
+# Reference values by kind, such as gravity times 1 kg. Values below this relative size are rounding.
 FLOORS = {"q": 0.1, "v": 0.1, "a": 10.0, "force": 1.0, "t": 0.1, "energy": 1.0, "number": 1.0, "rates": 1.0}
 LEAST_LOAD = 1e-3  # N m
-WALL = 10.0  # s, of one run
+WALL = 10.0  # wall time of one run [s]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """Values by name, each with its kind (which `Image.back` reads), and the tolerance of all.
+    """Values by name, each with its kind (for `Image.back`), and a common tolerance.
 
     Attributes:
-        first_order: whether steps of a method of first order found them.
-        energy: the largest one of a run, of which works are parts.
+        first_order: whether a first-order method computed the values.
+        energy: largest energy of a run, the reference of works.
     """
 
     values: dict[str, tuple[str, Any]]
@@ -53,7 +53,7 @@ STATIC: set[str] = set()
 
 
 def function(name: str, *, run: bool = False, static: bool = False) -> Any:
-    """Registers a function that answers about a case."""
+    """Register a function that computes results for a case."""
 
     def register(f: Callable[[Case], Answer]) -> Callable[[Case], Answer]:
         FUNCTIONS[name] = f
@@ -65,7 +65,7 @@ def function(name: str, *, run: bool = False, static: bool = False) -> Any:
 
 
 def ask(name: str, case: Case) -> Answer:
-    """The answer of a function, or the kind of its error."""
+    """Return the result of a function, or the kind of its error."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -115,7 +115,7 @@ def _(case: Case) -> Answer:
 
 @function("named velocities")
 def _(case: Case) -> Answer:
-    """The first joint's velocity alone is named; it is held and the others follow."""
+    """Project with the named velocity of the first joint only; it is kept and the others follow."""
     scene, values = case.scene, {}
     model, (q, v) = scene.model, case.states[0]
     own = [name for name in sorted(own_joints(model)) if model.joints[model.getJointId(name)].nv == 1]
@@ -144,19 +144,19 @@ def _(case: Case) -> Answer:
 def _(case: Case) -> Answer:
     found = pn.equilibrium(case.scene, case.states[0][0], t=case.t0, starts=1)
     values: dict[str, tuple[str, Any]] = {"stable": ("stable", found.stable)}
-    if found.stable is not None:  # else it lies in a continuum of others
+    if found.stable is not None:  # else the equilibrium is one of a continuum
         values |= {"rates": ("rates", np.real(found.rates)), "q": ("place of rest", found.q)}
     return Answer(values, OF_SEARCHES)
 
 
 def own_joints(model: pin.Model) -> list[str]:
-    """Joints of the case, without joints that an image adds."""
+    """Return the joints of the case, without joints that an image adds."""
     return [str(name) for name in model.names[1:] if name not in ("mount", "split", "added wheel")]
 
 
 @function("inverse_dynamics")
 def _(case: Case) -> Answer:
-    """Torques for the accelerations of the states, and torques that hold the start."""
+    """Compute torques for the accelerations of the states, and torques that hold the start."""
     scene, values = case.scene, {}
     for k, (q, v) in enumerate(case.states):
         a = scene.acceleration(q, v, t=case.t0)
@@ -170,7 +170,7 @@ def _(case: Case) -> Answer:
 
 @function("holding torques", static=True)
 def _(case: Case) -> Answer:
-    """Torque of each joint that alone can hold the start against all given forces without friction."""
+    """Compute the torque of each joint that alone can hold the start against all applied forces."""
     scene, values = case.scene, {}
     model, q = scene.model, case.states[0][0]
     still = np.zeros(model.nv)
@@ -189,13 +189,13 @@ def _(case: Case) -> Answer:
 
 # --- Runs -----------------------------------------------------------------------------------------------
 
-# Events of motion; impacts until the remaining bounces are summed up.
+# Events that are compared, and the smallest impact: smaller rebounds are summed up.
 EVENTS, LEAST_STRIKE = ("stick", "slip", "reverse", "impact", "touch_down", "lift_off"), 1e-3
 RECORD = ("a", "forces", "energy")
 
 
 def simulated(case: Case, method: str, **more: Any) -> list[pn.Trajectory]:
-    """The parts of a run."""
+    """Return the trajectories of the parts of a run."""
     if case.method is not None and method in ("dop853",):
         method = case.method
     own: dict[str, Any] = {
@@ -220,11 +220,11 @@ def simulated(case: Case, method: str, **more: Any) -> list[pn.Trajectory]:
 
 
 def of_run(case: Case, method: str, **more: Any) -> Answer:
-    """Samples on the grid, the end, events and works."""
+    """Return samples on the grid, the end, events and works of a run."""
     runs = simulated(case, method, **more)
     values: dict[str, tuple[str, Any]] = {}
     on = [np.flatnonzero(run.grid)[:: case.finer] for run in runs]
-    for run, chosen in zip(runs[:-1], on[:-1], strict=True):  # the end of a part begins the next
+    for run, chosen in zip(runs[:-1], on[:-1], strict=True):  # the end of a part is the start of the next
         assert run.t[chosen[-1]] == run.t[-1]
     on = [*(chosen[:-1] for chosen in on[:-1]), on[-1]]
     pairs = list(zip(runs, on, strict=True))
@@ -236,7 +236,7 @@ def of_run(case: Case, method: str, **more: Any) -> Answer:
         (e.time, e.kind, e.element, e.impulse)
         for r in runs
         for e in r.events
-        # Slip in several directions turns, fast or slowly.
+        # The reversal of slip with several components is no sharp event.
         if e.kind in EVENTS and (e.kind != "reverse" or sizes.get(e.element) == 1)
     ]
     strongest = max((np.abs(e[3]).max() for e in events if e[3] is not None), default=0.0)
@@ -263,7 +263,7 @@ for _method in ("dop853", "dopri5", "rk4", "semi_implicit_euler", "moreau", "Rad
 
 @function("stepper", run=True)
 def _(case: Case) -> Answer:
-    """Periods of a controller's loop with fixed steps."""
+    """Compute periods of a control loop with fixed steps."""
     period = case.duration / 10.0
     dt = period / np.ceil(period / case.dt - 1e-6)
     stepper = case.scene.stepper(period, t0=case.t0, method="rk4", dt=dt)
@@ -275,7 +275,7 @@ def _(case: Case) -> Answer:
 
 @function("poses of a replay", run=True)
 def _(case: Case) -> Answer:
-    """Placements of all joints in ten frames."""
+    """Compute placements of all joints in ten frames."""
     run = simulated(case, "dop853")[-1]
     motion = sample(run, fps=10.0 / case.duration)
     poses = {name: motion.poses[:, j] for j, name in enumerate(case.model.names) if j}
@@ -286,18 +286,18 @@ def _(case: Case) -> Answer:
 
 
 def asks(name: str, case: Case) -> bool:
-    """Whether a function knows cases like this one: an implicit method refuses contacts and dry friction."""
+    """Check if a function supports a case: implicit methods reject contacts and dry friction."""
     dry = case.contacts or case.has(pn.JointFriction, pn.UserFriction, pn.actuation.SampledControl)
     return name not in case.skips and not (name == "simulate Radau" and dry)
 
 
 def differences(one: Answer, other: Answer, image: Image, *, sharp: bool = True) -> list[str]:
-    """Differences between the answer of an image, read back, and that of its case; empty if none."""
+    """Return the differences between the result of an image, mapped back, and that of its case."""
     if ("error" in one.values) or ("error" in other.values):
         first, second = (a.values.get("error", (0, "an answer"))[1] for a in (one, other))
         same = first.partition(":")[0] == second.partition(":")[0]
         if "EquilibriumError" in second and one.values.get("stable") == ("stable", None):
-            return []  # one of a continuum, to which a search comes by chance
+            return []  # equilibria form a continuum, and the search result is arbitrary
         return [] if same else [f"{first[:200]} | {second[:200]}"]
     found = []
     for name, (kind, value) in one.values.items():
@@ -311,7 +311,7 @@ def differences(one: Answer, other: Answer, image: Image, *, sharp: bool = True)
         if kind in image.without:
             continue
         if kind == "events" and one.first_order and image.of.contacts:
-            continue  # of short steps off a plane and onto it rounding tells how many there are
+            continue  # rounding decides the number of short flights
         tolerance = one.tolerance * image.tolerance
         if one.first_order and (image.as_steps_shorten or image.of.contacts):
             tolerance = OF_FIRST_ORDER
@@ -393,7 +393,7 @@ RUBBING = ("stick", "slip", "reverse")
 
 
 def coupled(case: Case) -> bool:
-    """Whether several elements of friction slip as one, so that none of them sticks alone."""
+    """Check if several friction elements slip together, so that none sticks alone."""
     scene = case.scene
     if len(scene.element_names) < 2 or case.contacts:
         return False
@@ -405,13 +405,13 @@ def coupled(case: Case) -> bool:
 
 
 def said_of_all(image: Image, events: list[Any]) -> list[Any]:
-    """Events of the image, events of added elements included."""
+    """Return the events of the image, including events of added elements."""
     maps = image.carrier.maps
     return [(maps.time_back(t), kind, element, impulse) for t, kind, element, impulse in events]
 
 
 def together(events: list[Any]) -> list[Any]:
-    """Events of friction under one name, those at one time as one; which of them reverses rounding tells."""
+    """Merge friction events of one time under one name, since rounding decides which element reverses."""
     found: list[Any] = []
     for t, kind, element, impulse in events:
         if kind == "reverse":
@@ -424,7 +424,7 @@ def together(events: list[Any]) -> list[Any]:
 
 
 def _other_events(one: list[Any], other: list[Any], tolerance: float, duration: float) -> list[str]:
-    """Events by kind and element; times as of the motion, and impulses."""
+    """Compare events by kind and element, with their times and impulses."""
 
     def key(e: Any) -> Any:
         return (e[1], e[2])

@@ -1,4 +1,4 @@
-"""A case: the arguments of a scene and of its runs as values; and how linear maps of coordinates carry it."""
+"""Cases: the arguments of a scene and its runs as values, and their linear maps of coordinates."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from .models import SI, Units, joint_letter
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A scene and how it runs; each thing that it is made of has a name.
+    """Scene and its run; all its parts have names.
 
     Attributes:
-        drawn: consistent states at which instantaneous answers are taken; drawn near the start when None.
-        moved: states that break the constraints; the start moved the way in which they push when None.
-        outputs: samples of a run beside its start.
-        parts: fractions of the duration at which a run is cut.
-        finer: samples are taken so many times as finely as `outputs` says.
-        method: that runs in place of the function's own one, with `dt`.
-        still: whether it has states of rest at all.
-        units: those in which its numbers are.
-        skips: functions that are not asked about it.
+        drawn: consistent states for instantaneous results; None for random states near the start.
+        moved: states off the constraints; None for the start moved along constraint forces.
+        outputs: number of samples of a run after its start.
+        parts: fractions of the duration at which a run is divided.
+        finer: factor of the number of samples.
+        method: method in place of the function's method, with `dt`.
+        still: whether the case has states of rest.
+        units: units of the values.
+        skips: names of functions that are skipped.
     """
 
     name: str
@@ -93,11 +93,11 @@ class Case:
 
 
 def case_of(scene: pn.Scene, name: str | None = None, **more: Any) -> Case:
-    """The case of a scene: everything named, and states drawn near its start.
+    """Return the case of a scene, with names for all parts and random states near its start.
 
     Args:
         scene: the scene.
-        name: of the case; the scene's when None.
+        name: name of the case; None for the scene's name.
         **more: fields of the case.
     """
     used: dict[str, int] = {}
@@ -124,7 +124,7 @@ def case_of(scene: pn.Scene, name: str | None = None, **more: Any) -> Case:
 
 
 def _states(case: Case) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-    """The start, and the state to which a kick leads; the start alone where none is allowed."""
+    """Return the start and a state after a random perturbation, or the start only if that fails."""
     scene, rng = case.scene, np.random.default_rng(7)
     q, v = scene.initial_state()
     found = [(q, v)]
@@ -141,7 +141,7 @@ def _states(case: Case) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
 
 
 def _off(case: Case) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-    """The start moved by up to a hundredth of a unit the way in which constraints push."""
+    """Return the start moved by up to a hundredth of a unit along constraint forces."""
     scene, (q, v) = case.scene, case.states[0]
     try:
         force = np.asarray(scene.solve(q, v, case.t0).F_ideal)
@@ -160,11 +160,11 @@ def _off(case: Case) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
 class Maps:
     """Linear maps from the coordinates of a case to the coordinates of its image.
 
-    With small moves d = P d' and d' = S d: q = Pq q', v = T P v', a = T^2 P a', and generalized forces
+    Small displacements are d = P d' and d' = S d: q = Pq q', v = T P v', a = T^2 P a', and generalized forces
     F = S^T F'/E; q' = Sq q + more_q(t'), v' = S v/T + more_v(t').
 
     Attributes:
-        units: of the image.
+        units: units of the image.
         later: time of the image at time 0 of the case.
     """
 
@@ -184,7 +184,7 @@ class Maps:
 
     @classmethod
     def chosen(cls, old: pin.Model, new: pin.Model, joints: dict[int, int], **more: Any) -> Maps:
-        """Maps to a model that has the same joints at other indices, and further joints."""
+        """Return maps to a model that has the same joints at other indices, and additional joints."""
         S, Sq = np.zeros((new.nv, old.nv)), np.zeros((new.nq, old.nq))
         for j, k in joints.items():
             if j:
@@ -200,7 +200,7 @@ class Maps:
         return (t - self.later) / self.units.T
 
     def state(self, q: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
-        """The image of a state at time t of the case."""
+        """Return the image of a state at time t of the case."""
         t = self.time(t)
         q, v = self.Sq @ q, self.S @ v / self.units.T
         return (
@@ -225,7 +225,7 @@ class Maps:
 
 
 def carried_function(f: Any, maps: Maps, unit: float) -> Any:
-    """A function of time t -> (value, rate, acceleration) in other units, later."""
+    """Return a function of time t -> (value, rate, acceleration) in other units, with a delay."""
     T, later = maps.units.T, maps.later
     if isinstance(f, Constant):
         return Constant(unit * f.value)
@@ -249,7 +249,7 @@ def carried_function(f: Any, maps: Maps, unit: float) -> Any:
 
 
 class Reactions:
-    """Reactions of an image as a law of the case reads them."""
+    """Reactions of an image in the coordinates of the case, for its laws."""
 
     def __init__(self, of: Any, carrier: Carrier) -> None:
         self._of, self._carrier = of, carrier
@@ -269,13 +269,13 @@ class Reactions:
 
 @dataclass(frozen=True, eq=False)
 class Carrier:
-    """Carries descriptions of a case into its image.
+    """Mapping of the descriptions of a case to its image.
 
     Attributes:
         case: the case.
-        maps: of its coordinates.
-        rows: of each constraint and contact whose rows are not simply in other units: names in the image and
-            matrices, lam = sum of matrix @ lam'[name].
+        maps: maps of the coordinates.
+        rows: for each constraint and contact with more than a change of units, names in the image and
+            matrices with lam = sum of matrix @ lam'[name].
         turn: orientation of the image's world axes.
     """
 
@@ -285,13 +285,13 @@ class Carrier:
     turn: np.ndarray = field(default_factory=lambda: np.eye(3))
 
     def rows_back(self, name: str, lam: Callable[[str], np.ndarray]) -> np.ndarray:
-        """lam of a constraint of the case."""
+        """Return lam of a constraint of the case."""
         if name in self.rows:
             return sum(lam(called) @ np.asarray(matrix).T for called, matrix in self.rows[name])
         return lam(name) * self.row_units(name) / self.maps.units.energy
 
     def row_units(self, name: str) -> np.ndarray:
-        """Factor of each row's residual."""
+        """Return the unit factor of each row's residual."""
         about = name.removesuffix(" lower").removesuffix(" upper")
         d = next(d for d in (*self.case.constraints, *self.case.contacts) if d.name in (name, about))
         return self.maps.units.of(row_letters(self.case.model, d))
@@ -314,7 +314,7 @@ class Carrier:
         return data
 
     def function(self, d: Any, key: str) -> Any:
-        """A function of a description as the image calls it."""
+        """Return a function of a description in the coordinates of the image."""
         f, T = getattr(d, key), self.maps.units.T
         if f is None:
             return None
@@ -361,7 +361,7 @@ class Carrier:
         return tuple(turned(d.value))
 
     def description(self, d: Any) -> Any:
-        """The description in the image."""
+        """Return the description in the image."""
         from .dimensions import factor
 
         changes = {}
@@ -413,7 +413,7 @@ class Carrier:
         return given if given is None else maps.force(given)
 
     def _gain(self, gain: Any) -> np.ndarray:
-        """One entry for each degree of freedom: a number acts on joints that have one."""
+        """Return gains for all degrees of freedom; a scalar applies to one-dof joints."""
         if np.ndim(gain):
             return np.asarray(gain, dtype=float)
         model = self.case.model
@@ -421,7 +421,7 @@ class Carrier:
         return float(gain) * single
 
     def image(self, model: pin.Model, **changes: Any) -> Case:
-        """The case in the image."""
+        """Return the image of the case."""
         case, maps = self.case, self.maps
         lists = {
             key: tuple(map(self.description, getattr(case, key)))
@@ -466,7 +466,7 @@ def _times(factor: Any, value: Any) -> Any:
 
 
 def row_letters(model: pin.Model, d: Any) -> str:
-    """Rows of a constraint or contact that hold lengths; rows of users are pure numbers."""
+    """Return the dimension of each row of a constraint or contact; rows of users are dimensionless."""
     if isinstance(d, (pn.UserConstraint, pn.UserContact)):
         return "1" * getattr(d, "size", 1)
     if isinstance(d, pn.JointCoupling):

@@ -1,4 +1,4 @@
-"""Dimensions of the numbers that descriptions hold; a field that is new here stops the change of units."""
+"""Dimensions of the fields of descriptions; a field without an entry raises an error in a change of units."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .models import Units, joint_letter
 
 Factor = Callable[[Units], float]
 
-# Pure numbers, names and flags.
+# Dimensionless numbers, names and flags.
 PLAIN = {
     "axis",
     "normal",
@@ -57,7 +57,7 @@ LENGTHS = {
     "segment2",
     "rest_length",
 }
-# In units of force over one of length or angle u, and of time: (forces, u, times).
+# Exponents of force, of the joint unit u (length or angle) and of time: (forces, u, times).
 OF_JOINT = {
     (pn.JointFriction, "coulomb"): (1, 0, 0),
     (pn.JointFriction, "preload"): (1, 0, 0),
@@ -87,7 +87,7 @@ SPECIAL: dict[tuple[type, str], Callable[[Any, Units], float]] = {
 
 
 def rubbing_letter(model: pin.Model, name: str, constraints: tuple[Any, ...]) -> str:
-    """Whether friction is a torque or a force: in a joint, an anchor, or a coupling at its second joint."""
+    """Return the dimension of friction, torque or force; a coupling has the one of its second joint."""
     for c in constraints:
         if c.name == name:
             return joint_letter(model, c.joint2) if isinstance(c, pn.JointCoupling) else "1"
@@ -95,10 +95,10 @@ def rubbing_letter(model: pin.Model, name: str, constraints: tuple[Any, ...]) ->
 
 
 def factor(d: Any, key: str, model: pin.Model, constraints: tuple[Any, ...]) -> Factor:
-    """Factor of a field of a description in other units.
+    """Return the unit factor of a field of a description.
 
     Raises:
-        KeyError: the field has no line above.
+        KeyError: the field has no entry.
     """
     kind = type(d)
     if (kind, key) in SPECIAL:

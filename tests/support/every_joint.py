@@ -1,4 +1,4 @@
-"""An arm with joints of every kind, and numbers that do not fit it, for tests of what is refused."""
+"""Arm with joints of every kind, and invalid inputs for it."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ Q, V = pin.neutral(MODEL), np.zeros(MODEL.nv)
 
 
 def scaled(index, size, factor):
-    """Q with a part of another length."""
+    """Return Q with a part of another length."""
     q = Q.copy()
     q[index : index + size] *= factor
     return q
 
 
 def with_entry(x, index, value):
-    """The array with one entry changed."""
+    """Return the array with one entry changed."""
     x = np.array(x, dtype=float)
     x[index] = value
     return x

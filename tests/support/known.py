@@ -9,12 +9,12 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Known:
-    """A defect.
+    """Known defect.
 
     Attributes:
-        reason: in plain words.
-        example: scene, transformation and function that show it.
-        scenes, transformations, functions: where else it shows, as regular expressions of the whole name.
+        reason: description of the defect.
+        example: scene, transformation and function that show the defect.
+        scenes, transformations, functions: regular expressions of all affected names.
     """
 
     reason: str

@@ -1,4 +1,4 @@
-"""Mechanisms that move for a reason other than a count of their freedoms, and driven ones; by seed."""
+"""Overconstrained and driven mechanisms, by seed."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def at(x: Any, rpy: Any = (0.0, 0.0, 0.0)) -> pin.SE3:
 
 
 def bennett(seed: int) -> pn.Scene:
-    """Four hinges whose links have lengths and twists a, alpha, b, beta with sin alpha / a = sin beta / b.
+    """Bennett linkage: four hinges with link lengths and twists a, alpha, b, beta, sin alpha/a = sin beta/b.
 
-    It turns for ever, tan(th1/2) tan(th2/2) constant, though six rows would hold three joints.
+    The linkage moves with constant tan(th1/2) tan(th2/2), although six rows constrain three joints.
     """
     rng = np.random.default_rng(seed)
     alpha, beta, a = rng.uniform(0.4, 1.2), rng.uniform(1.5, 2.5), rng.uniform(0.2, 0.5)
@@ -61,7 +61,7 @@ def bennett(seed: int) -> pn.Scene:
 
 
 def side_rods(seed: int) -> pn.Scene:
-    """Wheels coupled by rods of one length: a parallelogram with rods to spare, through its folded poses."""
+    """Wheels coupled by parallel rods of one length, with redundant rods, through their dead centers."""
     rng = np.random.default_rng(seed)
     wheels, radius = int(rng.integers(3, 5)), rng.uniform(0.1, 0.3)
     model, anchors = empty((0.0, 0.0, 0.0)), []
@@ -84,7 +84,7 @@ def side_rods(seed: int) -> pn.Scene:
 
 
 def cardan(seed: int, driven: bool = True) -> pn.Scene:
-    """Two Cardan joints in a row whose outer shafts are parallel, or mirror each other, and turn."""
+    """Two Cardan joints in series with parallel or mirrored outer shafts."""
     rng = np.random.default_rng(seed)
     bend = rng.uniform(0.1, 0.6)
     m = np.array([np.cos(bend), np.sin(bend), 0.0])
@@ -97,7 +97,7 @@ def cardan(seed: int, driven: bool = True) -> pn.Scene:
     model = empty((0.0, 0.0, -9.81) if rng.random() < 0.5 else (0.0, 0.0, 0.0))
 
     def solid() -> dict[str, Any]:
-        """Inertia of a cross or a shaft: light bodies hang between heavy ones."""
+        """Return the inertia of a cross or a shaft, with light bodies between heavy bodies."""
         lever = (10.0 ** rng.uniform(-2.0, 0.0), 0.0, 0.0)
         return {
             "mass": 10.0 ** rng.uniform(-3.0, 1.0),
@@ -107,7 +107,7 @@ def cardan(seed: int, driven: bool = True) -> pn.Scene:
 
     joint = body(model, 0, hinge(1, 0, 0), "input", **solid())
     first, second = np.array([0.2, 0.0, 0.0]), np.array([0.2, 0.0, 0.0]) + 0.5 * m  # the crosses
-    at_bearing = rng.random() < 0.5  # where the loop is closed
+    at_bearing = rng.random() < 0.5  # location of the loop closure
     places = [at(first), pin.SE3.Identity(), at(0.5 * m), pin.SE3.Identity()][: 4 if at_bearing else 2]
     for k, place in enumerate(places):
         joint = body(model, joint, hinge(*pins[k]), f"pin{k}", place=place, **solid())
@@ -129,7 +129,7 @@ def cardan(seed: int, driven: bool = True) -> pn.Scene:
 
 
 def drive(seed: int, caster: bool = False) -> pn.Scene:
-    """A robot on two driven wheels that roll, and on a caster."""
+    """Robot on two driven rolling wheels, and optionally a caster."""
     rng = np.random.default_rng(seed)
     radius, half = rng.uniform(0.05, 0.15), rng.uniform(0.1, 0.3)
     model, held = empty(), []
@@ -174,7 +174,7 @@ def drive(seed: int, caster: bool = False) -> pn.Scene:
 
 
 def linkage(seed: int = 0) -> pn.Scene:
-    """A crank-rocker linkage in a vertical plane, closed in space: one row of its anchor cannot act."""
+    """Crank-rocker in a vertical plane with a spatial anchor, one row of which is zero."""
     rng = np.random.default_rng(seed)
     lengths = [0.1, 0.3, 0.25] if seed == 0 else rng.uniform(0.2, 0.4, 3)
     model, joint = empty(), 0
@@ -197,7 +197,7 @@ def linkage(seed: int = 0) -> pn.Scene:
 
 
 def ball_loop(seed: int) -> pn.Scene:
-    """Crank, coupler on two balls and rocker in space; the ball that closes the loop rubs under its load."""
+    """Spatial crank, coupler and rocker; the closing ball joint has load-dependent friction."""
     rng = np.random.default_rng(seed)
     model = empty()
     turned = at((0.0, 0.0, 0.0), rng.uniform(-0.5, 0.5, 3))
@@ -231,7 +231,7 @@ def ball_loop(seed: int) -> pn.Scene:
 
 
 def cart(seed: int) -> pn.Scene:
-    """A slow pendulum on a cart that a clamped spline moves by 0.3 m within a short time."""
+    """Slow pendulum on a cart that a clamped spline moves by 0.3 m within a short time."""
     rng = np.random.default_rng(seed)
     model = empty()
     joint = body(model, 0, pin.JointModelPX(), "cart", 1.0, inertia=0.01 * np.eye(3))
@@ -246,7 +246,7 @@ def cart(seed: int) -> pn.Scene:
 
 
 def chain(seed: int) -> pn.Scene:
-    """A chain in space closed by an anchor of any kind, without friction."""
+    """Spatial chain closed by an anchor of any kind, without friction."""
     rng = np.random.default_rng(seed)
     kinds = [
         str(k)

@@ -15,14 +15,14 @@ TIGHTER = {"rtol": 1e-13, "atol": 1e-14}
 
 
 def empty(gravity=(0.0, 0.0, -GRAVITY)):
-    """A model without joints."""
+    """Return a model without joints."""
     model = pin.Model()
     model.gravity = pin.Motion(np.array(gravity, dtype=float), np.zeros(3))
     return model
 
 
 def body(model, parent, joint, name, mass, *, place=None, lever=(0.0, 0.0, 0.0), inertia=None):
-    """Adds a joint, its frame and its body (a point mass unless its inertia is given); the joint's index."""
+    """Add a joint, its frame and its body (default: point mass), and return the joint's index."""
     index = model.addJoint(parent, joint, pin.SE3.Identity() if place is None else place, name)
     about_center = np.zeros((3, 3)) if inertia is None else np.asarray(inertia, dtype=float)
     Y = pin.Inertia(mass, np.array(lever, dtype=float), about_center)
@@ -32,18 +32,18 @@ def body(model, parent, joint, name, mass, *, place=None, lever=(0.0, 0.0, 0.0),
 
 
 def frame(model, name, joint, place=None):
-    """Adds a frame fixed to the body of a joint, or to the world (joint 0)."""
+    """Add a frame fixed to the body of a joint, or to the world (joint 0)."""
     placement = pin.SE3.Identity() if place is None else place
     model.addFrame(pin.Frame(name, joint, 0, placement, pin.FrameType.OP_FRAME), False)
 
 
 def hinge(x, y, z):
-    """A revolute joint about an axis."""
+    """Return a revolute joint about an axis."""
     return pin.JointModelRevoluteUnaligned(np.array([x, y, z], dtype=float))
 
 
 def point_mass(axes="XYZ", mass=1.0, gravity=(0.0, 0.0, -GRAVITY)):
-    """A point mass "mass" on slides along world axes, named by their small letters, and a frame "origin"."""
+    """Return a point mass "mass" on slides along world axes, named in lower case, and a frame "origin"."""
     model = empty(gravity)
     joint = 0
     for axis in axes:
@@ -55,7 +55,7 @@ def point_mass(axes="XYZ", mass=1.0, gravity=(0.0, 0.0, -GRAVITY)):
 
 
 def planar(mass, inertia, corners, gravity=(0.0, 0.0, -GRAVITY)):
-    """A body that slides in the x-z plane and turns about y, with frames "c0", "c1", ... at its corners."""
+    """Return a planar body in the x-z plane, with frames "c0", "c1", ... at its corners."""
     model = empty(gravity)
     joint = body(model, 0, pin.JointModelPX(), "x", 0.0)
     joint = body(model, joint, pin.JointModelPZ(), "z", 0.0)
@@ -66,29 +66,29 @@ def planar(mass, inertia, corners, gravity=(0.0, 0.0, -GRAVITY)):
 
 
 def at(run, *kinds):
-    """Times of events of these kinds."""
+    """Return the times of events of these kinds."""
     return np.array([event.time for event in run.events if event.kind in kinds])
 
 
 def decades(rng, low, high):
-    """A random number whose logarithm is uniform."""
+    """Return a random number with a uniform logarithm."""
     return 10.0 ** rng.uniform(np.log10(low), np.log10(high))
 
 
 def dof(scene, joint):
-    """Place of a one-dof joint's velocity in v (and of its angle in q, when all joints have one)."""
+    """Return the index of a one-dof joint in v (and in q, if all joints have one dof)."""
     return int(scene.model.idx_vs[scene.model.getJointId(joint)])
 
 
 def sample(run, t):
-    """Index of the sample at a time; it must be there."""
+    """Return the index of the sample at a time, which must exist."""
     index = int(np.argmin(np.abs(run.t - t)))
     assert abs(run.t[index] - t) < 1e-12 * max(1.0, t)
     return index
 
 
 def at_events(run):
-    """Indices of the samples that were taken at the events, in order."""
+    """Return the indices of the samples at the events, in order."""
     return [int(np.flatnonzero(run.t == event.time)[0]) for event in run.events]
 
 
@@ -97,7 +97,7 @@ def assert_close(value, reference, tolerance):
 
 
 def again(scene, **changes):
-    """The scene made again, with some of its arguments changed."""
+    """Return a new scene with some of its arguments changed."""
     names = ("constraints", "laws", "contacts", "forces", "actuation", "q0", "v0", "name", "terms")
     made = pn.Scene(scene.model, **{**{name: getattr(scene, name) for name in names}, **changes})
     if not {"q0", "v0"} & set(changes):

@@ -1,4 +1,4 @@
-"""Pinocchio models built again in other units, on another mount, in another order, or with a body split."""
+"""Pinocchio models rebuilt in other units, on another mount, in another order, or with a split body."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-# Coordinates of a velocity and of a configuration that are lengths, by kind of joint; the rest are numbers.
+# Dimensions of velocity and configuration by kind of joint: L for lengths, 1 for pure numbers.
 LENGTHS = {
     "JointModelPX": ("L", "L"),
     "JointModelPY": ("L", "L"),
@@ -23,7 +23,7 @@ LENGTHS = {
 
 @dataclass(frozen=True)
 class Units:
-    """Numbers of the new units in one old unit: of length, of mass and of time."""
+    """Old units of length, mass and time, expressed in new units."""
 
     L: float = 1.0
     M: float = 1.0
@@ -38,7 +38,7 @@ class Units:
         return self.energy / self.L
 
     def of(self, letters: str) -> np.ndarray:
-        """Factors of coordinates: the one of length for each L, one for each 1."""
+        """Return factors of coordinates: the length factor for each L, one for each 1."""
         return np.array([self.L if letter == "L" else 1.0 for letter in letters])
 
 
@@ -46,7 +46,7 @@ SI = Units()
 
 
 def letters(joint: Any) -> tuple[str, str]:
-    """Coordinates of a joint that are lengths: of its velocity, and of its configuration."""
+    """Return the dimensions of a joint's velocity and configuration."""
     kind = joint.shortname()
     if kind == "JointModelComposite":
         parts = [letters(part) for part in joint.extract().joints]
@@ -55,13 +55,13 @@ def letters(joint: Any) -> tuple[str, str]:
 
 
 def model_letters(model: pin.Model) -> tuple[str, str]:
-    """The same of all coordinates of a model."""
+    """Return the dimensions of a model's velocity and configuration."""
     parts = [letters(joint) for joint in list(model.joints)[1:]]
     return "".join(v for v, _ in parts), "".join(q for _, q in parts)
 
 
 def joint_letter(model: pin.Model, name: str) -> str:
-    """Whether a joint turns or slides, by the first coordinate of its velocity."""
+    """Return the dimension of the first velocity of a joint."""
     return letters(model.joints[model.getJointId(name)])[0][0]
 
 
@@ -70,7 +70,7 @@ def scaled_place(place: pin.SE3, units: Units) -> pin.SE3:
 
 
 def scaled_joint(joint: Any, units: Units) -> Any:
-    """A joint like this one, with the lengths that it holds in other units."""
+    """Return a copy of a joint with its lengths in other units."""
     kind = joint.shortname()
     inner = joint.extract() if hasattr(joint, "extract") else joint
     if kind == "JointModelComposite":
@@ -95,12 +95,12 @@ def scaled_inertia(Y: pin.Inertia, units: Units, part: float = 1.0) -> pin.Inert
 
 @dataclass
 class Rebuilt:
-    """A model made of another one.
+    """Model derived from another model.
 
     Attributes:
-        model: the new one.
+        model: new model.
         joints: new index of each old joint.
-        parts: new index of the joint whose body carries the frames and children of each old joint.
+        parts: new index of the joint whose body has the frames and children of each old joint.
     """
 
     model: pin.Model
@@ -118,16 +118,16 @@ def rebuilt(
     split: int | None = None,
     by: Any = None,
 ) -> Rebuilt:
-    """The model again, joint by joint.
+    """Rebuild a model joint by joint.
 
     Args:
-        old: the model.
-        units: of the new one.
-        mount: placement of all that is fixed to the world, gravity included.
-        moving: joint "mount" that carries all that was fixed to the world.
-        order: of the joints, branch by branch.
-        split: joint whose body becomes two of 0.6 and 0.4 of its inertia; the second carries all frames.
-        by: joint "split" between the two.
+        old: model.
+        units: units of the new model.
+        mount: placement of all parts that are fixed to the world, and rotation of gravity.
+        moving: joint "mount" between the world and these parts.
+        order: order of the joints, branch by branch.
+        split: joint whose body is split into 0.6 and 0.4 of its inertia; the second body has all frames.
+        by: joint "split" between the two bodies.
     """
     new, away = pin.Model(), pin.SE3.Identity() if mount is None else mount
     new.name = old.name
@@ -156,13 +156,13 @@ def rebuilt(
 
 
 def _copy_numbers(old: pin.Model, made: Rebuilt, units: Units) -> None:
-    """Armature and limits of each joint."""
+    """Copy armature and limits of each joint."""
     new = made.model
     inertia, least, most = np.zeros(new.nv), np.full(new.nv, -np.inf), np.full(new.nv, np.inf)
     lower, upper = np.full(new.nq, -np.inf), np.full(new.nq, np.inf)
 
     def finite(x: Any) -> np.ndarray:
-        """Pinocchio writes the largest number for no limit."""
+        """Return limits with infinity in place of Pinocchio's largest number for no limit."""
         x = np.asarray(x)
         return np.where(np.abs(x) > 1e300, np.sign(x) * np.inf, x)
 
@@ -183,7 +183,7 @@ def _copy_numbers(old: pin.Model, made: Rebuilt, units: Units) -> None:
 
 
 def other_order(model: pin.Model) -> list[int]:
-    """The joints branch by branch, the branches of each body from the last to the first."""
+    """Return the joints branch by branch, with the branches of each body in reverse order."""
     children: Callable[[int], list[int]] = lambda j: [  # noqa: E731
         k for k in range(model.njoints - 1, 0, -1) if model.parents[k] == j
     ]

@@ -1,4 +1,4 @@
-"""The scripts examples/paper_*.py as modules: they hold the formulas that the paper prints."""
+"""Import of the scripts examples/paper_*.py, which contain the formulas of the paper."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def example(name):
-    """The script examples/`name`.py, imported once."""
+    """Import the script examples/`name`.py once."""
     key = f"examples_{name}"
     if key not in sys.modules:
         path = Path(__file__).parents[2] / "examples" / f"{name}.py"

@@ -1,4 +1,4 @@
-"""Sentences of comments, docstrings and pages, and the counts that the style of CONTRIBUTING.md bounds.
+"""Sentences of comments, docstrings and pages, and their counts, which CONTRIBUTING.md bounds.
 
 `python tests/support/prose.py FOLDER_OR_FILE...` prints the counts of each and the sentences to rewrite.
 """
@@ -23,7 +23,7 @@ SUFFIXES = {".py", ".hpp", ".cpp", ".js", ".css", ".md"}
 
 @dataclass(frozen=True)
 class Sentence:
-    """One sentence with the line at which its paragraph begins."""
+    """Sentence with the first line of its paragraph."""
 
     path: Path
     line: int
@@ -31,7 +31,7 @@ class Sentence:
 
     @property
     def words(self) -> list[str]:
-        """Words of the sentence in lower case, without spans of code."""
+        """Return the words of the sentence in lower case, without spans of code."""
         return [word.lower() for word in WORD.findall(CODE_SPAN.sub(" ", self.text))]
 
     @property
@@ -47,7 +47,7 @@ class Sentence:
 
 @dataclass(frozen=True)
 class Counts:
-    """Numbers of sentences: all, with a "what", with an opener that stands for a noun."""
+    """Numbers of sentences: total, with a "what", with an opener that stands for a noun."""
 
     sentences: int
     whats: int
@@ -55,17 +55,17 @@ class Counts:
 
     @property
     def whats_per_100(self) -> float:
-        """Sentences with a "what" per 100."""
+        """Return the number of sentences with a "what" per 100."""
         return 100 * self.whats / max(self.sentences, 1)
 
     @property
     def openers_percent(self) -> float:
-        """Percentage of sentences with an opener that stands for a noun."""
+        """Return the percentage of sentences with an opener that stands for a noun."""
         return 100 * self.openers / max(self.sentences, 1)
 
 
 def sentences_of(path: Path) -> list[Sentence]:
-    """Sentences of the comments and docstrings of a source, or of the text of a page."""
+    """Return the sentences of the comments and docstrings of a source, or of the text of a page."""
     text = path.read_text()
     if path.suffix == ".py":
         blocks = [*_docstrings(text), *_python_comments(text)]
@@ -82,12 +82,12 @@ def sentences_of(path: Path) -> list[Sentence]:
 
 
 def count(sentences: list[Sentence]) -> Counts:
-    """Counts of a list of sentences."""
+    """Return the counts of a list of sentences."""
     return Counts(len(sentences), sum(s.has_what for s in sentences), sum(s.has_opener for s in sentences))
 
 
 def sources_below(root: Path) -> list[Path]:
-    """Files with comments or text below a folder, or the file itself."""
+    """Return the files with comments or text below a folder, or the file itself."""
     if root.is_file():
         return [root]
     return sorted(
@@ -135,7 +135,7 @@ def _c_comments(text: str) -> Iterator[tuple[int, str]]:
 
 
 def _joined(lines: dict[int, str], alone: set[int]) -> Iterator[tuple[int, str]]:
-    """Comments of consecutive lines joined, where each line after the first holds nothing else."""
+    """Yield joined comments of consecutive lines; each line after the first has no code."""
     block: list[str] = []
     start = previous = -1
     for number, line in sorted(lines.items()):
@@ -150,7 +150,7 @@ def _joined(lines: dict[int, str], alone: set[int]) -> Iterator[tuple[int, str]]
 
 
 def _blocks(lines: list[str]) -> Iterator[tuple[int, str]]:
-    """Paragraphs of a docstring, each argument one of its own."""
+    """Yield paragraphs of a docstring; each argument is a separate paragraph."""
     block: list[str] = []
     start = 0
     for number, line in enumerate(lines):
@@ -167,7 +167,7 @@ def _blocks(lines: list[str]) -> Iterator[tuple[int, str]]:
 
 
 def _paragraphs(text: str) -> Iterator[tuple[int, str]]:
-    """Paragraphs, items and cells of a Markdown page, without code, formulas and comments."""
+    """Yield paragraphs, items and cells of a Markdown page, without code, formulas and comments."""
     fenced = False
     block: list[str] = []
     start = 0
@@ -193,7 +193,7 @@ def _paragraphs(text: str) -> Iterator[tuple[int, str]]:
 
 
 def main(arguments: list[str]) -> None:
-    """Print the counts of each folder or file and the sentences that the style does not allow."""
+    """Print the counts of each folder or file, and the sentences that violate the style."""
     for argument in arguments:
         found = [s for path in sources_below(Path(argument)) for s in sentences_of(path)]
         counts = count(found)

@@ -1,7 +1,8 @@
-"""Random joints whose friction depends on their load, one to three at once, in motion.
+"""One to three random joints in motion with load-dependent friction.
 
-Drawers (|m| over a span), journals (radial, bending and axial load), plain hinges and ball joints in a tree,
-or hinge anchors between floating bodies.  Coefficients go from those of a dry bearing to those of a paradox.
+The joints are drawers (|m| over a span), journals (radial, bending and axial load), plain hinges and ball
+joints in a tree, or hinge anchors between floating bodies.  Coefficients range from dry bearings to the
+Painleve paradox.
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ from .mechanisms import GRAVITY, body, frame
 
 
 def random_scene(rng, kind=None):
-    """A scene and a state (q, v) in which every frictional element slips.
+    """Return a scene and a state (q, v) in which every friction element slips.
 
     Args:
         rng: numpy.random.Generator.
-        kind: "tree" or "anchors"; by lot when None.
+        kind: "tree" or "anchors"; None for a random choice.
     """
     kind = kind or rng.choice(["tree", "tree", "tree", "anchors"])
     count = int(rng.choice([1, 1, 2, 2, 3]))
@@ -62,7 +63,7 @@ def _inertial(rng):
 
 
 def _rubbing(rng, joint, kind):
-    """JointFriction of a kind of bearing."""
+    """Return JointFriction of a kind of bearing."""
     law = {"mu": float(10.0 ** rng.uniform(-1.5, 0.4))}
     if kind != "drawer":
         law["radius"] = float(10.0 ** rng.uniform(-1.5, 0.0))
@@ -94,9 +95,7 @@ def _tree(rng, model, count):
     laws, forces, index = [], [], 0
     for k, kind in enumerate(joints):
         parent = index
-        while (
-            parent and rng.random() < 0.25
-        ):  # branch by branch, as Pinocchio's crba needs the joints numbered
+        while parent and rng.random() < 0.25:  # branch by branch: Pinocchio's crba requires this order
             parent = model.parents[parent]
         name = f"{kind}{k}"
         index = body(model, parent, made[kind](), name, place=_place(rng), **_inertial(rng))
@@ -109,14 +108,14 @@ def _tree(rng, model, count):
 
 
 def _anchored(rng, model, count):
-    """A chain of floating bodies, each hung on a hinge anchor of the one before."""
+    """Return a chain of floating bodies, each attached to the previous body by a hinge anchor."""
     laws, anchors, forces, place = [], [], [], _place(rng)
     frame(model, "hinge of world", 0, place)
     last = "hinge of world"
     q0 = []
     for k in range(count):
         index = body(model, 0, pin.JointModelFreeFlyer(), f"body{k}", **_inertial(rng))
-        here = _place(rng)  # of the hinge in the body
+        here = _place(rng)  # placement of the hinge in the body
         frame(model, f"pin{k}", index, here)
         at = (
             place

@@ -1,4 +1,4 @@
-"""Random trees of drawers and journals whose friction follows their load, beyond what bearings are for."""
+"""Random trees of drawers and journals with load-dependent friction, beyond realistic coefficients."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pin_nonideal as pn
 
 
 def loaded_tree(seed, joints):
-    """A tree of joints in a row or apart, a law for each, a configuration and joint torques.
+    """Return a tree of serial or parallel joints, a law for each, a configuration and joint torques.
 
     Returns:
         model, laws, q (nq,), tau (nv,).

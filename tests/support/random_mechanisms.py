@@ -1,4 +1,4 @@
-"""Random mechanisms with friction, by seed: trees, planar linkages, hung bodies, chains closed in space."""
+"""Random mechanisms with friction, by seed: trees, planar linkages, hanging bodies, closed spatial chains."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ SHAPES = ("tree", "linkage", "hung body", "closed chain")
 
 @dataclass
 class Mechanism:
-    """A scene at a start that it can be simulated from.
+    """Scene with a consistent initial state.
 
     Attributes:
-        seed: what it was made of.
+        seed: seed of the mechanism.
         shape: one of SHAPES.
         scene: the scene.
         q: configuration, (nq,).
         v: velocity on the constraints, (nv,).
-        slips: name of each frictional element to a function (data) -> its slip velocity, shape (dim,).
+        slips: maps the name of each friction element to a function (data, v) -> slip velocity, (dim,).
     """
 
     seed: int
@@ -44,7 +44,7 @@ class Mechanism:
 
 
 def mechanism(seed):
-    """The mechanism of a seed."""
+    """Return the mechanism of a seed."""
     rng = np.random.default_rng(seed)
     shape = SHAPES[seed % len(SHAPES)]
     model, q, constraints = {
@@ -79,7 +79,7 @@ def _tree(rng):
 
 
 def _linkage(rng):
-    """Chains of three to five bars in a plane, closed by hinges, all pins parallel."""
+    """Return planar chains of three to five bars, closed by hinges with parallel pins."""
     model = pin.Model()
     axis = pin.JointModelRevoluteUnaligned(np.array([0.0, -1.0, 0.0]))
     constraints, q = [], []
@@ -107,7 +107,7 @@ def _linkage(rng):
 
 
 def _hung_body(rng):
-    """Free bodies that hang on the ground and on each other by hinges and balls."""
+    """Return free bodies that hang on the ground and on each other by hinges and ball joints."""
     model = pin.Model()
     for k in range(rng.integers(1, 3)):
         joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), f"body{k}")
@@ -127,7 +127,7 @@ def _hung_body(rng):
 
 
 def _closed_chain(rng):
-    """A chain in space of five to eight joints whose tip is held at a point, on a plane or at a distance."""
+    """Return a spatial chain of five to eight joints with its tip at a point, on a plane or at a distance."""
     kinds = list(rng.choice(ONE_AXIS, rng.integers(5, 9)))
     model = tree(kinds, rng, parents=range(len(kinds)))
     q = pin.integrate(model, pin.neutral(model), rng.normal(0.0, 0.7, model.nv))
@@ -145,9 +145,12 @@ def _closed_chain(rng):
 
 
 def _laws(model, constraints, rng):
-    """Laws on most joints and hinges; slip velocities by element.  Bristles may give back what they store."""
+    """Return laws on most joints and hinges, and slip velocities by element.
+
+    Bristles can return stored energy.
+    """
     laws, slips = [], {}
-    users = int(rng.random() < 0.25)  # a Python function in the loop is slow
+    users = int(rng.random() < 0.25)  # Python functions are slow
     for k in range(1, model.njoints):
         name, joint = model.names[k], model.joints[k]
         kind = rng.choice(["none", "dry", "dry", "dry", "dry", "smooth", "bristles", "user"])
@@ -166,7 +169,7 @@ def _laws(model, constraints, rng):
             else:
                 numbers = _numbers(rng)
                 if any(isinstance(c, pn.HingeAnchor) for c in constraints):
-                    numbers["span"] = None  # the torque in a hinge would load the joints beside it
+                    numbers["span"] = None  # the hinge torque would load adjacent joints
                 laws.append(pn.JointFriction(name, **numbers, name=law))
             dofs = slice(joint.idx_v, joint.idx_v + joint.nv)
             slips[law] = lambda data, v, dofs=dofs: v[dofs]
@@ -184,7 +187,7 @@ def _laws(model, constraints, rng):
 
 
 def _numbers(rng):
-    """Of a bearing with mu radius far below the lengths of the bodies, so that a paradox is an exception."""
+    """Return parameters of a bearing with mu radius far below the body lengths, so that a paradox is rare."""
     return {
         "coulomb": rng.exponential(0.2) * (rng.random() < 0.5),
         "mu": rng.uniform(0.02, 0.25),
@@ -200,7 +203,7 @@ def _numbers(rng):
 
 
 def _user_friction(model, name, dof, rng):
-    """A user's own limit, in proportion to the whole reaction force of the joint."""
+    """Return user friction with a limit proportional to the reaction force of the joint."""
     direction = np.zeros(model.nv)
     direction[dof] = 1.0
     constant, share = rng.exponential(0.2), rng.uniform(0.0, 0.01)
@@ -239,7 +242,7 @@ def _forces(model, rng):
 
 
 def _drive(nv, rng):
-    """No torque, a constant one, or one that swings."""
+    """Return no torque, a constant torque or a harmonic torque."""
     kind = rng.choice(["none", "constant", "swing"])
     size, speed = rng.normal(0.0, 1.5, nv) * (rng.random(nv) < 0.5), rng.uniform(1.0, 8.0)
     if kind == "none":

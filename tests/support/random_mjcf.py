@@ -1,4 +1,4 @@
-"""MJCF files drawn by lot: trees with every joint, springs, tendons, actuators, equalities and fluid."""
+"""Random MJCF files: trees with all joints, springs, tendons, actuators, equalities and fluid."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 
 class Writer:
-    """Draws one file from a random source."""
+    """Writer of one random file."""
 
     def __init__(self, rnd):
         self.rnd = rnd
@@ -204,5 +204,5 @@ class Writer:
 
 
 def mjcf_files():
-    """Strategy of the texts of random MJCF files."""
+    """Return a strategy for texts of random MJCF files."""
     return st.integers(0, 2**32).map(lambda seed: Writer(random.Random(seed)).file())

@@ -13,19 +13,19 @@ from .random_trees import attach, place_of, tree
 
 SINGLE = ("revolute x", "revolute unaligned", "prismatic y", "helical z", "endless z")
 SEVERAL = ("universal", "planar", "translation", "spherical", "free flyer")
-WIDE = 0.07  # radius of what turns [m]
+WIDE = 0.07  # radius for rotations [m]
 
 
 @dataclass
 class Places:
-    """A scene at a start that it can be simulated from; as `Mechanism`, with the elements' loads.
+    """Scene with a consistent initial state, as `Mechanism`, with loads of the elements.
 
     Attributes:
         scene: the scene.
         q: configuration, (nq,).
         v: velocity on the constraints, (nv,).
-        slips: name of each element to a function (data, v) -> its slip velocity.
-        places: for `Conditions`.
+        slips: maps the name of each element to a function (data, v) -> slip velocity.
+        places: argument of `Conditions`.
     """
 
     scene: pn.Scene = None
@@ -36,7 +36,7 @@ class Places:
 
 
 def places(seed):
-    """The mechanism of a seed."""
+    """Return the mechanism of a seed."""
     rng = np.random.default_rng(seed)
     closed = bool(rng.random() < 0.4)
     kinds = [*rng.choice(SINGLE, rng.integers(2, 4)), *rng.choice(SEVERAL[:-1], rng.integers(1, 3))]
@@ -81,12 +81,10 @@ def _dry(rng):
 
 
 def _in_joint(made, model, j, rng, closed):
-    """A law in a joint; the loads of joints with one velocity are the oracle's own."""
+    """Add a law to a joint; the oracle has the loads of one-dof joints."""
     kind, first, nv = model.joints[j].shortname(), model.joints[j].idx_v, model.joints[j].nv
     law = f"law {model.names[j]}"
-    span = (
-        None if closed else rng.choice([None, rng.uniform(0.3, 1.0)])
-    )  # torque in a ball loads joints beside it
+    span = None if closed else rng.choice([None, rng.uniform(0.3, 1.0)])  # ball torque loads adjacent joints
     bearing = {"mu": rng.uniform(0.02, 0.2), "radius": rng.uniform(0.005, 0.04), "span": span}
     lever = 0.0 if span is None else 1.0 / span
 
@@ -129,14 +127,14 @@ def _in_joint(made, model, j, rng, closed):
 
 
 def _axes(model, j, q):
-    """Axes of a universal joint in its frame."""
+    """Return the axes of a universal joint in its frame."""
     data = model.joints[j].createData()
     model.joints[j].calc(data, q)
     return np.asarray(data.S)[3:].T
 
 
 def _in_coupling(made, model, c, rng):
-    """A thread: parts a = tan p tan l and b = tan p / tan l of the force between its flanks."""
+    """Add thread friction: fractions a = tan p tan l and b = tan p / tan l of the flank force."""
     d1, d2 = (model.joints[model.getJointId(joint)].idx_v for joint in (c.joint1, c.joint2))
     lead, flank, mu = rng.uniform(0.5, 1.1), rng.uniform(0.0, 0.5), rng.uniform(0.01, 0.06)
     rough = mu / np.cos(flank)
@@ -151,7 +149,7 @@ def _in_coupling(made, model, c, rng):
 
 
 def _in_ball(made, model, c, rng):
-    """A ball that closes a loop: mu radius |lam|."""
+    """Add friction mu radius |lam| to a ball anchor that closes a loop."""
     frames = [model.getFrameId(f) for f in (c.frame1, c.frame2)]
     mu, radius = rng.uniform(0.02, 0.2), rng.uniform(0.005, 0.04)
 

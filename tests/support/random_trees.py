@@ -1,4 +1,4 @@
-"""Random trees with every kind of joint, and small means to check scenes at random states."""
+"""Random trees with every kind of joint, and helpers for scenes at random states."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def _composite():
 
 
 def _endless_unaligned():
-    """Python's constructor takes no axis; the URDF reader's does."""
+    """Return an unbounded unaligned joint from the URDF reader: the Python constructor has no axis."""
     links = "".join(
         f'<link name="{n}"><inertial><mass value="1"/>'
         '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
@@ -28,7 +28,7 @@ def _endless_unaligned():
     return pin.buildModelFromXML(f'<robot name="r">{links}{joint}</robot>').joints[1]
 
 
-# Every kind of joint that Pinocchio has (mimic joints become couplings when loading).
+# All kinds of joints of Pinocchio (loading converts mimic joints to couplings).
 JOINTS = {
     "revolute x": pin.JointModelRX,
     "revolute y": pin.JointModelRY,
@@ -58,7 +58,7 @@ JOINTS = {
 
 
 def any_joint(rng, deepest=2):
-    """A joint of any kind, or a composite of one to four of them, nested as deep as `deepest`."""
+    """Return a joint of any kind, or a composite of one to four joints, nested up to `deepest` levels."""
     if deepest == 0 or rng.uniform() < 0.6:
         return JOINTS[str(rng.choice(list(JOINTS)))]()
     joint = pin.JointModelComposite(any_joint(rng, deepest - 1), placement(rng))
@@ -68,7 +68,7 @@ def any_joint(rng, deepest=2):
 
 
 def placement(rng, size=0.3):
-    """A random place and orientation."""
+    """Return a random placement."""
     return pin.SE3(_rotation(rng), size * rng.standard_normal(3))
 
 
@@ -78,14 +78,14 @@ def _rotation(rng):
 
 
 def inertia(rng, mass=1.0):
-    """Inertia of a random solid: positive, with its center anywhere."""
+    """Return a random positive-definite inertia with a random center of mass."""
     points = 0.1 * rng.standard_normal((6, 3))
     second = sum(np.dot(p, p) * np.eye(3) - np.outer(p, p) for p in points)
     return pin.Inertia(mass, 0.1 * rng.standard_normal(3), mass * second)
 
 
 def add(model, name, kind, parent, rng, mass=1.0):
-    """One joint, by its kind or ready-made, with a body and a frame "<name> tip" at a random place of it."""
+    """Add a joint, by kind or as an object, with a body and a frame "<name> tip" at a random placement."""
     joint = JOINTS[kind]() if isinstance(kind, str) else kind
     joint = model.addJoint(parent, joint, placement(rng), name)
     model.appendBodyToJoint(joint, inertia(rng, mass), pin.SE3.Identity())
@@ -94,10 +94,10 @@ def add(model, name, kind, parent, rng, mass=1.0):
 
 
 def tree(kinds, rng, *, parents=None, armature=False, gravity=True):
-    """A tree of the given kinds of joints, j0, j1, ...
+    """Return a tree of the given kinds of joints, j0, j1, ...
 
-    Each hangs on the one before it, on an ancestor of that one, or on the world, so that joints are numbered
-    branch by branch as Pinocchio's algorithms need.
+    The parent of a joint is the previous joint, an ancestor of that joint, or the world.  Joints are then
+    numbered branch by branch, as Pinocchio's algorithms require.
     """
     model = pin.Model()
     model.name = "tree"
@@ -116,13 +116,13 @@ def tree(kinds, rng, *, parents=None, armature=False, gravity=True):
 
 
 def state(model, rng, speed=1.0, spread=1.0):
-    """Random configuration and velocity."""
+    """Return a random configuration and velocity."""
     q = pin.integrate(model, pin.neutral(model), spread * rng.standard_normal(model.nv))
     return q, speed * rng.standard_normal(model.nv)
 
 
 def attach(model, name, joint, q, place):
-    """A frame of a joint's body that is at `place` in the world when the model is at q."""
+    """Add a frame to a joint's body that is at `place` in the world at the configuration q."""
     data = model.createData()
     pin.forwardKinematics(model, data, q)
     frame = pin.Frame(name, joint, 0, data.oMi[joint].actInv(place), pin.FrameType.OP_FRAME)
@@ -131,14 +131,14 @@ def attach(model, name, joint, q, place):
 
 
 def place_of(model, q, name):
-    """Placement of a frame in the world."""
+    """Return the placement of a frame in the world."""
     data = model.createData()
     pin.framesForwardKinematics(model, data, q)
     return data.oMf[model.getFrameId(name)]
 
 
 def three_trees(rng):
-    """A floating chain, a floating pair and a chain on the ground, with frames on every body.
+    """Return a floating chain, a floating pair and a chain on the ground, with frames on every body.
 
     Returns:
         The model and a configuration away from the neutral one.

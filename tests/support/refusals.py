@@ -1,4 +1,4 @@
-"""Errors compared with the words that a user reads."""
+"""Comparison of errors with their full messages."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ from pin_nonideal.errors import LoadingError
 
 
 def refuses(message, error=LoadingError):
-    """The block must raise the error, with the message in it letter by letter."""
+    """Assert that the block raises the error with the exact message in it."""
     return pytest.raises(error, match=re.escape(message))

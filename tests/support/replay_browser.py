@@ -28,16 +28,16 @@ FLAGS = [
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
-    "--disable-gpu-compositing",  # the software renderer of WebGL is a slow one for the page around it
+    "--disable-gpu-compositing",  # software WebGL is slow at compositing the page
 ]
 SIZE = (1000, 720)
 TIMEOUT = 60_000  # milliseconds; a software renderer on a busy machine takes seconds
-MOVED = 2000  # pixels: a robot that fills the view moves several times as many
+MOVED = 2000  # pixels: a robot that fills the view changes several times as many
 
 
 @contextlib.contextmanager
 def headless_browser() -> Iterator[Any]:
-    """The browser of this process, begun once; tests that need it are skipped where it is missing."""
+    """Yield the browser of this process, started once; skip tests if no browser is installed."""
     api = pytest.importorskip("playwright.sync_api", reason="needs playwright")
     if BROWSER is None:
         pytest.skip("needs chromium, chromium-browser or google-chrome on the path")
@@ -55,16 +55,16 @@ def _launched(api: Any) -> Any:
 
 @cache
 def _unused_pages(browser: Any) -> list[Any]:
-    """Pages without network that wait for the next test: a process for each test would take long."""
+    """Return reusable pages without network: a new process for each test would be slow."""
     return []
 
 
 class Watched:
-    """A page opened without network, with all that it complained about and asked for."""
+    """Page opened without network, with its errors and requests."""
 
     def __init__(self, browser: Any, path: Path, fragment: str = "paused") -> None:
         self._unused = _unused_pages(browser)
-        # A context, and so a window, for each page: a browser draws a tab in the background once a second.
+        # A context with its own window for each page: browsers draw background tabs once a second.
         self.page = self._unused.pop() if self._unused else browser.new_context(offline=True).new_page()
         self.page.set_default_timeout(TIMEOUT)
         self.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
@@ -89,7 +89,7 @@ class Watched:
         self.requests.append(request.url)
 
     def close(self) -> None:
-        """Leave the page to the next test."""
+        """Release the page for the next test."""
         for event, listener in self._listeners.items():
             self.page.remove_listener(event, listener)
         self.page.mouse.move(0.0, 0.0)
@@ -103,7 +103,7 @@ class Watched:
         return self.run("time => { replay.seek(time); return replay.poses(); }", time)
 
     def picture(self, time: float) -> np.ndarray:
-        """The three-dimensional view at a time, as red, green and blue, (height, width, 3)."""
+        """Return the three-dimensional view at a time as RGB, (height, width, 3)."""
         from PIL import Image
 
         self.run("time => replay.seek(time)", time)
@@ -114,12 +114,12 @@ class Watched:
 
 @contextlib.contextmanager
 def opened_replay(browser: Any, run: Any, path: Path) -> Iterator[SimpleNamespace]:
-    """A run written as a page, and the page opened."""
+    """Write a run as a page and open the page."""
     watched = Watched(browser, replay(run, path))
     yield SimpleNamespace(run=run, path=path, watched=watched, page=watched.page)
     watched.close()
 
 
 def changed(one: np.ndarray, other: np.ndarray) -> int:
-    """Pixels that differ between two pictures by more than a shade."""
+    """Return the number of pixels that differ clearly between two pictures."""
     return int(np.count_nonzero(np.abs(other - one).max(axis=2) > 20))

@@ -1,4 +1,4 @@
-"""Runs with known numbers, for the replay and the figures: no simulation stands between cause and picture."""
+"""Runs with known values for the replay and the figures, without simulation."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import PointAnchor
 from pin_nonideal.trajectory.trajectory import Stats
 
-STEP = 1e-6  # for rates by central differences: their error is near 1e-9
+STEP = 1e-6  # step of central differences for rates, with an error near 1e-9
 
 
 def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -> Any:
-    """A run that follows q(t), with what `simulate` without record gives, changed by `fields`."""
+    """Return a run that follows q(t), with the default fields of `simulate`, updated by `fields`."""
     t = np.asarray(t, dtype=float)
     configurations = np.array([q(x) for x in t])
     rates = [pin.difference(model, q(x - STEP), q(x + STEP)) / (2 * STEP) for x in t]
@@ -63,7 +63,7 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
 
 
 def _program(scene: Any, names: list[str]) -> Any:
-    """What the core knows of the constraints and contacts of a scene that nobody analysed."""
+    """Return the core's data of the constraints and contacts of a scene without analysis."""
     builder, where = core.Builder(scene.model), Resolution(scene.model, scene.q0)
     for name, c in zip(names, scene.constraints, strict=False):
         lower_constraint(c, name, builder, where)
@@ -73,7 +73,7 @@ def _program(scene: Any, names: list[str]) -> Any:
 
 
 def jointed(*joints: Any, name: str = "chain", lever: float = 0.2) -> pin.Model:
-    """A chain of joints along x, 0.4 m apart, with bodies of 1 kg."""
+    """Return a chain of joints along x, 0.4 m apart, with bodies of 1 kg."""
     model = pin.Model()
     model.name = name
     parent, place = 0, pin.SE3.Identity()
@@ -86,13 +86,13 @@ def jointed(*joints: Any, name: str = "chain", lever: float = 0.2) -> pin.Model:
 
 
 def add_frame(model: pin.Model, name: str, joint: int, place: Any, turn: Any = None) -> None:
-    """A frame fixed to a joint."""
+    """Add a frame fixed to a joint."""
     placement = pin.SE3(np.eye(3) if turn is None else turn, np.asarray(place, dtype=float))
     model.addFrame(pin.Frame(name, joint, 0, placement, pin.FrameType.OP_FRAME))
 
 
 def panda(count: int = 31, duration: float = 0.5) -> Any:
-    """The Panda arm with its meshes on a smooth path, with friction torques and a mode that changes."""
+    """Return a run of the Panda arm with meshes on a smooth path, with friction torques and a mode change."""
     import example_robot_data
 
     robot = example_robot_data.load("panda")
@@ -118,7 +118,7 @@ CRANK, COUPLER, ROCKER, GROUND = 0.3, 0.8, 0.6, 0.9
 
 
 def four_bar(count: int = 61, duration: float = 1.0) -> Any:
-    """A planar four-bar without geometry, closed in closed form, with a reaction of known components."""
+    """Return a run of a planar four-bar without geometry in closed form, with a known reaction."""
     model = pin.Model()
     model.name = "four_bar"
     for name, parent, x in (("crank", 0, 0.0), ("coupler", 1, CRANK), ("rocker", 0, GROUND)):
@@ -136,7 +136,7 @@ def four_bar(count: int = 61, duration: float = 1.0) -> Any:
         length = abs(reach)
         turn = np.arccos((COUPLER**2 + length**2 - ROCKER**2) / (2.0 * COUPLER * length))
         tip = pin_at + COUPLER * reach / length * np.exp(1j * turn)
-        # Positive angles about y turn x towards -z.
+        # Positive angles about y rotate x towards -z.
         return np.array([-angle, -np.angle((tip - pin_at) / np.exp(1j * angle)), -np.angle(tip - GROUND)])
 
     t = np.linspace(0.0, duration, count)

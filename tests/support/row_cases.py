@@ -1,4 +1,4 @@
-"""Scenes that show each kind of constraint: hand-made random trees, and the robots of the package."""
+"""Scenes with each kind of constraint: random trees, and the robots of the package."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ ROBOTS = [name for name, _ in pn.robots()]
 
 
 def kept(scene):
-    """The scene with contacts that may open kept instead, without friction: their rows act in any state.
+    """Return the scene with bilateral contacts without friction, whose rows act in any state.
 
-    Friction of feet that are kept though they pull may leave no solution.
+    Friction of bilateral contacts under tension may leave no solution.
     """
 
     def closed(c):
@@ -31,7 +31,7 @@ def kept(scene):
 
 
 def _meeting(rng, one, other):
-    """Three trees, with frame "meet" of the body of `other` where the tip of `one` is at the start."""
+    """Return three trees, with a frame "meet" of the body of `other` at the initial tip of `one`."""
     model, q = three_trees(rng)
     attach(model, "meet", model.getJointId(other), q, place_of(model, q, f"{one} tip"))
     return model, q
@@ -79,7 +79,7 @@ def _contact(radius):
 
 
 def _on_plane(make, body, plane, height):
-    """A frame of `body` at this height over a plane (z of frame "plane" of another body, or of the world)."""
+    """Return a frame of `body` at a height over a plane (z of frame "plane" of a body or of the world)."""
 
     def build(rng):
         model, q = three_trees(rng)
@@ -99,7 +99,7 @@ def _on_plane(make, body, plane, height):
 
 
 def _user(rng):
-    """A frame's origin on a sphere around a fixed center, whose radius changes in time."""
+    """Return a constraint of a frame's origin to a sphere with a fixed center and a time-dependent radius."""
     model = pin.Model()
     add(model, "root", "free flyer", 0, rng)
     add(model, "arm", "revolute unaligned", 1, rng)
@@ -167,9 +167,9 @@ TREES = {
 
 
 def parallel_cranks(radius=0.3, mass=1.0, **keywords):
-    """A bar carried by three cranks of equal length in the x-z plane, closed by point anchors on x and z.
+    """Return a bar on three equal cranks in the x-z plane, closed by point anchors on x and z.
 
-    One of the four rows is redundant while the cranks are parallel, that is on the constraints only.
+    One of the four rows is redundant while the cranks are parallel, which holds on the constraints only.
     """
     model = pin.Model()
     model.name = "parallel cranks"

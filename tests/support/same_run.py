@@ -1,4 +1,4 @@
-"""Runs compared bit by bit."""
+"""Bitwise comparison of runs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pin_nonideal as pn
 
 
 def assert_same_run(one, other):
-    """Every array bit by bit, names, events and counters; all but the scene and the time that it took."""
+    """Assert equal arrays, names, events and counters; scene and wall time may differ."""
     for field in dataclasses.fields(pn.Trajectory):
         first, second = getattr(one, field.name), getattr(other, field.name)
         if field.name == "scene":
@@ -31,7 +31,7 @@ def assert_same_run(one, other):
 
 
 def assert_same_parts(one, other, name):
-    """Arrays of dense output, or of the events of each function, bit by bit."""
+    """Assert bitwise equal arrays of dense output, or of the events of each function."""
     pairs = (
         zip(one, other, strict=True) if isinstance(one, list) else [(one, other)] if one is not None else []
     )

@@ -30,7 +30,7 @@ DURATIONS = {
     "panda_settling": 0.5,
     "rough_four_bar": 1.0,
 }
-FALLING = frozenset({"equilibrium"})  # a free body has no equilibrium, and the search for one takes long
+FALLING = frozenset({"equilibrium"})  # a free body has no equilibrium, and the search is slow
 CUBE = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-0.2, 0.2)]
 RUBS: dict[str, Any] = {"mu": 0.5, "restitution": 0.3, "name": "it"}
 
@@ -38,7 +38,7 @@ RUBS: dict[str, Any] = {"mu": 0.5, "restitution": 0.3, "name": "it"}
 def robot(name: str) -> Case:
     more: dict[str, Any] = {"N": 3} if name == "n_four_bar" else {}
     duration = DURATIONS.get(name, 0.3)
-    # They have no equilibrium, and `equilibrium` looks for one for up to minutes.
+    # These robots have no equilibrium, and `equilibrium` searches for minutes.
     skips = frozenset({"equilibrium"} if name in ("rolling_disk", "slider_crank") else ())
     return case_of(
         pn.load(name, **more), name, duration=duration, dt=min(1e-3, duration / 300.0), skips=skips
@@ -49,7 +49,7 @@ def robot(name: str) -> Case:
 
 
 def slid(joint: Any) -> tuple[pin.Model, int]:
-    """A body of 1 kg with frames "body" and "far", and a frame "base" of the world."""
+    """Return a body of 1 kg with frames "body" and "far", and a frame "base" of the world."""
     model = empty()
     k = body(
         model, 0, joint, "floating", 1.0, lever=(0.01, -0.02, 0.0), inertia=np.diag([0.01, 0.012, 0.015])
@@ -61,7 +61,7 @@ def slid(joint: Any) -> tuple[pin.Model, int]:
 
 
 def _gap(t: float, q: Any, v: Any, data: Any) -> tuple[Any, Any]:
-    """Height of a body whose coordinates are its place."""
+    """Return height and row of a body with its position as coordinates."""
     return np.array([[0.0, 0.0, 1.0]]), np.zeros(1)
 
 
@@ -99,7 +99,7 @@ TOUCHES: dict[type, Callable[[], Any]] = {
 
 
 def touching(kind: type) -> Case:
-    """A body that falls by 1 cm on something fixed, strikes and slides."""
+    """Return the case of a body that falls by 1 cm on a fixed shape, collides and slides."""
     joint = {pn.JointLimit: pin.JointModelPZ, pn.UserContact: pin.JointModelTranslation}.get(
         kind, pin.JointModelFreeFlyer
     )()
@@ -114,7 +114,7 @@ def touching(kind: type) -> Case:
 
 
 def feet_on_ramp(mu: float) -> Case:
-    """A body on four feet on a ramp, which hold it or slide: they could share its weight in other ways."""
+    """Return the case of a body on four feet on a ramp, sticking or sliding, with redundant loads."""
     model, k = slid(pin.JointModelFreeFlyer())
     model.gravity = pin.Motion(np.array([2.5, 1.0, -9.2]), np.zeros(3))
     q, feet = pin.neutral(model), []
@@ -129,7 +129,7 @@ def feet_on_ramp(mu: float) -> Case:
 
 
 def arm(**more: Any) -> pn.Scene:
-    """Two turning joints and a slide, at an angle to gravity."""
+    """Return two revolute joints and a slide, at an angle to gravity."""
     model = tree(
         ["revolute x", "revolute unaligned", "prismatic y"], np.random.default_rng(5), parents=range(3)
     )
@@ -204,7 +204,7 @@ Maker = Callable[[], Case]
 
 
 def kinds() -> dict[str, Maker]:
-    """Samples of robots and kinds of descriptions, by name."""
+    """Return sample robots and kinds of descriptions, by name."""
     made: dict[str, Maker] = {f"robot {name}": lambda name=name: robot(name) for name, _ in pn.robots()}
     for name, build in TREES.items():
         made[f"rows of {name}"] = lambda name=name, build=build: case_of(
@@ -227,7 +227,7 @@ def kinds() -> dict[str, Maker]:
 
 
 def random_cases(count: int) -> dict[str, Maker]:
-    """Mechanisms by seed, `count` of each family."""
+    """Return random mechanisms by seed, `count` of each family."""
     families: dict[str, tuple[Callable[[int], Any], dict[str, Any]]] = {
         "mechanism": (mechanism, {"duration": 0.3}),
         "places": (places, {"duration": 0.2}),

@@ -1,4 +1,4 @@
-"""Seeds of a property: ten by default, all with -m slow."""
+"""Seeds of a randomized test: ten by default, all with -m slow."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ BY_DEFAULT = 10
 
 
 def seeds(every: Iterable[int], always: Iterable[int] = (), count: int = BY_DEFAULT) -> list[Any]:
-    """Parameters of a test: the first few seeds, and those that must always run; the others are slow.
+    """Return parameters of a test: the first seeds and the `always` seeds; the others are marked slow.
 
     Args:
         every: all seeds.
-        always: more of them that a default run takes in, each for a reason told where it stands.
-        count: how many a default run takes; fewer than ten where each takes long.
+        always: additional seeds of a default run, each with a reason at the call.
+        count: number of seeds of a default run; fewer than ten for slow tests.
     """
     listed, kept = list(every), set(always)
     kept |= set([seed for seed in listed if seed not in kept][: count - len(kept)])
@@ -24,7 +24,7 @@ def seeds(every: Iterable[int], always: Iterable[int] = (), count: int = BY_DEFA
 
 
 def ranges(few: int, many: int, most: int | None = None) -> list[Any]:
-    """Parameters of a test of many seeds at once: few by default, many when slow, most under stress."""
+    """Return parameters of a test of many seeds: few by default, many if slow, most under stress."""
     every = [
         pytest.param(range(few), id=str(few)),
         pytest.param(range(many), id=str(many), marks=pytest.mark.slow),

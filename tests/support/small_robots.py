@@ -1,4 +1,4 @@
-"""Small robots written on the spot, for tests of loading."""
+"""Small robots for tests of loading."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def robot(*parts):
 
 
 def folder(path, yaml=None, urdf=None):
-    """A robot folder: robot.urdf, the arm when none is given, and robot.yaml when it is given."""
+    """Write a robot folder: robot.urdf (default: the arm), and robot.yaml if given."""
     (path / "robot.urdf").write_text(robot(*ARM) if urdf is None else urdf)
     if yaml is not None:
         (path / "robot.yaml").write_text(yaml)

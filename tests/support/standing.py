@@ -1,4 +1,4 @@
-"""Bodies that begin to slip slowly, beside the same in `oracles.slow_slip`."""
+"""Bodies with slow slip onset, and their references from `oracles.slow_slip`."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from oracles.slow_slip import Ball, Plate
 
 from .mechanisms import body, empty, frame
 
-MASS, INERTIA = 10.0, 0.3  # of a plate
+MASS, INERTIA = 10.0, 0.3  # plate [kg, kg m^2]
 LEVER = 0.02  # mu radius of a ball joint [m]
 
 
 def star(feet, height=0.3):
-    """Feet evenly on a circle below the center of mass."""
+    """Return feet at equal spacing on a circle below the center of mass."""
     angle = np.arange(feet) * 2.0 * np.pi / feet
     return np.column_stack([0.3 * np.cos(angle), 0.3 * np.sin(angle), np.full(feet, -height)])
 
 
 def plate(feet, mu, wrench, at, ratio=1.0, unilateral=True, **more):
-    """A body on feet, and its oracle."""
+    """Return a body on feet, and its oracle."""
     model = empty()
     joint = body(model, 0, pin.JointModelFreeFlyer(), "plate", MASS, inertia=INERTIA * np.eye(3))
     names = [f"foot {k}" for k in range(len(feet))]
@@ -36,7 +36,7 @@ def plate(feet, mu, wrench, at, ratio=1.0, unilateral=True, **more):
 
 
 def planar_state(run):
-    """x, y and angle of a plate and their rates in world axes, at the end of a run."""
+    """Return x, y and angle of a plate and their rates in world axes, at the end of a run."""
     turn = Rotation.from_quat(run.q[-1, 3:7])
     return np.concatenate(
         [run.q[-1, :2], [turn.as_rotvec()[2]], turn.apply(run.v[-1, :3])[:2], run.v[-1, 5:]]
@@ -44,7 +44,7 @@ def planar_state(run):
 
 
 def balls(links, ratio=1.0, pull=2.0):
-    """A hanging chain of ball joints with load-dependent friction, its end pulled about."""
+    """Return a hanging chain of ball joints with load-dependent friction and a varying force at its end."""
     model, joint = empty(), 0
     for k in range(links):
         place = pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.3 * (k > 0)]))
@@ -71,7 +71,7 @@ def balls(links, ratio=1.0, pull=2.0):
 
 
 def ball():
-    """One ball joint whose body hangs with its center of mass below, and its oracle."""
+    """Return one ball joint with a hanging body, and its oracle."""
     model = empty()
     inertia, lever = np.diag([0.02, 0.03, 0.015]), np.array([0.0, 0.0, -0.15])
     joint = body(model, 0, pin.JointModelSpherical(), "ball", 1.0, lever=lever, inertia=inertia)

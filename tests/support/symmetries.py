@@ -1,4 +1,4 @@
-"""Transformations of cases that change no answer but for how it is written down."""
+"""Symmetry transformations of cases, under which results change by a known map only."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from .random_trees import place_of
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """A case made of another one, and how its answers are read.
+    """Transformed case, and the map of its results.
 
     Attributes:
-        case: the image.
-        of: the case that it was made of.
-        carrier: of coordinates and rows.
-        place: of the image's world in that of the case.
-        tolerance: factor on the tolerances.
-        moving: whether nothing of it is at rest.
-        as_steps_shorten: whether methods of first order give the same only as their steps shorten: beside a
-            motion that accelerates, the position of a step's end misses h^2 a/2, and the projection that puts
-            it back moves all coordinates; and events that do nothing end steps.
+        case: transformed case.
+        of: original case.
+        carrier: map of coordinates and rows.
+        place: placement of the image's world in that of the case.
+        tolerance: factor of the tolerances.
+        moving: whether no part is at rest.
+        as_steps_shorten: whether first-order methods agree only in the limit of short steps. On a moving
+            mount the position at a step's end has the error h^2 a/2, and projection changes all coordinates.
+            Events without effect also end steps.
         without: kinds of values that are not compared.
     """
 
@@ -44,7 +44,7 @@ class Image:
     without: frozenset[str] = frozenset()
 
     def back(self, kind: str, value: Any) -> Any:
-        """A value of the image as one of the case."""
+        """Return a value of the image as a value of the case."""
         maps = self.carrier.maps
         units = maps.units
         if kind in ("q", "place of rest"):
@@ -85,17 +85,17 @@ class Image:
         return self.carrier.maps.time_back(t), kind, element, size
 
 
-ADDED = "added "  # begins the names of whatever an image has beside its case
+ADDED = "added "  # prefix of names of elements that only the image has
 
 
 @dataclass(frozen=True, eq=False)
 class Transformation:
-    """A transformation that makes an image of a case.
+    """Transformation of a case to an image.
 
     Attributes:
-        name: of the transformation.
-        make: the image of a case; None where the symmetry does not hold for it.
-        runs_only: whether only runs can tell.
+        name: name of the transformation.
+        make: function that returns the image of a case, or None if the symmetry does not apply.
+        runs_only: whether only runs are affected.
     """
 
     name: str
@@ -107,7 +107,7 @@ ALL: dict[str, Transformation] = {}
 
 
 def transformation(name: str, **more: Any) -> Callable[[Callable[[Case], Image | None]], Any]:
-    """Registers a function from a case to its image."""
+    """Register a function from a case to its image."""
 
     def register(make: Callable[[Case], Image | None]) -> Any:
         ALL[name] = Transformation(name, make, **more)
@@ -117,7 +117,7 @@ def transformation(name: str, **more: Any) -> Callable[[Callable[[Case], Image |
 
 
 def then(first: Image, make: Callable[[Case], Image | None]) -> Image | None:
-    """The image of an image that keeps the coordinates and names of its case."""
+    """Return the image of an image; the second transformation keeps coordinates and names."""
     second = make(first.case)
     if second is None:
         return None
@@ -126,7 +126,7 @@ def then(first: Image, make: Callable[[Case], Image | None]) -> Image | None:
 
 
 def unchanged(case: Case, **changes: Any) -> Image:
-    """The case with some of its fields changed, in the same coordinates."""
+    """Return the case with some fields changed, in the same coordinates."""
     changed = replace(case, **{"drawn": case.states, "moved": case.off, **changes})
     return Image(changed, case, Carrier(case, Maps.same(case.model)))
 
@@ -135,7 +135,7 @@ def unchanged(case: Case, **changes: Any) -> Image:
 
 
 def explicit(case: Case) -> Image:
-    """Planes and second frames that are in the world by default, on frames of their own there."""
+    """Replace the default world as plane or second frame by explicit world frames."""
     model = case.model.copy()
     q0 = case.scene.q0
     known = {f.name for f in model.frames}
@@ -193,8 +193,8 @@ def _(case: Case) -> Image | None:
 
 
 def carried_along(case: Case, rate: float, growth: float) -> Image | None:
-    """Everything on a mount that moves along a line; gravity makes up for its acceleration."""
-    if case.has(pn.Drag, pn.KnifeEdge):  # the air and the ice stay behind
+    """Place the scene on a mount that moves along a line; gravity compensates its acceleration."""
+    if case.has(pn.Drag, pn.KnifeEdge):  # drag and knife edges depend on the world frame
         return None
     rng = np.random.default_rng(len(case.name))
     along = rng.standard_normal(3)
@@ -280,14 +280,14 @@ def _(case: Case) -> Image | None:
 
 
 def loaded_names(case: Case) -> set[str]:
-    """Constraints whose reactions a law reads: copies would share the load."""
+    """Return constraints whose reactions a law reads: copies would share the load."""
     if case.has(pn.UserLaw, pn.UserFriction):
         return {c.name for c in case.constraints}
     return {law.joint for law in case.laws if isinstance(law, pn.JointFriction)}
 
 
 def shares_loads(case: Case) -> bool:
-    """Whether friction depends on how rows share a load that they could share otherwise."""
+    """Check if friction depends on the loads of redundant rows."""
     loaded = case.has(pn.UserLaw, pn.UserFriction, pn.JointFriction, pn.Rolling) or any(
         getattr(c, "mu", 0.0) for c in case.contacts
     )
@@ -295,7 +295,7 @@ def shares_loads(case: Case) -> bool:
 
 
 def independent(case: Case) -> bool:
-    """Whether all rows that act are independent at the start."""
+    """Check if all active rows are independent at the start."""
     scene = case.scene
     q, v = case.states[0]
     try:
@@ -339,10 +339,10 @@ def _size(case: Case, name: str) -> int:
 
 
 def by_hand(case: Case, scale: float) -> Image | None:
-    """Each constraint as functions of the user's, all rows times a factor."""
+    """Replace each constraint by user functions, with all rows times a factor."""
     if shares_loads(case) or case.has(pn.UserLaw, pn.UserFriction):
         return None
-    if any(getattr(law, "mu", 0.0) for law in case.laws):  # rows of a user's have no wrench on bodies
+    if any(getattr(law, "mu", 0.0) for law in case.laws):  # user rows have no wrench on bodies
         return None
     loaded = loaded_names(case)
     chosen = [c for c in case.constraints if c.name not in loaded and _writable(c)]
@@ -361,17 +361,17 @@ def by_hand(case: Case, scale: float) -> Image | None:
 
 
 def _writable(c: Any) -> bool:
-    """Whether functions can say all of a constraint: its torques of resistance they cannot.
+    """Check if user functions can represent a constraint; resistance torques cannot be represented.
 
-    For angles between frames the rate is the derivative of the residual on the constraint only, and functions
-    are checked elsewhere too.
+    For angles between frames the rate is the derivative of the residual on the constraint only, but functions
+    are also checked off the constraint.
     """
     resists = getattr(c, "torsional", 0.0) or getattr(c, "rolling", 0.0)
     return not (resists or isinstance(c, (pn.FrameAnchor, pn.HingeAnchor)))
 
 
 def _as_functions(case: Case, c: Any, scale: float) -> list[tuple[pn.UserConstraint, np.ndarray]]:
-    """A constraint as one of the user's, or two where some rows hold no position; and the rows of each."""
+    """Return a constraint as a user constraint, or as two if some rows are nonholonomic, with their rows."""
     if isinstance(c, pn.UserConstraint):
 
         def times(key: str) -> Any:
@@ -420,20 +420,20 @@ transformation("rows by hand, times 1e-4")(lambda case: by_hand(case, 1e-4))
 
 
 def split(case: Case, by: Any, hold: Any) -> Image | None:
-    """The body of the last joint but one or two in two parts that a joint and a constraint hold together."""
+    """Split a body near the end into two parts that a joint and a constraint connect."""
     j = 1 + (case.model.njoints - 1) // 2
     if (
         j >= case.model.njoints
         or min(case.model.inertias[j].mass, *np.diag(case.model.inertias[j].inertia)) <= 0.0
     ):
-        return None  # nothing that a joint of its own could move
+        return None  # no body to split
     made = rebuilt(case.model, split=j, by=by)
     carrier = Carrier(case, Maps.chosen(case.model, made.model, made.joints))
     image = carrier.image(made.model)
     for name, joint in (("split a", made.joints[j]), ("split b", made.parts[j])):
         image.model.addFrame(pin.Frame(name, joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME), False)
     held = replace(image, constraints=(*image.constraints, hold))
-    if shares_loads(case) or shares_loads(held):  # rows across a plane that act on nothing act on the split
+    if shares_loads(case) or shares_loads(held):  # zero rows of a planar mechanism act on the split body
         return None
     return Image(held, case, carrier, without=frozenset({"rank"}))
 
@@ -462,7 +462,7 @@ def _(case: Case) -> Image:
 @transformation("cut in two", runs_only=True)
 def _(case: Case) -> Image | None:
     if case.has(pn.LuGre, pn.actuation.SampledControl) or any(getattr(law, "states", 0) for law in case.laws):
-        return None  # a state of their own is left behind
+        return None  # their internal state is lost
     return unchanged(case, parts=(0.37,))
 
 
@@ -507,7 +507,7 @@ def _(case: Case) -> Image:
 
 
 def body_frames(model: pin.Model, case: Case) -> tuple[int, str]:
-    """The last joint, and a frame "added tip" of its body."""
+    """Return the last joint, and add a frame "added tip" to its body."""
     joint = model.njoints - 1
     place = pin.SE3(np.eye(3), np.array([0.1, 0.2, 0.3]))
     model.addFrame(pin.Frame("added tip", joint, 0, place, pin.FrameType.OP_FRAME), False)
@@ -517,7 +517,7 @@ def body_frames(model: pin.Model, case: Case) -> tuple[int, str]:
 
 @transformation("an idle row")
 def _(case: Case) -> Image:
-    """A rod between two points of one body, and a row of zeros."""
+    """Add a rod between two points of one body, and a zero row."""
     model, nv = case.model.copy(), case.model.nv
     body_frames(model, case)
     rod = pn.Distance("added tip", "added root", name="added rod")
@@ -556,7 +556,7 @@ def _(case: Case) -> Image:
 
 @transformation("friction without limit")
 def _(case: Case) -> Image | None:
-    """An element of dry friction whose limit is zero: it may stick for nothing."""
+    """Add a dry friction element with a limit of zero, which may stick."""
     model = case.model
     single = [j for j in range(1, model.njoints) if model.joints[j].nv == 1]
     if not single:
@@ -571,7 +571,7 @@ def _(case: Case) -> Image | None:
 
 @transformation("a body apart")
 def _(case: Case) -> Image:
-    """A balanced wheel on a spring of its own, which nothing joins to the rest."""
+    """Add a balanced wheel on a spring that is independent of the rest."""
     model = case.model.copy()
     k = model.addJoint(0, pin.JointModelRY(), pin.SE3(np.eye(3), np.array([0.0, 9.0, 0.0])), "added wheel")
     Y = pin.Inertia(1.0, np.zeros(3), 0.01 * np.eye(3))
@@ -582,5 +582,5 @@ def _(case: Case) -> Image:
     q0, v0 = maps.state(case.q0, case.v0, 0.0)
     spring = pn.JointSpring("added wheel", 1.0, name="added spring")
     made = replace(image, q0=q0, v0=v0, forces=(*image.forces, spring))
-    # A search goes in steps of all coordinates, and to another one of several states of rest.
+    # The search steps depend on all coordinates and may reach another equilibrium.
     return Image(made, case, carrier, without=frozenset({"energies", "rates", "place of rest"}))
