@@ -397,7 +397,6 @@ def test_the_public_names_are_all_drawn():
     }
     drawn_by_lot |= {
         "cone_complementarity",
-        "solve_details",
         "geometry_contacts",
         "sweep_grid",
         "sweep_samples",
@@ -422,6 +421,7 @@ def test_the_public_names_are_all_drawn():
         "Stats",
         "Trajectory",
         "Solution",
+        "SolutionDetails",
         "robots",
     }
     told = {
