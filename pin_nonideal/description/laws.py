@@ -6,10 +6,11 @@ C never feeds energy when the law is a friction: its power v^T C is zero or nega
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from pin_nonideal.errors import InputError
+from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.validation import (
     choice,
     count,
@@ -130,6 +131,45 @@ class JointFriction:
                 f"{who}: one of coulomb, mu, preload, viscous must be positive; all are zero, "
                 "so leave the law out"
             )
+
+    @classmethod
+    def for_joints(
+        cls,
+        scene: object,
+        joints: Mapping[str, float | Mapping[str, object]] | Sequence[str] | None = None,
+        **coefficients: object,
+    ) -> list[JointFriction]:
+        """Friction of many joints, one law each, named after its joint.
+
+        Args:
+            scene: a Scene or a pinocchio.Model.
+            joints: by joint name the dry friction `coulomb` or a table of coefficients, or names alone; None
+                for all joints of one degree of freedom.
+            **coefficients: of all of them, where a table does not give its own.
+
+        Returns:
+            The laws, in the order of `joints` or of the model.
+
+        Raises:
+            InputError: a coefficient is wrong, or all of a joint are zero.
+            UnknownNameError: there is no such joint.
+        """
+        model: Any = getattr(scene, "model", scene)
+        known = [str(name) for name in model.names][1:]
+        if joints is None:
+            joints = [
+                name for name, joint in zip(known, list(model.joints)[1:], strict=True) if joint.nv == 1
+            ]
+        table = joints if isinstance(joints, Mapping) else dict.fromkeys(joints, {})
+        laws = []
+        for joint, given in table.items():
+            if joint not in known:
+                raise UnknownNameError(
+                    f'JointFriction.for_joints: no joint "{joint}"{nearest(str(joint), known)}'
+                )
+            own = given if isinstance(given, Mapping) else {"coulomb": given}
+            laws.append(cls(joint, **{"name": f"{joint} friction", **coefficients, **own}))  # type: ignore[arg-type]
+        return laws
 
     @property
     def tooth_losses(self) -> tuple[float, float]:

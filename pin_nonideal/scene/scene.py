@@ -29,6 +29,7 @@ from pin_nonideal.types import Array, GeometryModel, Model, State, Table
 from pin_nonideal.validation import choice, nonnegative, number, optional_text, sequence
 
 from .copying import copied, packed, parts_of, rebuilt
+from .editing import UNCHANGED, Unchanged, held_after, on_ground, parts_after
 from .evaluation import Evaluator
 from .queries import Queries
 from .shapes import SceneShapes
@@ -458,6 +459,90 @@ class Scene:
     def collision_model(self) -> GeometryModel | None:
         """pinocchio.GeometryModel for collisions, or None; meshes are read when first asked for."""
         return self._shapes.collision
+
+    # --- new scenes -----------------------------------------------------------------------------------------
+
+    def replace(
+        self,
+        *,
+        constraints: Sequence[Any] | None = None,
+        laws: Sequence[Law] | None = None,
+        contacts: Sequence[Contact | GeometryContact] | None = None,
+        forces: Sequence[Force] | None = None,
+        add_constraints: Sequence[Any] = (),
+        add_laws: Sequence[Law] = (),
+        add_contacts: Sequence[Contact | GeometryContact] = (),
+        add_forces: Sequence[Force] = (),
+        remove: Sequence[str] = (),
+        actuation: Actuation | Unchanged | None = UNCHANGED,
+        q0: State | None = None,
+        v0: State | None = None,
+        name: str | None = None,
+    ) -> Scene:
+        """A new scene with some parts replaced, added or removed; this one stays as it is.
+
+        Everything else is kept: model, shapes, notes, source and licence, named entries of the initial state.
+        `resume` and `Trajectory.load` cannot make the new scene from the robot's file alone: give them the
+        scene.
+
+        Args:
+            constraints: all constraints of the new scene; the present ones when None.
+            laws: all laws; the present ones when None.
+            contacts: all contacts; the present ones when None.
+            forces: all forces; the present ones when None.
+            add_constraints: constraints in addition.
+            add_laws: laws in addition.
+            add_contacts: contacts in addition.
+            add_forces: forces in addition.
+            remove: names of present constraints, laws, contacts and forces to leave out.
+            actuation: of the new scene, None for none; the present one when left out.
+            q0: initial configuration, (nq,) or by joint name (the others as now); the present one when None.
+            v0: initial velocity, (nv,) or by joint name (the others as now); the present one when None.
+            name: of the new scene; the present one when None.
+
+        Returns:
+            The new Scene.
+
+        Raises:
+            InputError, UnknownNameError: something does not fit the model, or nothing has a name in `remove`.
+        """
+        new = {"constraints": constraints, "laws": laws, "contacts": contacts, "forces": forces}
+        added = {
+            "constraints": add_constraints,
+            "laws": add_laws,
+            "contacts": add_contacts,
+            "forces": add_forces,
+        }
+        parts = self._parts()
+        made = parts["made"] | parts_after(self._compiled, new, added, remove)
+        if not isinstance(actuation, Unchanged):
+            made["actuation"] = actuation
+        if q0 is not None:
+            made["q0"] = self._states.configuration(q0, "replace: q0")
+        if v0 is not None:
+            made["v0"] = self._states.velocity(v0, "replace: v0")
+        made["name"] = made["name"] if name is None else name
+        later = parts["later"] | {"table": None}
+        later["held"] = held_after(self.model, self._states.held, q0, v0)
+        return rebuilt(type(self), parts | {"made": made, "later": later})  # type: ignore[no-any-return]
+
+    def put_on_ground(self, plane: str | None = None) -> Scene:
+        """A new scene whose floating robot is moved along a normal until its lowest collision shape touches.
+
+        The initial configuration is taken with loops closed. All floating bodies move by the same distance.
+
+        Args:
+            plane: name of a frame on the world, whose z axis is the normal; None for the ground z = 0.
+
+        Returns:
+            The new Scene.
+
+        Raises:
+            InputError: there is no floating base, no collision shape, or the plane moves.
+            UnknownNameError: there is no such frame.
+        """
+        q, _ = self.initial_state()
+        return self.replace(q0=on_ground(self.model, self.collision_model, q, plane))
 
     # --- text -----------------------------------------------------------------------------------------------
 

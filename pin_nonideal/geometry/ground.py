@@ -1,0 +1,79 @@
+"""Lowest points of shapes over a plane."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.errors import InputError
+from pin_nonideal.types import Array, GeometryModel, Model, Placement
+
+
+def lowest_height(model: Model, shapes: GeometryModel, q: Array, plane: Placement) -> float:
+    """Height of the lowest point of the shapes of moving bodies over a plane [m].
+
+    Args:
+        model: pinocchio.Model.
+        shapes: pinocchio.GeometryModel; shapes on the world are left out.
+        q: configuration, (nq,).
+        plane: its point and, as the third axis, its normal.
+
+    Raises:
+        InputError: no shape is on a moving body, or one has no lowest point here.
+    """
+    data, of_shapes = model.createData(), shapes.createData()
+    pin.updateGeometryPlacements(model, data, shapes, of_shapes, q)
+    heights = [
+        depth(item, plane.inverse() * place)
+        for item, place in zip(shapes.geometryObjects, of_shapes.oMg, strict=True)
+        if item.parentJoint
+    ]
+    if not heights:
+        raise InputError(f'no collision shape of model "{model.name}" is on a moving body')
+    return min(heights)
+
+
+def depth(item: Any, place: Placement) -> float:
+    """Height of the lowest point of one shape over the plane z = 0 [m].
+
+    Args:
+        item: pinocchio.GeometryObject.
+        place: of the shape's axes.
+
+    Raises:
+        InputError: the shape is unbounded, or of a kind without a lowest point here.
+    """
+    shape, kind = item.geometry, type(item.geometry).__name__
+    height, normal = float(place.translation[2]), place.rotation[2]  # the normal in the shape's axes
+    across = float(np.hypot(normal[0], normal[1]))
+    if kind == "Sphere":
+        return height - float(shape.radius)
+    if kind == "Capsule":
+        return height - float(shape.halfLength) * abs(float(normal[2])) - float(shape.radius)
+    if kind == "Box":
+        return height - float(np.abs(normal) @ np.array(shape.halfSide))
+    if kind == "Ellipsoid":
+        return height - float(np.linalg.norm(normal * np.array(shape.radii)))
+    if kind == "Cylinder":
+        return height - float(shape.halfLength) * abs(float(normal[2])) - float(shape.radius) * across
+    if kind == "Cone":
+        half = float(shape.halfLength) * float(normal[2])
+        return height + min(half, -half - float(shape.radius) * across)
+    points = _vertices(item)
+    if points is None:
+        raise InputError(f'shape "{item.name}" is a {kind}, which has no lowest point here; remove it')
+    return height + float((points @ normal).min())
+
+
+def _vertices(item: Any) -> Array | None:
+    """Vertices of a mesh, or None of anything else."""
+    mesh, kind = item.geometry, type(item.geometry).__name__
+    if kind.startswith("Convex"):
+        points = np.array([mesh.point(i) for i in range(mesh.num_points)])
+    elif "BVH" in kind:
+        points = np.array(mesh.vertices())
+    else:
+        return None
+    return np.asarray(points * np.array(item.meshScale))
