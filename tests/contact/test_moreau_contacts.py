@@ -21,7 +21,7 @@ def box(mu, angle=0.0, restitution=0.0):
     return pn.Scene(model, contacts=corners)
 
 
-# Violation of the laws at the corners of a foot, which redundancy makes inconsistent, relative to velocities.
+# Violation of the laws at the corners of a foot, which redundancy makes inconsistent, over velocities.
 UNCHANGEABLE = 1e-7
 # Relative error of an impulse that is summed up from force samples, one per step.
 STEPPED = 0.05

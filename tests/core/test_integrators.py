@@ -79,7 +79,7 @@ def gap(model, one, two):
 
 
 def observed_order(case, method, ladder, **grid):
-    """Return the order between the finest grid with an error above the floor and a grid with a third of its steps.
+    """Return the order between the finest grid above the error floor and a grid with a third of its steps.
 
     The random direction of errors would affect the order between closer grids.
     """

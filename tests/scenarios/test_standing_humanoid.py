@@ -1,4 +1,4 @@
-"""A humanoid on two feet with dry friction in all joints: postures near singular ones, in which much sticks.
+"""A humanoid on two feet with dry friction in all joints: nearly singular postures with many sticking joints.
 
 The pitch axes of two straight legs are parallel but for the little by which the pelvis leans.  When the other
 joints stick, the feet then hold that little by a millionth of their forces.
@@ -117,7 +117,7 @@ def test_what_stands_is_moved_by_what_begins_to_push(late: str) -> None:
 def test_sinks_as_friction_lets_it(seed: int) -> None:
     """From rest, by Gauss's principle: the least |R^T a|^2 over friction within its limits.
 
-    What sticks in a leg is told by the accelerations of legs, not by those of a wrist that is much lighter.
+    Sticking in a leg depends on accelerations of legs, not on those of a much lighter wrist.
     """
     limit, kp = 20.0, 500.0
     scene = standing(limit, kp, 20.0)

@@ -29,7 +29,7 @@ INSTANT = 5e-8
 
 
 def told(scene, q, v):
-    """What `solve` says of the motion: how many there are, their accelerations, and limits of several."""
+    """Return the number of solutions of `solve`, their accelerations, and the limits of several solutions."""
     try:
         s = scene.solve(q, v)
         return {True: "one", None: "not shown"}[s.unique], [s.a], []

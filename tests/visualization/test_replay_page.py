@@ -1,4 +1,4 @@
-"""What a replay page shows: opened from file:// by a browser without network, and compared with Pinocchio."""
+"""Contents of a replay page, opened from file:// without network, and compared with Pinocchio."""
 
 from __future__ import annotations
 
