@@ -196,7 +196,7 @@ def test_a_resumed_run_is_bitwise_the_same(kept, tmp_path):
 
 @pytest.mark.parametrize("count", [20, pytest.param(1000, marks=pytest.mark.stress)])
 def test_random_bodies_dropped(count):
-    """1 to 8 points of a body fall on a plane: no NaN, no hang, penetration below the approach in one step."""
+    """1 to 8 points of a body fall on a plane: no NaN, no hang, penetration below one step's approach."""
     rng = np.random.default_rng(0)
     deepest, failed = 0.0, []
     for k in range(count):

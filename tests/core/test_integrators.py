@@ -279,7 +279,7 @@ def test_three_parallel_cranks_swing_as_one_pendulum():
     assert np.ptp(run.energy["total"]) < 1e-9 * weight
 
 
-# --- What a run must not depend on ------------------------------------------------------------------------
+# --- Independence of runs ------------------------------------------------------------------------
 
 
 def loops():

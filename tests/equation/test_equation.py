@@ -15,8 +15,8 @@ from oracles.paper_road import (
 )
 from pin_nonideal.equation import RANK_TOLERANCE, solve
 
-# Relative agreement of methods: the random problems have condition below 100, the paper's equations square it,
-# and 1e4 roundings of 1e-16 are 1e-12.
+# Relative agreement of methods: the random problems have condition below 100, the paper's equations square
+# it, and 1e4 roundings of 1e-16 are 1e-12.
 ROADS = 1e-12
 EPS = np.finfo(float).eps
 
@@ -153,8 +153,8 @@ class TestTheoremsOfThePaper:
 def ill_conditioned(kind, condition, seed, redundant=False):
     """Return a problem with the condition of M.
 
-    random: random directions are light.  graded: coordinates are light and heavy.  held: constraints act on the
-    light directions, as in a closed loop of light links.
+    random: random directions are light.  graded: coordinates are light and heavy.  held: constraints act on
+    the light directions, as in a closed loop of light links.
     """
     rng = np.random.default_rng(seed)
     n, m = 6, 3

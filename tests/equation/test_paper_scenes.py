@@ -16,7 +16,7 @@ TIGHT = {"rtol": 1e-12, "atol": 1e-13}
 CLOSED, LOOP = 1e-10, 1e-9
 # Documented residual of positions and rates, also at samples between steps.
 HELD = 1e-10
-# Printed formulas at the recorded states: forces of size ten times what the constraint may be off there.
+# Error of printed formulas at recorded states: forces of size ten times the constraint residual there.
 PRINTED = 10.0 * HELD
 
 

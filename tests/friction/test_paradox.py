@@ -1,7 +1,7 @@
 """Painleve paradox: beyond a closed-form friction threshold there is no solution or several.
 
-The implicit equation is y = g(y), with the friction limit y and the limit g(y) of the motion under y.  For one
-element g has the slopes -mu k and mu k: there is one solution if mu k < 1, and none or two beyond.
+The implicit equation is y = g(y), with the friction limit y and the limit g(y) of the motion under y.  For
+one element g has the slopes -mu k and mu k: there is one solution if mu k < 1, and none or two beyond.
 The determinant of the error is 1 - mu k.
 """
 

@@ -77,7 +77,7 @@ LYING = pin.SE3(pin.rpy.rpyToMatrix(0.5 * np.pi, 0.0, 0.0), np.zeros(3))
 
 @pytest.mark.parametrize(("mu", "cosine"), [(0.0, 2.0 / 3.0), (1e6, 10.0 / 17.0)])
 def test_a_ball_leaves_a_lying_cylinder(mu, cosine):
-    """The ball leaves at cos = 2/3 without friction, and at 10/17 if it rolls, for the energy of rest on top."""
+    """The ball leaves at cos = 2/3 without friction, and at 10/17 if it rolls, for a start on top."""
     r, start = 0.1, 0.2
     spin = 0.4 if mu else 0.0
     scene = pair(coal.Sphere(r), coal.Cylinder(0.9, 4.0), LYING, inertia=0.4 * r * r, mu=mu)

@@ -18,7 +18,7 @@ from ..support.mechanisms import body, empty, frame
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 DURATION, SAMPLES = 0.8, 200
-# Difference of one motion in other coordinates [m, and unit quaternions]: tolerance 1e-10 and growth by impacts.
+# Difference of one motion in other coordinates [m, unit quaternions]: tolerance 1e-10, growth by impacts.
 SAME = 1e-7
 
 

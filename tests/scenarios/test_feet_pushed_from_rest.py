@@ -1,8 +1,8 @@
 """Slip onset of resting bodies on several feet under constant forces.
 
 The oracle checks the law only: nonnegative loads must exist that give the acceleration, with friction against
-the slip acceleration of each slipping foot and inside the cone of each sticking foot (nonnegative least squares
-over the generators of these forces).
+the slip acceleration of each slipping foot and inside the cone of each sticking foot (nonnegative least
+squares over the generators of these forces).
 """
 
 from functools import cache
@@ -93,7 +93,7 @@ def lack(places, mu, pushed, push, solution):
 
 
 def slowness(places, solution):
-    """Return the largest acceleration over the smallest slip acceleration, the error factor of its direction."""
+    """Return the largest over the smallest slip acceleration, the error factor of its direction."""
     slips = [
         np.linalg.norm((solution.a[:3] + np.cross(solution.a[3:], place))[:2])
         for place, mode in zip(places, solution.modes, strict=True)
@@ -145,7 +145,7 @@ def test_six_feet_begin_to_slip_in_one_step():
 
 @pytest.mark.parametrize("moment", [9.0, 10.0])
 def test_tables_side_by_side_begin_as_each_alone(moment):
-    """Both spun by moments, the second beyond what its feet hold; the loads of the feet are even."""
+    """Moments act on both tables, on the second beyond its friction limit; the feet have equal loads."""
     turn = np.pi / 3.0 * np.arange(6)
     radius = np.where(np.arange(6) % 2 == 0, 0.3, 0.1)
     places = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full(6, -0.3)])

@@ -231,7 +231,7 @@ class TestLightCartPole:
         cart = body(model, 0, pin.JointModelPX(), "cart", self.CART)
         body(model, cart, hinge(0.0, -1.0, 0.0), "pole", self.POLE, lever=(0.0, 0.0, -1.0))
         run = pn.simulate(pn.Scene(model, q0=[0.0, 0.5 * np.pi]), 10.0, output_dt=0.01, **TIGHT)
-        # M + m - m cos^2 in double precision keeps ten digits, so 1e-8 is what the coordinates allow.
+        # M + m - m cos^2 keeps ten digits in double precision, so the coordinates limit the error to 1e-8.
         assert self.error(run, run.q[:, 1]) < 0.1 * self.ACCEPTED
 
     def test_dependent_coordinates(self):

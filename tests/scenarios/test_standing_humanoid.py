@@ -17,7 +17,7 @@ import pin_nonideal as pn
 from pin_nonideal.description.actuation import Table
 
 SOLES = ("left_sole_link", "right_sole_link")
-# By which a sole may leave its place: far above rounding, far below what dropped rows would let it drift [m].
+# Maximum drift of a sole [m]: far above rounding, far below the drift with dropped rows.
 KEPT = 1e-9
 
 
@@ -145,7 +145,7 @@ def test_sinks_as_friction_lets_it(seed: int) -> None:
 
 
 def test_a_jam_of_joints_is_told_as_one() -> None:
-    """Bearings as wide as the links: of 27 ways in which three joints at rest may go on none is a motion."""
+    """For bearings as wide as the links, none of the 27 modes of three joints at rest is a solution."""
     talos = pn.load("talos")
     model, names = talos.model, list(talos.model.names)[2:]
     bearings = [pn.JointFriction(name, mu=0.1, radius=0.05) for name in names]

@@ -187,7 +187,7 @@ def test_a_wrong_number_of_steps(wrong):
         pn.simulate(pulled(1.0), 1.0, max_steps=wrong)
 
 
-# --- What takes long for a fast motion ---------------------------------------------------------------------
+# --- Slow runs of fast motions ---------------------------------------------------------------------
 
 
 def beam(links: int = 30, damping: float = 0.0) -> pn.Scene:

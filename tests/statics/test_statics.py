@@ -210,7 +210,7 @@ def test_static_friction_and_joints():
 
 
 def test_rest_agrees_with_the_motion():
-    """Where the margin is positive the simulation stays, where it is negative it leaves."""
+    """The simulation stays at rest if the margin is positive, and moves if it is negative."""
     for angle, mu in ((0.3, 0.4), (0.3, 0.28), (0.5, 0.6), (0.5, 0.5)):
         scene = block(angle, mu)
         assert pn.rest(scene).rests == (np.abs(pn.simulate(scene, 0.2).v).max() == 0.0)

@@ -40,7 +40,7 @@ def result_or_named_error(call):
         return call()
     except PinNonidealError as error:
         message = str(error)
-    assert len(message.split()) > 3  # what must hold, what came, what to do
+    assert len(message.split()) > 3  # requirement, given value, remedy
     return None
 
 

@@ -1,6 +1,6 @@
 """Mechanisms drawn by lot: every one runs with its books in order, or stops with an error by name.
 
-The seed of each is its number, printed with what was measured; `check(1234)` runs one again.
+The seed of each is its number, printed with the measurements; `check(1234)` repeats a seed.
 """
 
 from __future__ import annotations

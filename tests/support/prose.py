@@ -36,7 +36,7 @@ class Sentence:
 
     @property
     def has_what(self) -> bool:
-        """Check if the sentence has the word "what"."""
+        """Check if the sentence has the word `what`."""
         return "what" in self.words
 
     @property
@@ -47,7 +47,7 @@ class Sentence:
 
 @dataclass(frozen=True)
 class Counts:
-    """Numbers of sentences: total, with a "what", with an opener that stands for a noun."""
+    """Numbers of sentences: in total, with `what`, and with an opener that stands for a noun."""
 
     sentences: int
     whats: int
@@ -55,7 +55,7 @@ class Counts:
 
     @property
     def whats_per_100(self) -> float:
-        """Return the number of sentences with a "what" per 100."""
+        """Return the number of sentences with `what` per 100."""
         return 100 * self.whats / max(self.sentences, 1)
 
     @property
@@ -83,9 +83,7 @@ def sentences_of(path: Path) -> list[Sentence]:
 
 def count(sentences: list[Sentence]) -> Counts:
     """Return the counts of a list of sentences."""
-    return Counts(
-        len(sentences), sum(s.has_what for s in sentences), sum(s.has_opener for s in sentences)
-    )
+    return Counts(len(sentences), sum(s.has_what for s in sentences), sum(s.has_opener for s in sentences))
 
 
 def sources_below(root: Path) -> list[Path]:
@@ -176,7 +174,9 @@ def _paragraphs(text: str) -> Iterator[tuple[int, str]]:
     for number, line in enumerate(text.splitlines(), 1):
         if line.lstrip().startswith(("```", "$$")):
             fenced = not fenced
-        starts = fenced or not line.strip() or line.lstrip().startswith(("- ", "* ", "#", "|", "<", "```", "$$"))
+        starts = (
+            fenced or not line.strip() or line.lstrip().startswith(("- ", "* ", "#", "|", "<", "```", "$$"))
+        )
         if starts and block:
             yield start, " ".join(block)
             block = []

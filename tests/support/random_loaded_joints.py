@@ -95,9 +95,7 @@ def _tree(rng, model, count):
     laws, forces, index = [], [], 0
     for k, kind in enumerate(joints):
         parent = index
-        while (
-            parent and rng.random() < 0.25
-        ):  # branch by branch: Pinocchio's crba requires this order
+        while parent and rng.random() < 0.25:  # branch by branch: Pinocchio's crba requires this order
             parent = model.parents[parent]
         name = f"{kind}{k}"
         index = body(model, parent, made[kind](), name, place=_place(rng), **_inertial(rng))

@@ -84,9 +84,7 @@ def _in_joint(made, model, j, rng, closed):
     """Add a law to a joint; the oracle has the loads of one-dof joints."""
     kind, first, nv = model.joints[j].shortname(), model.joints[j].idx_v, model.joints[j].nv
     law = f"law {model.names[j]}"
-    span = (
-        None if closed else rng.choice([None, rng.uniform(0.3, 1.0)])
-    )  # ball torque loads adjacent joints
+    span = None if closed else rng.choice([None, rng.uniform(0.3, 1.0)])  # ball torque loads adjacent joints
     bearing = {"mu": rng.uniform(0.02, 0.2), "radius": rng.uniform(0.005, 0.04), "span": span}
     lever = 0.0 if span is None else 1.0 / span
 

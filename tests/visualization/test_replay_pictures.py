@@ -23,7 +23,7 @@ from ..support.replay_runs import jointed, run_of
 
 # Closure gap of a drawn loop, relative to the smallest link.
 GAP = 1e-2
-# Errors relative to the model's size: at frames, stored as 32-bit floats with products of rotations, and between.
+# Errors relative to the model's size: at frames, with 32-bit floats and products of rotations, and between.
 AT_FRAMES, BETWEEN = 1e-5, 1e-3
 
 
