@@ -93,7 +93,10 @@ def lack(places, mu, pushed, push, solution):
 
 
 def slowness(places, solution):
-    """Return the largest over the smallest slip acceleration, the error factor of its direction."""
+    """Return the largest acceleration, gravity added, over the smallest slip acceleration.
+
+    This ratio magnifies errors of the slip direction.
+    """
     slips = [
         np.linalg.norm((solution.a[:3] + np.cross(solution.a[3:], place))[:2])
         for place, mode in zip(places, solution.modes, strict=True)

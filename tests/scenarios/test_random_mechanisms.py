@@ -60,7 +60,7 @@ def assert_ledger_closes(m, run, rounding=ROUNDING):
 
 
 def assert_conditions(m, run, i, conditions):
-    """Assert that forces of slipping elements follow their laws and forces of others are admissible."""
+    """Assert the conditions of sticking elements, the sign of slip, and the force of undirected slip."""
     slips, forces, limits, size = conditions.at(run, i)
     speed = 1.0 + np.abs(run.v[i]).max()
     for name, mode in zip(m.scene.element_names, run.modes[i], strict=True):

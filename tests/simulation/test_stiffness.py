@@ -241,7 +241,7 @@ def test_what_is_allowed_by_max_steps_is_not_told(recwarn):
 
 
 def swings():
-    """Return motions without damping: step sizes follow the motion at any tolerance."""
+    """Return motions with little or no damping: step sizes follow the motion at any tolerance."""
     pendulum = empty()
     joint = body(pendulum, 0, pin.JointModelRY(), "a", 1.0, lever=(0.0, 0.0, -0.5))
     place = pin.SE3(np.eye(3), np.array([0.0, 0.0, -1.0]))

@@ -13,7 +13,7 @@ few_and_many = pytest.mark.parametrize("examples", [25, pytest.param(3000, marks
 
 
 def for_all(check, *strategies, examples):
-    """Calls `check` on examples of the strategies: the same each time; the smallest that fails is shown.
+    """Call `check` on reproducible examples of the strategies; the smallest failing example is shown.
 
     The check returns None for a named error, else any other value.  If all examples are rejected, or all are
     accepted, the test fails.
