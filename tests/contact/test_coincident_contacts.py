@@ -141,7 +141,7 @@ def slider(*coefficients):
 
 
 def test_copies_that_a_run_tells_apart():
-    """Duplicates with friction from run parameters share the load like duplicates with equal declarations."""
+    """Duplicates with friction from run parameters act like duplicates with the same declared friction."""
     names = slider(0.2, 0.2).contact_names
     given = {names[1]: {"mu": [0.2, 0.4]}}
     alike, apart = pn.rollout(slider(0.2, 0.2), None, None, 0.1, parameters=given)

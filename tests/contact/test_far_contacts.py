@@ -102,7 +102,7 @@ def test_pairs_that_are_far_change_no_bit(count):
 
 
 def test_resumed_among_far_ones(kept, tmp_path):
-    """A run resumed in flight or at rest is bitwise the same: checkpoints store the monitored contacts."""
+    """A run among far shapes that is resumed in flight or at rest is bitwise the same."""
     path, scene = tmp_path / "run", far_shapes(40)
     alone = pn.simulate(scene, 2.0)
     assert_same_run(alone, pn.simulate(scene, 2.0, checkpoint=path, checkpoint_interval=0.0))

@@ -21,7 +21,7 @@ def box(mu, angle=0.0, restitution=0.0):
     return pn.Scene(model, contacts=corners)
 
 
-# Violation of the laws at the corners of a foot, which redundancy makes inconsistent, relative to velocities.
+# Violation of the laws at the corners of a foot, which redundancy makes inconsistent, over velocities.
 UNCHANGEABLE = 1e-7
 # Relative error of an impulse that is summed up from force samples, one per step.
 STEPPED = 0.05
@@ -196,7 +196,7 @@ def test_a_resumed_run_is_bitwise_the_same(kept, tmp_path):
 
 @pytest.mark.parametrize("count", [20, pytest.param(1000, marks=pytest.mark.stress)])
 def test_random_bodies_dropped(count):
-    """1 to 8 points of a body fall on a plane: no NaN, no hang, penetration below the approach in one step."""
+    """1 to 8 points of a body fall on a plane: no NaN, no hang, penetration below one step's approach."""
     rng = np.random.default_rng(0)
     deepest, failed = 0.0, []
     for k in range(count):

@@ -164,7 +164,9 @@ def test_time_stepping_keeps_the_books_of_a_slip_that_turns():
     run = pn.simulate(scene, 1.5, method="moreau", dt=1e-3, **options)
     assert run.energy["rub"][-1] == pytest.approx(fine.energy["rub"][-1], rel=1e-2)  # first order
     assert (np.diff(run.energy["rub"]) <= 0.0).all()
-    assert np.abs(run.energy["balance"]).max() < 1e-8  # of 2 J; the error of a 1 ms step has third order
+    assert (
+        np.abs(run.energy["balance"]).max() < 1e-8
+    )  # balance of 2 J; the error of a 1 ms step has third order
 
 
 def table(places, height=0.0, **keywords):

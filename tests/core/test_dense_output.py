@@ -88,7 +88,7 @@ def test_dense_output_changes_nothing():
     "method", ["dop853", "dopri5", "rk4", "Radau", "BDF", "LSODA", "semi_implicit_euler", "moreau"]
 )
 def test_samples_by_every_method_are_those_of_the_run(method):
-    """Dense output equals the run at its samples, with all recorded data, and meets constraints between them."""
+    """Dense output equals the run at its samples, with all records, and meets constraints between them."""
     scene = pn.load("rough_four_bar")
     dt = None if method not in ("rk4", "semi_implicit_euler", "moreau") else 0.005
     record = ("a", "forces", "energy", "reactions", "power", "dense")

@@ -79,7 +79,7 @@ def gap(model, one, two):
 
 
 def observed_order(case, method, ladder, **grid):
-    """Return the order between the finest grid with an error above the floor and a grid with a third of its steps.
+    """Return the order between the finest grid above the error floor and a grid with a third of its steps.
 
     The random direction of errors would affect the order between closer grids.
     """
@@ -279,7 +279,7 @@ def test_three_parallel_cranks_swing_as_one_pendulum():
     assert np.ptp(run.energy["total"]) < 1e-9 * weight
 
 
-# --- What a run must not depend on ------------------------------------------------------------------------
+# --- Independence of runs ------------------------------------------------------------------------
 
 
 def loops():

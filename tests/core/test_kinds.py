@@ -1,4 +1,4 @@
-"""Each kind of constraint is complete in the core and in Python, and its formulas are generic in the scalar."""
+"""Each kind of constraint is complete in the core and in Python, with formulas generic in the scalar."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Determinism: scene, state and method define all bits of a motion, independent of earlier runs and records."""
+"""Determinism: scene, state and method define all bits of a motion, whatever ran before or is recorded."""
 
 from __future__ import annotations
 

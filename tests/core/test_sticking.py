@@ -106,7 +106,7 @@ class AtRest:
 
     @staticmethod
     def four_bar_held_twice():
-        """Return two sticking pins with one degree of freedom: the loads are not unique, but nothing moves."""
+        """Return two sticking pins with one degree of freedom: loads are not unique, but nothing moves."""
         return AtRest.four_bar("crank_joint", "rocker_joint")
 
     @staticmethod
@@ -222,7 +222,7 @@ class TestBreakAway:
     @pytest.mark.parametrize("excess", [1e-3, 1e-5, 1e-7])
     @pytest.mark.parametrize("options", [{}, TIGHT, {"method": "rk4", "dt": 0.01}])
     def test_load_that_hardly_passes_the_limit(self, options, excess):
-        """The load exceeds the limit for sqrt(2 excess) / 3 s on each side of its peak, far less than a step."""
+        """The load exceeds the limit for sqrt(2 excess) / 3 s on each side of its peak, less than a step."""
         law = pn.JointFriction("pin", coulomb=1.0, static_ratio=1.5)
         scene = rotor(law, lambda t, q, v: [1.5 * (1.0 + excess) * np.sin(3.0 * t)], inertia=1.0)
         run = pn.simulate(scene, 1.0, **options)

@@ -76,7 +76,7 @@ class TestSigmoidFriction:
         scene = slider([pn.SigmoidFriction("mass", 2.0, 50.0)], actuation=[1e-4])
         run = pn.simulate(scene, 5.0, **TIGHT)
         assert run.events == []
-        assert run.v[-1, 0] == pytest.approx(1e-4 / 25.0, rel=1e-6)  # of third order in load/phi1
+        assert run.v[-1, 0] == pytest.approx(1e-4 / 25.0, rel=1e-6)  # error of third order in load/phi1
 
 
 class TestLuGre:

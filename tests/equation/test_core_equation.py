@@ -15,7 +15,7 @@ from ..support.small_robots import DATA
 
 
 def anchored(rng, *, others=(), laws=(), **keywords):
-    """Three trees with a point anchor between two of them."""
+    """Return three trees with a point anchor between two of them."""
     model, q = three_trees(rng)
     attach(model, "meet", model.getJointId("b2"), q, place_of(model, q, "a3 tip"))
     loop = pn.PointAnchor("a3 tip", "meet", name="loop")
@@ -23,7 +23,7 @@ def anchored(rng, *, others=(), laws=(), **keywords):
 
 
 def combination(scene, weights):
-    """A user constraint whose rows are combinations of the scene's rows."""
+    """Return a user constraint whose rows are combinations of the scene's rows."""
     runner, weights = scene._compiled.program.runner(), np.asarray(weights)
 
     def pick(part):
@@ -50,7 +50,7 @@ def test_closures_of_robots_from_the_community(name):
 
 
 def test_three_parallel_cranks():
-    """A bar on three cranks of equal length: redundant on the constraints, and only there."""
+    """A bar on three equal cranks has redundant rows on the constraints only."""
     scene = parallel_cranks()
     raw = assert_solves_its_rows(scene, *scene.initial_state(), 0.0)
     assert (raw.rank, len(raw.lam), scene.dropped) == (3, 4, [])
@@ -67,7 +67,7 @@ def test_rows_that_combine_others():
     assert raw.rank == 3
     expected = assert_solves_its_rows(plain, q, v, 0.0)
     np.testing.assert_allclose(raw.a, expected.a, rtol=0, atol=KKT * np.abs(expected.a).max())
-    # The load is shared with least norm: lam = [I W^T]^+ lam_plain.
+    # The load has minimum norm: lam = [I W^T]^+ lam_plain.
     share = np.linalg.pinv(np.hstack([np.eye(3), weights.T])) @ expected.lam
     np.testing.assert_allclose(raw.lam, share, rtol=0, atol=1e-9 * np.abs(share).max())
 
@@ -111,7 +111,7 @@ def test_prescribed_modes_and_sticking(kind):
     q, v = both.project(q, v)
     raw = assert_solves_its_rows(scene, q, v, 0.0, modes=[0] * len(stuck))
     np.testing.assert_array_equal(raw.a[dofs], 0.0)
-    # The same motion with the stuck directions as ideal constraints, and the force that holds as multiplier.
+    # Sticking directions as ideal constraints give the same motion, with friction forces as multipliers.
     smooth = [law for law in LAWS[kind] if not isinstance(law, pn.JointFriction)]
     grease = [law for law in LAWS[kind] if getattr(law, "viscous", 0.0)]
     smooth += [pn.JointFriction(law.joint, viscous=law.viscous) for law in grease]

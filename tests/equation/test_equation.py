@@ -1,4 +1,4 @@
-"""solve(M, F, A, b, C) against the paper's own road, other roads and exact arithmetic."""
+"""solve(M, F, A, b, C) against the equations of the paper, other methods and exact arithmetic."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from oracles.paper_road import (
 )
 from pin_nonideal.equation import RANK_TOLERANCE, solve
 
-# Relative agreement of roads: the random problems have condition below 100, the literal road squares it, and
-# 1e4 roundings of 1e-16 leave 1e-12.
+# Relative agreement of methods: the random problems have condition below 100, the paper's equations square
+# it, and 1e4 roundings of 1e-16 are 1e-12.
 ROADS = 1e-12
 EPS = np.finfo(float).eps
 
@@ -36,7 +36,7 @@ SHAPES = [
 
 
 def problem(seed, n, independent, redundant, nonideal=True):
-    """A random well-conditioned problem whose redundant rows are combinations of the independent ones."""
+    """Return a random well-conditioned problem with redundant rows as combinations of independent rows."""
     rng = np.random.default_rng(seed)
     # Orthogonal times a short range of scales keeps the condition of M below 10 and of A below 10.
     Q = np.linalg.qr(rng.normal(size=(n, n)))[0]
@@ -51,7 +51,7 @@ def problem(seed, n, independent, redundant, nonideal=True):
 
 
 def assert_close(value, reference, tolerance, scale=0.0):
-    """Relative in the Euclidean norm; `scale` is the size of what cancels to give the reference."""
+    """Assert a relative error in the Euclidean norm; `scale` is the size of canceling terms."""
     error = np.linalg.norm(np.asarray(value) - reference)
     assert error <= tolerance * max(np.linalg.norm(reference), scale), (
         error,
@@ -61,7 +61,7 @@ def assert_close(value, reference, tolerance, scale=0.0):
 
 
 def assert_forces(solution, forces, tolerance, scale):
-    """`scale`: size of the forces in play, since a part that vanishes is rounding of the others."""
+    """Assert equal forces; `scale` is the size of all forces, since a zero part has their rounding."""
     assert_close(solution.a, forces.a, tolerance, scale)
     assert_close(solution.F_ideal, forces.F_ideal, tolerance, scale)
     assert_close(solution.F_nonideal, forces.F_nonideal, tolerance, scale)
@@ -151,10 +151,10 @@ class TestTheoremsOfThePaper:
 
 
 def ill_conditioned(kind, condition, seed, redundant=False):
-    """M with the stated condition.
+    """Return a problem with the condition of M.
 
-    random: any directions are light.  graded: the coordinates themselves are light and heavy.  held: light
-    directions are held by the constraints, as in a closed loop whose links are light.
+    random: random directions are light.  graded: coordinates are light and heavy.  held: constraints act on
+    the light directions, as in a closed loop of light links.
     """
     rng = np.random.default_rng(seed)
     n, m = 6, 3
@@ -185,21 +185,21 @@ class TestIllConditionedMass:
             rows, right = np.vstack([A, mix @ A]), np.concatenate([b, mix @ b])
             s = solve(M, F, rows, right, C)
             assert s.rank == len(A)
-            # The answer moves by the rounding of M times its condition, once, where a light direction is free
-            # and mixed; where constraints hold it, or a coordinate alone is light, by 1e4 roundings at most.
+            # The solution changes by the rounding of M times its condition if a light direction is free and
+            # mixed. If constraints act on it, or a single coordinate is light, the change is 1e4 roundings.
             tolerance = EPS * condition + 1e-13 if kind == "random" else 1e-12
             for value, reference in zip((s.a, s.F_ideal, s.F_nonideal), forces, strict=True):
                 assert_close(value, reference, tolerance)
             if not redundant:
                 assert_close(s.lam, lam, tolerance)
-            # Backward: equations hold to rounding of their own terms, whatever the condition.
+            # Backward error: equations hold to rounding of their terms for any condition.
             assert_close(
                 M @ s.a - F - C - rows.T @ s.lam, 0.0, 1e-14, np.linalg.norm(M) * np.linalg.norm(s.a) + 10.0
             )
             assert_close(rows @ s.a, right, 1e-14, np.linalg.norm(rows) * np.linalg.norm(s.a))
 
     def test_squaring_the_condition_would_show(self):
-        """The Delassus matrix A M^-1 A^T, solved as it stands, misses the tolerance of the test above."""
+        """A direct solution with the Delassus matrix A M^-1 A^T misses the tolerance of the test above."""
         M, F, A, b, C, _ = ill_conditioned("held", 1e12, 0)
         G = A @ np.linalg.solve(M, A.T)
         lam = np.linalg.solve(G, b - A @ np.linalg.solve(M, F + C))
@@ -251,7 +251,7 @@ class TestRowsInAnyForm:
         assert_close(s.lam, np.array([-0.2, -0.4]), ROADS)
 
     def test_units_of_coordinates_change_nothing(self):
-        """Some coordinates in micrometres, some in megametres: q = S q', so M' = S M S and A' = A S."""
+        """Some coordinates in micrometers, some in megameters: q = S q', so M' = S M S and A' = A S."""
         M, F, A, b, C = problem(52, 6, 3, 1)
         S = 10.0 ** np.array([-6.0, 6.0, -6.0, 6.0, -6.0, -6.0])
         reference, other = solve(M, F, A, b, C), solve(S[:, None] * M * S, S * F, A * S, b, S * C)

@@ -1,4 +1,4 @@
-"""What solve(M, F, A, b, C) takes, gives and refuses; every message word by word."""
+"""Arguments, results and errors of solve(M, F, A, b, C), with exact messages."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class TestContract:
         s = solve(*arguments)
         for x, copy in zip(arguments, copies, strict=True):
             np.testing.assert_array_equal(x, copy)
-        s.a[0] = s.lam[0] = s.F_ideal[0] = s.F_nonideal[0] = 0.0  # the results are the caller's own
+        s.a[0] = s.lam[0] = s.F_ideal[0] = s.F_nonideal[0] = 0.0  # results are writable copies
 
     def test_solution_is_frozen_and_has_no_modes(self):
         s = solve([[1.0]], [1.0])
@@ -168,7 +168,7 @@ class TestMessages:
         check(SingularMassError, message, M, np.ones(len(M)))
 
     def test_mass_singular_to_rounding(self):
-        """As a ball joint of three revolutes in gimbal lock: Cholesky passes, but no digit is left."""
+        """A ball joint of three revolutes in gimbal lock: Cholesky succeeds, but no digit is significant."""
         M = np.array([[1.0, 1.0 - EPS / 2], [1.0 - EPS / 2, 1.0]])
         np.linalg.cholesky(M)
         with pytest.raises(

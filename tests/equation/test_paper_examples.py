@@ -1,4 +1,4 @@
-"""The paper's three examples, value by value: what it prints against `solve` and against its own letters."""
+"""The paper's three examples: its printed values against `solve` and against its equations."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def assert_rate_is_the_derivative(system, t, q, v):
 
 
 def assert_forces(M, F, A, b, C, ideal, nonideal):
-    """The printed force of constraint against `solve` and against the paper's formula on its letters."""
+    """Assert the printed constraint force against `solve` and against the paper's equations."""
     solution = solve(M, F, A, b, C)
     literal = paper_road(M, F, A, b, C)
     for forces in (solution, literal):

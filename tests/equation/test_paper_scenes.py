@@ -14,9 +14,9 @@ from ..support.paper_examples import example
 # on the loop of the bead, whose speed falls to a third, errors grow about tenfold.
 TIGHT = {"rtol": 1e-12, "atol": 1e-13}
 CLOSED, LOOP = 1e-10, 1e-9
-# What the package promises for positions and rates, at samples between steps as well.
+# Documented residual of positions and rates, also at samples between steps.
 HELD = 1e-10
-# Printed formulas at the recorded states: forces of size ten times what the constraint may be off there.
+# Error of printed formulas at recorded states: forces of size ten times the constraint residual there.
 PRINTED = 10.0 * HELD
 
 
@@ -119,7 +119,7 @@ class TestRing:
         assert run.violation.max() < HELD
 
     def test_friction_takes_what_the_speed_loses(self):
-        """No mass in the closed form: any bead moves alike, and its friction scales with the mass."""
+        """The motion does not depend on the mass, and friction is proportional to it."""
         light, heavy = self.script.Ring(mass=0.1), self.script.Ring(mass=50.0)
         q0, v0 = light.at(0.5, 6.0)
         one, two = (

@@ -1,4 +1,4 @@
-"""docs/theory.md and the sources agree: which file does what, and where each numbered equation stands."""
+"""docs/theory.md agrees with the sources: tasks of files, and files of numbered equations."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PYTHON = sorted(
     p for room in ("pin_nonideal", "oracles", "examples", "tests") for p in (ROOT / room).rglob("*.py")
 )
 HEADERS = sorted(CORE.rglob("*.hpp"))
-MODULE = CORE / "python" / "module.cpp"  # the list of what Python sees
+MODULE = CORE / "python" / "module.cpp"  # list of Python bindings
 SOURCES = sorted(p for p in CORE.rglob("*.cpp") if p != MODULE)
 MENTION = re.compile(r"Eqs?\. \(\d+\)(?:(?:-|, | and )\(\d+\))*")
 
@@ -32,7 +32,7 @@ def numbers(text):
 
 
 def trailing_comments(path):
-    """Comments of Python behind code."""
+    """Return trailing comments of Python code."""
     text = path.read_text(encoding="utf-8")
     lines = text.splitlines()
     for token in tokenize.generate_tokens(io.StringIO(text).readline):

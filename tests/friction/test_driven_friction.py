@@ -1,4 +1,4 @@
-"""Friction in joints whose motion the constraints prescribe: it cannot stick against its drive."""
+"""Friction in joints with prescribed motion, which cannot stick."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_the_drive_does_the_work_that_friction_takes(kind):
         laws=[pn.JointFriction("driven", coulomb=LIMIT, static_ratio=1.4, name="rub")],
     )
     run = pn.simulate(rough, 3.0, **options)
-    # The motion is the same; the drive carries the friction, and pays for it.
+    # The motion is the same, and the drive does the work of friction.
     np.testing.assert_allclose(run.q[-1], smooth.q[-1], atol=1e-6)
     assert run.energy["rub"][-1] == pytest.approx(-LIMIT * path, abs=1e-6)
     size = np.abs(run.energy["kinetic"]).max() + np.ptp(run.energy["potential"]) + LIMIT * path
@@ -82,7 +82,7 @@ def test_fixed_steps(method):
 
 
 def test_a_joint_geared_to_a_drive_rubs_as_well():
-    """Neither row is the joint's own: the constraints together decide its motion."""
+    """No single row acts on the joint alone, but the constraints together prescribe its motion."""
     model = double_pendulum()
     scene = pn.Scene(
         model,

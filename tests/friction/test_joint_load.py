@@ -1,4 +1,4 @@
-"""Friction that follows the load of a joint, against closed forms, whichever way the joint is modelled."""
+"""Load-dependent joint friction against closed forms, for different models of the joint."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from ..support.mechanisms import GRAVITY, TIGHT, TIGHTER, assert_close, body, do
 FORCE = 1e-12
 MASS, INERTIA = 2.0, 0.3
 PUSH = np.array([3.0, 5.0, -4.0])  # on the wheel, world axes
-ARM = 0.15  # along the pin to where it is pushed
+ARM = 0.15  # distance of the force along the pin [m]
 
 
 def friction_of(scene, joint, q, v):
-    """Generalized friction force at a joint of a tree, where nothing else is nonideal."""
+    """Return the generalized friction force at a joint of a tree without other nonideal forces."""
     s = scene.solve(q, v)
     assert_close(s.F_ideal, 0.0, 0.0)
     return s.F_nonideal[dof(scene, joint)]
@@ -184,7 +184,7 @@ class TestLawsThatLoad:
 
 
 class OnePin:
-    """An arm on a skew pin, at 1.9 rad from where it hangs, as different models of the same mechanics.
+    """Arm on a skew pin, at 1.9 rad from its hanging position, as different models of the same mechanics.
 
     Each returns the scene, and functions of q and v that give angle and rate about the pin.
     """

@@ -1,4 +1,4 @@
-"""Friction with a limit for each way of slip: one-way clutches, ratchets, sledges that glide one way."""
+"""Friction with a limit for each direction of slip: one-way clutches, ratchets, sledges."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_one_number_and_two_equal_ones_are_the_same():
 
 
 def random_system(seed, count):
-    """Masses on three slides, springs, a force that swings, and elements along directions drawn by lot."""
+    """Return masses on three slides, springs, an oscillating force, and elements along random directions."""
     draw = np.random.default_rng([count, seed])
     M = np.diag(draw.uniform(0.5, 3.0, 3)) if count > 1 else np.diag(draw.uniform(0.5, 3.0, 1))
     n = len(M)
@@ -101,7 +101,7 @@ def scene_of(system):
     model, last = empty(gravity=(0.0, 0.0, 0.0)), 0
     n = len(system.M)
     kinds = (pin.JointModelPX(), pin.JointModelPY(), pin.JointModelPZ())[:n]
-    for k, kind in enumerate(kinds):  # with the masses as armature: on carriages that weigh nothing
+    for k, kind in enumerate(kinds):  # massless carriages with armature
         last = body(model, last, kind, f"slide{k}", 0.0)
     model.armature = np.diag(system.M).copy()
     laws = [

@@ -1,7 +1,7 @@
-"""Painleve's paradox: beyond a friction that is known in closed form there is no motion or several.
+"""Painleve paradox: beyond a closed-form friction threshold there is no solution or several.
 
-The implicit equation is y = g(y), y the friction limit and g what the motion under y makes of it.  For one
-element g has the slopes -mu k and mu k, so that there is one solution while mu k < 1, and none or two beyond.
+The implicit equation is y = g(y), with the friction limit y and the limit g(y) of the motion under y.  For
+one element g has the slopes -mu k and mu k: there is one solution if mu k < 1, and none or two beyond.
 The determinant of the error is 1 - mu k.
 """
 
@@ -19,7 +19,7 @@ from ..support.mechanisms import GRAVITY, body, empty, frame, hinge
 
 # The core differentiates the reaction equation by differences with relative steps of 1e-7.
 DETERMINANT = 1e-6
-# A run that comes to the threshold halves its steps until the determinant's error is all that is left.
+# A run near the threshold halves its steps until the determinant's error remains.
 THRESHOLD = 1e-6
 # Below the threshold the equation is solved to rounding, which its condition 1/(1 - mu k) magnifies; the case
 # nearest to the threshold has 1 - mu k = 1e-4.
@@ -117,7 +117,7 @@ class TestRod:
         rod = Rod(angle)
         none = (
             "no solution" if way is Rod.contact else "no solution or several"
-        )  # of functions nothing is shown
+        )  # user functions have no diagnostics
         for share in (1.0 + NEAR, 1.1, 1.7, 3.0):
             with raises(element, "several solutions" if sense > 0 else none) as caught:
                 way(rod, share / rod.k).solve(*rod.state(sense))
@@ -141,7 +141,7 @@ class TestRod:
     @pytest.mark.parametrize("angle", ANGLES)
     @pytest.mark.parametrize(("way", "element"), WAYS)
     def test_the_threshold_itself_is_a_paradox(self, way, element, angle):
-        """Where the one solution goes to infinity, to the digits in which a determinant differs from zero."""
+        """The unique solution diverges there, within the error of the determinant."""
         rod = Rod(angle)
         for beyond in (0.0, 1e-16, -1e-16, 1e-13, -1e-13, 1e-10, -1e-10, 1e-9, -1e-9):
             with raises(element) as caught:
@@ -149,7 +149,7 @@ class TestRod:
             assert abs(caught.value.determinant) < DETERMINANT
 
     def test_on_the_ideal_reaction_there_is_no_paradox(self):
-        """The paper's law does not look at what it causes."""
+        """The law of the paper depends on ideal reactions, which friction does not change."""
         rod = Rod(1.1)
         ground = pn.PointAnchor("tip", "ground", axes="z", name="ground")
 
@@ -239,7 +239,7 @@ def block_that_grows_rough(start, growth):
 
 
 class TestRuns:
-    """A run ends where the paradox begins, and keeps what was computed before."""
+    """A run ends at the onset of the paradox and keeps its samples."""
 
     @pytest.mark.parametrize("method", ["dop853", "dopri5"])
     def test_at_the_time_of_the_threshold(self, method):

@@ -25,7 +25,7 @@ from ..support.mechanisms import (
     sample,
 )
 
-# Of the references, for times and states of events.
+# Tolerance of times and states of events.
 EVENT = 1e-9
 
 

@@ -1,4 +1,4 @@
-"""Friction of ball anchors, universal and planar joints, and of bodies that float, against closed forms."""
+"""Friction of ball anchors, universal and planar joints, and floating bodies, against closed forms."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..support.random_trees import inertia, placement
 
 # Forces of friction follow from a handful of products: relative error of rounding.
 FORCE = 1e-12
-# Of accelerations through an implicit equation, beside Pinocchio's inverse dynamics of the same motion.
+# Error of accelerations by an implicit equation, against Pinocchio's inverse dynamics of the same motion.
 INVERSE = 1e-10
 LAW = {"mu": 0.2, "radius": 0.03, "axial_radius": 0.02, "span": 0.4, "coulomb": 0.1, "preload": 0.05}
 

@@ -1,4 +1,4 @@
-"""Samples inside the steps that end as slip of several directions comes to rest; the work of friction."""
+"""Samples inside steps that end when slip with several components comes to rest, and work of friction."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ..support.standing import balls
 
 DURATION = 1.5
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
-PARTS = np.array([0.05, 0.3, 0.6, 0.9, 0.99])  # of the step before the rest
-SPEED = 1e-7  # of the largest speed, by which a sample may be off
+PARTS = np.array([0.05, 0.3, 0.6, 0.9, 0.99])  # fractions of the step before rest
+SPEED = 1e-7  # error of a sample, relative to the largest speed
 INSTANT = 1e-8  # [s]
-SHORT = 1e-5  # of a step [s], below which no even grid has a time inside it
+SHORT = 1e-5  # step size below which no uniform grid has a sample inside [s]
 # The direction of slip is as exact as the slip itself; so are the forces and accelerations along it.
 CLEAR, FORCE = 1e-4, 1e-6  # parts of the largest speed and acceleration
 WORK = 1e-8  # part of the work of friction

@@ -1,4 +1,4 @@
-"""What redundant anchors, feet and gears carry, beside dense algebra: no order of a list decides it."""
+"""Loads of redundant anchors, feet and gears against dense algebra, independent of the order of lists."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from oracles.sharing import constraint_force, least_norm
 from ..support.mechanisms import GRAVITY, assert_close, body, empty, frame
 from ..support.seeds import seeds
 
-# Of the loads: products of a dozen numbers, through a least-squares solution.
+# Rounding of loads: products of a dozen numbers and a least-squares solution.
 ROUNDING = 1e-9
 
 
@@ -70,7 +70,7 @@ def test_equal_hinges_share_whatever_their_order(places):
 
 @pytest.mark.parametrize("places", [(0.2, 1.8), (0.2, 1.0, 1.8), (0.0, 0.0), (0.5, 0.5, 1.5, 1.9)])
 def test_loads_of_hinges_are_the_least_ones(places):
-    """lam has the least norm of all that give this motion; the friction is that of these loads."""
+    """lam is the minimum-norm solution for this motion, and friction follows from these loads."""
     radii = [0.02 * (k + 1) for k in range(len(places))]
     scene = door(places, radii=radii)
     q, v = scene.project(scene.q0, scene.v0)

@@ -1,4 +1,4 @@
-"""Slip that begins from rest without a drop of the limit, or goes on slowly: its direction is stiff."""
+"""Slip onset without a drop of the limit, and slow slip, with stiff slip directions."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import pin_nonideal as pn
 
 from ..support.standing import ball, balls, planar_state, plate, star
 
-# What the default tolerance allows over some tenths of a second, and the oracle's own error: it starts with a
-# speed of its own and integrates at 1e-9.
+# Error of the default tolerance over several tenths of a second, and of the oracle, which starts at a finite
+# speed and integrates at 1e-9.
 REACHED = 3e-8
-# An onset from rest to where an explicit method serves again.
+# Evaluations from slip onset until an explicit method is stable again.
 ONSET = 100
 TIGHT = {"rtol": 1e-11, "atol": 1e-13}
 
@@ -66,7 +66,7 @@ def test_a_ball_joint_begins_to_slip_as_a_stiff_solver_has_it():
     ("make", "duration"), [(lambda ratio: three_feet(ratio)[0], 1.0), (lambda ratio: balls(1, ratio)[0], 0.9)]
 )
 def test_a_static_ratio_of_one_is_the_limit_of_others(make, duration):
-    """What is left falls at least with the ratio's distance from one, to nothing."""
+    """The difference decreases at least linearly with the ratio's distance from one."""
 
     def end(ratio):
         run = pn.simulate(make(ratio), duration, **TIGHT)

@@ -38,7 +38,7 @@ def test_a_driven_slider(method, viscous, ratio):
     assert [event.kind for event in run.events] == [kind for _, kind in expected]
     times = [time for time, _ in expected]
     np.testing.assert_allclose([event.time for event in run.events], times, atol=1e-6)
-    middle = 0.5 * (times[2] + times[3])  # of the second slip, the other way
+    middle = 0.5 * (times[2] + times[3])  # middle of the second slip, in the opposite direction
     k = int(np.argmin(np.abs(run.t - middle)))
     speed = exact.speed(run.t[k], times[2], -1)
     assert run.v[k, 0] == pytest.approx(speed, abs=1e-6 / viscous)

@@ -1,4 +1,4 @@
-"""What comes to rest as a whole and turns back, while something that stuck gives way at the same instant."""
+"""Reversal of a body at the same instant as slip onset of a sticking contact."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import pin_nonideal as pn
 
 from ..support.mechanisms import body, empty, frame, hinge
 
-# [J], of 40: what the error of the steps leaves; friction against the wrong side made 0.02.
+# Energy error of the steps, of 40 J. Friction in the wrong direction has an error of 0.02 J.
 BALANCED = 1e-8
-# [m or rad, and their rates]: what fixed steps of 1e-4 and the default tolerances of adaptive ones leave.
+# Error of fixed steps of 1e-4 s and of default tolerances of adaptive methods [m or rad, and their rates].
 AGREED = 1e-4
 
-# Of a throw as it rocks up on two feet, three arms on their stops, a fourth limb drawn over the floor.
+# State of a body that rocks on two feet, with three arms on their stops and a fourth limb on the floor.
 Q = [
     *(0.09696395065729727, -0.33381903009585595, -0.04978739597504663),
     *(-0.9636872296683546, 0.263022590521419, 0.04003821805126653, -0.022868785381238006),

@@ -1,4 +1,4 @@
-"""Every pair of shapes of collision models: which are known, their gaps and normals beside Coal's."""
+"""All pairs of shapes of collision models: supported pairs, gaps and normals against Coal's."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from pin_nonideal.geometry.manifold import LEAST_ROUNDING
 
 from ..support.mechanisms import body, empty, frame
 
-# [m], by which gaps may differ from Coal's where both are exact.
+# Difference from Coal's gaps if both are exact [m].
 EXACT = 1e-9
-# By which normals on a cone may: Coal iterates (GJK) for those, to the root of the digits of the distance.
+# Difference of normals on a cone: Coal iterates (GJK), to the root of the distance error.
 ROOT = 1e-5
 RADIUS, HALF, SIZE = 0.15, 0.2, np.array([0.3, 0.5, 0.4])
 SHAPES = ("sphere", "capsule", "box", "convex mesh", "cylinder", "cone", "ellipsoid", "half-space")
 SOLIDS = ("sphere", "capsule", "box", "convex mesh")
 KNOWN = {(shape, "half-space") for shape in SHAPES[:-1]} | set(combinations_with_replacement(SOLIDS, 2))
 KNOWN |= {("sphere", "cylinder"), ("sphere", "cone")}
-# What these stand for is compared part by part in test_revolved_pairs.py.
+# The parts of these pairs are compared in test_revolved_pairs.py.
 IN_PARTS = {
     (shape, revolved) for shape in (*SOLIDS[1:], "cylinder", "cone") for revolved in ("cylinder", "cone")
 }
@@ -60,9 +60,9 @@ def shape(kind):
 
 
 def as_modelled(kind, other, edge):
-    """The same shape as its contacts stand for it, where it is in its own axes, and what is around it.
+    """Return the modeled shape of a contact, its local placement, and the radius around it.
 
-    Rims of a cylinder or cone stand back behind its faces; solids with flat faces that meet are rounded.
+    Rims of a cylinder or cone are inset behind its faces; pairs of solids with flat faces are rounded.
     """
     if kind in ("cylinder", "cone") and other == "half-space":
         back = LEAST_ROUNDING * RADIUS

@@ -19,17 +19,17 @@ from .test_geometry_pairs import EXACT, HALF, RADIUS, SIZE, by_coal, cloud, conv
 from .test_geometry_pairs import shape as any_shape
 
 REVOLVED, OTHERS = ("cylinder", "cone"), ("capsule", "box", "convex mesh")
-ROUNDING = 0.01  # [m], so that cores are apart where shapes have entered each other a little
+ROUNDING = 0.01  # [m]: cores are separate for small penetration
 # Corners of a box of edges 2.
 CUBE = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
-# [m]: Coal's distances of what is nearer are asked for no digits.
+# [m]: smaller distances of Coal are not compared.
 NEAR = 1e-4
-LINE = 1e-3  # [m], radius of what Coal takes for a segment or a point
+LINE = 1e-3  # radius of Coal's segments and points [m]
 BEHIND = 1e-4  # [m]
 THIN = 1e-12  # [m]
 HERE = pin.SE3.Identity()
-DEPTH = 1e-10  # [m], that nothing enters another
-LEDGER = 1e-5  # [J], of some 20, that step control at its default leaves
+DEPTH = 1e-10  # maximum penetration [m]
+LEDGER = 1e-5  # energy error of default step control, of about 20 J [J]
 REACH = 0.8  # [m], beyond which nothing touches
 STEP = 1e-6  # [s], of differences
 SMOOTH = 1e-10  # [m], by which a gap bends over it at the most where its slope is one
@@ -44,7 +44,7 @@ def shape(kind):
 
 
 def octagons(kind):
-    """Of the points that carry faces: pyramids to a place close behind, which nothing reaches from there."""
+    """Return octagons of the face points, as pyramids with an apex close behind the face."""
     turns = 2.0 * np.pi / FACE_POINTS * np.arange(FACE_POINTS)
     ring = FACE_CIRCLE * RADIUS * np.column_stack([np.cos(turns), np.sin(turns), np.zeros(FACE_POINTS)])
     ends = [-HALF] if kind == "cone" else [-HALF, HALF]
@@ -61,7 +61,7 @@ def stood_back(kind, back, by=0.0):
 
 
 def disks(kind, back):
-    """Rims of what stands back, thinner than Coal can tell, and where they are."""
+    """Return the rims of the inset solid, thinner than Coal's resolution, and their placements."""
     radius = RADIUS * (1.0 - back / (2.0 * HALF)) if kind == "cone" else RADIUS
     made = coal.Cylinder(radius, 2.0 * THIN)
     ends = [-1.0] if kind == "cone" else [-1.0, 1.0]
@@ -69,7 +69,7 @@ def disks(kind, back):
 
 
 def slices(kind, back):
-    """Rims of what stands back, as lines from the axis over both faces: (radius, height)."""
+    """Return the outline of the inset solid from the axis over both faces: (radius, height)."""
     heights = [(-HALF + back, -HALF + 2.0 * back)]
     if kind == "cylinder":
         heights.append((HALF - 2.0 * back, HALF - back))
@@ -82,7 +82,7 @@ def slices(kind, back):
 
 
 def from_slice(outline, at):
-    """How far a place outside is from what such a line turns around."""
+    """Return the distance of an outside point from the solid of revolution of an outline."""
     place = np.array([np.hypot(at[0], at[1]), at[2]])
     first, way = outline[:-1], np.diff(outline, axis=0)
     part = np.clip(((place - first) * way).sum(axis=1) / (way**2).sum(axis=1), 0.0, 1.0)
@@ -146,7 +146,7 @@ class Modelled:
             self.parts.append(((core, HERE), point([0.0, 0.0, HALF]), edge - LINE))
 
     def apart(self, at_other, at_solid):
-        """That of what the radii are around, and of all with these."""
+        """Return the distance of the cores, and the distance including the radii."""
         found = [
             (distance(first, at_other * place1, second, at_solid * place2), radius)
             for (first, place1), (second, place2), radius in self.parts
@@ -163,7 +163,7 @@ class Modelled:
 
 
 def modelled_as(scene, other, kind, rounding=None):
-    """What the contacts of a scene stand for."""
+    """Return the modeled shapes of the contacts of a scene."""
     edge = max((c.radius2 for c in scene.contacts if isinstance(c, pn.RimContact)), default=0.0)
     return Modelled(other, kind, edge, LEAST_ROUNDING * RADIUS if rounding is None else rounding)
 
@@ -188,7 +188,7 @@ def test_gaps_beside_coal(kind, other, rounding, count):
 
 
 def assert_rows_are_differences_of_gaps(scene):
-    """Of every place, near and far: along a random motion, by central differences."""
+    """Assert the row of every contact point along a random motion, by central differences."""
     rng, runner, compared = np.random.default_rng(2), scene._compiled.program.runner(), 0
     for q in placements(rng, 30):
         v = rng.normal(size=6)
@@ -196,7 +196,7 @@ def assert_rows_are_differences_of_gaps(scene):
         before, after = (
             runner.rows(pin.integrate(scene.model, q, by * v), v, 0.0)[2] for by in (-STEP, STEP)
         )
-        # Where two features are as near, or a solid that stands back has been entered, the slope leaps.
+        # The slope is discontinuous if two features are equally near, or inside an inset solid.
         smooth = (np.abs(before + after - 2.0 * gaps) < SMOOTH) & (gaps > 0.0)
         rates = A.reshape(-1, 6) @ v
         assert rates[smooth] == pytest.approx(((after - before) / (2.0 * STEP))[smooth], abs=1e-7)
@@ -214,7 +214,7 @@ CAN = coal.Cylinder(0.1, 0.3)
 TABLES = [coal.Box(1.0, 1.2, 0.4), convex(0.5 * CUBE * [1.0, 1.2, 0.4])]
 LYING = pin.Quaternion(pin.rpy.rpyToMatrix(0.5 * np.pi, 0.0, 0.0)).coeffs()
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
-# What rests on what, at which height over the middle of that and how it is turned.
+# Shape, fixed shape, height over its center, and orientation.
 AT_REST = {
     "can on box": (CAN, TABLES[0], 0.35, LEVEL),
     "can on mesh": (CAN, TABLES[1], 0.35, LEVEL),
@@ -233,7 +233,7 @@ AT_REST = {
 
 @pytest.mark.parametrize("what", AT_REST)
 def test_what_rests(what):
-    """It stays where it is, with a velocity of zero, and what carries it presses with its weight."""
+    """The body stays at rest with zero velocity, and the contact force equals its weight."""
     thing, fixed, height, turn = AT_REST[what]
     run = pn.simulate(free(thing, fixed, mu=0.5), 1.0, q=[0.04, 0.02, height, *turn], record="forces")
     assert np.abs(run.v).max() == 0.0
@@ -275,7 +275,7 @@ def test_a_can_rolls_down_a_face(fixed):
 def test_a_plank_rocks_on_a_lying_cylinder():
     """Without slipping: the motion of a block on a cylinder, by an integration of its own."""
     size, thick, inertia = 0.4, 0.1, 0.03
-    radius = size - PASSED_ON * LEAST_ROUNDING * thick  # of the side, as edges find it
+    radius = size - PASSED_ON * LEAST_ROUNDING * thick  # effective radius of the side for edges
 
     def rate(_, y):
         angle, spin = y
@@ -344,7 +344,7 @@ def test_a_capsule_falls_on_a_lying_can(length, turn):
 
 
 def test_cones_of_any_size_are_made():
-    """What is cut of one has radii that rounding does not take below zero."""
+    """Truncation of a cone keeps radii nonnegative despite rounding."""
     rng = np.random.default_rng(4)
     for _ in range(40):
         radius = 10.0 ** rng.uniform(-3.0, 1.0)

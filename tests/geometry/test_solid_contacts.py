@@ -15,7 +15,7 @@ from ..support.mechanisms import GRAVITY, body, empty, frame
 from ..support.same_run import assert_same_run
 from .test_geometry_pairs import by_coal, cloud, convex
 
-DEPTH = 1e-10  # [m], that nothing enters another
+DEPTH = 1e-10  # maximum penetration [m]
 # Corners of a box of edges 1, in an order that is not that of the package's own boxes.
 CUBE = np.array([[x, y, z] for z in (0.5, -0.5) for x in (-0.5, 0.5) for y in (0.5, -0.5)])
 MESH, STONE = cloud(3, 6), 0.7 * cloud(8, 5)
@@ -77,7 +77,7 @@ LYING = pin.SE3(pin.rpy.rpyToMatrix(0.5 * np.pi, 0.0, 0.0), np.zeros(3))
 
 @pytest.mark.parametrize(("mu", "cosine"), [(0.0, 2.0 / 3.0), (1e6, 10.0 / 17.0)])
 def test_a_ball_leaves_a_lying_cylinder(mu, cosine):
-    """Where cos = 2/3 without friction, and 10/17 where it rolls; its energy is that of a start on top."""
+    """The ball leaves at cos = 2/3 without friction, and at 10/17 if it rolls, for a start on top."""
     r, start = 0.1, 0.2
     spin = 0.4 if mu else 0.0
     scene = pair(coal.Sphere(r), coal.Cylinder(0.9, 4.0), LYING, inertia=0.4 * r * r, mu=mu)
@@ -138,7 +138,7 @@ def test_what_slides_over_an_edge_flies_off(fixed, radius, speed):
 @pytest.mark.parametrize("fixed", [coal.Box(1.0, 1.0, 0.4), convex(CUBE * [1.0, 1.0, 0.4])], ids=type)
 @pytest.mark.parametrize("mu", [0.05, 0.5])
 def test_what_rolls_over_an_edge_flies_off(fixed, mu):
-    """Sticking until there: what holds it leaps with its load, and it neither slips nor chatters."""
+    """The ball sticks until the edge, where friction and load jump, without slip or chatter."""
     radius, speed = 1e-4, 7.0
     scene = pair(coal.Sphere(radius), fixed, mu=mu, inertia=0.4 * radius**2)
     v = [speed, 0, 0, 0, speed / radius, 0]
@@ -162,7 +162,7 @@ def test_bricks_that_slide_over_edges(seed):
         assert any(event.kind == "impact" for event in run.events)
 
 
-# What is thrown at what, and the edge by which solids with flat faces are rounded.
+# Pairs of shapes, and the rounding of edges of solids with flat faces.
 BRICK = CUBE * [0.3, 0.4, 0.2]
 
 
@@ -218,7 +218,7 @@ def test_thrown_bodies_do_not_enter(kind, seeds):
     ("kind", "seed"), [("box at mesh", 2), ("box at mesh", 73), ("box at mesh", 107), ("mesh at mesh", 92)]
 )
 def test_a_corner_comes_to_an_edge(kind, seed):
-    """Thrown so that what a corner carries leaps from some newtons to none: it flies off there, at once."""
+    """The load of a corner jumps from several newtons to zero at the edge, where it lifts off at once."""
     scene, _, _, start = thrown(kind, seed)
     run = pn.simulate(scene, 0.5, **start)
     assert run.t[-1] == 0.5

@@ -1,4 +1,4 @@
-"""Drives that are asked for more than they have: closed forms, events, and what is refused."""
+"""Drives beyond their effort limits: closed forms, events and errors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pin_nonideal as pn
 
 from ..support.mechanisms import TIGHT, body, empty, hinge
 
-SAME = 1e-9  # of states and instants, at a tolerance of 1e-12
+SAME = 1e-9  # error of states and times at a tolerance of 1e-12
 
 
 def slider(mass=2.0, effort=None):

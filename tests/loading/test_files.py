@@ -101,8 +101,10 @@ def test_parts_of_killed_processes_are_taken_away(tmp_path):
     assert len(list(tmp_path.iterdir())) == 1
     (half,) = tmp_path.iterdir()
     beginning, owner, process, *ends = half.name.rsplit(".", 4)
-    live = half.with_name(".".join((beginning, owner, str(os.getpid()), *ends)))  # of a process that goes on
-    far = half.with_name(".".join((beginning, "00000000", process, *ends)))  # of another machine, or file
+    live = half.with_name(
+        ".".join((beginning, owner, str(os.getpid()), *ends))
+    )  # part file of a running process
+    far = half.with_name(".".join((beginning, "00000000", process, *ends)))  # part file of another machine
     for other in (live, far):
         other.write_bytes(b"")
     write(path)

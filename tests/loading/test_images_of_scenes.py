@@ -1,4 +1,4 @@
-"""Scenes that are images of each other move as such: no rival is needed to tell what is wrong.
+"""Symmetric images of scenes have the image motions.
 
 Contacts are declared in another order, a scene is mirrored, moved with its plane, or its lengths, masses and
 times are multiplied.
@@ -18,12 +18,12 @@ from ..support.mechanisms import body, empty, frame
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 DURATION, SAMPLES = 0.8, 200
-# Of one motion in other numbers [m, and of unit quaternions]: steps of 1e-10, times what impacts make of it.
+# Difference of one motion in other coordinates [m, unit quaternions]: tolerance 1e-10, growth by impacts.
 SAME = 1e-7
 
 
 def drawn(seed: int) -> dict[str, Any]:
-    """One to three bodies that fall on a tilted plane and on each other, all of it drawn by lot."""
+    """Return one to three random bodies that fall on a tilted plane and on each other."""
     rng = np.random.default_rng(seed)
     bodies = []
     for i in range(int(rng.integers(1, 4))):
@@ -160,7 +160,7 @@ def test_the_order_of_contacts_is_of_no_matter(seed: int) -> None:
 
 
 def test_rounding_of_an_impact_is_no_event() -> None:
-    """A box that lies on the ground is struck from the side: what its corners take of that is rounding."""
+    """A resting box is struck from the side: the impulses at its corners are rounding."""
     what = drawn(172)
     run = pn.simulate(made(what), DURATION, rtol=1e-10, atol=1e-13)
     strikes: dict[float, list[float]] = {}

@@ -1,4 +1,4 @@
-"""No field of MuJoCo's compiled model slips through: each is on a list, and what is carried moves a scene."""
+"""All fields of MuJoCo's compiled model are listed, and each supported field affects a scene."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pin_nonideal.loading.yaml.assembly import scene_arguments
 
 from ..support.refusals import refuses
 
-ROUNDING = 1e-9  # of accelerations of order one to a hundred, along two routes
+ROUNDING = 1e-9  # error of accelerations of order 1 to 100, by two methods
 
 # Every kind of thing that is carried, each with numbers of its own.
 RICH = """<mujoco><compiler angle="radian"/>
@@ -117,7 +117,7 @@ def test_each_number_that_is_carried_moves_a_scene_as_it_moves_mujoco(field):
     else:
         values[-3:] += 0.1 * (field != "geom_fluid")
     for shortcut in ("body_sameframe", "body_simple", "site_sameframe", "geom_sameframe", "dof_simplenum"):
-        np.asarray(getattr(model, shortcut))[:] = 0  # MuJoCo's for what the file's numbers allowed
+        np.asarray(getattr(model, shortcut))[:] = 0  # shortcut flags of MuJoCo for the values of the file
     ours, theirs = accelerations(model)
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=ROUNDING * np.abs(theirs).max())
 

@@ -22,7 +22,7 @@ EPS = float(np.finfo(float).eps)
 
 @pytest.fixture(autouse=True, scope="module")
 def _no_log():
-    """MuJoCo writes what it warns of to a file in the working directory, unless somebody hears it."""
+    """Install a warning handler: without it MuJoCo writes warnings to a file in the working directory."""
     mujoco.set_mju_user_warning(lambda text: None)
     yield
     mujoco.set_mju_user_warning(None)

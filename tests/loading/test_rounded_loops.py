@@ -1,4 +1,4 @@
-"""Loops whose frames an export has rounded: dependent rows give way, and the run starts."""
+"""Loops with rounded frames from an export: dependent rows are removed, and the run starts."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.errors import LoopClosureError
 
-ROUNDED = 3e-8  # what an export of CAD leaves of the place of a pin [m]
-TOLERANCE = 1e-5  # of accelerations: rounding over the crank's length, times a few rad/s^2
+ROUNDED = 3e-8  # position error of a pin in a CAD export [m]
+TOLERANCE = 1e-5  # error of accelerations: rounding over the crank's length, times a few rad/s^2
 
 
 def parallelogram(path, beside=0.0, tilt=0.0):
-    """Three parallel cranks on one coupler: the third adds no row, but for what is rounded.
+    """Write three parallel cranks on one coupler: the third adds no independent row except by rounding.
 
     Args:
-        path: the file.
-        beside: places of the pins of the second and third crank beside the plane [m].
-        tilt: of the second and third axis [rad].
+        path: file.
+        beside: distance of the pins of the second and third crank from the plane [m].
+        tilt: tilt of the second and third axis [rad].
     """
     cranks = "".join(
         f'<body name="crank{i}" pos="{i} 0 0"><joint name="turn{i}" axis="0 1 {tilt * (i > 0)}"/>'
@@ -89,7 +89,7 @@ def test_rows_of_welds_go_one_by_one(tmp_path):
 
 
 def test_loops_that_depend_on_each_other_beyond_the_tolerance_are_told(tmp_path):
-    """Cranks of nearly equal length lock what should move."""
+    """Cranks of nearly equal length lock the mechanism."""
     file = parallelogram(tmp_path / "long.xml")
     text = file.read_text().replace('name="tip2" pos="0.1 0.0 1"', 'name="tip2" pos="0.10003 0 1"')
     file.write_text(text.replace('name="hole2" pos="2 0 0"', 'name="hole2" pos="2.00003 0 0"'))

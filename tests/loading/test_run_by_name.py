@@ -1,4 +1,4 @@
-"""What a run did by the names of its joints, frames, constraints and laws."""
+"""Results of a run by the names of its joints, frames, constraints and laws."""
 
 from __future__ import annotations
 

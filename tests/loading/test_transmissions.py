@@ -38,7 +38,7 @@ def gears(law, *, ratio=-0.5, inertia=(0.3, 0.2), more=(), **options):
 
 
 def draw(seed):
-    """A thread, what acts on nut and screw, and a turning rate."""
+    """Return a thread, loads on nut and screw, and an angular velocity."""
     rng = np.random.default_rng(seed)
     angles = {"lead_angle": rng.uniform(0.03, 0.8), "pressure_angle": rng.uniform(0.0, 0.5)}
     thread = Screw(
@@ -122,7 +122,7 @@ class TestPowerScrew:
 
 
 class TestWorm:
-    """A worm of lead angle 0.08 against mu 0.2 locks itself: what is on the wheel cannot turn it."""
+    """A worm with lead angle 0.08 and mu 0.2 is self-locking: loads on the wheel cannot move it."""
 
     MU, LEAD, RATIO, LOAD = 0.2, 0.08, 1.0 / 40.0, 20.0
 
@@ -239,7 +239,7 @@ def test_the_order_of_a_list_decides_nothing():
 
 
 def test_forces_balance_where_joint_and_teeth_stick():
-    """What holds the joint is all that the teeth, which share with it, leave over."""
+    """Joint friction equals the load minus the force of the teeth, which are redundant with it."""
     laws = [pn.JointFriction("one", coulomb=5.0), pn.JointFriction("mesh", efficiency=0.7, coulomb=0.2)]
     torque = np.array([1.5, -0.8])
     scene = again(gears(laws[0], actuation=torque), laws=laws)

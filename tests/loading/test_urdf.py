@@ -1,4 +1,4 @@
-"""URDF files: what Pinocchio's reader passes over in silence is an error, a note, a law or a constraint."""
+"""URDF files: elements that Pinocchio's reader ignores become an error, a note, a law or a constraint."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""URDF files as the world writes them: broken paths of meshes, words of other tools, what is told of them."""
+"""URDF files in practice: broken mesh paths, elements of other tools, and notes about them."""
 
 from __future__ import annotations
 

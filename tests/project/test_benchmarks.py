@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 pytest.importorskip("matplotlib")
 
 ROOT = Path(__file__).resolve().parents[2]
-REACHED = 1e-9  # [rad] by our finest runs: what the goal of the Coulomb pendulum asks for
+REACHED = 1e-9  # [rad] by our finest runs: goal of the Coulomb pendulum
 ENERGY = 1e-5  # [J] of about 8 J, after two seconds at a tolerance of 1e-9
 GAP = 1e-12  # [m]: loops of one meter closed to rounding
 

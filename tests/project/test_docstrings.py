@@ -1,4 +1,4 @@
-"""Public docstrings are true: they exist, and their Args and Attributes name exactly what there is."""
+"""Public docstrings exist, and their Args and Attributes name exactly the parameters and fields."""
 
 from __future__ import annotations
 

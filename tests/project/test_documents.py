@@ -1,4 +1,4 @@
-"""What the Markdown files show works: Python blocks compile, marked ones run, links lead somewhere.
+"""Examples in Markdown files: Python blocks compile, marked blocks run, links are valid.
 
 Marks are HTML comments right above a block: `runs` for a block that runs, after the ones before it in the
 same document, and `file: NAME` for the text of a file that they read.

@@ -1,4 +1,4 @@
-"""The examples of friction and of contacts print what they compute beside closed forms; both must agree."""
+"""The examples of friction and of contacts print results beside closed forms, and both agree."""
 
 from __future__ import annotations
 

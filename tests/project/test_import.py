@@ -18,7 +18,7 @@ from pin_nonideal import core_loader as compiled
 
 AGAIN = "pip install 'pin==4.1.*' brings the Pinocchio that it needs"
 HEAVY = ["IPython", "joblib", "matplotlib", "meshcat", "scipy", "tqdm", "yaml"]
-# Of this package, what only some programs need: readers of robots, files of runs.
+# Optional modules of this package: readers of robots, files of runs.
 LATER = ["pin_nonideal.loading", "pin_nonideal.trajectory.file"]
 
 
@@ -28,7 +28,7 @@ def test_import_is_light() -> None:
     assert sorted(set(json.loads(done.stdout)) & set(LATER)) == []
     loaded = {name.split(".")[0] for name in json.loads(done.stdout)}
     assert "pinocchio" in loaded
-    # What Pinocchio itself imports is not ours to avoid.
+    # Imports of Pinocchio itself are excluded.
     done = subprocess.run(
         [sys.executable, "-c", code.replace("pin_nonideal", "pinocchio")],
         capture_output=True,

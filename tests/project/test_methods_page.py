@@ -1,4 +1,4 @@
-"""The tables of docs/methods.md are what the package does."""
+"""The tables of docs/methods.md agree with the package."""
 
 from __future__ import annotations
 

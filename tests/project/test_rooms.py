@@ -114,7 +114,7 @@ def test_the_core_includes_upward() -> None:
 
 
 def test_stub_is_the_core(tmp_path: Path) -> None:
-    """`_core.pyi`, which type checkers read, is what nanobind generates of the compiled core."""
+    """`_core.pyi`, for type checkers, equals the stub that nanobind generates from the compiled core."""
     generated = tmp_path / "_core.pyi"
     patterns = PACKAGE / "_core" / "python" / "stub.txt"
     command = ["-m", "nanobind.stubgen", "-q", "-m", "pin_nonideal._core", "-p", patterns, "-o", generated]

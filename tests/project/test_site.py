@@ -15,7 +15,7 @@ import pin_nonideal as pn
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-# What a page may call on each: attributes of instances are not among those of the class.
+# Objects in pages and their classes, and instance attributes, which the class does not have.
 OWNERS = {"pn": pn, "scene": pn.Scene, "run": pn.Trajectory}
 INSTANCE = {"scene": {"model", "constraints", "laws", "forces", "contacts", "actuation", "name", "notes"}}
 INSTANCE["scene"] |= set(

@@ -18,7 +18,7 @@ DURATION = 4.0
 KINDS = ("clamped", "natural", "pulse", "zigzag", "profile")
 LONGER = [pytest.param(kind, marks=pytest.mark.slow) for kind in ("clamped", "pulse", "profile")]
 ORDERED = ["natural", "zigzag", *LONGER]
-# Errors of all steps, in tolerances of one; and the rounding of fast pulses.
+# Sum of the errors of all steps in tolerances, and rounding of fast pulses.
 ADDED, FLOOR = 300.0, 1e-10
 BALANCE = 1e-9
 
@@ -165,7 +165,7 @@ def test_a_rate_that_jumps_is_an_impulse_whose_work_is_the_drives(kind, seed):
 
 @pytest.mark.parametrize("ends", ["clamped", "natural"])
 def test_what_rests_is_moved_by_a_spline_far_in_its_future(ends):
-    """A cart alone, which no step has to look at before."""
+    """A cart alone, which needs no steps before the spline."""
     model = pin.Model()
     cart = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "cart")
     model.appendBodyToJoint(cart, pin.Inertia(CART_MASS, np.zeros(3), np.eye(3)), pin.SE3.Identity())

@@ -1,4 +1,4 @@
-"""Shafts with two and three Cardan joints, driven at the input or free, beside the closed form."""
+"""Shafts with two and three Cardan joints, driven at the input or free, against the closed form."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from oracles.cardan_shafts import Shafts
 from ..support.seeds import ranges
 
 DURATION = 2.0
-# Nothing is integrated where no freedom is left: rounding through loops that turn at up to 60 rad/s.
+# Errors without integration, for no degree of freedom: rounding through loops at up to 60 rad/s.
 POSITION, VELOCITY, FORCE = 1e-9, 1e-8, 1e-6
 
 

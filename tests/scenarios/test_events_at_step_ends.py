@@ -54,7 +54,7 @@ def falls():
 
 
 def gives_way():
-    """What sticks is pushed more and more."""
+    """Return a sticking body under a growing force."""
     model = point_mass("X", gravity=(0.0, 0.0, 0.0))
     push = pn.Wrench("mass", lambda t: [3.0 * t, 0.0, 0.0, 0.0, 0.0, 0.0])
     return model, {"laws": [pn.JointFriction("x", coulomb=2.0)], "forces": [push]}

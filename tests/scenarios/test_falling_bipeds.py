@@ -61,7 +61,7 @@ def biped(
 
 
 def heights(scene: pn.Scene, q: np.ndarray) -> np.ndarray:
-    """Of all corners above the ground."""
+    """Return the heights of all corners above the ground."""
     data = scene.model.createData()
     pin.framesForwardKinematics(scene.model, data, q)
     return np.array([data.oMf[scene.model.getFrameId(name)].translation[2] for name in scene.contact_names])

@@ -1,7 +1,7 @@
-"""Bodies on several feet that rest and are pushed: what they begin to do.
+"""Slip onset of resting bodies on several feet under constant forces.
 
-The oracle asks only for the law: some loads that press, with friction against the slip that begins at
-each foot that slips and within the cone of each that sticks, must give the acceleration (non-negative least
+The oracle checks the law only: nonnegative loads must exist that give the acceleration, with friction against
+the slip acceleration of each slipping foot and inside the cone of each sticking foot (nonnegative least
 squares over the generators of these forces).
 """
 
@@ -17,9 +17,9 @@ import pin_nonideal as pn
 from ..support.seeds import seeds
 
 DRAWS = range(40)
-# One of their feet has to pull where all stay closed; they lift then.
+# Seeds with tension in one foot if all contacts stay closed, so that a foot lifts off.
 LIFTING = [1594, 2437, 2789, 3003, 3273, 3401, 3448, 3772, 4478]
-FACETS = 256  # of the cone of a foot that sticks
+FACETS = 256  # facets of the cone of a sticking foot
 INSIDE = 1.0 - np.cos(np.pi / FACETS)  # part by which they are inside of it
 SETTLED = 1e-12  # part of the forces to which limits and loads are turned
 MASS, INERTIA, GRAVITY = 10.0, 0.3, 9.81
@@ -65,7 +65,7 @@ def begun(seed):
 
 
 def lack(places, mu, pushed, push, solution):
-    """What the law's forces lack to give the acceleration, as part of the weight."""
+    """Return the residual of the acceleration under forces of the law, relative to the weight."""
     a = solution.a
     sides = 2.0 * np.pi * np.arange(FACETS) / FACETS
     columns = []
@@ -93,7 +93,10 @@ def lack(places, mu, pushed, push, solution):
 
 
 def slowness(places, solution):
-    """Accelerations in play over the least that begins a slip: its way is known so much worse."""
+    """Return the largest acceleration, gravity added, over the smallest slip acceleration.
+
+    This ratio magnifies errors of the slip direction.
+    """
     slips = [
         np.linalg.norm((solution.a[:3] + np.cross(solution.a[3:], place))[:2])
         for place, mode in zip(places, solution.modes, strict=True)
@@ -145,7 +148,7 @@ def test_six_feet_begin_to_slip_in_one_step():
 
 @pytest.mark.parametrize("moment", [9.0, 10.0])
 def test_tables_side_by_side_begin_as_each_alone(moment):
-    """Both spun by moments, the second beyond what its feet hold; the loads of the feet are even."""
+    """Moments act on both tables, on the second beyond its friction limit; the feet have equal loads."""
     turn = np.pi / 3.0 * np.arange(6)
     radius = np.where(np.arange(6) % 2 == 0, 0.3, 0.1)
     places = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full(6, -0.3)])

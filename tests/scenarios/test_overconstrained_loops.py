@@ -21,7 +21,7 @@ METHODS = (
 )
 # Rounding that the linkage magnifies [rad, and part of the largest velocity].
 ON_PATH = 1e-10
-# Of the forces in play: a closed form beside a solution of linear equations.
+# Relative error of forces: a closed form against a solution of linear equations.
 STATICS = 1e-7
 
 

@@ -23,7 +23,7 @@ DEEP = int(os.environ.get("PIN_NONIDEAL_MECHANISMS", "500"))
 QUICK = 48
 # Part of the forces in play by which a condition may be missed: rounding, through the constraints' solution.
 SLACK = 1e-8
-# Part of the speeds in play that is rounding, for what sticks elsewhere than in a joint.
+# Rounding of the slip velocity of sticking elements other than joints, relative to the largest speed.
 STILL = 1e-11
 # The ledger's integrals share the step control's error: its rtol of 1e-8 over the steps of a run.
 KEPT = 1e-6
@@ -60,7 +60,7 @@ def assert_ledger_closes(m, run, rounding=ROUNDING):
 
 
 def assert_conditions(m, run, i, conditions):
-    """Elements that slip by their laws leave to the others what keeps these conditions."""
+    """Assert the conditions of sticking elements, the sign of slip, and the force of undirected slip."""
     slips, forces, limits, size = conditions.at(run, i)
     speed = 1.0 + np.abs(run.v[i]).max()
     for name, mode in zip(m.scene.element_names, run.modes[i], strict=True):

@@ -34,10 +34,10 @@ def check(seed):
         assert_conditions(m, run, i, conditions)
 
 
-# At rest the joints of seed 21 and the teeth between them share one load, and so decide each other's limits:
-# the search for modes ends in a FrictionParadoxError, as for one in ten of the stress seeds.
-# In seed 11 three elements that share a load stick, and what each carries is not unique: the search finds a
-# sharing that the one of least norm, by which limits are reported, does not hold to (docs/limits.md).
+# At rest the joints of seed 21 and the teeth between them share one load, and their limits depend on each
+# other.  The search for modes raises FrictionParadoxError, as for one in ten of the stress seeds.
+# In seed 11 three elements that share a load stick, and their loads are not unique.  The loads of the search
+# differ from the minimum-norm loads, by which limits are reported (docs/limits.md).
 SHARED = pytest.param(11, marks=pytest.mark.xfail(reason="limits by another sharing than holds", strict=True))
 
 

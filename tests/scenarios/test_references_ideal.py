@@ -79,7 +79,7 @@ class TestNFourBar:
         (40, 4.0, 12.6357683369214925, (1.0238043879877688, -0.071163972510921743)),
         (40, 10.0, 31.5974337439857377, (1.1484412774694141, -0.21077006677942393)),
     )
-    POSITION = 1e-7  # of the reference
+    POSITION = 1e-7  # error of the reference
 
     def check(self, N, tolerance, position):
         scene = pn.load("n_four_bar", N=N)
@@ -179,7 +179,7 @@ class TestLightCartPole:
         (5.87, 1.0399732048568950956, -0.039984898568490593944),
         (10.0, 1.9997632824687276547, -1.5491294418948281698),
     )
-    # Of the benchmark, for e = sqrt(mean[(x - x_ref)^2 + (th - th_ref)^2]) over 1001 samples.
+    # Levels of the benchmark for e = sqrt(mean[(x - x_ref)^2 + (th - th_ref)^2]) over 1001 samples.
     ACCEPTED, GOOD = 1e-6, 1e-9
 
     def motion(self, times):
@@ -231,7 +231,7 @@ class TestLightCartPole:
         cart = body(model, 0, pin.JointModelPX(), "cart", self.CART)
         body(model, cart, hinge(0.0, -1.0, 0.0), "pole", self.POLE, lever=(0.0, 0.0, -1.0))
         run = pn.simulate(pn.Scene(model, q0=[0.0, 0.5 * np.pi]), 10.0, output_dt=0.01, **TIGHT)
-        # M + m - m cos^2 in double precision keeps ten digits, so 1e-8 is what the coordinates allow.
+        # M + m - m cos^2 keeps ten digits in double precision, so the coordinates limit the error to 1e-8.
         assert self.error(run, run.q[:, 1]) < 0.1 * self.ACCEPTED
 
     def test_dependent_coordinates(self):

@@ -1,4 +1,4 @@
-"""Robots on two flat feet that slide: eight contacts share what they carry, and the legs move."""
+"""Robots on two sliding flat feet: eight contacts share the load, and the legs move."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pin_nonideal as pn
 from ..support.mechanisms import body, empty, frame
 
 SHANK, SOLE = 0.35, 0.07  # length of thigh and shank, and of the ankle above the ground [m]
-BALANCED = 1e-7  # of the energy that there is
+BALANCED = 1e-7  # energy balance relative to the energy
 DEPTH = 1e-10  # [m], that no contact leaves or sinks below its plane
 
 

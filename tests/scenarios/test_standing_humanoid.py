@@ -1,4 +1,4 @@
-"""A humanoid on two feet with dry friction in all joints: postures near singular ones, in which much sticks.
+"""A humanoid on two feet with dry friction in all joints: nearly singular postures with many sticking joints.
 
 The pitch axes of two straight legs are parallel but for the little by which the pelvis leans.  When the other
 joints stick, the feet then hold that little by a millionth of their forces.
@@ -17,7 +17,7 @@ import pin_nonideal as pn
 from pin_nonideal.description.actuation import Table
 
 SOLES = ("left_sole_link", "right_sole_link")
-# By which a sole may leave its place: far above rounding, far below what dropped rows would let it drift [m].
+# Maximum drift of a sole [m]: far above rounding, far below the drift with dropped rows.
 KEPT = 1e-9
 
 
@@ -117,7 +117,7 @@ def test_what_stands_is_moved_by_what_begins_to_push(late: str) -> None:
 def test_sinks_as_friction_lets_it(seed: int) -> None:
     """From rest, by Gauss's principle: the least |R^T a|^2 over friction within its limits.
 
-    What sticks in a leg is told by the accelerations of legs, not by those of a wrist that is much lighter.
+    Sticking in a leg depends on accelerations of legs, not on those of a much lighter wrist.
     """
     limit, kp = 20.0, 500.0
     scene = standing(limit, kp, 20.0)
@@ -145,7 +145,7 @@ def test_sinks_as_friction_lets_it(seed: int) -> None:
 
 
 def test_a_jam_of_joints_is_told_as_one() -> None:
-    """Bearings as wide as the links: of 27 ways in which three joints at rest may go on none is a motion."""
+    """For bearings as wide as the links, none of the 27 modes of three joints at rest is a solution."""
     talos = pn.load("talos")
     model, names = talos.model, list(talos.model.names)[2:]
     bearings = [pn.JointFriction(name, mu=0.1, radius=0.05) for name in names]

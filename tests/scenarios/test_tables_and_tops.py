@@ -102,7 +102,7 @@ def test_a_table_stands_while_its_load_slides(draw):
     assert np.abs(run.a[:, :6]).max() < STILL
 
 
-# Of a hundred tables two ended in errors where the last of them dwindles.
+# Two of a hundred tables ended in errors during chatter.
 @pytest.mark.parametrize(
     "draw",
     seeds([*range(DRAWS), 101, 154, 167, 286, 441, 504, 517, 540, 566, 650, 690], always=[101, 441, 504]),

@@ -68,7 +68,7 @@ def test_a_block_rocks_to_rest(draw):
 
 @each_draw
 def test_a_squat_block_stops_at_once(draw):
-    """Where sin^2 of its diagonal is 2/3 or more."""
+    """The block stops at the first impact if sin^2 of its diagonal is at least 2/3."""
     rng = np.random.default_rng([12, draw])
     b = decades(rng, 0.05, 1.0)
     h = b * rng.uniform(0.2, np.sqrt(0.5))
@@ -158,7 +158,7 @@ def test_a_chain_with_gaps(draw):
     x, v = (
         gap * np.arange(count),
         np.array([speed, *np.zeros(count - 1)]),
-    )  # of points, the balls' size left out
+    )  # positions as points, without the balls' size
     time, instants = 0.0, []
     while len(instants) < 10 and (np.diff(v) < 0.0).any():
         closing = -np.diff(v)

@@ -16,7 +16,7 @@ from ..support.row_cases import ROBOTS, kept
 
 # Sums of a few dozen products of forces and displacements.
 ROUNDING = 1e-11
-# Runs at this tolerance keep what is conserved to a few hundred steps of it.
+# Error of conserved quantities: several hundred steps at this tolerance.
 RUN = {"rtol": 1e-10, "atol": 1e-11}
 KEPT = 1e-8
 

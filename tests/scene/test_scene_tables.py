@@ -1,4 +1,4 @@
-"""Tables of a scene: what it is made of, M(q), rows, energies, beside Pinocchio."""
+"""Tables of a scene: parts, M(q), rows and energies, against Pinocchio."""
 
 from __future__ import annotations
 

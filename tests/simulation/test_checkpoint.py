@@ -294,7 +294,7 @@ def test_a_damaged_header(written):
 
 
 def states_of(scene, duration):
-    """What the core hands over to be written, and the options to read it with."""
+    """Return the states that the core writes, and the options to read them."""
     states = []
     options = run_options(scene, duration, 0.0, "dop853", 1e-6, None, None, None, None, (), "error")
     q, v = scene.initial_state()
@@ -313,7 +313,7 @@ def resumed(scene, state, options):
 
 
 def test_states_that_do_not_fit():
-    """Of another scene, cut off, or with bytes put in anywhere."""
+    """States of another scene, truncated states, and states with inserted bytes are rejected."""
     scene = cart()
     states, options = states_of(scene, 0.2)
     state, others = states[0], states_of(pn.load("four_bar"), 1e-3)[0]

@@ -1,4 +1,4 @@
-"""Forces as data: of each law, and what joints and anchors carry, beside Pinocchio and Newton's laws."""
+"""Recorded forces of laws, joints and anchors, against Pinocchio and Newton's laws."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..support.mechanisms import body, empty, frame
 from ..support.refusals import refuses
 from ..support.same_run import assert_same_run
 
-# Of recursive Newton-Euler sums beside the core's own, over the largest of them.
+# Difference of recursive Newton-Euler sums from the core's, relative to the largest.
 ROUNDING = 1e-10
 RECORD = ("a", "forces", "power", "energy", "reactions")
 
@@ -125,7 +125,7 @@ def frame_names(scene, name):
 
 
 def test_joint_wrenches_are_those_of_pinocchio(run):
-    """The tree with its loops cut, and what closed them as forces, contacts with their friction."""
+    """Joint wrenches equal those of the cut tree with loop and contact forces, including friction."""
     scene, model = run.scene, run.scene.model
     names = [model.names[i] for i in range(1, model.njoints)]
     for k in range(0, len(run), 3):
@@ -199,7 +199,7 @@ def test_a_joint_carries_the_same_wherever_the_loop_is_cut():
     for mine, theirs in (("crank", "crank"), ("pin", "pin"), ("close", "rocker"), ("joint", "close")):
         a, b = run.reaction(mine, axes="world"), other.reaction(theirs, axes="world")
         sign = -1.0 if (mine, theirs) == ("joint", "close") else 1.0
-        planar = [0, 2, 4]  # what a plane mechanism closed in space shares out elsewhere is not unique
+        planar = [0, 2, 4]  # out-of-plane loads of a planar mechanism with spatial closure are not unique
         size = np.abs(a).max()
         np.testing.assert_allclose(a[:, planar], sign * b[:, planar], rtol=0, atol=1e-7 * size, err_msg=mine)
 

@@ -1,4 +1,4 @@
-"""What is recorded changes neither motion nor events; what projection finds on its way is no result."""
+"""Recording changes neither motion nor events, and intermediate results of projection are not recorded."""
 
 from __future__ import annotations
 

@@ -23,13 +23,13 @@ from ..support.seeds import seeds
 # The oracle's roots and the core's carry the rounding of one linear solution, magnified by 1/det(I - dg/dy),
 # which is 1e4 at most in cases that are not in doubt.
 SAME = 1e-7
-# Where the growth of g comes within 1e-8 of one the determinant is not told from zero; here it grows by 0.25
-# a second.
+# Error of the event time: the determinant is zero within rounding if the slope of g is within 1e-8 of one,
+# and the slope grows by 0.25 per second.
 INSTANT = 5e-8
 
 
 def told(scene, q, v):
-    """What `solve` says of the motion: how many there are, their accelerations, and limits of several."""
+    """Return the number of solutions of `solve`, their accelerations, and the limits of several solutions."""
     try:
         s = scene.solve(q, v)
         return {True: "one", None: "not shown"}[s.unique], [s.a], []

@@ -128,7 +128,7 @@ def test_the_clock_of_functions_of_time():
     np.testing.assert_allclose(run.q[:, 0], 0.3 * np.sin(5.0 * run.t), atol=1e-12)
 
 
-# --- What cannot go on --------------------------------------------------------------------------------------
+# --- Failing runs --------------------------------------------------------------------------------------
 
 
 def test_sampled_control_is_refused():

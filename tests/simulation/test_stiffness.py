@@ -16,7 +16,7 @@ from ..support.refusals import refuses
 from ..support.same_run import assert_same_run
 
 EXPLICIT = ["dop853", "dopri5"]
-# Of a rate found by power iteration, and of one of an oscillation by its plane.
+# Error of a rate by power iteration, and of an oscillation rate by its plane.
 RATE = 0.05
 
 
@@ -106,7 +106,7 @@ def test_stiff_friction_that_crowds_its_events():
 
 
 def test_a_force_that_leaps_is_not_stiff():
-    """A push that turns a million times a second crowds events; what rests at a leap beside it rests on."""
+    """A force with a million jumps a second crowds events; a sticking element beside it keeps sticking."""
     model = empty(gravity=(0.0, 0.0, 0.0))
     body(model, 0, pin.JointModelPX(), "slide", 1.0)
     body(model, 0, pin.JointModelPY(), "beside", 1.0)
@@ -187,7 +187,7 @@ def test_a_wrong_number_of_steps(wrong):
         pn.simulate(pulled(1.0), 1.0, max_steps=wrong)
 
 
-# --- What takes long for a fast motion ---------------------------------------------------------------------
+# --- Slow runs of fast motions ---------------------------------------------------------------------
 
 
 def beam(links: int = 30, damping: float = 0.0) -> pn.Scene:
@@ -241,7 +241,7 @@ def test_what_is_allowed_by_max_steps_is_not_told(recwarn):
 
 
 def swings():
-    """Motions without damping to speak of: whatever the tolerance, steps follow what moves."""
+    """Return motions with little or no damping: step sizes follow the motion at any tolerance."""
     pendulum = empty()
     joint = body(pendulum, 0, pin.JointModelRY(), "a", 1.0, lever=(0.0, 0.0, -0.5))
     place = pin.SE3(np.eye(3), np.array([0.0, 0.0, -1.0]))

@@ -38,7 +38,7 @@ NAMED_V = {
 
 
 def coordinates():
-    """What NAMED_Q and NAMED_V say, by Pinocchio's own means."""
+    """Return the values of NAMED_Q and NAMED_V, by functions of Pinocchio."""
     q = np.concatenate(
         [
             [0.3, -0.1],

@@ -11,7 +11,7 @@ import pin_nonideal as pn
 from ..support.mechanisms import body, empty, frame
 from ..support.seeds import seeds
 
-CLOSE = 1e-5  # of configurations that a search ends in, in units of the mechanism
+CLOSE = 1e-5  # difference of search results, in units of the mechanism
 
 
 def planar_loop(seed: int, length: float = 1.0, times: int = 1, factor: float | None = None) -> pn.Scene:

@@ -146,7 +146,7 @@ def hanging(links: int, depth: float, feet=(-0.1, 0.1)) -> tuple[pn.Scene, np.nd
 
 @pytest.mark.parametrize("depth", [1e-9, 1e-6, 1e-3, 3.5e-3])
 def test_a_straight_leg_bends_its_knee(depth: float) -> None:
-    """The knee bends by the root of the depth: 2 z'' = depth, whatever the linear model says."""
+    """The knee bends by the root of the depth, 2 z'' = depth, although the linear model is singular."""
     scene, q = hanging(3, depth)
     on, _, report = scene.project(q, np.zeros(3), report=True)
     data = scene.model.createData()

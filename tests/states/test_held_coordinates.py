@@ -18,8 +18,8 @@ from ..support.refusals import refuses
 from ..support.seeds import seeds
 from .test_held_velocities import chain
 
-CLOSED = 1e-10  # of residuals [m] of chains of a meter
-STATIONARY = 1e-6  # of the gradient of the move, which a search takes for zero at 1e-10 of it
+CLOSED = 1e-10  # residual of chains of 1 m [m]
+STATIONARY = 1e-6  # gradient tolerance; the search ends at a relative gradient of 1e-10
 
 
 def loop_at(scene, q):

@@ -16,7 +16,7 @@ from ..support.mechanisms import body, empty, frame
 from ..support.refusals import refuses
 from ..support.seeds import seeds
 
-ROUNDING = 1e-9  # of rates and velocities of some 10
+ROUNDING = 1e-9  # error of rates and velocities of about 10
 
 
 def rates(scene, q, v):

@@ -58,7 +58,7 @@ def random_friction(seed):
     ],
 )
 def test_it_comes_to_rest(friction, sway, seed):
-    """Forces within their limits tell whether two joints may hold what a third all but holds as well."""
+    """Forces within the limits decide if two joints can stick where a third is nearly redundant."""
     assert (come_to_rest(friction, sway, seed).v[-1] == 0.0).all()
 
 
@@ -74,8 +74,8 @@ def test_random_friction_never_gives_energy(seed):
 def test_friction_of_any_stance():
     """Never more than a cluster of events that is bridged, and never energy.
 
-    Eight joints that stick hold a stance in which the other four all but jam: there loads grow beyond what
-    friction leaves one motion for, and the run says so.
+    Eight sticking joints hold a stance in which the other four nearly jam.  Loads there grow beyond the range
+    of a unique solution, which the run reports.
     """
     jammed = 0
     for seed in range(100, 160):

@@ -18,7 +18,7 @@ from ..support.standing import plate, star
 
 # A fold of the equation of rest costs half the digits of a force near it.
 MOTION = 1e-7
-# Of the time at which a stance gives way, and of the conditions that the optimizer leaves open [N or N^2].
+# Error of the time of slip onset, and residual of the optimizer's conditions [N or N^2].
 GIVE_WAY = 1e-6
 CONVERGED = 1e-6
 # Normal force below which a foot is about to lift [N].
@@ -26,7 +26,7 @@ PRESSED = 1e-3
 
 
 def stickiest(solutions):
-    """The motion in which all that sticks in any other sticks, and more; None where there is no such one."""
+    """Return the solution whose sticking set contains all others, or None."""
     stuck = [frozenset(np.flatnonzero(np.equal(modes, 0))) for modes, _ in solutions]
     for k, own in enumerate(stuck):
         if all(own > other for i, other in enumerate(stuck) if i != k):
@@ -175,7 +175,7 @@ def pulse(seed):
 
 @pytest.mark.parametrize("seed", [10, 13, 21, 23, 32, 52, 58])
 def test_a_push_within_a_step_at_rest(seed):
-    """What holds again by the end of the step has slipped inside it."""
+    """Elements that stick at the end of the step have slipped inside it."""
     scene, begins, after = pulse(seed)
     run = pn.simulate(scene, after)
     first = min(event.time for event in run.events if event.kind == "slip")

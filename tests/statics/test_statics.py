@@ -69,7 +69,7 @@ def test_a_pendulum_hangs_or_stands():
     hangs = pn.equilibrium(pendulum())
     np.testing.assert_allclose(hangs.q, [0.5 * np.pi], rtol=0, atol=1e-12)
     assert hangs.stable is True
-    np.testing.assert_allclose(hangs.rates, [1.5 * G], rtol=1e-8)  # of a bar: 3 g / (2 l)
+    np.testing.assert_allclose(hangs.rates, [1.5 * G], rtol=1e-8)  # rate of a bar: 3 g / (2 l)
     stands = pn.equilibrium(pendulum(), {"swing": -1.4}, stable=False)
     np.testing.assert_allclose(stands.q, [-0.5 * np.pi], rtol=0, atol=1e-12)
     assert stands.stable is False
@@ -183,7 +183,7 @@ def test_a_block_on_an_incline(angle):
 
 
 def test_the_cone_is_round():
-    """Pushed across as well: what counts is the length of both, at every angle around."""
+    """With a lateral force the norm of the tangential force counts, in every direction."""
     for turn in np.linspace(0.0, 2.0 * np.pi, 7):
         push = 5.0 * np.array([np.cos(turn), np.sin(turn), 0.0])
         found = pn.rest(block(0.2, 0.5, push))
@@ -210,7 +210,7 @@ def test_static_friction_and_joints():
 
 
 def test_rest_agrees_with_the_motion():
-    """Where the margin is positive the simulation stays, where it is negative it leaves."""
+    """The simulation stays at rest if the margin is positive, and moves if it is negative."""
     for angle, mu in ((0.3, 0.4), (0.3, 0.28), (0.5, 0.6), (0.5, 0.5)):
         scene = block(angle, mu)
         assert pn.rest(scene).rests == (np.abs(pn.simulate(scene, 0.2).v).max() == 0.0)

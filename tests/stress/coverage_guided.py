@@ -2,8 +2,8 @@
 
     python tests/stress/coverage_guided.py robot.yaml -max_total_time=600
 
-The first argument is what is read: robot.yaml, robot.urdf, trajectory or checkpoint; the others are of
-libFuzzer.
+The first argument is the kind of input: robot.yaml, robot.urdf, trajectory or checkpoint.  The other
+arguments are those of libFuzzer.
 Inputs grow from the files of the package's robots; one that ends in an error without a name is written to
 crash-<digest> in the current folder and shown with its traceback.
 """

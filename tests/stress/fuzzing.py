@@ -13,10 +13,10 @@ few_and_many = pytest.mark.parametrize("examples", [25, pytest.param(3000, marks
 
 
 def for_all(check, *strategies, examples):
-    """Calls `check` on examples of the strategies: the same each time; the smallest that fails is shown.
+    """Call `check` on reproducible examples of the strategies; the smallest failing example is shown.
 
-    What the check returns tells whether the example was taken (anything but None) or refused by name.
-    Where all are refused, or all taken, nothing was tried.
+    The check returns None for a named error, else any other value.  If all examples are rejected, or all are
+    accepted, the test fails.
     """
     quiet = settings(
         max_examples=examples,
@@ -35,12 +35,12 @@ def for_all(check, *strategies, examples):
 
 
 def result_or_named_error(call):
-    """What the call returns, or None when it ends in an error of this package; any other error goes on."""
+    """Return the result of the call, or None for an error of this package; other errors propagate."""
     try:
         return call()
     except PinNonidealError as error:
         message = str(error)
-    assert len(message.split()) > 3  # what must hold, what came, what to do
+    assert len(message.split()) > 3  # requirement, given value, remedy
     return None
 
 

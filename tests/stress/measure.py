@@ -1,4 +1,4 @@
-"""What the stress runs measure, and linkages built for them."""
+"""Measurements of the stress runs, and linkages for them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..support.mechanisms import frame
 
 
 def at_most(what, value, bound):
-    """Prints what was measured beside what must hold (shown by `pytest -rP`), and holds it."""
+    """Print the measured value and its bound (shown by `pytest -rP`), and assert the bound."""
     print(f"{what}: {value:.2g}, at most {bound:.2g}")
     assert value <= bound
 

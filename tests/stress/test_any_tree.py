@@ -22,7 +22,7 @@ from .test_random_mechanisms import closures
 FEW, MANY, BLOCK = 60, 10_000, 100
 # Sums of a few dozen products in another order.
 ROUNDING = 1e-12
-# Of the accelerations in play, while M has a condition below KNOWN: its rounding grows by that.
+# Relative error of accelerations for a condition of M below KNOWN, which magnifies rounding.
 SOLVED = 1e-9
 KNOWN = 1e5
 # Rows whose singular values all lie outside this band are dependent or not, and no tolerance decides.

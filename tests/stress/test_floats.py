@@ -32,7 +32,7 @@ def no_warnings():
 
 
 def ends_well(call, size):
-    """What came of a call with numbers of this size: a run or an array, or None after an error by name."""
+    """Return the result of a call with numbers of this size, or None after a named error."""
     try:
         result = call()
     except PinNonidealError as error:

@@ -29,7 +29,7 @@ DESCRIPTIONS = [
     pn.box_contacts,
 ]  # fmt: skip
 TIMES = [pn.constant, pn.polynomial, pn.sinusoid, pn.spline]
-# Where a description belongs in a scene.
+# Arguments of a scene for each description.
 PLACES = {
     "constraints": ("Distance", "FrameAnchor", "HingeAnchor", "JointCoupling", "KnifeEdge", "PointAnchor",
                     "PrescribedMotion", "Rolling", "UserConstraint"),
@@ -363,7 +363,7 @@ def test_stores(scene, examples, tmp_path):
 
 @few_and_many
 def test_render(scene, examples, tmp_path, monkeypatch):
-    """What is asked for is checked before a browser is started, which here gives one picture for all."""
+    """Arguments are checked before a browser starts; here the browser returns one fixed picture."""
     picture = io.BytesIO()
     Image.new("RGB", (2, 2)).save(picture, "PNG")
 

@@ -92,7 +92,7 @@ def damaged(text, place, length, filling):
 
 
 def loads_and_runs(folder):
-    """Loads a folder; what loads also runs, or stops by name."""
+    """Load a folder and run its scene; both succeed or raise a named error."""
     scene = result_or_named_error(lambda: pn.load(folder))
     if scene is None:
         return None

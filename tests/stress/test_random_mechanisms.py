@@ -1,6 +1,6 @@
 """Mechanisms drawn by lot: every one runs with its books in order, or stops with an error by name.
 
-The seed of each is its number, printed with what was measured; `check(1234)` runs one again.
+The seed of each is its number, printed with the measurements; `check(1234)` repeats a seed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ..support.random_trees import JOINTS, attach, place_of, state, tree
 from .measure import finite
 
 FEW, MANY, BLOCK = 40, 10_000, 100
-# Of the energy in play, at rtol 1e-8 over at most a few hundred steps.
+# Relative energy error at rtol 1e-8 over at most several hundred steps.
 BALANCE = 1e-5
 # A chain of a few meters after projection.
 CLOSURE = 1e-9

@@ -15,7 +15,7 @@ from ..support.mechanisms import empty
 from .measure import at_most, finite, ledger, linkage
 
 TIGHT = {"rtol": 1e-12, "atol": 1e-13}
-# What is left of the energy at these tolerances after a few hundred steps.
+# Energy error at these tolerances after several hundred steps.
 CLOSED = 1e-8
 # Positions of bodies as large as R are known to R eps, and their residuals to a few hundred times that.
 CLOSURE = 1e-13

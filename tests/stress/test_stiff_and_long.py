@@ -118,7 +118,7 @@ def test_a_brake_that_holds_for_a_day_costs_nothing():
 def test_time_far_from_zero():
     """A day is added to all times and nothing else changes, up to the rounding of time."""
     scene = pn.load("five_bar")
-    period = 2.0 * np.pi / 4.0  # of its drive
+    period = 2.0 * np.pi / 4.0  # period of the drive
     shift = 60000 * period
     options = {"rtol": 1e-11, "atol": 1e-12, "output_dt": 0.1}
     here, there = (pn.simulate(scene, 1.0, t0=t0, **options) for t0 in (0.0, shift))

@@ -36,7 +36,7 @@ class Sentence:
 
     @property
     def has_what(self) -> bool:
-        """Check if the sentence has the word "what"."""
+        """Check if the sentence has the word `what`."""
         return "what" in self.words
 
     @property
@@ -47,7 +47,7 @@ class Sentence:
 
 @dataclass(frozen=True)
 class Counts:
-    """Numbers of sentences: total, with a "what", with an opener that stands for a noun."""
+    """Numbers of sentences: in total, with `what`, and with an opener that stands for a noun."""
 
     sentences: int
     whats: int
@@ -55,7 +55,7 @@ class Counts:
 
     @property
     def whats_per_100(self) -> float:
-        """Return the number of sentences with a "what" per 100."""
+        """Return the number of sentences with `what` per 100."""
         return 100 * self.whats / max(self.sentences, 1)
 
     @property

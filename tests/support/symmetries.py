@@ -420,7 +420,7 @@ transformation("rows by hand, times 1e-4")(lambda case: by_hand(case, 1e-4))
 
 
 def split(case: Case, by: Any, hold: Any) -> Image | None:
-    """Split a body near the end into two parts that a joint and a constraint connect."""
+    """Split the body of the middle joint into two parts that a joint and a constraint connect."""
     j = 1 + (case.model.njoints - 1) // 2
     if (
         j >= case.model.njoints

@@ -86,7 +86,7 @@ def packs(store):
 
 
 def test_what_is_missing_is_done_and_what_is_there_is_not_done_again(tmp_path):
-    """Of the files only the index, or only what follows a run, may be lost or cut off."""
+    """The index, or the end of a file after a run, may be lost or truncated."""
     store = tmp_path / "runs"
     kept = pn.sweep(pendulum, GRID, 0.1, jobs=1, store=store, measure=amplitude)
     index = store / "index.jsonl"
@@ -108,7 +108,7 @@ def test_what_is_missing_is_done_and_what_is_there_is_not_done_again(tmp_path):
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_kill_loses_nothing_that_was_done(tmp_path, jobs):
-    """A process is killed in the middle; the same call goes on with what is missing."""
+    """A process is killed during a sweep; the same call computes the missing runs."""
     store = tmp_path / "runs"
     code = f"""
     import sys
@@ -139,7 +139,7 @@ def test_a_kill_loses_nothing_that_was_done(tmp_path, jobs):
 
 
 def test_a_run_knows_its_robot(tmp_path):
-    """What `load` made is loaded again; a run is an archive as `save` writes it."""
+    """A scene from `load` is loaded again; a run is an archive in the format of `save`."""
     points = [{"name": "four_bar"}, {"name": "slider_crank"}]
     kept = pn.sweep(pn.load, points, 0.1, jobs=1, store=tmp_path / "runs", record="forces")
     run = kept.load(1)
@@ -239,7 +239,7 @@ def test_makers_are_told_apart_by_what_they_hold(tmp_path):
 
 
 def test_a_full_disk_is_named(tmp_path, monkeypatch):
-    """What was done before stays; the run that was cut off is done again."""
+    """Earlier runs are kept, and the interrupted run is repeated."""
     resource = pytest.importorskip("resource")
     store = tmp_path / "runs"
     whole = pn.sweep(pendulum, GRID, 0.1, jobs=1, store=tmp_path / "whole")

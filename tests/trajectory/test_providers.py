@@ -1,4 +1,4 @@
-"""terms="pinocchio" beside terms="core": one evaluation, whole runs, and what a run leaves behind."""
+"""terms="pinocchio" against terms="core": evaluations, runs and workspaces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figures of a run: what each axis shows, and files that are whole or not there."""
+"""Figures of a run: contents of each axis, and complete files or none."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def test_a_video_is_written(run: Any, tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("ending", ["mp4", "webm"])
 def test_a_video_is_played(run: Any, tmp_path: Path, ending: str) -> None:
-    """What a player shows of it is the picture of that time."""
+    """Frames of the video equal the pictures at their times."""
     video = pn.render(run, tmp_path / f"a.{ending}", width=319, height=200, seconds=1.0, fps=8)
     stills = [pn.render(run, tmp_path / f"{k}.png", width=320, height=200, time=k / 7.0) for k in (3, 4, 5)]
     (tmp_path / "a.html").write_text(f'<body style="margin: 0"><video src="{video.name}"></video>')
@@ -123,7 +123,7 @@ def test_what_cannot_be_rendered_is_told(run: Any, tmp_path: Path, monkeypatch: 
 
 
 class Window:
-    """What `meshcat.Visualizer` sends to its window, without one."""
+    """Recorder of the commands that `meshcat.Visualizer` sends to its window."""
 
     def __init__(self) -> None:
         self.sent: list[Any] = []

@@ -1,4 +1,4 @@
-"""What the controls of a replay page do: time line, keys, pointer and camera, in a browser."""
+"""Controls of a replay page in a browser: time line, keys, pointer and camera."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_the_camera_turns_and_returns(loop: Any) -> None:
     turned = loop.watched.picture(0.0)
     assert changed(before, turned) > MOVED
     loop.page.keyboard.press("r")
-    inside = (slice(4, -4), slice(4, -4))  # the ring around what has the focus left out
+    inside = (slice(4, -4), slice(4, -4))  # without the focus ring
     assert changed(before[inside], loop.watched.picture(0.0)[inside]) == 0
 
 

@@ -1,4 +1,4 @@
-"""The file of a replay: how it is written, what stands in it, and what is refused; no browser is needed."""
+"""The file of a replay: writing, contents and errors, without a browser."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Marks and arrows of the replay: where constraints act, in which direction, and how large."""
+"""Marks and arrows of the replay: position, direction and size of constraint forces."""
 
 from __future__ import annotations
 

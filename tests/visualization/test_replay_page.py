@@ -1,4 +1,4 @@
-"""What a replay page shows: opened from file:// by a browser without network, and compared with Pinocchio."""
+"""Contents of a replay page, opened from file:// without network, and compared with Pinocchio."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ POSE = 1e-5
 # The straight line between samples 1/60 s apart errs by a'' h^2 / 8, the blend by less: 8 rad/s^2 on 0.9 m.
 BLENDED = 1e-3
 
-# Sizes in bytes, with a fifth to spare over what was measured; the viewer library takes 0.29 MB of each.
+# Maximum sizes [bytes], a fifth above the measured sizes; the viewer library takes 0.29 MB of each.
 BUDGET = {"panda": 2_500_000, "four_bar": 500_000}
 
 

@@ -1,4 +1,4 @@
-"""What a reader chooses to see: the tree of the scene, signals to plot, overlays, views, the address."""
+"""Panel of a replay page: tree of the scene, plotted signals, overlays, views, the URL."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a replay shows of fast, long, large, small and failed runs, in a browser."""
+"""Replays of fast, long, large, small and failed runs, in a browser."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from ..support.paper_examples import example
 from ..support.replay_browser import Watched, changed, headless_browser
 from ..support.replay_runs import jointed, run_of
 
-# Of the smallest link: what a loop may be drawn open.
+# Closure gap of a drawn loop, relative to the smallest link.
 GAP = 1e-2
-# Of the model's size: at frames, which travel as 32-bit floats, through a product of rotations; between them.
+# Errors relative to the model's size: at frames, with 32-bit floats and products of rotations, and between.
 AT_FRAMES, BETWEEN = 1e-5, 1e-3
 
 
@@ -99,7 +99,7 @@ def test_forty_revolutions_a_second_are_drawn_closed(opened: Any) -> None:
 
 
 def paper_runs() -> dict[str, tuple[Any, Any]]:
-    """The three examples of the paper, with what the paper prints of their forces."""
+    """Return the three examples of the paper, with the printed forces."""
     a, b, c = (example(name) for name in ("paper_a_particle", "paper_b_ring", "paper_c_incline"))
     particle, ring, block = a.Particle(), b.Ring(), c.Incline()
     q = np.array([0.3, -0.2, 0.9])

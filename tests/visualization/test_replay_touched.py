@@ -1,4 +1,4 @@
-"""What a replay shows of contacts that open, of springs and drag, and of a run between its samples."""
+"""Replay of unilateral contacts, springs and drag, and of a run between its samples."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from ..support.replay_runs import add_frame, jointed
 
 G = 9.81
 ROUNDING = 1e-9
-BLENDED = 1e-6  # of cubics between the samples of a smooth run
+BLENDED = 1e-6  # error of cubics between the samples of a smooth run
 
 
 def ball(**contact: Any) -> Any:
@@ -159,7 +159,7 @@ def test_points_of_contact_that_span_a_solid_are_its_corners() -> None:
     corners = [np.array([x, y, z]) for x in (-0.1, 0.1) for y in (-0.2, 0.2) for z in (-0.3, 0.3)]
     (solid,) = sticks(model, [(1, corner) for corner in corners], 0.5)
     found = solid.shape.vertices[solid.shape.triangles]
-    volume = np.sum(np.linalg.det(found)) / 6.0  # of a closed surface whose triangles look outwards
+    volume = np.sum(np.linalg.det(found)) / 6.0  # volume of a closed surface with outward triangles
     assert volume == pytest.approx(0.2 * 0.4 * 0.6, rel=1e-12)
     flat = sticks(model, [(1, corner) for corner in corners if corner[2] < 0.0], 0.5)
     assert len(flat) > 3
@@ -167,7 +167,7 @@ def test_points_of_contact_that_span_a_solid_are_its_corners() -> None:
 
 @pytest.mark.slow
 def test_views_are_framed_between_what_lies_over_them(tmp_path: Path) -> None:
-    """The robot is neither under the heading nor under the buttons, and a belt that ran 100 m stays large."""
+    """The robot is not covered by heading or buttons, and a belt with 100 m travel stays large."""
     runs = {
         "four_bar": pn.simulate(pn.load("four_bar"), 1.0, record="forces"),
         "delta": pn.simulate(pn.load("delta"), 0.5, record="forces"),
