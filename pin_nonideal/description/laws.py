@@ -160,7 +160,7 @@ class JointFriction:
             joints = [
                 name for name, joint in zip(known, list(model.joints)[1:], strict=True) if joint.nv == 1
             ]
-        table = joints if isinstance(joints, Mapping) else dict.fromkeys(joints, {})
+        table = joints if isinstance(joints, Mapping) else {name: {} for name in joints}
         laws = []
         for joint, given in table.items():
             if joint not in known:
