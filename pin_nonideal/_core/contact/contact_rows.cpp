@@ -1,28 +1,36 @@
 #include "contact/contact_rows.hpp"
 
+#include <utility>
+
 #include "dynamics/evaluation.hpp"
 #include "dynamics/acceleration.hpp"
 #include "dynamics/step_start.hpp"
 
 namespace pn {
 
-void free_contacts(const Program& p, Workspace& w, const std::vector<char>& touching) {
+static void free_contacts(const Program& p, Workspace& w, const std::vector<char>& touching,
+                          const std::vector<Mode>& modes) {
     set_closed(p, w, touching);
-    set_modes(p, w, std::vector<Mode>(p.frictions.size(), unloaded));
+    set_modes(p, w, modes);
     for (const Gap& gap : p.gaps)
         for (size_t k = 0; k < p.blocks[gap.block].kept.size(); ++k)
             w.now.rows.required[p.blocks[gap.block].row + k] = 0;
     w.now.rows.use_required(p.blocks);
 }
 
+void free_contacts(const Program& p, Workspace& w, const std::vector<char>& touching) {
+    free_contacts(p, w, touching, std::vector<Mode>(p.frictions.size(), unloaded));
+}
+
 void release_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                      const std::vector<char>& touching) {
-    free_contacts(p, w, touching);
+                      const std::vector<char>& touching, const std::vector<Mode>& modes) {
+    free_contacts(p, w, touching, modes);
     begin_step(p, w, t, q, v);
 }
 
-ContactRows::ContactRows(const Program& program, Workspace& workspace, const std::vector<int>& list, bool rub)
-    : p(program), w(workspace), gaps(list) {
+ContactRows::ContactRows(const Program& program, Workspace& workspace, const std::vector<int>& list, bool rub,
+                         std::vector<int> more)
+    : p(program), w(workspace), gaps(list), others(std::move(more)) {
     int rows = 0;
     for (int gap : gaps) {
         const int sliding = rub ? p.gaps[gap].sliding : -1;
@@ -30,6 +38,11 @@ ContactRows::ContactRows(const Program& program, Workspace& workspace, const std
         first.push_back(rows);
         cones.push_back(ConeElement::contact(1 + slips, sliding < 0 ? 0.0 : p.frictions[sliding].mu));
         rows += 1 + slips;
+    }
+    for (int e : others) {
+        first.push_back(rows);
+        cones.push_back(ConeElement::box(p.frictions[e].dim, 0.0));
+        rows += p.frictions[e].dim;
     }
     W.setZero(rows, rows);
     response.setZero(p.mechanism.nv, rows);

@@ -8,23 +8,31 @@ namespace pn {
 
 // Evaluate touching contacts as rows without constraint forces and friction. `touching` is by gap.
 void free_contacts(const Program& p, Workspace& w, const std::vector<char>& touching);
-// Do the same and compute the motion at (t, q, v).
+// Do the same with the friction of slipping elements in `modes`, which contacts have none of, and compute the motion at
+// (t, q, v).
 void release_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                      const std::vector<char>& touching);
+                      const std::vector<char>& touching, const std::vector<Mode>& modes);
 
-// Rows of some contacts, each with its normal and then its slip directions: response to forces along them, and
-// velocities.
+// Rows of some contacts, each with its normal and then its slip directions, and of other friction elements: response to
+// forces along them, and velocities.
 struct ContactRows {
     const Program& p;
     Workspace& w;
     const std::vector<int>& gaps;
-    std::vector<ConeElement> cones;
-    std::vector<int> first;  // first row of each contact
+    std::vector<int> others;         // friction elements that belong to no contact
+    std::vector<ConeElement> cones;  // of the contacts, then of the other elements
+    std::vector<int> first;          // first row of each
     MatX W, response;        // velocities of the rows, and v, for a unit of each force or impulse
     VecX velocity;           // velocities of the rows
 
-    // Set up the rows of these unconstrained gaps. Without `rub`, only their normals.
-    ContactRows(const Program& p, Workspace& w, const std::vector<int>& gaps, bool rub = true);
+    // Set up the rows of these unconstrained gaps and elements. Without `rub`, only the normals of the gaps.
+    ContactRows(const Program& p, Workspace& w, const std::vector<int>& gaps, bool rub = true,
+                std::vector<int> others = {});
+
+    // Friction element of a cone, or -1.
+    int element(size_t cone) const {
+        return cone < gaps.size() ? p.gaps[gaps[cone]].sliding : others[cone - gaps.size()];
+    }
 
     // Call act(row of W, block, kept row of the block).
     template <class Act>
@@ -34,6 +42,8 @@ struct ContactRows {
             act(first[i], gap.block, 0);
             for (int k = 0; k + 1 < cones[i].dim; ++k) act(first[i] + 1 + k, p.frictions[gap.sliding].block, k);
         }
+        for (size_t i = gaps.size(); i < cones.size(); ++i)
+            for (int k = 0; k < cones[i].dim; ++k) act(first[i] + k, p.frictions[element(i)].block, k);
     }
 
     // Change of the rows' velocities due to a change of v.

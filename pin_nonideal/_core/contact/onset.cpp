@@ -20,17 +20,25 @@ constexpr int most_releases = 4;    // rounds that set kinetic limits of slippin
 constexpr int most_turns = 100;     // maximum iterations of loads and their friction
 constexpr double settled = 1e-13;   // rounding of the loads' change, relative to the largest acceleration
 
-// Check if the cone problem applies. All friction must be sliding of contacts that grows from zero with the load. No
-// user law may depend on reactions.
+// Check if the cone problem applies. All friction must be sliding of contacts that grows from zero with the load, or have
+// a constant limit. No user law may depend on reactions.
 bool fits(const Program& p) {
-    bool only_cones = true;
-    each_law<UserLaw>(p.laws, [&](const UserLaw& law) { only_cones &= law.reaction == Reaction::none; });
+    bool known = true;
+    each_law<UserLaw>(p.laws, [&](const UserLaw& law) { known &= law.reaction == Reaction::none; });
     for (size_t e = 0; e < p.frictions.size(); ++e) {
         const Friction& f = p.frictions[e];
-        only_cones &= f.gap >= 0 && p.gaps[f.gap].sliding == static_cast<int>(e) && f.constant == 0.0 &&
-                      static_cast<int>(p.blocks[f.block].kept.size()) == f.dim;
+        const bool slides = f.gap >= 0 && p.gaps[f.gap].sliding == static_cast<int>(e) && f.constant == 0.0;
+        const bool is_constant = f.gap < 0 && f.reaction == Reaction::none && f.mu == 0.0 && !f.user_limit;
+        known &= (slides || is_constant) && static_cast<int>(p.blocks[f.block].kept.size()) == f.dim;
     }
-    return only_cones;
+    return known;
+}
+
+bool is_at_rest(const Program& p, const Workspace& w, const VecX& v, const ClosingQuestion& question,
+                const RunState& before, int e) {
+    const bool known = before.mode[e] == sticking || before.lingers[e];
+    return e == question.arrived || (known && !question.struck) ||
+           slip_velocity(w.now, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
 }
 
 struct RestingProblem {
@@ -48,15 +56,15 @@ struct RestingProblem {
     VecX w0, f;
 
     RestingProblem(const Program& program, Workspace& workspace, const VecX& velocity, const std::vector<int>& gaps,
-                   const ClosingQuestion& asked, const RunState& state)
-        : p(program), w(workspace), v(velocity), question(asked), before(state), rows(program, workspace, gaps) {
+                   const std::vector<int>& others, const ClosingQuestion& asked, const RunState& state)
+        : p(program), w(workspace), v(velocity), question(asked), before(state), rows(program, workspace, gaps, true, others) {
         const int all = static_cast<int>(rows.W.rows());
         int n = 0;
         MatX share = MatX::Zero(all, all);
         drag = share;
         for (size_t i = 0; i < gaps.size(); ++i) {
             const int e = p.gaps[gaps[i]].sliding, at = rows.first[i], dim = rows.cones[i].dim;
-            const bool slips = e >= 0 && dim > 1 && !rests(e);
+            const bool slips = e >= 0 && dim > 1 && !is_at_rest(p, w, v, question, before, e);
             slides.push_back(slips);
             first.push_back(n);
             share(at, n) = 1.0;
@@ -70,6 +78,13 @@ struct RestingProblem {
                 cones.push_back(ConeElement::contact(dim, e < 0 ? 0.0 : limit(e)));
             }
             n += cones.back().dim;
+        }
+        for (size_t i = gaps.size(); i < rows.cones.size(); ++i) {
+            const int dim = rows.cones[i].dim;
+            first.push_back(n);
+            for (int k = 0; k < dim; ++k) share(rows.first[i] + k, n + k) = 1.0;
+            cones.push_back(ConeElement::box(dim, limit(rows.element(i))));
+            n += dim;
         }
         const VecX free = accelerations();
         W = chosen(rows.W * share.leftCols(n));
@@ -87,18 +102,19 @@ struct RestingProblem {
         return out;
     }
 
-    bool rests(int e) const {
-        const bool known = before.mode[e] == sticking || before.lingers[e];
-        return e == question.arrived || (known && !question.struck) ||
-               slip_velocity(w.now, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
-    }
+    // Coefficient of a contact, or limit of another element.
+    double strength(int e) const { return p.frictions[e].gap >= 0 ? p.frictions[e].mu : p.frictions[e].constant; }
 
     double limit(int e) const {
-        const Friction& friction = p.frictions[e];
         const std::vector<int>& list = question.breaking;
         const bool breaks = std::find(list.begin(), list.end(), e) != list.end();
-        return friction.holding_limit(friction.mu) * (breaks ? 1.0 - breaking_by : 1.0);
+        return p.frictions[e].holding_limit(strength(e)) * (breaks ? 1.0 - breaking_by : 1.0);
     }
+
+    // Rows of a cone that belong to a normal.
+    int head(size_t i) const { return cones[i].is(ConeElement::Kind::contact); }
+    int tail(size_t i) const { return cones[i].dim - head(i); }
+    auto tail_of(const VecX& x, size_t i) const { return x.segment(first[i] + head(i), tail(i)); }
 
     // Accelerations of the rows without contact forces.
     VecX accelerations() {
@@ -112,11 +128,10 @@ struct RestingProblem {
 
     double in_play() const { return w0.cwiseAbs().maxCoeff() + (W.cwiseAbs() * f.cwiseAbs()).maxCoeff(); }
 
-    // Check if the friction of a contact is at its limit. A contact that shares a load may have a load of rounding
-    // only.
+    // Check if friction is at its limit. A contact that shares a load may have a load of rounding only.
     bool at_its_limit(size_t i) const {
-        const double most = cones[i].bound * f[first[i]], rounding = none * f.cwiseAbs().maxCoeff();
-        return f.segment(first[i] + 1, cones[i].dim - 1).norm() >= most * (1.0 - at_limit) - rounding;
+        const double most = cones[i].bound * (head(i) ? f[first[i]] : 1.0), rounding = none * f.cwiseAbs().maxCoeff();
+        return tail_of(f, i).norm() >= most * (1.0 - at_limit) - rounding;
     }
 
     // Set the kinetic limit of contacts that slip from rest. Return true if any limit changed.
@@ -124,11 +139,10 @@ struct RestingProblem {
         const VecX a = w0 + W * f;
         bool any = false;
         for (size_t i = 0; i < cones.size(); ++i) {
-            const int e = p.gaps[rows.gaps[i]].sliding;
-            if (cones[i].dim == 1 || e < 0 || !at_its_limit(i)) continue;
-            const double kinetic = p.frictions[e].kinetic_limit(p.frictions[e].mu, 0.0);
-            if (!(a.segment(first[i] + 1, cones[i].dim - 1).norm() > none * in_play()) || !(kinetic < cones[i].bound))
-                continue;
+            const int e = rows.element(i);
+            if (tail(i) == 0 || e < 0 || !at_its_limit(i)) continue;
+            const double kinetic = p.frictions[e].kinetic_limit(strength(e), 0.0);
+            if (!(tail_of(a, i).norm() > none * in_play()) || !(kinetic < cones[i].bound)) continue;
             cones[i].bound = kinetic;
             any = true;
         }
@@ -191,21 +205,23 @@ struct RestingProblem {
         const VecX a = w0 + W * f;
         const double least = none * in_play();
         for (size_t i = 0; i < cones.size(); ++i) {
-            const int gap = rows.gaps[i], e = p.gaps[gap].sliding;
-            out.closed[gap] = a[first[i]] <= least;
-            if (e < 0 || !out.closed[gap]) continue;
-            if (slides[i]) {
-                const Vec3 u = slip_velocity(w.now, p.frictions[e]);
-                out.modes[e] = p.frictions[e].dim > 1 || u[0] > 0.0 ? slip_plus : slip_minus;
-                out.direction[e] = (1.0 / u.norm()) * u;
-                continue;
+            const int e = rows.element(i);
+            if (i < rows.gaps.size()) {
+                const int gap = rows.gaps[i];
+                out.closed[gap] = a[first[i]] <= least;
+                if (e < 0 || !out.closed[gap]) continue;
+                if (slides[i]) {
+                    const Vec3 u = slip_velocity(w.now, p.frictions[e]);
+                    out.modes[e] = p.frictions[e].dim > 1 || u[0] > 0.0 ? slip_plus : slip_minus;
+                    out.direction[e] = (1.0 / u.norm()) * u;
+                    continue;
+                }
             }
             out.modes[e] = sticking;
-            for (int k = 1; k < cones[i].dim; ++k) out.friction[e][k - 1] = f[first[i] + k];
-            const auto slip = a.segment(first[i] + 1, cones[i].dim - 1);
-            if (cones[i].dim == 1 || !at_its_limit(i) || !(slip.norm() > least)) continue;
+            const VecX friction = tail_of(f, i), slip = tail_of(a, i);
+            for (int k = 0; k < tail(i); ++k) out.friction[e][k] = friction[k];
+            if (tail(i) == 0 || !at_its_limit(i) || !(slip.norm() > least)) continue;
             // At a slow slip onset the force defines the direction more accurately than the acceleration.
-            const VecX friction = f.segment(first[i] + 1, slip.size());
             const bool tells = friction.norm() > none * f.cwiseAbs().maxCoeff();
             const VecX way = tells ? VecX(-friction.normalized()) : VecX(slip.normalized());
             for (int k = 0; k < slip.size(); ++k) out.direction[e][k] = way[k];
@@ -244,10 +260,18 @@ bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const
         if (question.rest[i]) gaps.push_back(i);
     if (gaps.empty() || !fits(p)) return false;
     const RunState before = w.state;
+    std::vector<int> others;  // at rest
+    std::vector<Mode> modes(p.frictions.size(), unloaded);
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
+        if (p.frictions[e].gap >= 0) continue;
+        if (is_at_rest(p, w, v, question, before, e)) others.push_back(e);
+        else if (p.frictions[e].dim > 1) return false;
+        else modes[e] = slip_velocity(w.now, p.frictions[e])[0] > 0.0 ? slip_plus : slip_minus;
+    }
     bool found = false;
     try {
-        release_contacts(p, w, t, q, v, question.rest);
-        RestingProblem problem(p, w, v, gaps, question, before);
+        release_contacts(p, w, t, q, v, question.rest, modes);
+        RestingProblem problem(p, w, v, gaps, others, question, before);
         found = act(problem);
     } catch (const Failure& failure) {  // the caller's own evaluation reports failures of other rows
         if (failure.kind == Failure::Kind::interrupted) throw;
