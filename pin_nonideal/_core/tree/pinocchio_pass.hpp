@@ -9,7 +9,7 @@
 
 namespace pn {
 
-struct JointMotion {  // moving frame of a joint: placement after the joint, motion per dof and bias in its own axes
+struct JointMotion {  // moving frame of a joint: placement from the fixed frame, motion per dof and bias in its own axes
     Mat3 R;
     Vec3 p;
     std::vector<Motion> S;
