@@ -11,8 +11,7 @@ struct NearestOnBox {
     using Scalar = typename Sides::Scalar;
     Vec e[3];                                // axes of the box
     bool beyond[3] = {false, false, false};  // axes along which the point lies beyond the box
-    Vec n;                                   // from the nearest point on the box (inside: outward normal of the nearest
-                                             // face)
+    Vec n;                                   // from the nearest point on the box (inside: out of the nearest face)
     Scalar distance;                         // negative inside
 
     PN_INLINE NearestOnBox(const Sides& s, const Vec3& half)

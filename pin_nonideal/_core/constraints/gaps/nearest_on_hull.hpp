@@ -70,7 +70,7 @@ struct Hull {
     }
 
 private:
-    // The other face slopes away beyond the edge, so the side normal leans against the normal of that face.
+    // The other face slopes away beyond the edge, so its normal has an outward component there.
     void add_side(const Edge& edge, int face, int other) {
         Vec3 side = faces[face].normal.cross(points[edge.to] - points[edge.from]).normalized();
         if (side.dot(faces[other].normal) < 0.0) side = -side;
@@ -83,8 +83,7 @@ template <class Sides>
 struct NearestOnHull {
     using Vec = typename Sides::Vec;
     using Scalar = typename Sides::Scalar;
-    Vec n;                                   // from the nearest point on the hull (inside: outward normal of the nearest
-                                             // face)
+    Vec n;                                   // from the nearest point on the hull (inside: out of the nearest face)
     Vec along;                               // direction of the nearest edge
     bool on_face = false, on_edge = false;  // location of the nearest point (neither: a corner)
     Scalar distance;                         // negative inside

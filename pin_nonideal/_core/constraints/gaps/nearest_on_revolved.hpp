@@ -46,7 +46,7 @@ struct NearestOnRevolved {
     using Vec = typename Sides::Vec;
     using Scalar = typename Sides::Scalar;
     Vec axis, out;            // along the axis, and away from it toward the point
-    Vec n;                    // from the nearest point on the solid (inside: outward normal of the nearest face)
+    Vec n;                    // from the nearest point on the solid (inside: out of the nearest face)
     Scalar distance;          // negative inside
     bool on_rim = false;      // the nearest point is on a rim, or at the tip
     Scalar turns = Scalar(0.0);  // rate of n about the axis, per velocity of the point around the axis
