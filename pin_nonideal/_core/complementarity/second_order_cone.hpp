@@ -9,7 +9,7 @@
 
 namespace pn {
 
-// A vector of the cone's algebra; elements of fewer directions leave the rest of the tail zero.
+// A vector of the cone's algebra. Elements of fewer directions leave the rest of the tail zero.
 struct Cone {
     double head = 0.0;
     Eigen::Vector3d tail = Eigen::Vector3d::Zero();

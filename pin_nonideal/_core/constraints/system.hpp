@@ -1,8 +1,8 @@
 // Rows in the metric of M, and the solution for their multipliers: Eq. (40) in factor form. With M = R R^T, B = A R^-T
 // and a_s' = R^-1 (F + C):
-//     B B^T lam = b - B a_s',   a_s = a_s' + B^T lam,   a = R^-T a_s,
-// for the rows in use, which are independent. Duplicate and vanishing rows were removed before the run. Other
-// redundancy is decided at the start of each step (decide_rows) and kept over the step.
+//     B B^T lam = b - B a_s',   a_s = a_s' + B^T lam,   a = R^-T a_s.
+// The rows in use are independent. Duplicate and vanishing rows were removed before the run. Other redundancy is decided
+// at the start of each step (decide_rows) and kept over the step.
 #pragma once
 
 #include <vector>

@@ -28,7 +28,7 @@ struct Joint {
     bool aligned = false;        // R0 is the identity
     Vec3 p0 = Vec3::Zero();
     Vec3 axis = Vec3::UnitZ();
-    int axis_index = -1;  // 0, 1, 2 for x, y, z or their opposites; -1 for a general axis
+    int axis_index = -1;  // 0, 1, 2 for x, y, z or their opposites, -1 for a general axis
     double axis_sign = 1.0;
     double pitch = 0.0;
     double mass = 0.0;

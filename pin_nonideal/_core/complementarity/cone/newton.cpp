@@ -136,7 +136,7 @@ bool ConeNewton::advance(const ConeProblem& p, Eigen::Ref<VecX> f, double& merit
     return merit < HUGE_VAL;
 }
 
-// Check if the equations at f differ from those factored last. Those of a slipping element differ at every point.
+// Check if the equations at f differ from those factored last. A slipping element has different equations at every point.
 bool ConeNewton::changes_piece(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
     constexpr signed char curved = -1, unknown = -2;
     const auto w = w_.vector(p.n);

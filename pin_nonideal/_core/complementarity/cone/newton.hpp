@@ -13,7 +13,7 @@ public:
     double solve(const ConeProblem& problem, Eigen::Ref<VecX> f, int most_steps);
     // Return the relative error of f.
     double error(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
-    bool regular() const { return regular_; }  // whether the last equations had full rank
+    bool regular() const { return regular_; }  // the last equations had full rank
     int steps() const { return steps_; }       // total of all calls
 
 private:
