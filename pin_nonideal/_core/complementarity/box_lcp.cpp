@@ -13,8 +13,7 @@ constexpr double met = 1e-9;  // part of the acceleration scale that counts as z
 constexpr double at_limit = 1e-12;  // relative distance to the limit at which a force is at it
 constexpr double rounding = 1e-13;  // rounding, relative to a limit or to the acceleration scale
 constexpr double noise_of_others = 1e-14;  // rounding of other elements, relative to the largest acceleration
-// Smallest root of a pivot of W, scaled to a unit diagonal, for which the Cholesky factor is as good as an orthogonal
-// one.
+// Smallest root of a pivot of W, scaled to a unit diagonal, for which the Cholesky factor is as good as an orthogonal one.
 constexpr double regular_pivot = 1e-3;
 constexpr int most_patience = 10;  // rounds of block pivoting without progress
 

@@ -11,8 +11,7 @@ namespace {
 // Pivot of the elimination, as a part of the largest entry, below which a full rank is uncertain.
 constexpr double regular_pivot = 1e-9;
 
-// Compute the reflector that maps x = (x0, rest) to (beta, 0): I - tau (1, u)(1, u)^T, with u in place of rest. Returns
-// tau.
+// Compute the reflector that maps x = (x0, rest) to (beta, 0): I - tau (1, u)(1, u)^T, with u in place of rest. Returns tau.
 template <class Rest>
 double reflector(double& x0, Rest&& rest) {
     const double beside = rest.squaredNorm();

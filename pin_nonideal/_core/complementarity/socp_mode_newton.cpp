@@ -10,8 +10,8 @@ namespace pn {
 
 namespace {
 
-// With f = s x and slip accelerations alpha, the pairs z_e = (1, x_e) and y_e = (u_e, alpha_e) lie in the cone |tail|
-// <= head. They are complementary at the solution: x_e = -alpha_e / |alpha_e| or alpha_e = 0. A primal-dual
+// With f = s x and slip accelerations alpha, the pairs z_e = (1, x_e) and y_e = (u_e, alpha_e) lie in the cone
+// |tail| <= head. They are complementary at the solution: x_e = -alpha_e / |alpha_e| or alpha_e = 0. A primal-dual
 // interior-point method in Nesterov and Todd's scaling (Vandenberghe, "The CVXOPT linear and quadratic cone program
 // solvers", 2010) needs some fifteen steps however singular W is. It ends at the most even distribution of an
 // undetermined load. Newton's method then solves the equations of the resulting modes to rounding.

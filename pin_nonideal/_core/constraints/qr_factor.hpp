@@ -6,8 +6,7 @@
 
 namespace pn {
 
-// Find the rank of the required rows and at most `most` independent ones by column pivoting. These become the rows in
-// use.
+// Find the rank of the required rows and at most `most` independent ones by column pivoting. These become the rows in use.
 void find_independent(const std::vector<Block>& blocks, const std::vector<double>& B, double tolerance, int most,
                       RowSystem& s);
 // Factorize B^T = Q T for the active rows, without pivoting.

@@ -90,9 +90,8 @@ std::vector<const TimeFunction*> time_functions(const Kind& kind);
 // Return the dofs on which A may differ from zero.
 std::vector<int> dofs(const Kind& kind, const Mechanism& m);
 
-// Parts of the evaluation of all rows of a kind: `residual` for the residuals alone, `place` for residuals and wrenches
-// or A of placed bodies, and `motion` for rates and biases. `motion` needs velocities of the bodies, and `place`
-// before.
+// Parts of the evaluation of all rows of a kind: `residual` for the residuals alone, `place` for residuals and wrenches or A
+// of placed bodies, and `motion` for rates and biases. `motion` needs velocities of the bodies, and `place` before.
 enum class Part { residual, place, motion };
 void evaluate(const Kind& kind, const State& s, Part part, RowValues& out);
 

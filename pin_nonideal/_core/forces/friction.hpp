@@ -12,8 +12,8 @@
 
 namespace pn {
 
-// Limits of the friction force against forward and backward slip, along the direction of an element: -forward <= force
-// <= backward. Elements of several directions have one limit for all.
+// Limits of the friction force against forward and backward slip, along the direction of an element:
+// -forward <= force <= backward. Elements of several directions have one limit for all.
 struct SlipLimits {
     double forward = 0.0, backward = 0.0;
 

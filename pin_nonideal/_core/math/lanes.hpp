@@ -1,6 +1,5 @@
-// Four numbers at a time. Functions marked PN_WIDE are compiled twice. On a processor with registers of four numbers
-// (AVX2) the loader selects the version that uses them. Neither version fuses products and sums, so both give the same
-// numbers.
+// Four numbers at a time. Functions marked PN_WIDE are compiled twice. On a processor with registers of four numbers (AVX2)
+// the loader selects the version that uses them. Neither version fuses products and sums, so both give the same numbers.
 #pragma once
 
 #include <cstring>

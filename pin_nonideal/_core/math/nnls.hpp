@@ -11,8 +11,7 @@ namespace pn {
 // Compute x >= 0 that minimizes |A x - b|.
 VecX nonnegative_least_squares(const MatX& A, const VecX& b);
 
-// Compute the shortest v >= 0 for which some z gives N + Z z >= -v. v is zero if all numbers can be nonnegative
-// together.
+// Compute the shortest v >= 0 for which some z gives N + Z z >= -v. v is zero if all numbers can be nonnegative together.
 VecX least_violation(const MatX& Z, const VecX& N);
 
 // Compute the shortest z that makes the marked numbers zero, or as near to zero as possible.
@@ -23,9 +22,9 @@ VecX shortest_with_zeros(const MatX& Z, const VecX& N, const std::vector<char>& 
 struct Nonnegative { VecX z; std::vector<char> held; bool met; };
 Nonnegative shortest_nonnegative(const MatX& Z, const VecX& N);
 
-// Largest s for which some z gives N + Z z >= s. `weight` marks the numbers that bind together: weight >= 0, Z^T weight
-// = 0, sum(weight) = 1 and s = weight . N. If s has no bound, `value` is the largest entry of |N| and `weight` is
-// empty.
+// Largest s for which some z gives N + Z z >= s. `weight` marks the numbers that bind together: weight >= 0, Z^T
+// weight = 0, sum(weight) = 1 and s = weight . N. If s has no bound, `value` is the largest entry of |N| and `weight`
+// is empty.
 struct LargestLeast { double value; VecX weight; };
 LargestLeast largest_least(const MatX& Z, const VecX& N);
 

@@ -48,8 +48,7 @@ struct Coefficients {
 };
 inline const Coefficients table;
 
-// Call use(k, weight) with the weight at x of each node in the polynomial through all nodes. Node 0 is the step's
-// start.
+// Call use(k, weight) with the weight at x of each node in the polynomial through all nodes. Node 0 is the step's start.
 template <class Use>
 void with_weights(double x, const Use& use) {
     double sum = 0.0, weight[n_points + 1];

@@ -162,8 +162,8 @@ OwnPass::OwnPass(const Mechanism& m) : cos_sin(m.joints.size()), others(m), rest
 // The functions below are compiled twice, for mechanisms with deep trees and without. The second version has no checks
 // for deep trees.
 
-// Place body i relative to its parent. In a deep tree, `shift` becomes the vector from the parent's reference point to its
-// own.
+// Place body i relative to its parent. In a deep tree, `shift` becomes the vector from the parent's reference point to
+// its own.
 template <bool some_deep>
 static PN_INLINE void place_body(const Mechanism& m, OwnPass& pass, BodyTerms& terms, int i, Vec3& shift) {
     const Joint& j = m.joints[i];

@@ -65,8 +65,7 @@ bool no_forces(const ConeProblem& p, VecX& y) {
     return margin > clearly;
 }
 
-// Replace y by a nearby y that balances exactly. Small forces become zero, and forces near the edge of a cone move onto
-// it.
+// Replace y by a nearby y that balances exactly. Small forces become zero, and forces near the edge of a cone move onto it.
 void sharpen(const ConeProblem& p, const MatX& E, double near_edge, VecX& y) {
     const double none = near_edge * y.cwiseAbs().maxCoeff();
     const int rank = static_cast<int>(E.cols());

@@ -16,8 +16,7 @@ constexpr double gap_tolerance = 1e-15, least_step = 1e-7;
 constexpr double to_boundary = 0.99;   // part of the way to the cone's boundary that a step takes
 constexpr double smooth_speed = 1e-12;  // slip speed below which the direction is undefined
 
-// Return the scale that makes the cone |f_t| <= mu f_n circular: forces (root f_n, f_t / root), velocities the other
-// way.
+// Return the scale that makes the cone |f_t| <= mu f_n circular: forces (root f_n, f_t / root), velocities the other way.
 double root_of(const ConeElement& e) { return e.slides() && e.bound > 0.0 ? std::sqrt(e.bound) : 1.0; }
 bool in_path(const ConeElement& e) { return !e.is(ConeKind::equality); }
 int head_rows(const ConeElement& e) { return e.is(ConeKind::contact) ? 1 : 0; }
@@ -113,8 +112,7 @@ bool ConePath::factorize(const ConeProblem& p) {
     return true;
 }
 
-// Compute the step to z o y = target that leaves `keep` of the residual, with the second-order terms of the predictor
-// step.
+// Compute the step to z o y = target that leaves `keep` of the residual, with the second-order terms of the predictor step.
 void ConePath::direction(const ConeProblem& p, double target, double keep) {
     auto rhs = rhs_.vector(p.n), step = step_.vector(p.n);
     rhs = (keep - 1.0) * miss_.vector(p.n);

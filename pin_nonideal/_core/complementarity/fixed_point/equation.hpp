@@ -1,8 +1,7 @@
 // Implicit reaction equation of dry friction as arrays. y holds the limit of each slipping element. The motion is
 // affine in y, and a load is a sum of lengths of vectors, so that
 //     y_i = g_i(y) = c_i + sum_k |b_k + P_k y|.
-// The function g is convex, and smooth except where a vector vanishes. Written for (y s, s) it is homogeneous of degree
-// one.
+// The function g is convex, and smooth except where a vector vanishes. Written for (y s, s) it is homogeneous of degree one.
 #pragma once
 
 #include <vector>
@@ -30,7 +29,7 @@ struct ReactionEquation {
     void slope(const VecX& y, double s, MatX& J) const;
     // Compute L, the largest |dg_i/dy_j| over all y.
     void steepest(MatX& L) const;
-    // Return the same bound for the derivative in s. It is the limits if friction causes no load.
+    // Return the same bound for the derivative in s. Its entries are the limits if friction causes no load.
     VecX steepest_in_s() const;
     bool finite() const;
 };

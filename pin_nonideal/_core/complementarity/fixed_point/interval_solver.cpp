@@ -102,8 +102,7 @@ void Search::divide() {
     spread_ = pn::inverse(MatX::Identity(m, m) - among(L_, following_, following_));
 }
 
-// Compute the following unknowns for the bisected ones in z, starting at z. Returns false if the iteration does not
-// end.
+// Compute the following unknowns for the bisected ones in z, starting at z. Returns false if the iteration does not end.
 bool Search::follow(VecX& z, double s) const {
     const int m = static_cast<int>(following_.size());
     if (m == 0) return true;

@@ -1,6 +1,6 @@
-// Rest equation. The unknowns are the friction forces x of all elements at rest. Slip accelerations are alpha = alpha0
-// + W x, and limits come from lengths of vectors that are linear in x. An element sticks (alpha = 0, |x| <= limit) or
-// begins to slip (x = -limit alpha / |alpha|). In both cases
+// Rest equation. The unknowns are the friction forces x of all elements at rest. Slip accelerations are
+// alpha = alpha0 + W x, and limits come from lengths of vectors that are linear in x. An element sticks (alpha = 0,
+// |x| <= limit) or begins to slip (x = -limit alpha / |alpha|). In both cases
 //     x = P(x - rho alpha),    P the projection on the ball of radius limit, any rho > 0.
 // If the slip of an element is known (the element slips already, or is driven), x = -limit times its direction. If the
 // limits differ forward and backward, the ball is centered at their middle. Pure functions on arrays.
@@ -33,8 +33,7 @@ struct RestEquation {
     std::vector<RestElement> elements;
     VecX still;  // load vectors without friction,
     MatX loads;  // and per unit of each force
-    // Set if laws are known only as functions: computes slip accelerations, and limits before `factor`, for the forces
-    // x.
+    // Set if laws are known only as functions: computes slip accelerations, and limits before `factor`, for the forces x.
     std::function<void(const VecX& x, VecX& alpha, FrictionLimits& limits)> ask;
     // Part of the limits that comes from `fixed` instead of the load (continuation parameter).
     double frozen = 0.0;
@@ -52,8 +51,7 @@ struct RestEquation {
     // Return d residual / dx on the branch of x.
     MatX jacobian(const VecX& x) const;
 
-    // Return forces under which no element at rest accelerates, for any limits. Redundant elements share with minimum
-    // norm.
+    // Return forces under which no element at rest accelerates, for any limits. Redundant elements share with minimum norm.
     VecX holding_forces() const;
     // Return the sticking elements in the motion with forces x, a solution.
     std::vector<bool> sticks(const VecX& x) const;
@@ -64,8 +62,8 @@ struct RestEquation {
 };
 
 // Return a bound on the contraction of the limits. If it is below 1, the motion is unique: the difference of the limits
-// of two motions would shrink to this part of itself. With W = G G^T and u = G^T (x - y) for two solutions x, y, |u|^2
-// <= sum_i |G_i u| |limit_i(x) - limit_i(y)|, and |limit_i(x) - limit_i(y)| <= l_i |u|.
+// of two motions would shrink to this part of itself. With W = G G^T and u = G^T (x - y) for two solutions x, y,
+// |u|^2 <= sum_i |G_i u| |limit_i(x) - limit_i(y)|, and |limit_i(x) - limit_i(y)| <= l_i |u|.
 double contraction(const RestEquation& equation);
 
 }  // namespace pn

@@ -25,8 +25,7 @@ constexpr double rim_kink = 1e-9;
 constexpr double shown_nearest = 1e-14;
 // Maximum number of evaluations. Bisection alone ends within this number, and Newton's method takes three to eight.
 constexpr int most_rim_looks = 80;
-// Bisections over the chords of a disk, and half angle [rad] of the arc in which Newton's method continues from the
-// result.
+// Bisections over the chords of a disk, and half angle [rad] of the arc in which Newton's method continues from the result.
 constexpr int most_chords = 40;
 constexpr double beside_chords = 1e-3;
 
