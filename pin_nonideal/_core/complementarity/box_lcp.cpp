@@ -9,15 +9,16 @@ namespace pn {
 
 namespace {
 
-constexpr double met = 1e-9;  // part of the accelerations in play that counts as none
-constexpr double at_limit = 1e-12;  // part of it within which a force is
-constexpr double rounding = 1e-13;  // part of a limit, or of the accelerations in play, that is none
-constexpr double noise_of_others = 1e-14;  // part of the largest accelerations that the others may hold by rounding
-// Least root of a pivot of W, scaled to a unit diagonal, with which Cholesky's factor is as good as an orthogonal one.
+constexpr double met = 1e-9;  // part of the acceleration scale that counts as zero
+constexpr double at_limit = 1e-12;  // relative distance to the limit at which a force is at it
+constexpr double rounding = 1e-13;  // rounding, relative to a limit or to the acceleration scale
+constexpr double noise_of_others = 1e-14;  // rounding of other elements, relative to the largest acceleration
+// Smallest root of a pivot of W, scaled to a unit diagonal, for which the Cholesky factor is as good as an orthogonal one.
 constexpr double regular_pivot = 1e-3;
-constexpr int most_patience = 10;  // rounds of block pivoting that may gain nothing
+constexpr int most_patience = 10;  // rounds of block pivoting without progress
 
-// Cholesky's factor of A, scaled to a unit diagonal, by rows, with the inverse pivots; whether it keeps clear of singular.
+// Compute the Cholesky factor of A, scaled to a unit diagonal, by rows, with the inverse pivots. Returns false if A is
+// nearly singular.
 PN_WIDE bool factor_scaled(int n, const double* A, const double* scale, double* L, double* inverse) {
     for (int i = 0; i < n; ++i) {
         double* Li = L + i * n;
@@ -42,7 +43,7 @@ PN_WIDE void substitute_scaled(int n, const double* L, const double* inverse, do
 
 }  // namespace
 
-// rhs of W_FF x = r_F into part, where W, scaled to a unit diagonal, keeps clear of singular; returns whether it does.
+// Solve W_FF x = r_F into part_. Returns false if W_FF, scaled to a unit diagonal, is nearly singular.
 bool BoxProgram::solve_regular(int n) {
     auto A = A_.matrix(n, n), L = L_.matrix(n, n);
     auto scale = scale_.vector(n), inverse = inverse_.vector(n), rhs = rhs_.vector(n), x = part_.vector(n),
@@ -50,7 +51,7 @@ bool BoxProgram::solve_regular(int n) {
     scale = A.diagonal().cwiseSqrt().cwiseInverse();
     if (!factor_scaled(n, A.data(), scale.data(), L.data(), inverse.data())) return false;
     x.setZero();
-    for (int pass = 0; pass < 2; ++pass) {  // the second gives back the digits that the condition costs
+    for (int pass = 0; pass < 2; ++pass) {  // the second pass restores digits lost to the condition
         change = rhs;
         if (pass > 0) change.noalias() -= A * x;
         change.array() *= scale.array();
@@ -60,7 +61,8 @@ bool BoxProgram::solve_regular(int n) {
     return true;
 }
 
-// Least-norm x of W_FF x = r_F on the free elements F; zero on the others, and where nothing responds.
+// Compute the minimum-norm x of W_FF x = r_F on the free elements F. x is zero on the others, and on elements without
+// response.
 void BoxProgram::solve_free(const MatX& W) {
     list_.clear();
     for (int i = 0; i < r_.size(); ++i)
@@ -81,14 +83,14 @@ void BoxProgram::solve_free(const MatX& W) {
     for (int i = 0; i < n; ++i) x_[list_[i]] = x[i];
 }
 
-// Each element by its own: a light finger's accelerations say nothing of what is none in a leg.
+// Compute the acceleration scale of each element. The scale of a light finger does not apply to a leg.
 void BoxProgram::measure(const MatX& W, const VecX& alpha0, const VecX& forces) {
     size_ = alpha0.cwiseAbs();
     for (int j = 0; j < forces.size(); ++j) size_ += std::abs(forces[j]) * W.col(j).cwiseAbs();
     noise_ = noise_of_others * size_.maxCoeff();
 }
 
-// Forces that the limits allow, those near by: each at its limit or free.
+// Set start forces within the limits, close to `near`: each at its limit or free.
 void BoxProgram::start(const VecX& s, const VecX* near) {
     const int n = static_cast<int>(s.size());
     f_.setZero(n);
@@ -99,9 +101,9 @@ void BoxProgram::start(const VecX& s, const VecX* near) {
     }
 }
 
-// Primal active set: from where f is, steps that lower f^T W f / 2 + alpha0^T f and stay in the box. Where redundant
-// elements cannot all stick, since what they would have to hold back is no acceleration that forces cause, the program
-// falls without end along a direction with W d = 0, until one of them is at its limit and slips.
+// Primal active-set method. Steps from f lower f^T W f / 2 + alpha0^T f and stay in the box. Redundant elements cannot
+// all stick if no forces cause the accelerations that they would have to cancel. The program then decreases without end
+// along a direction with W d = 0, until one of the elements is at its limit and slips.
 void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
     const int n = static_cast<int>(s.size());
     measure(W, alpha0, s);
@@ -133,7 +135,7 @@ void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
         }
         alpha_ = alpha0;
         alpha_.noalias() += W * f_;
-        int worst = -1;  // what slips against its force no longer does
+        int worst = -1;  // element that accelerates most along its force: it becomes free
         double most = rounding;
         for (int i = 0; i < n; ++i) {
             const double back = alpha_[i] * (f_[i] > 0.0 ? 1.0 : -1.0) - noise_;
@@ -146,8 +148,8 @@ void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
     }
 }
 
-// Block principal pivoting, single (least index) once it fails to make progress; false where what is free cannot all
-// stick, or it does not end.
+// Block principal pivoting, with single pivots (largest index) once it makes no progress. Returns false if the free
+// elements cannot all stick, or if pivoting does not end.
 bool BoxProgram::pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s) {
     const int n = static_cast<int>(s.size());
     int fewest = n + 1, patience = most_patience;

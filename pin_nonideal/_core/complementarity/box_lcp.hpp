@@ -1,4 +1,4 @@
-// Friction forces of elements of one direction, at rest, all at once: min f^T W f / 2 + alpha0^T f in the box
+// Friction forces of elements of one direction, at rest, all at once: minimize f^T W f / 2 + alpha0^T f in the box
 // |f_e| <= s_e, exactly. Pure functions on arrays.
 #pragma once
 
@@ -8,16 +8,17 @@
 
 namespace pn {
 
-// Responses below this part of the largest are none; rank_tolerance_sticking is its square root.
+// Responses below this part of the largest count as zero. rank_tolerance_sticking is its square root.
 constexpr double rank_threshold = 1e-13;
 
-// In room that is kept: a program no larger than one before takes no memory.
+// Solver with persistent buffers: a program no larger than an earlier one allocates no memory.
 class BoxProgram {
 public:
-    // `near`: forces of a program like this one, whose choice of those that are at their limits is tried first; f may be
-    // the same.
+    // Solve for f. `near` holds the forces of a similar program (warm start), and its set of forces at their limits is
+    // tried first. f may be the same vector as `near`.
     void solve(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* near, VecX& f);
-    // x of least norm with W x = r, W symmetric without negative eigenvalues; of a part of r where no x gives all of it.
+    // Compute the minimum-norm x with W x = r, for a symmetric positive semidefinite W. If no x gives all of r, x gives
+    // a part of it.
     void solve_all(const MatX& W, const VecX& r, VecX& x);
 
 private:
@@ -31,8 +32,8 @@ private:
     std::vector<char> is_free_;
     std::vector<int> list_, wrong_;
     VecX near_, f_, alpha_, r_, x_, left_;
-    VecX size_;           // of the accelerations in play, of each element
-    double noise_ = 0.0;  // what those of the lightest leave to the others by rounding
+    VecX size_;           // scale of the accelerations, by element
+    double noise_ = 0.0;  // rounding that the largest accelerations leave in all elements
     Buffer A_, L_, inverse_, scale_, rhs_, part_, change_;
     DenseSolver solver_;
 };

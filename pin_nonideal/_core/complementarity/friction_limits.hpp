@@ -5,8 +5,8 @@
 
 namespace pn {
 
-// Limits of friction forces: those of an element lie within `size` of `middle`, which is given by row and is zero but for
-// elements of one direction that do not rub alike forward and backward.
+// Limits of friction forces. The force of an element lies within `size` of `middle`. `middle` is given by row. It is
+// zero except for elements of one direction with different limits forward and backward.
 struct FrictionLimits {
     VecX size, middle;
 

@@ -1,5 +1,5 @@
-// The second-order cone |tail| <= head: its algebra, the way to its boundary, and Nesterov and Todd's scaling of a pair
-// of points (Vandenberghe, "The CVXOPT linear and quadratic cone program solvers", 2010).
+// The second-order cone |tail| <= head: its algebra, the step to its boundary, and Nesterov and Todd's scaling of a
+// pair of points (Vandenberghe, "The CVXOPT linear and quadratic cone program solvers", 2010).
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace pn {
 
-// A vector of the cone's algebra; elements of fewer directions leave the rest of the tail zero.
+// A vector of the cone's algebra. Elements of fewer directions leave the rest of the tail zero.
 struct Cone {
     double head = 0.0;
     Eigen::Vector3d tail = Eigen::Vector3d::Zero();
@@ -24,13 +24,13 @@ struct Cone {
 
 inline Cone product(const Cone& a, const Cone& b) { return {a.dot(b), a.head * b.tail + b.head * a.tail}; }
 
-// x with product(a, x) = b.
+// Return x with product(a, x) = b.
 inline Cone quotient(const Cone& b, const Cone& a) {
     const double head = (a.head * b.head - a.tail.dot(b.tail)) / a.determinant();
     return {head, (b.tail - head * a.tail) / a.head};
 }
 
-// Largest step along d that stays in the cone.
+// Return the largest step along d that stays in the cone.
 inline double room(const Cone& u, const Cone& d) {
     const double a = d.head * d.head - d.tail.squaredNorm();
     const double b = u.head * d.head - u.tail.dot(d.tail), c = u.determinant();
@@ -41,9 +41,9 @@ inline double room(const Cone& u, const Cone& d) {
     return least;
 }
 
-// The symmetric map T with T y = T^-1 z.
+// Symmetric map T with T y = T^-1 z.
 struct Scaling {
-    Cone w, v;     // T^2 = beta (2 w w^T - J), T = sqrt(beta) (2 v v^T - J), J the mirror
+    Cone w, v;     // T^2 = beta (2 w w^T - J), T = sqrt(beta) (2 v v^T - J), J the reflection of the tail
     double root = 1.0;  // sqrt(beta)
     Cone scaled;   // T y
 

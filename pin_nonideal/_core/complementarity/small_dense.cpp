@@ -8,10 +8,10 @@ namespace pn {
 
 namespace {
 
-// Part of the largest entry below which a pivot of the elimination no longer tells a full rank.
+// Pivot of the elimination, as a part of the largest entry, below which a full rank is uncertain.
 constexpr double regular_pivot = 1e-9;
 
-// The reflector that makes of x = (x0, rest) the vector (beta, 0): I - tau (1, u)(1, u)^T, u in place of rest.
+// Compute the reflector that maps x = (x0, rest) to (beta, 0): I - tau (1, u)(1, u)^T, with u in place of rest. Returns tau.
 template <class Rest>
 double reflector(double& x0, Rest&& rest) {
     const double beside = rest.squaredNorm();
@@ -77,7 +77,7 @@ void DenseSolver::factor_orthogonally(const Eigen::Ref<const MatX>& A, double to
         for (int c = k + 1; c < n_; ++c) reflect(k, F.col(c));
     }
     const int beyond = n_ - rank_;
-    for (int k = rank_ - 1; k >= 0 && beyond > 0; --k) {  // what the dependent columns add goes into the others
+    for (int k = rank_ - 1; k >= 0 && beyond > 0; --k) {  // reflect the dependent columns into the others
         tau_right[k] = reflector(F(k, k), F.row(k).tail(beyond));
         for (int i = 0; i < k; ++i) {
             const double w = tau_right[k] * (F(i, k) + F.row(i).tail(beyond).dot(F.row(k).tail(beyond)));
@@ -87,7 +87,7 @@ void DenseSolver::factor_orthogonally(const Eigen::Ref<const MatX>& A, double to
     }
 }
 
-// The k-th left reflector on x.
+// Apply the k-th left reflector to x.
 void DenseSolver::reflect(int k, Eigen::Ref<VecX> x) const {
     const Eigen::Map<const MatX> F = factors_.matrix(n_, n_);
     const int below = n_ - k - 1;

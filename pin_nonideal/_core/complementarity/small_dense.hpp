@@ -1,4 +1,4 @@
-// Square systems A x = r of any rank, in buffers that grow to the largest size asked for and stay.
+// Square systems A x = r of any rank, in buffers that grow to the largest size used and stay.
 #pragma once
 
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace pn {
 
-// Numbers that are seen as a matrix or a vector of whatever size is at hand.
+// Storage that is mapped as a matrix or a vector of any size.
 class Buffer {
 public:
     Eigen::Map<MatX> matrix(int rows, int columns) {
@@ -32,16 +32,17 @@ class DenseSolver {
 public:
     static constexpr double rank_tolerance = 1e-12;
 
-    // By elimination, and where its pivots fall below `regular_pivot` of their rows by orthogonal factors, with the
-    // rank by `rank_tolerance`.
+    // Factorize by elimination. If a pivot falls below `regular_pivot` of the largest entry, orthogonal factors replace
+    // it, with the rank by `rank_tolerance`.
     void factor(const Eigen::Ref<const MatX>& A);
-    // Orthogonal factors whatever the pivots; columns of which they leave no more than this part of the largest are none.
+    // Compute orthogonal factors for any pivots. A column counts as zero if no more than `tolerance` of the largest is
+    // left of it.
     void factor_orthogonally(const Eigen::Ref<const MatX>& A, double tolerance = rank_tolerance);
     bool regular() const { return regular_; }
     int rank() const { return rank_; }
-    // x of least norm with A x = r, or the nearest to it where none is. x may be r.
+    // Compute the minimum-norm x with A x = r, or the x that is nearest to a solution if there is none. x may be r.
     void solve(const Eigen::Ref<const VecX>& r, Eigen::Ref<VecX> x);
-    // Orthonormal columns that span the columns of A, (n, rank), after factor_orthogonally.
+    // Compute orthonormal columns that span the columns of A, (n, rank). Requires factor_orthogonally.
     void range(Eigen::Ref<MatX> basis) const;
 
 private:

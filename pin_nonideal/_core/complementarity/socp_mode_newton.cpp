@@ -11,17 +11,17 @@ namespace pn {
 namespace {
 
 // With f = s x and slip accelerations alpha, the pairs z_e = (1, x_e) and y_e = (u_e, alpha_e) lie in the cone
-// |tail| <= head, and are complementary at the solution: x_e = -alpha_e / |alpha_e| or alpha_e = 0. A primal-dual
+// |tail| <= head. They are complementary at the solution: x_e = -alpha_e / |alpha_e| or alpha_e = 0. A primal-dual
 // interior-point method in Nesterov and Todd's scaling (Vandenberghe, "The CVXOPT linear and quadratic cone program
-// solvers", 2010) needs some fifteen steps however singular W is, and ends at the most even shares of a load that
-// nothing tells apart. Newton's method then solves the equations of the modes that it found to rounding.
+// solvers", 2010) needs some fifteen steps however singular W is. It ends at the most even distribution of an
+// undetermined load. Newton's method then solves the equations of the resulting modes to rounding.
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr int most_steps = 60, most_newton = 12;
-constexpr double gap_tolerance = 1e-17;  // of z . y, part of the accelerations in play; rounding may end it before
-constexpr double to_boundary = 0.99;     // of the way to the cone's boundary that a step takes
+constexpr double gap_tolerance = 1e-17;  // z . y, relative to the acceleration scale (rounding may end the iteration before)
+constexpr double to_boundary = 0.99;     // part of the way to the cone's boundary that a step takes
 constexpr double newton_tolerance = 4e-16, condition = 1e-12;
 
 struct ConeProgram {
@@ -32,7 +32,7 @@ struct ConeProgram {
     int n, elements;
     std::vector<int> at;
     VecX scale;            // s of each row
-    double size = 0.0;     // of the accelerations in play
+    double size = 0.0;     // scale of the accelerations
     MatX V, K;             // W s / size, and the matrix of a step
     VecX r0, x;
     std::vector<Cone> y;
@@ -84,7 +84,7 @@ struct ConeProgram {
         return factor.compute(K);
     }
 
-    // Step to z o y = target, with the second-order terms of the step before.
+    // Compute the step to z o y = target. `second` holds the second-order terms of the predictor step.
     void direction(double target, const std::vector<Cone>& second, VecX& dx, std::vector<Cone>& dy) const {
         VecX rhs(n);
         for (int e = 0; e < elements; ++e) {
@@ -105,7 +105,7 @@ struct ConeProgram {
         return least;
     }
 
-    // y's tails are the accelerations of x; its heads keep what the step left them beyond the tails.
+    // Take a step. The tails of y become the accelerations of x, and the heads keep their excess over the tails.
     void advance(double step, const VecX& dx, const std::vector<Cone>& dy) {
         x += step * dx;
         const VecX alpha = V * x + r0;
@@ -135,13 +135,14 @@ struct ConeProgram {
             const std::vector<Cone> y_before = y;
             advance(std::min(1.0, to_boundary * length(dx, dy)), dx, dy);
             if (inside()) continue;
-            x = x_before;  // as near as rounding lets it come
+            x = x_before;  // rounding allows no further progress
             y = y_before;
             return;
         }
     }
 
-    // Newton's method for modes as equations: alpha = 0 for what sticks, alpha + m x = 0 and |x| = 1 for what slides.
+    // Solve the modes as equations by Newton's method: alpha = 0 for sticking elements, alpha + m x = 0 and |x| = 1 for
+    // slipping ones.
     bool solve_modes(const std::vector<char>& slides, VecX& there, VecX& m) const {
         there = x;
         m.setZero();
@@ -173,8 +174,9 @@ struct ConeProgram {
         return last < condition;
     }
 
-    // The modes that the path leads to: what has more acceleration than room slides. Where both are small only the
-    // solution tells: modes that it contradicts are changed until none is. False if they do not come to rest.
+    // Find the modes from the end of the path. An element slips if its acceleration exceeds the distance of its force
+    // to the limit. If both are small, the solution decides: modes that it contradicts are changed until none is left.
+    // Returns false if the modes do not settle.
     bool find_modes() {
         std::vector<char> slides(elements);
         for (int e = 0; e < elements; ++e) slides[e] = y[e].head > 1.0 - tail(x, e).norm();
@@ -194,7 +196,7 @@ struct ConeProgram {
                 }
                 continue;
             }
-            for (int e = 0; e < elements; ++e)  // what sticks cannot: the one with the least room slides
+            for (int e = 0; e < elements; ++e)  // not all can stick: the element nearest to its limit slips
                 if (!slides[e] && (nearest < 0 || tail(x, e).norm() > tail(x, nearest).norm())) nearest = e;
             if (nearest < 0) return false;
             slides[nearest] = 1;
@@ -205,7 +207,7 @@ struct ConeProgram {
     VecX solve() {
         follow_central_path();
         const bool found = find_modes();
-        for (int e = 0; e < elements; ++e) {  // what slides is at its limit, to the last bit
+        for (int e = 0; e < elements; ++e) {  // slipping forces are exactly at their limits
             const double length = tail(x, e).norm();
             if (found ? length > 1.0 - condition : y[e].head > 1.0 - length) x.segment(at[e], dims[e]) /= length;
         }

@@ -1,6 +1,6 @@
-// Friction forces of elements at rest, all at once, in disks and balls: min f^T W f / 2 + alpha0^T f with |f_e| <= s_e, a
-// second-order cone program, for elements whose directions lie one after the other (dims[e] rows each). A pure function
-// on arrays.
+// Friction forces of elements at rest, all at once, in disks and balls: minimize f^T W f / 2 + alpha0^T f with |f_e| <=
+// s_e. This is a second-order cone program. The directions of the elements lie in sequence (dims[e] rows each). Pure
+// functions on arrays.
 #pragma once
 
 #include <vector>
@@ -11,12 +11,12 @@
 namespace pn {
 
 VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s);
-// The same, as a box program where every element has one direction.
+// Solve the same program, as a box program if every element has one direction.
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s,
                       const VecX* near = nullptr);
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits);
-// Slip accelerations a little beyond the load at which elements give way: there they are rounding, and forces of elements
-// that share a load tell the directions in which all begin to move together only to its root.
+// Return slip accelerations slightly beyond the load of slip onset. At onset they are rounding. If elements share a
+// load, their forces give the directions of a common slip only to the square root of rounding.
 VecX onset_accelerations(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits);
 
 }  // namespace pn

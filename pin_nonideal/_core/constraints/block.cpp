@@ -49,13 +49,13 @@ void Block::lay_out(const Mechanism& m) {
         if (std::find(d1.begin(), d1.end(), d) == d1.end()) entries.push_back({place[d], d, -1.0});
 }
 
-// A unit wrench on the two bodies of a block, about their reference points; these differ when the bodies belong to
-// different trees, or to a deep one.
+// Return a unit wrench as a force on one body of a block, about its reference point. The reference points of both
+// bodies differ if the bodies belong to different trees or to a deep tree.
 static PN_INLINE Force about(const Wrench& w, const Body& body) {
     return {w.force, w.couple + (w.point - body.ref).cross(w.force)};
 }
 
-// A of bodies in deep trees, which have reference points of their own.
+// Fill A of bodies in deep trees, which have their own reference points.
 [[gnu::noinline]] static void fill_deep_A(const Block& block, const Mechanism& m, const Terms& terms,
                                           const RowValues& values, double* A) {
     const int r = static_cast<int>(block.kept.size());
@@ -84,8 +84,8 @@ PN_WIDE void fill_A(const Block& block, const Mechanism& m, const Terms& terms, 
     }
 }
 
-// The part of deep trees: of a row of bodies the wrench itself enters the sweep, of another its numbers. It stands apart:
-// inside scale_rows it would take the registers of the part that every robot has.
+// Scale the part of the rows on deep trees. The wrench of a row between bodies enters the sweep, and other rows enter
+// by their entries. A separate function leaves the registers of scale_rows to the common part.
 [[gnu::noinline]] static void scale_deep_rows(const Mechanism& m, Terms& terms, const Block& block,
                                               const RowValues& values, double* B) {
     const int r = static_cast<int>(block.kept.size());
@@ -102,7 +102,7 @@ PN_WIDE void fill_A(const Block& block, const Mechanism& m, const Terms& terms, 
     }
 }
 
-// The part of the dofs that have rows of the factor.
+// Scale the part of the rows on dofs with rows of the factor.
 template <bool some_deep>
 static PN_INLINE void scale_flat_rows(const Mechanism& m, const Terms& terms, const Block& block, double* B) {
     const int n = static_cast<int>(block.support.size());
@@ -114,7 +114,7 @@ static PN_INLINE void scale_flat_rows(const Mechanism& m, const Terms& terms, co
             const double* row = L + m.row_offset[dof];
             double* __restrict x = B + l * r;
             for (int p = block.parent[l], s = 1; p >= 0; p = block.parent[p], ++s) {
-                double* __restrict y = B + p * r;  // of an ancestor
+                double* __restrict y = B + p * r;  // entries of an ancestor
                 for (int k = 0; k < r; ++k) y[k] -= row[s] * x[k];
             }
             const double d = inv_sqrt_D[dof];

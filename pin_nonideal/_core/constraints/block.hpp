@@ -1,4 +1,4 @@
-// A constraint, or a direction of friction, with its place among the rows of the scene.
+// A constraint or a direction of friction, with the position of its rows among the rows of the scene.
 #pragma once
 
 #include <string>
@@ -12,44 +12,46 @@ struct Block {
     std::string name;
     Kind kind;
     int joint1 = 0, joint2 = 0;    // bodies of a geometric kind
-    int dof = -1;                  // where each row is a dof itself: the first of them
+    int dof = -1;                  // first dof, if each row is a dof itself
     int total = 0;                 // rows of the description
     std::vector<int> kept;         // rows that act
-    std::vector<char> holonomic;   // of the kept rows
-    bool comparable_rows = false;  // rows are components of one vector, of one unit
-    bool affine_rate = true;       // its rate is A(q, t) v + phi_t; a user's own may be another function of v
+    std::vector<char> holonomic;   // by kept row
+    bool comparable_rows = false;  // rows are components of one vector with one unit
+    bool affine_rate = true;       // the rate is A(q, t) v + phi_t (a user's rate may depend on v otherwise)
     int user_row = 0;              // first row in the user's numbering
     int row = 0;                   // first row among the kept rows of the scene
-    std::vector<int> support;      // dofs that the scaled rows reach, descending and closed under ancestors
-    std::vector<int> parent;       // place in support of each dof's parent, or -1
+    std::vector<int> support;      // dofs of the scaled rows, descending and closed under ancestors
+    std::vector<int> parent;       // index in support of each dof's parent, or -1
     struct Entry { int place, dof; double sign; };
-    std::vector<Entry> entries;    // where A of a geometric kind may differ from zero
-    bool deep = false;             // some of them belong to a deep tree
-    int offset = 0;                // of its support.size() x kept.size() entries in Evaluation::A and ::B
+    std::vector<Entry> entries;    // entries of A that may be nonzero, for a geometric kind
+    bool deep = false;             // some dofs of the support belong to a deep tree
+    int offset = 0;                // first of its support.size() x kept.size() entries in Evaluation::A and ::B
 
     Block() = default;
-    // All its rows act.
+    // Create a block that keeps all rows.
     Block(std::string its_name, Kind what);
-    // Support and entries, and what follows from the rows that are kept.
+    // Compute support, entries and flags from the kept rows.
     void lay_out(const Mechanism& m);
 };
 
-// A on the block's support from the wrenches or the dense rows; dof-major.
+// Fill A on the block's support from the wrenches or the dense rows, dof-major.
 void fill_A(const Block& block, const Mechanism& m, const Terms& terms, const RowValues& values, double* A);
-// B = A R^-T on it, that is B^T = D^-1/2 L^-T A^T, or in deep trees sweeps of the rows' wrenches.
+// Compute B = A R^-T on the support, that is B^T = D^-1/2 L^-T A^T. Deep trees use sweeps of the rows' wrenches.
 void scale_rows(const Mechanism& m, Terms& terms, const Block& block, const RowValues& values, const double* A,
                 double* B);
 
-// y += B^T lam and r = B x, with lam and r by kept row of the scene; the same functions serve A with the array A.
+// Compute y += B^T lam and r = B x, with lam and r by kept row of the scene. With the array A in place of B, the
+// functions multiply by A.
 void add_transpose(const Block& block, const std::vector<double>& B, const VecX& lam, VecX& y);
 void multiply(const Block& block, const std::vector<double>& B, const VecX& x, VecX& r);
 
-// force += A^T f for a force along the rows of a block.
+// Compute force += A^T f, for a force f along the rows of a block.
 void add_along(const Block& block, const std::vector<double>& rows, const Vec3& f, VecX& force);
-// y += A^T lam for the rows of a block, what acts on bodies of deep trees as forces on them into `body`.
+// Compute y += A^T lam for the rows of a block. For deep trees, `body` takes the wrenches on the bodies instead.
 void add_transpose(const Block& block, const Mechanism& m, const Terms& terms, const RowValues& values,
                    const std::vector<double>& A, const VecX& lam, VecX& y, std::vector<Force>& body);
-// Adds a unit wrench times its size to the forces on the two bodies of a block, about their reference points.
+// Add a unit wrench times its size to the force on body 1, and subtract it from that on body 2, about their reference
+// points.
 inline void add_wrench(const Block& block, const Terms& terms, const Wrench& unit, double size,
                        std::vector<Force>& body) {
     for (int side = 0; side < 2; ++side) {

@@ -1,4 +1,4 @@
-// What constraints on joints directly are written in: their coordinates.
+// Joint coordinates, in which constraints on joints are written.
 #pragma once
 
 #include <cmath>

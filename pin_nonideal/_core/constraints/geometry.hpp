@@ -1,4 +1,4 @@
-// What constraints between two bodies are written in: frames, where they are and how they move, and unit wrenches.
+// Frames, their placements and motions, and unit wrenches, in which constraints between two bodies are written.
 #pragma once
 
 #include "tree/terms.hpp"
@@ -11,7 +11,7 @@ struct Frame {  // a frame fixed to the body of a joint (0: the world)
     Vec3 p = Vec3::Zero();
 };
 
-// Force at a point of the world, and couple.
+// Wrench: force at a point of the world, and couple.
 template <class Vec>
 struct WrenchOf {
     Vec force, point, couple;
@@ -23,7 +23,7 @@ PN_INLINE WrenchOf<Vec> force_at(const Vec& point, const Vec& force) { return {f
 template <class Vec>
 PN_INLINE WrenchOf<Vec> couple_at(const Vec& point, const Vec& couple) { return {Vec(), point, couple}; }
 
-struct Pose {  // a frame in the world, and how the points of its body move
+struct Pose {  // placement of a frame in the world, and motion of the points of its body
     using Vec = Vec3;
     using Scalar = double;
 
@@ -44,8 +44,8 @@ struct Pose {  // a frame in the world, and how the points of its body move
     PN_INLINE Vec3 acceleration(const Vec3& at) const { return acceleration_at(m, body, at); }
 };
 
-// Both sides of a constraint at time t, for any kind of numbers. Kinds read nothing else, so that a pose in other
-// numbers (dual ones, say) needs no second copy of their formulas.
+// Both sides of a constraint at time t, for any scalar type. Kinds read nothing else, so other scalars (such as dual
+// numbers) need no second copy of the formulas.
 template <class PoseType>
 struct Sides {
     using Pose = PoseType;
@@ -55,7 +55,7 @@ struct Sides {
     double t;
 };
 
-// Velocity of frame 1's origin seen from body 2, and its rate at zero acceleration.
+// Velocity of frame 1's origin relative to body 2, and its rate at zero acceleration.
 template <class Pose>
 struct PointMotion {
     using Vec = typename Pose::Vec;
@@ -65,7 +65,7 @@ struct PointMotion {
         u = s.a.velocity(s.a.x) - s.b.velocity(s.a.x);
         du = s.a.acceleration(s.a.x) - s.b.acceleration(s.a.x) - 2.0 * s.b.omega().cross(u);
     }
-    // Row k: its component along e, which is fixed in body 2.
+    // Set row k to the component along e, which is fixed in body 2.
     template <class Out>
     PN_INLINE void row(Out& out, int k, const Vec& e) const {
         out.rate[k] = e.dot(u);
@@ -73,7 +73,8 @@ struct PointMotion {
     }
 };
 
-// Row k along e, fixed in body 2: sliding of body 1 against body 2 at a contact point that moves with the rate c_rate.
+// Set row k to the sliding of body 1 against body 2 along e, which is fixed in body 2. The contact point c moves with
+// the rate c_rate.
 template <class Pose, class Out, class Vec>
 PN_INLINE void sliding_row(const Sides<Pose>& s, Out& out, int k, const Vec& e, const Vec& c, const Vec& c_rate) {
     const Vec va = s.a.velocity(c), vb = s.b.velocity(c), u = va - vb;

@@ -8,8 +8,8 @@ namespace pn {
 
 namespace {
 
-// Order of the blocks in which neighbors (blocks that share dofs) stand close: breadth first from a block of least
-// degree, reversed (Cuthill-McKee).
+// Return an order of the blocks in which neighbors (blocks that share dofs) stand close: breadth first from a block of
+// least degree, reversed (Cuthill-McKee).
 std::vector<int> elimination_order(const std::vector<std::vector<int>>& neighbors) {
     const int n = static_cast<int>(neighbors.size());
     std::vector<int> order, by_degree(n);
@@ -34,7 +34,7 @@ std::vector<int> elimination_order(const std::vector<std::vector<int>>& neighbor
     return order;
 }
 
-// The same number for blocks with the same support.
+// Return a number per block, the same for blocks with the same support.
 std::vector<int> numbered_supports(const std::vector<Block>& blocks) {
     std::map<std::vector<int>, int> numbers;
     std::vector<int> out;
@@ -83,7 +83,7 @@ RowLayout layout_rows(const std::vector<Block>& blocks, int nv) {
     layout.first.resize(layout.rows);
     layout.start.resize(layout.rows);
     const std::vector<int> support = numbered_supports(blocks);
-    std::map<std::pair<int, int>, int> known;  // number of what two supports have in common
+    std::map<std::pair<int, int>, int> known;  // index of the common dofs of two supports
     std::vector<int> lead(n);  // first position of the first neighbor of each block
     layout.first_pair.push_back(0);
     for (int b = 0; b < n; ++b) {

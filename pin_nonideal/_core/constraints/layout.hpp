@@ -1,4 +1,4 @@
-// Where the rows of all blocks stand in the symmetric matrix B B^T, and which of its entries are stored.
+// Positions of the rows of all blocks in the symmetric matrix B B^T, and the stored entries of this matrix.
 #pragma once
 
 #include <utility>
@@ -8,21 +8,21 @@
 
 namespace pn {
 
-// Rows stored so that row i of the symmetric matrix keeps columns first[i] .. i (an envelope): blocks that share no
-// dof leave no entry, and the Cholesky factor stays inside.
+// Envelope storage: row i of the symmetric matrix keeps columns first[i] .. i. Blocks without a common dof need no
+// entries, and the Cholesky factor stays inside the envelope.
 struct RowLayout {
     int rows = 0;
-    std::vector<int> position;  // of each kept row in elimination order
+    std::vector<int> position;  // position of each kept row in elimination order
     std::vector<int> row_at;    // inverse of position
     std::vector<int> first, start;
     size_t entries = 0;
-    using Common = std::vector<std::pair<int, int>>;  // where common dofs stand in two supports
-    struct Pair {  // a block with another one with common dofs
+    using Common = std::vector<std::pair<int, int>>;  // positions of common dofs in two supports
+    struct Pair {  // another block with common dofs
         int other, common;
     };
-    std::vector<Common> commons;  // of any two blocks with the same supports the same
-    std::vector<Pair> pairs;      // those of each block after those of the one before
-    std::vector<int> first_pair;  // of each block, and the end
+    std::vector<Common> commons;  // one list for all pairs of blocks with the same two supports
+    std::vector<Pair> pairs;      // pairs of each block, in the order of the blocks
+    std::vector<int> first_pair;  // first pair of each block, and the end
 };
 
 RowLayout layout_rows(const std::vector<Block>& blocks, int nv);

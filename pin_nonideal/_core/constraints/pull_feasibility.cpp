@@ -9,14 +9,14 @@ namespace pn {
 
 namespace {
 
-// Part of a unit vector of multipliers that exert no force below which a row takes no part in it.
+// Entry of a unit null-space vector of multipliers below which a row has no share in it.
 constexpr double takes_part = 1e-9;
-constexpr double binding = 1e-6;     // part of the weights below which a row does not bind
-constexpr double rounding = 1e-12;   // part of the loads that a margin may be off
+constexpr double binding = 1e-6;     // part of the largest weight below which a row does not bind
+constexpr double rounding = 1e-12;   // rounding of a margin, relative to the loads
 
-// Multipliers of all described rows that exert no force together: the rows of Z are theirs, and its columns are
-// orthonormal. With the first described row of each row in use as what the others depend on, A_others = C A_first, they
-// are y_first = -C^T z, y_others = z.
+// Return a basis of the multipliers of all described rows that together exert no force. The rows of Z follow the
+// described rows, and its columns are orthonormal. The other rows depend on the first described row of each row in use:
+// A_others = C A_first. Then y_first = -C^T z and y_others = z.
 MatX free_described(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
                     const DescribedRows& all, RowSystem& s) {
     const std::vector<int> dependent = dependent_rows(s);
@@ -46,7 +46,7 @@ MatX free_described(const RowLayout& layout, const std::vector<Block>& blocks, c
     return factor.solve_lower(Z.transpose()).transpose();
 }
 
-// What the pressing rows have of these multipliers.
+// Return the entries of these multipliers at the pressing rows.
 MatX of_pressing(const std::vector<int>& pressing, const MatX& Z) {
     MatX part(static_cast<Eigen::Index>(pressing.size()), Z.cols());
     for (size_t k = 0; k < pressing.size(); ++k) {
@@ -56,7 +56,7 @@ MatX of_pressing(const std::vector<int>& pressing, const MatX& Z) {
     return part;
 }
 
-// All that one shares a load with, directly or not, itself first.
+// Return all rows that share a load with one row, directly or not, with that row first.
 std::vector<int> sharing_with(int index, const MatX& Z) {
     const MatX coupling = Z * Z.transpose();
     std::vector<int> found{index};

@@ -1,5 +1,5 @@
-// Which rows that should press must pull: where rows share a load that is no matter of one multiplier, for the shares are
-// not unique, but of whether any sharing lets all of them press.
+// Rows that must pull although their multipliers should not be negative. If rows share a load, single multipliers are
+// not unique. A row must pull only if no distribution of the load lets all of them press.
 #pragma once
 
 #include "constraints/redundancy.hpp"
@@ -7,14 +7,14 @@
 namespace pn {
 
 struct Press {
-    double margin;             // largest normal force that all of them can have together; below zero some must pull
-    std::vector<int> sharing;  // those that share a load with the row asked for, as indices of `pressing`
-    std::vector<int> pulling;  // of them those that the margin hangs on together
-    bool must_pull;            // by more than rounding
+    double margin;             // largest s with all multipliers >= s in some distribution (negative: some row must pull)
+    std::vector<int> sharing;  // rows that share a load with the given row, as indices of `pressing`
+    std::vector<int> pulling;  // rows among them that determine the margin together
+    bool must_pull;            // the margin is negative by more than rounding
 };
 
-// Of one of the described rows `pressing`, whose multipliers should not be negative, for the shares of the multipliers
-// in use, see `share_multipliers`.
+// Compute the margin of the described row pressing[index]. The multipliers of the rows `pressing` should not be
+// negative. `shared` holds the result of `share_multipliers`.
 Press press(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
             const DescribedRows& all, const std::vector<int>& pressing, RowSystem& s, const VecX& shared, int index);
 

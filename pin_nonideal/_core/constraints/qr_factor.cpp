@@ -6,11 +6,11 @@ namespace pn {
 
 namespace {
 
-// Columns whose squared lengths differ by less than this part are of one length, and the earlier goes first: rounding
-// does not choose among rows of equal worth.
+// Relative difference of squared lengths below which two columns tie. The earlier column then goes first, so that
+// rounding does not choose among equal rows.
 constexpr double tie = 1e-12;
 
-// Rows of unit length in use as columns of Q.
+// Copy the rows in use, scaled to unit length, to the columns of Q.
 void dense_columns(const std::vector<Block>& blocks, const std::vector<double>& B,
                    const std::vector<char>& use, RowSystem& s) {
     if (s.Q.cols() == 0) s.Q.resize(s.Q.rows(), s.scale.size());
@@ -30,7 +30,7 @@ void dense_columns(const std::vector<Block>& blocks, const std::vector<double>& 
     }
 }
 
-// Householder factorization of the first n columns of Q in place, with column pivoting when asked. Returns the rank.
+// Factorize the first n columns of Q in place by Householder reflectors, with column pivoting if `pivot`. Returns the rank.
 int householder(RowSystem& s, int n, bool pivot, double tolerance) {
     const int m = static_cast<int>(s.Q.rows());
     for (int k = 0; k < n; ++k) {

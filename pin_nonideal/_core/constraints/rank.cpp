@@ -8,14 +8,14 @@
 
 namespace pn {
 
-// Part of the square of a length, or of a pivot, below which another choice of rows is looked for.
+// Part of a largest squared length, or of a largest pivot, below which a new choice of rows is due.
 static constexpr double faded_part = 0.1;
 
-// Whether a block is a constraint that holds for good: contacts and friction count by their own length, as in the programs
-// that decide which elements stick.
+// Check if a block is a permanent constraint. Contacts and friction count by their own length, as in the programs that
+// decide which elements stick.
 static bool is_lasting(const Block& block) { return role(block.kind) == Role::constraint && pressing_row(block.kind) < 0; }
 
-// Whether rows hold a position, of coordinates that are as long as they were at any pose so far.
+// Check if the rows of a block hold a position by coordinates. Such rows keep their greatest length at any pose so far.
 static bool keeps_length(const Block& block, const RowValues& values) {
     return !values.geometric && !block.holonomic.empty() && block.holonomic.front();
 }

@@ -4,9 +4,9 @@
 
 namespace pn {
 
-// Weights of rows come from products of rows, which square their condition: what a first solution leaves of the dependent
-// row is spanned by the others again, until it is rounding. [Bjorck: Stability analysis of the method of seminormal
-// equations, 1987.]
+// Weights of rows are solved from products of rows, which square the condition number. A second pass therefore solves
+// for the rest of the dependent row, unless this rest is rounding. [Bjorck: Stability analysis of the method of
+// seminormal equations, 1987.]
 static constexpr double spanned = 1e-14;
 static constexpr int most_passes = 2;
 
@@ -57,7 +57,7 @@ void share_multipliers(const RowLayout& layout, const std::vector<Block>& blocks
     shared = lam;
     const std::vector<int> dependent = dependent_rows(s);
     if (dependent.empty()) return;
-    // With weights g and x + W^T y = lam, sum(x^2/g) + sum(y^2/g) is least where (1/g + W (1/g) W^T) y = W (1/g) lam.
+    // With weights g and x + W^T y = lam, sum(x^2/g) + sum(y^2/g) is minimal if (1/g + W (1/g) W^T) y = W (1/g) lam.
     const MatX W = dependence(layout, blocks, B, s, dependent);
     const VecX inverse = all.weight.cwiseInverse();
     MatX S = W * inverse.asDiagonal() * W.transpose();

@@ -1,38 +1,41 @@
-// What rows that say the same carry each, where the motion tells only their sum: the multipliers of least norm, in the
-// scale of the descriptions, among all that exert the same force.
+// Load sharing of redundant rows, for which the motion determines only the sum of the multipliers. The multipliers have
+// minimum norm, in the scale of the descriptions, among all that exert the same force.
 #pragma once
 
 #include "constraints/schur_factor.hpp"
 
 namespace pn {
 
-// Rows of all descriptions by the rows that are kept of them: copies were dropped, and carry their share all the same.
+// Rows of all descriptions and the kept rows that represent them. Duplicate rows are removed but carry their share of
+// the load.
 struct DescribedRows {
     struct Row {
-        int kept = -1;        // the row that stands for it; -1: nothing moves along it, and it carries nothing
-        double factor = 1.0;  // it is this multiple of that one
-        double part = 1.0;    // its multiplier, of least norm, over that of what stands for it
+        int kept = -1;        // kept row that represents it (-1: nothing moves along it, and its multiplier is zero)
+        double factor = 1.0;  // the row is this multiple of the kept row
+        double part = 1.0;    // its minimum-norm multiplier over the multiplier of the kept row
     };
     std::vector<Row> rows;  // constraints and contacts in their order, then directions of friction
-    VecX weight;            // of each kept row: the sum of squares of the factors of what it stands for
-    bool copied = false;    // some kept row stands for several
+    VecX weight;            // by kept row: sum of the squared factors of the rows that it represents
+    bool copied = false;    // some kept row represents several rows
 
-    // Parts and weights, once all rows are known.
+    // Compute parts and weights once all rows are known.
     void finish(int kept);
-    // The multiplier of one described row for those of the kept rows.
+    // Return the multiplier of one described row from the multipliers of the kept rows.
     double share(int row, const VecX& lam) const { return rows[row].kept < 0 ? 0.0 : rows[row].part * lam[rows[row].kept]; }
 };
 
-// Rows that are required though others say the same, and their coefficients in the rows in use: A_dependent = W A_active.
+// Required rows that depend on the rows in use, and their coefficients: A_dependent = W A_active.
 std::vector<int> dependent_rows(const RowSystem& s);
 MatX dependence(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s,
                 const std::vector<int>& dependent);
 
-// Multipliers of least norm by kept row, each for all that it stands for, for those of the rows in use.
+// Compute minimum-norm multipliers by kept row from the multipliers of the rows in use. The multiplier of a kept row is
+// the total of the rows that it represents.
 void share_multipliers(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
                        const DescribedRows& all, RowSystem& s, const VecX& lam, VecX& shared);
 
-// Multipliers by kept row that exert no force together, orthonormal where each counts for all that it stands for.
+// Return a basis of the multipliers by kept row that together exert no force. It is orthonormal in the norm of the
+// described rows.
 MatX free_multipliers(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
                       const DescribedRows& all, RowSystem& s);
 

@@ -17,24 +17,24 @@ constexpr bool is_geometric = false;
 template <class K>
 constexpr bool is_geometric<K, std::void_t<decltype(&K::frame1), decltype(&K::frame2)>> = true;
 
-// Whether K answers a question: a lambda that asks it.
+// Check if the lambda `Question` compiles for a K.
 template <class K, class Question>
 constexpr bool answers(Question) { return std::is_invocable_v<Question, const K&>; }
-// Its constants as types, so that a question can ask for them.
+// Constants of K as types, for use in such lambdas.
 template <class K> using ConstantA = std::bool_constant<std::decay_t<K>::constant_A>;
 template <class K> using AffineRate = std::bool_constant<std::decay_t<K>::affine_rate>;
 template <class K> using ComparableRows = std::bool_constant<std::decay_t<K>::comparable_rows>;
 template <class K> using ShownAs = std::integral_constant<Shown, std::decay_t<K>::shown>;
 template <class K> using Called = decltype(std::string(std::decay_t<K>::name));
 template <class K> using RoleOf = std::integral_constant<Role, std::decay_t<K>::role>;
-// Something of a type, in questions that nobody asks.
+// A value of type T for unevaluated expressions. It has no definition.
 template <class T> T given();
 
-// Whether K gives residual and rows at once, from nearest points found once.
+// Check if K has `place`, which computes residual and rows at once from the same nearest points.
 template <class K, class At, class Out = RowValues>
 constexpr bool places = answers<K>([](const auto& k) -> decltype(k.place(given<At>(), given<Out&>())) {});
 
-// A struct is a kind when it says all this of itself.
+// Check at compile time that K has all members of a kind.
 template <class K>
 constexpr bool is_complete() {
     using At = std::conditional_t<is_geometric<K>, const Sides<Pose>&, const State&>;

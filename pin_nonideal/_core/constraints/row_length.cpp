@@ -9,11 +9,11 @@ namespace pn {
 
 namespace {
 
-// Part of the length of a force that moves all mass, below which the length of a row may be rounding: a force through the
-// only pin of a body moves nothing, wherever the pin is.
+// Part of the length of a force that moves all mass, below which the length of a row may be rounding. For example, a
+// force through the only pin of a body moves nothing at any position of the pin.
 constexpr double least_part = 1e-4;
-// Part of the longest row of a user's function below which a row counts as this long: rounding of a direction without
-// freedom is far shorter, rows in other units are longer.
+// Lower bound on the length of a row of a user's function, as a part of the longest row. Rounding of a direction
+// without freedom is far shorter, and rows in other units are longer.
 constexpr double least_of_function = 1e-4;
 
 class Lengths {
@@ -25,7 +25,7 @@ public:
         if (mass > 0.0) least_ = least_part * least_part / mass;
     }
 
-    // Square of the length of the row of one unit wrench.
+    // Return the squared length of the row of one unit wrench.
     double square(const Wrench& w) {
         x_.setZero();
         for (const Block::Entry& e : block_.entries) {

@@ -1,16 +1,16 @@
-// What a kind may say of itself beside its formulas.
+// Traits that a kind declares beside its formulas.
 #pragma once
 
 namespace pn {
 
-// What its rows are to a scene.
+// Role of the rows of a kind in a scene.
 enum class Role {
     constraint,
-    contact,   // a constraint whose multiplier should press
-    direction  // of friction: its rates are slip velocities
+    contact,   // a constraint with a multiplier that should not be negative
+    direction  // slip direction of friction, with a slip velocity as rate
 };
 
-// A number, frame or vector that it is made of, by the name that Python gives it.
+// A number, frame or vector of a kind, with its name in Python.
 template <class Kind, class Value>
 struct Datum {
     const char* name;
@@ -19,19 +19,19 @@ struct Datum {
 template <class Kind, class Value>
 Datum(const char*, Value Kind::*) -> Datum<Kind, Value>;
 
-// What a replay shows of it.
+// Display of a kind in a replay.
 enum class Shown {
     nothing,
-    anchor,   // a tie of two frames; the force on frame 1, by components in the axes of frame 2
-    rod,      // a tie of two frames; the force along their line
-    contact,  // a ring, cone and mark, and the force, where it touches
-    rolling,  // the force where a sphere or disk touches a plane
+    anchor,   // two tied frames, and the force on frame 1 by components in the axes of frame 2
+    rod,      // two tied frames, and the force along their line
+    contact,  // a ring, cone and mark, and the force, at the contact point
+    rolling,  // the force at the contact of a sphere or disk with a plane
     edge,     // the force at a frame, along its axis
     drive,    // the generalized force on a joint
-    gear      // the same on two joints
+    gear      // the generalized forces on two joints
 };
 
-// What directions of friction between two frames have in common: their rates are slip velocities, and nothing is kept.
+// Base of friction directions between two frames. Their rates are slip velocities, and they hold no position.
 struct SlipDirections {
     static constexpr Role role = Role::direction;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;

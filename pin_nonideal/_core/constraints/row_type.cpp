@@ -96,7 +96,7 @@ void RowValues::resize(const Kind& kind, int nv) {
     if (geometric) return;
     A = MatX::Zero(rows, nv);
     b = VecX::Zero(rows);
-    scratch = VecX::Zero(std::max(rows, 2 * nv));  // rows, or two directions one after the other
+    scratch = VecX::Zero(std::max(rows, 2 * nv));  // rows, or two directions in sequence
 }
 
 template <Part part, class K, class At>
@@ -123,7 +123,7 @@ static PN_INLINE void evaluate_kind(const K& kind, const State& s, RowValues& ou
     }
 }
 
-// Like std::visit, but part of the caller; the kinds from the first on, one for each index k.
+// Like std::visit but inlined into the caller, for the kinds first + k.
 template <Part part, size_t first, size_t... k>
 static PN_INLINE void evaluate_some(const Kind& kind, const State& s, RowValues& out, std::index_sequence<k...>) {
     (void)((kind.index() == first + k && (evaluate_kind<part>(*std::get_if<first + k>(&kind), s, out), true)) || ...);
@@ -141,7 +141,7 @@ static constexpr size_t index_of(const std::variant<K...>*) {
     return i;
 }
 
-// The last kinds are gaps between shapes, which search for nearest points. Six functions instead of one, because compile
+// The last kinds are gaps between shapes, which search for nearest points. Six functions replace one, because compile
 // time grows faster than the size of a function (GCC 12: 66 s for one, 36 s for six).
 constexpr size_t shapes = index_of<EllipsoidRow>(static_cast<const Kind*>(nullptr)), all = std::variant_size_v<Kind>;
 static PN_WIDE void residual(const Kind& kind, const State& s, RowValues& out) {

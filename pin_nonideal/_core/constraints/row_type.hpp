@@ -1,8 +1,8 @@
-// The kinds of constraints, and of directions along which friction acts.
+// Kinds of constraints, and of directions along which friction acts.
 //
-// A kind is one struct in one header that knows everything about itself; constraints/kinds/complete.hpp lists what. Most
-// kinds act between two bodies: a row is then the power of a unit wrench w on the motion of body 1 relative to body 2, so
-// that A_j = w . J_j, and the multiplier is the size of that wrench. The others act on dofs directly and write A.
+// A kind is one struct in one header. constraints/row_completeness.hpp lists its members. Most kinds act between two
+// bodies. A row is then the power of a unit wrench w on the motion of body 1 relative to body 2. So A_j = w . J_j, and
+// the multiplier is the size of the wrench. The other kinds act on dofs directly and write A.
 #pragma once
 
 #include <utility>
@@ -50,21 +50,21 @@ using Kind = std::variant<PointRows, ContactRow, CapsulesRow, BoxRow, FrameRows,
                           RevolvedSlipRows, LineRow, LineSlipRows, RimRow, RimSlipRows, RimsRow,
                           RimsSlipRows>;
 
-// Rows of one constraint before any is left out.
+// Values of the rows of one constraint, before any row is removed.
 struct RowValues {
     int rows = 0;
     bool geometric = false;  // rows are wrenches between two bodies
     std::vector<Wrench> wrench;
     std::vector<double> drift, residual, rate;
-    std::vector<double> phi_t, phi_tt;  // explicit rates in time of the residual
+    std::vector<double> phi_t, phi_tt;  // explicit time derivatives of the residual
     MatX A;  // rows x nv, when not geometric
-    bool constant_A = false, has_A = false;  // A that never changes is written once
+    bool constant_A = false, has_A = false;  // a constant A is written once
     VecX b, scratch;
 
     void resize(const Kind& kind, int nv);
 };
 
-// What an evaluation of a kind may read.
+// Quantities that the evaluation of a kind may read.
 struct State {
     const Mechanism& mechanism;
     const Terms& terms;
@@ -72,26 +72,26 @@ struct State {
     const VecX &q, &v;
 };
 
-// What a kind knows of itself, whichever it is.
+// Properties of a kind.
 int size(const Kind& kind);
 bool is_holonomic(const Kind& kind, int row);
 bool moves_in_time(const Kind& kind);
 bool has_constant_A(const Kind& kind);
 bool has_affine_rate(const Kind& kind);
 bool has_comparable_rows(const Kind& kind);
-// The row whose multiplier should press, or -1.
+// Return the row with a multiplier that should not be negative, or -1.
 int pressing_row(const Kind& kind);
 Role role(const Kind& kind);
 Shown shown(const Kind& kind);
-// Its two frames, where it acts between bodies; else none.
+// Return both frames of a kind between bodies, else null pointers.
 std::pair<const Frame*, const Frame*> frames(const Kind& kind);
-// The functions of time that move it.
+// Return the functions of time among the data of a kind.
 std::vector<const TimeFunction*> time_functions(const Kind& kind);
-// Dofs on which A may differ from zero.
+// Return the dofs on which A may differ from zero.
 std::vector<int> dofs(const Kind& kind, const Mechanism& m);
 
-// What of all rows of the kind is evaluated: the residuals alone; residuals and wrenches or A, which bodies in their
-// places give; or rates and drifts, which need bodies in motion, and the place part before.
+// Parts of the evaluation of all rows of a kind: `residual` for the residuals alone, `place` for residuals and wrenches or A
+// of placed bodies, and `motion` for rates and biases. `motion` needs velocities of the bodies, and `place` before.
 enum class Part { residual, place, motion };
 void evaluate(const Kind& kind, const State& s, Part part, RowValues& out);
 

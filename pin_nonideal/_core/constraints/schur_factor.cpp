@@ -9,11 +9,11 @@
 
 namespace pn {
 
-// Part of the square of the longest row of a block below which a row is rounding.
+// Part of the squared length of the longest row of a block below which a row is rounding.
 constexpr double vanishing_square = 1e-28;
 
-// G of n1 rows of one block, from position p1, with n2 of another, from p2: B B^T summed over their common dofs, below
-// the diagonal.
+// Compute the entries of G = B B^T below the diagonal for n1 rows of one block, from position p1, and n2 rows of
+// another, from p2. The sum runs over their common dofs.
 template <int n1, int n2>
 static void multiply_tile(const double* X, int r1, const double* Y, int r2, const RowLayout::Common& common,
                           const RowLayout& layout, int p1, int p2, double* G) {
@@ -31,8 +31,8 @@ static void multiply_tile(const double* X, int r1, const double* Y, int r2, cons
     }
 }
 
-// The product of the rows of two blocks, a tile at a time. The rows of a block stand side by side in the layout, and those
-// of the first block not before those of the second.
+// Multiply the rows of two blocks, one tile at a time. The rows of a block are adjacent in the layout, and those of the
+// first block do not precede those of the second.
 static PN_INLINE void multiply_blocks(const RowLayout& layout, const Block& b1, const Block& b2,
                                       const RowLayout::Common& common, const std::vector<double>& B, RowSystem& s) {
     const int r1 = static_cast<int>(b1.kept.size()), r2 = static_cast<int>(b2.kept.size());
@@ -65,8 +65,8 @@ void scale_to_unit_length(const RowLayout& layout, const std::vector<char>& use,
     }
 }
 
-// Square of the shortest row of a block beside the longest one there: the least of all blocks whose rows are comparable.
-// Sets `vanishes` where a row of any block is rounding beside another one.
+// Return the least square of a row's length over that of the longest row of its block, among blocks with comparable
+// rows. Sets `vanishes` if a row of any block is rounding beside another row.
 static PN_INLINE double shortest_row(const RowLayout& layout, const std::vector<Block>& blocks, const RowSystem& s,
                                      bool& vanishes) {
     double shortest = 1.0;
@@ -86,7 +86,8 @@ static PN_INLINE double shortest_row(const RowLayout& layout, const std::vector<
     return shortest;
 }
 
-// Square of the shortest active row beside its own greatest length in these modes, where others depend on it.
+// Return the least square of an active row's length over its greatest length in these modes. Used if other rows depend
+// on the active ones.
 static double shortest_passing(const RowLayout& layout, const RowSystem& s) {
     double shortest = 1.0;
     for (int i = 0; i < layout.rows; ++i) {
@@ -97,7 +98,7 @@ static double shortest_passing(const RowLayout& layout, const RowSystem& s) {
     return shortest;
 }
 
-// Cholesky factor of the unit-diagonal B B^T inside the envelope; returns whether its pivots are safe.
+// Compute the Cholesky factor of the unit-diagonal B B^T inside the envelope. Returns true if its pivots are safe.
 static PN_INLINE bool factor_cholesky(const RowLayout& layout, RowSystem& s) {
     double* L = s.factor.data();
     for (int i = 0; i < layout.rows; ++i) {
@@ -107,14 +108,14 @@ static PN_INLINE bool factor_cholesky(const RowLayout& layout, RowSystem& s) {
         const double* Gi = s.G.data() + layout.start[i];
         const int first = layout.first[i];
         const double scale = s.scale[row];
-        double pivot = Gi[i] > 0.0 ? 1.0 : 0.0;  // a row of nothing: its dofs are locked
+        double pivot = Gi[i] > 0.0 ? 1.0 : 0.0;  // zero row: its dofs are locked
         for (int j = first; j < i; ++j) {
             const int column = layout.row_at[j];
             if (!s.active[column]) { Li[j] = 0.0; continue; }
             const double* Lj = L + layout.start[j];
             const int common = std::max(first, layout.first[j]);
             const double sum = Gi[j] * scale * s.scale[column] - dot(Li + common, Lj + common, j - common);
-            Li[j] = sum * Lj[j];  // the diagonal holds inverse pivots
+            Li[j] = sum * Lj[j];  // the diagonal holds inverse roots of pivots
             pivot -= Li[j] * Li[j];
         }
         s.min_pivot = std::min(s.min_pivot, pivot);

@@ -22,7 +22,7 @@ void RowSystem::use_required(const std::vector<Block>& all) {
     blocks.clear();
     std::fill(block_used.begin(), block_used.end(), char(0));
     const auto last = std::find(required.rbegin(), required.rend(), char(1));
-    const int end = static_cast<int>(required.rend() - last);  // of the rows that are
+    const int end = static_cast<int>(required.rend() - last);  // end of the required rows
     for (size_t i = 0; i < all.size() && all[i].row < end; ++i) {
         for (size_t k = 0; k < all[i].kept.size(); ++k) block_used[i] |= required[all[i].row + k];
         if (block_used[i]) blocks.push_back(static_cast<int>(i));

@@ -1,8 +1,8 @@
 // Rows in the metric of M, and the solution for their multipliers: Eq. (40) in factor form. With M = R R^T, B = A R^-T
 // and a_s' = R^-1 (F + C):
-//     B B^T lam = b - B a_s',   a_s = a_s' + B^T lam,   a = R^-T a_s,
-// for the rows in use, which are independent: copies and vanishing rows were dropped before the run, other redundancy
-// is decided at each step's start (decide_rows) and held over the step.
+//     B B^T lam = b - B a_s',   a_s = a_s' + B^T lam,   a = R^-T a_s.
+// The rows in use are independent. Duplicate and vanishing rows were removed before the run. Other redundancy is decided
+// at the start of each step (decide_rows) and kept over the step.
 #pragma once
 
 #include <vector>
@@ -11,12 +11,12 @@
 
 namespace pn {
 
-// The choice of active rows among the required ones, and the record by which a new choice becomes due.
+// Choice of active rows among the required ones, and the records that make a new choice due.
 struct RowChoice {
     std::vector<char> active;
     bool redundant = false;  // some required row is not active
-    // Kept at the starts of steps while `redundant`: the greatest square of each row's length in these modes, and the same
-    // since the last choice; and the greatest of the smallest pivots since the last choice.
+    // Updated at the starts of steps while `redundant`. longest: greatest squared length of each row in these modes.
+    // longest_chosen: the same since the last choice. chosen_pivot: greatest of the smallest pivots since the last choice.
     VecX longest, longest_chosen;
     double chosen_pivot = 0.0;
 };
@@ -30,19 +30,19 @@ struct RowSystem : RowChoice {
     bool orthogonal = false;        // B^T = Q T in use instead of the Cholesky factor
     bool refine = false;            // very unequal pivots of M: solutions are refined
     double min_pivot = 1.0;
-    // Square of the sine at which some row stands to the others, or of its length beside the other rows of its block
-    // (a singular position turns a row into zero), or of a row beside its greatest length where others depend on it: small
-    // near a singular position.
+    // Distance from a singular position, small near it. It is the minimum of three squares: (a) sine of the angle
+    // between a row and the others, (b) length of a row relative to the longest row of its block (a singular position
+    // turns a row into zero), (c) length of a row relative to its greatest length, if other rows depend on it.
     double distance = 1.0;
     int rank = 0;
-    // Orthogonal factorization of the scaled active rows, one column a row: no columns before it is first needed, for
-    // in a mechanism of many loops it takes far more room than all else.
+    // Orthogonal factorization of the scaled active rows, one column per row. Columns are allocated on first use,
+    // because a mechanism of many loops needs far more memory for them than for all else.
     MatX Q;
     VecX tau, work;
     std::vector<int> columns;
 
     void allocate(const RowLayout& layout, int blocks, int nv);
-    // Blocks with a required row, and all required rows in use.
+    // Select the blocks with a required row, and use all required rows.
     void use_required(const std::vector<Block>& all);
 };
 

@@ -1,4 +1,4 @@
-// Given forces F beside the bias: springs, wrenches, the user's own, and the torques of the actuation.
+// Applied forces in F beside the bias: springs, wrenches, user-defined forces and actuation torques.
 #pragma once
 
 #include <functional>
@@ -12,8 +12,8 @@ namespace pn {
 struct Program;
 struct Workspace;
 
-// Each tells whether it acts on bodies, not on joints, and whether it asks a function of the user, so that it may
-// change while nothing moves.
+// `acts_on_bodies` is true for forces on bodies and false for forces on joints. `asks_function` is true if a user's
+// function gives the force. Such a force may change while nothing moves.
 struct SpringDamper {
     Frame frame1, frame2;
     double stiffness = 0.0, damping = 0.0, rest_length = 0.0;
@@ -48,7 +48,7 @@ struct SampledTorque {
     double period;
 };
 struct HoldPosition { VecX kp, kd, q; };
-struct TorqueTable { std::vector<double> times; MatX values; };  // one column a time
+struct TorqueTable { std::vector<double> times; MatX values; };  // one column per time
 using Actuation = std::variant<NoActuation, ConstantTorque, TorqueFunction, SampledTorque, HoldPosition, TorqueTable>;
 
 }  // namespace pn

@@ -1,8 +1,8 @@
-// Nonideal laws: what C(q, v, t, reactions) is made of Eq. (9), w^T F^c = w^T C.
+// Nonideal laws, which form C(q, v, t, reactions) of Eq. (9), w^T F^c = w^T C.
 //
-// Each smooth law is one struct that says what it exerts, through one function `act`, on dofs, on bodies or along the
-// rows of a block, and how its own states change. The same function makes C and, where joints carry its forces, the
-// reactions. Dry friction, whose elements stick and slip, is in friction.hpp.
+// Each smooth law is one struct. Its function `act` exerts forces on dofs, on bodies or along the rows of a block, and
+// sets the rates of its states. The same function computes C and, if joints carry the forces, the reactions. Dry
+// friction, with sticking and slipping elements, is in friction.hpp.
 #pragma once
 
 #include <cmath>
@@ -19,16 +19,16 @@ struct Program;
 struct Workspace;
 struct Evaluation;
 
-// Which reactions a law reads: none, those of the ideal constraints alone, or those of the motion that it causes.
+// Reactions that a law reads: none, those of the ideal constraints alone, or those of the motion that the law causes.
 enum class Reaction { none, ideal, total };
 
-// What laws may read at a state.
+// Quantities that a law may read at a state.
 struct LawState {
     const Terms& terms;
-    const std::vector<RowValues>& values;  // of each block, its rates
+    const std::vector<RowValues>& values;  // rates of each block
     const VecX& v;
     const VecX& z;
-    const std::vector<VecX>& user_force;  // of each user's law, as it answered last
+    const std::vector<VecX>& user_force;  // last result of each user-defined law
 };
 
 struct Viscous {  // C = -coefficient v on dofs, or on the slip velocities along a block
@@ -68,7 +68,7 @@ struct Sigmoid {  // identified robot friction, phi1/(1+exp(-phi2 (v+phi3))) - p
 struct LuGre {  // F = sigma0 z + sigma1 dz + sigma2 v, dz = v - sigma0 |v| z / g(v)
     int law = 0, dof = 0;
     double sigma0 = 0.0, sigma1 = 0.0, sigma2 = 0.0, coulomb = 0.0, stiction = 0.0, stribeck_velocity = 1.0;
-    int state = 0;  // place of its first among the states of all laws, as Program::add gives it
+    int state = 0;  // index of its first state among the states of all laws, set by Program::add
     static constexpr int states = 1;
     static constexpr Reaction reaction = Reaction::none;
 
@@ -110,9 +110,9 @@ struct Drag {  // force -coefficient |u|^(exponent - 1) u at the origin of a fra
 };
 
 struct UserLaw {
-    int law = 0, index = 0, state = 0, states = 0;  // index: among the user's laws
+    int law = 0, index = 0, state = 0, states = 0;  // index: number among the user-defined laws
     Reaction reaction = Reaction::none;
-    // C (and dz when it has states) for provisional reactions held in the workspace.
+    // Computes C (and dz if the law has states) for provisional reactions in the workspace.
     std::function<void(const Program& p, double t, const VecX& q, const VecX& v, Workspace& w, VecX& C, const double* z,
                        double* dz)> function;
 
@@ -120,20 +120,20 @@ struct UserLaw {
     void act(const LawState& s, Sink& sink) const { sink.on_all(s.user_force[index]); }
 };
 
-// Sums run kind by kind, in this order.
+// Forces are summed by kind, in this order.
 using Law = std::variant<Viscous, Sigmoid, LuGre, Drag, UserLaw>;
 
-// Whether it has states of its own, and so a place for them.
+// Check if a law has a member `state`, the index of its first state.
 template <class L, class = void>
 constexpr bool has_states = false;
 template <class L>
 constexpr bool has_states<L, std::void_t<decltype(L::state)>> = true;
 
-// What each law must say of itself, so that none is added and never acts.
+// Check at compile time that a law declares its members. A law without them would be added but never act.
 template <class L>
 constexpr bool is_complete_law() {
     static_assert(std::is_same_v<decltype(L::law), int>, "a law has `int law`, its column of the ledger");
-    if constexpr (!std::is_same_v<L, UserLaw>) {  // which says these of each of its kind
+    if constexpr (!std::is_same_v<L, UserLaw>) {  // a UserLaw declares these members per object
         static_assert(L::reaction == Reaction::none, "reactions are solved for dry friction and for laws of the user");
         static_assert(has_states<L> == (L::states > 0), "a law with states has `int state`, the place of the first");
     }
@@ -143,7 +143,7 @@ template <class... L>
 constexpr bool all_laws_complete(const std::variant<L...>*) { return (is_complete_law<L>() && ...); }
 static_assert(all_laws_complete(static_cast<const Law*>(nullptr)));
 
-// Calls f(law) for each law of one kind.
+// Call f(law) for each law of one kind.
 template <class Kind, class Laws, class Function>
 void each_law(Laws& laws, const Function& f) {
     for (auto& law : laws)

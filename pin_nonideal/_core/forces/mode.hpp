@@ -1,13 +1,13 @@
-// Modes of frictional elements.
+// Modes of friction elements.
 #pragma once
 
 #include <vector>
 
 namespace pn {
 
-// An element slips one way (+1, -1; +1 for several directions), sticks, or carries no friction at all: that of an open
-// contact, or while the modes are being sought.
-// Numbers, so that the sign of a slip is the mode.
+// Stick-slip mode of a friction element: slip in one direction (+1 or -1, +1 for several directions), sticking, or
+// unloaded. An unloaded element exerts no friction, because its contact is open or its mode is still being determined.
+// The value of a slip mode is the sign of the slip.
 enum Mode : signed char { slip_minus = -1, sticking = 0, slip_plus = 1, unloaded = 2 };
 inline bool slips(Mode mode) { return mode == slip_plus || mode == slip_minus; }
 
@@ -15,7 +15,7 @@ struct Program;
 struct Workspace;
 class Archive;
 
-// Those of all elements, to be read by all and changed by set_alone.
+// Modes of all elements. Every reader may access them, but only set_modes and archives change them.
 class Modes {
 public:
     explicit Modes(size_t elements = 0) : values_(elements, slip_plus) {}

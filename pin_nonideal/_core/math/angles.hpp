@@ -1,6 +1,6 @@
-// Cosines and sines of four angles at once: x = n pi/2 + r with r in two numbers (Cody and Waite's reduction, pi/2 in
-// three parts), and the minimax polynomials of both functions on |r| <= pi/4. Errors stay below one unit in the last
-// place; angles far away are left to the system's library.
+// Cosines and sines of four angles at once. Cody and Waite's reduction gives x = n pi/2 + r, with r in two numbers and
+// pi/2 in three parts. Minimax polynomials of both functions apply on |r| <= pi/4. Errors stay below one unit in the
+// last place. Large angles use the system's library.
 #pragma once
 
 #include <cmath>
@@ -9,14 +9,15 @@
 
 namespace pn {
 
-// To here n is exact, and so is its product with the first two parts of pi/2, of 33 bits each.
+// Norm of four angles [rad] from which the system's library computes them. Below it n is exact. The products of n with
+// the first two parts of pi/2 (33 bits each) are exact too.
 constexpr double farthest_reduced = 8e5;
 
 PN_INLINE void cosines_and_sines(const Lanes& x, Lanes& c, Lanes& s) {
     using Bits = long long __attribute__((vector_size(32)));
     constexpr double two_over_pi = 0x1.45f306dc9c883p-1;
     constexpr double part1 = 0x1.921fb544p+0, part2 = 0x1.0b4611a6p-34, part3 = 0x1.3198a2e037073p-69;
-    constexpr double to_integer = 0x1.8p52;  // added, it leaves the nearest integer in the last bits
+    constexpr double to_integer = 0x1.8p52;  // adding it puts the nearest integer into the last bits
 
     if (!(sum(x * x) < farthest_reduced * farthest_reduced)) {
         for (int k = 0; k < 4; ++k) {
@@ -42,7 +43,8 @@ PN_INLINE void cosines_and_sines(const Lanes& x, Lanes& c, Lanes& s) {
     const Lanes sine = r + (r * z * p + low * most);
     const Lanes cosine = most + (((1.0 - most) - half) + (zz * q - r * low));
 
-    // Quadrants: odd ones exchange the two, the upper bit of n or n + 1 is the sign.
+    // Quadrants: an odd n swaps cosine and sine. The second bit of n + 1 is the sign of the cosine, and that of n the
+    // sign of the sine.
     const Bits quadrant = (Bits)shifted, swap = -(quadrant & 1);
     const Bits of_sine = (Bits)sine, of_cosine = (Bits)cosine;
     c = (Lanes)(((of_cosine & ~swap) | (of_sine & swap)) ^ (((quadrant + 1) & 2) << 62));

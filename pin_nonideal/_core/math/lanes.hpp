@@ -1,6 +1,5 @@
-// Four numbers at a time. Functions marked PN_WIDE are compiled twice, and on a processor with registers of four numbers
-// (AVX2) the loader takes the version that uses them. Neither version fuses products and sums, so that both give the
-// same numbers.
+// Four numbers at a time. Functions marked PN_WIDE are compiled twice. On a processor with registers of four numbers (AVX2)
+// the loader selects the version that uses them. Neither version fuses products and sums, so both give the same numbers.
 #pragma once
 
 #include <cstring>
@@ -10,7 +9,7 @@
 #else
 #define PN_WIDE
 #endif
-// What a wide function calls is part of it.
+// Functions called by a wide function must be inlined into it.
 #define PN_INLINE inline __attribute__((always_inline))
 
 namespace pn {
@@ -26,7 +25,7 @@ PN_INLINE void store(const Several& x, double* to) { std::memcpy(to, &x, sizeof 
 
 PN_INLINE double sum(const Lanes& x) { return (x[0] + x[2]) + (x[1] + x[3]); }
 
-// Four sums side by side, so that none waits for the one before.
+// Return the dot product from four independent partial sums, so that no addition waits for the previous one.
 PN_INLINE double dot(const double* x, const double* y, int n) {
     Lanes sums = {};
     int k = 0;

@@ -10,20 +10,20 @@ namespace pn {
 
 namespace {
 
-// What a handful of products leaves of numbers that cancel, as a part of them.
+// Rounding of a few products, relative to the numbers that cancel.
 constexpr double rounding = 1e-13;
-// Columns that the others leave less of than this part are spanned by them.
+// Relative pivot below which a column counts as spanned by the others.
 constexpr double spanned = 1e-11;
-// Violation that is left for the search of what binds, where no z meets all: it must not be lost in rounding.
+// Slack for the search of binding numbers if no z is feasible, relative to max |N|. It must exceed rounding.
 constexpr double slack = 1e-9;
-// What is left of zero by a least-squares solution, as a part of the numbers that it adds.
+// Rounding of a zero in a least-squares solution, relative to the numbers that it sums.
 constexpr double met_rounding = 1e-11;
-// Exchanges for each column after which the rest is rounding; the method is finite, and takes about one.
+// Maximum number of exchanges per column. The method is finite and takes about one. Further exchanges are rounding.
 constexpr int exchanges = 10;
-constexpr double least_size = 1e-300;  // of numbers that are all zero
-constexpr int most_cuts = 50;  // of the bound on the largest least number, each exact for the numbers that bind
+constexpr double least_size = 1e-300;  // scale of numbers that are all zero
+constexpr int most_cuts = 50;  // updates of the bound in largest_least, each exact for the binding numbers
 
-// Least squares over some of the columns.
+// Solve the least-squares problem over the listed columns.
 VecX solve_over(const MatX& A, const VecX& b, const std::vector<int>& columns) {
     MatX part(A.rows(), static_cast<Eigen::Index>(columns.size()));
     for (size_t k = 0; k < columns.size(); ++k) part.col(k) = A.col(columns[k]);
@@ -32,7 +32,7 @@ VecX solve_over(const MatX& A, const VecX& b, const std::vector<int>& columns) {
 
 double largest(const VecX& x) { return x.size() > 0 ? x.cwiseAbs().maxCoeff() : 0.0; }
 
-// What is orthogonal to the columns of Z, as a matrix.
+// Return the projector onto the orthogonal complement of the columns of Z.
 MatX complement_of(const MatX& Z) {
     const Eigen::Index n = Z.rows();
     if (Z.cols() == 0) return MatX::Identity(n, n);
@@ -60,12 +60,12 @@ VecX nonnegative_least_squares(const MatX& A, const VecX& b) {
         if (best < 0) break;
         used.push_back(best);
         VecX s = solve_over(A, b, used);
-        if (!(s[s.size() - 1] > 0.0)) {  // rounding says that it would fall
+        if (!(s[s.size() - 1] > 0.0)) {  // positive but for rounding
             refused[best] = 1;
             used.pop_back();
             continue;
         }
-        while (s.size() > 0 && s.minCoeff() <= 0.0) {  // as far as all stay positive
+        while (s.size() > 0 && s.minCoeff() <= 0.0) {  // step only as far as all stay nonnegative
             double part = 1.0;
             for (size_t k = 0; k < used.size(); ++k)
                 if (s[k] <= 0.0) part = std::min(part, x[used[k]] > 0.0 ? x[used[k]] / (x[used[k]] - s[k]) : 0.0);
@@ -85,7 +85,7 @@ VecX nonnegative_least_squares(const MatX& A, const VecX& b) {
 VecX least_violation(const MatX& Z, const VecX& N) {
     if (N.size() == 0 || N.minCoeff() >= 0.0) return VecX::Zero(N.size());
     const MatX P = complement_of(Z);
-    const VecX off = P * (N - nonnegative_least_squares(P, P * N));  // z takes up the rest
+    const VecX off = P * (N - nonnegative_least_squares(P, P * N));  // Z z takes up the rest
     const double noise = rounding * static_cast<double>(N.size()) * largest(N);
     return off.unaryExpr([noise](double x) { return x < -noise ? -x : 0.0; });
 }
@@ -100,8 +100,8 @@ VecX shortest_with_zeros(const MatX& Z, const VecX& N, const std::vector<char>& 
     return -least_squares(rows, numbers, spanned);
 }
 
-// Which numbers bind in the shortest z with N + Z z >= 0, as weights, none where that has no solution: with
-// u >= 0 the nearest that [Z^T; -N^T] u comes to the last unit vector. [Lawson, Hanson, 23.4.]
+// Return the numbers that bind in the shortest z with N + Z z >= 0. These are the positive entries of u >= 0 for which
+// [Z^T; -N^T] u is nearest to the last unit vector. [Lawson, Hanson, 23.4.]
 static std::vector<char> binding(const MatX& Z, const VecX& N) {
     MatX both(Z.cols() + 1, Z.rows());
     both << Z.transpose(), -N.transpose() / std::max(largest(N), least_size);
@@ -130,11 +130,11 @@ Nonnegative shortest_nonnegative(const MatX& Z, const VecX& N) {
 
 LargestLeast largest_least(const MatX& Z, const VecX& N) {
     const double size = largest(N);
-    double value = N.maxCoeff() + std::max(size, least_size);  // above what any weights of sum 1 can give
+    double value = N.maxCoeff() + std::max(size, least_size);  // above any weighted mean of N
     LargestLeast found{size, VecX()};
     for (int cut = 0; cut < most_cuts; ++cut) {
         const VecX violation = least_violation(Z, (N.array() - value).matrix());
-        if (largest(violation) <= met_rounding * size) break;  // its parts would be rounding
+        if (largest(violation) <= met_rounding * size) break;  // smaller violations are rounding
         found.weight = violation / violation.sum();
         const double bound = found.weight.dot(N);
         if (!(bound < value - rounding * size)) { value = bound; break; }

@@ -1,5 +1,5 @@
-// Polynomials through Radau's seven points of a step, and its start: the last point is the step's end, and the integral
-// of a polynomial of degree 12 by its values there is exact.
+// Polynomials through the seven Radau points of a step and its start. The last point is the end of the step. The values
+// at the points integrate a polynomial of degree 12 exactly.
 #pragma once
 
 #include <array>
@@ -9,20 +9,20 @@ namespace pn::radau {
 // [Hairer, Wanner, "Solving Ordinary Differential Equations II", sec. IV.5]
 constexpr int n_points = 7;
 
-// Roots of P_7(2x - 1) - P_6(2x - 1), Legendre's polynomials.
+// Roots of P_7(2x - 1) - P_6(2x - 1), with Legendre polynomials P_n.
 constexpr double points[n_points] = {
     0.02931642715978489197, 0.14807859966848429185, 0.33698469028115429910, 0.55867151877155013208,
     0.76923386203005450092, 0.92694567131974111485, 1.0,
 };
 
-// What follows from the points: integrals of Lagrange's polynomials through them, a_ij = int_0^c_i l_j, and the values
-// of those at 0; barycentric weights of the points together with 0.
+// Coefficients derived from the points. a_ij = int_0^c_i l_j are integrals of the Lagrange polynomials l_j through the
+// points. at_start holds l_j(0), and barycentric the weights of the points together with 0.
 struct Coefficients {
     double a[n_points][n_points], at_start[n_points], barycentric[n_points + 1];
 
     Coefficients() {
         for (int j = 0; j < n_points; ++j) {
-            std::array<long double, n_points> l{1.0L};  // by powers
+            std::array<long double, n_points> l{1.0L};  // coefficients by powers
             int degree = 0;
             for (int k = 0; k < n_points; ++k) {
                 if (k == j) continue;
@@ -48,7 +48,7 @@ struct Coefficients {
 };
 inline const Coefficients table;
 
-// Calls use(k, weight) with the weight of each node, 0 at the step's start, in the polynomial through all of them.
+// Call use(k, weight) with the weight at x of each node in the polynomial through all nodes. Node 0 is the step's start.
 template <class Use>
 void with_weights(double x, const Use& use) {
     double sum = 0.0, weight[n_points + 1];

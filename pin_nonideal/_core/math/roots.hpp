@@ -1,4 +1,4 @@
-// Where a margin first falls below zero, on functions of the part of a step.
+// Roots and minima of event functions (margins) of the part of a step.
 #pragma once
 
 #include <algorithm>
@@ -6,16 +6,16 @@
 
 namespace pn {
 
-constexpr int dip_passes = 40;     // golden sections: a dip of 1e-16 of the margin's own change
+constexpr int dip_passes = 40;     // golden sections, which find a dip of 1e-16 of the margin's change
 constexpr int root_passes = 60;
-constexpr int start_halvings = 30;  // of the first part, in which a slip from rest may have come to rest again
-constexpr double root_width = 1e-13, root_margin = 1e-13;  // the guess of a step that is taken again
+constexpr int start_halvings = 30;  // halvings toward the start, near which a slip from rest may stop again
+constexpr double root_width = 1e-13, root_margin = 1e-13;  // the root is a guess for the repeated step
 
-// Root of a margin between a part of the step where it is positive and one where it is negative: secants, kept inside
-// (Illinois).
+// Return the root of a margin that is positive at `low` and negative at `high`, as parts of a step. Uses secants that
+// stay inside the bracket (Illinois).
 template <class Margin>
 double root_between(double low, double margin_low, double high, double margin_high, const Margin& margin) {
-    if (margin_low <= 0.0) return low;  // it starts at zero and goes the wrong way at once
+    if (margin_low <= 0.0) return low;  // the margin starts at zero and falls at once
     int side = 0;
     for (int it = 0; it < root_passes && high - low > root_width; ++it) {
         double mid = (low * margin_high - high * margin_low) / (margin_high - margin_low);
@@ -37,8 +37,8 @@ double root_between(double low, double margin_low, double high, double margin_hi
     return high;
 }
 
-// The same for a margin that is zero at the start: where it has risen above `least` before it falls, the root after that;
-// else the start, from where it goes the wrong way at once.
+// Return the root of a margin that is zero at the start. If the margin rises above `least` before it falls, the later
+// root is returned. Otherwise the margin falls at once, and the start is returned.
 template <class Margin>
 double root_after_start(double high, double margin_high, double least, const Margin& margin) {
     for (int it = 0; it < start_halvings; ++it) {
@@ -50,26 +50,26 @@ double root_after_start(double high, double margin_high, double least, const Mar
     return 0.0;
 }
 
-// What the cubic with values u0, u1 and slopes a0, a1 at 0 and 1 nowhere between goes below: the least of its Bernstein
-// coefficients.
+// Return a lower bound on [0, 1] of the cubic with values u0, u1 and slopes a0, a1 at 0 and 1. It is the minimum of the
+// Bernstein coefficients.
 inline double lower_bound_inside(double u0, double a0, double u1, double a1) {
     constexpr double third = 1.0 / 3.0;
     return std::min({u0, u0 + third * a0, u1 - third * a1, u1});
 }
 
-// Its least value inside, where it has one there.
+// Return the least extremum of the same cubic inside (0, 1), or HUGE_VAL if there is none.
 inline double least_inside(double u0, double a0, double u1, double a1) {
     // u' = a0 + 2 b x + 3 c x^2
     const double b = 3.0 * (u1 - u0) - 2.0 * a0 - a1, c = a0 + a1 - 2.0 * (u1 - u0);
-    const double root = std::sqrt(b * b - 3.0 * a0 * c);  // no number: no extremum
+    const double root = std::sqrt(b * b - 3.0 * a0 * c);  // NaN: no extremum
     const double q = -(b + std::copysign(root, b));
     double least = HUGE_VAL;
-    for (double x : {q / (3.0 * c), a0 / q})  // of a maximum and a minimum
+    for (double x : {q / (3.0 * c), a0 / q})  // maximum and minimum in either order
         if (x > 0.0 && x < 1.0) least = std::min(least, u0 + x * (a0 + x * (b + x * c)));
     return least;
 }
 
-// How far the parabola through three points rises above the highest of them in between; 0 where it does not.
+// Return the height of the parabola through three points above the highest of them, or 0 if none lies between them.
 inline double rise_between(double t0, double u0, double t1, double u1, double t2, double u2) {
     const double first = (u1 - u0) / (t1 - t0), second = ((u2 - u1) / (t2 - t1) - first) / (t2 - t0);
     if (!(second < 0.0)) return 0.0;
@@ -79,7 +79,8 @@ inline double rise_between(double t0, double u0, double t1, double u1, double t2
     return std::max(0.0, peak - std::max({u0, u1, u2}));
 }
 
-// A place between a and b where the margin is negative, by golden sections toward its least value; none: b.
+// Return a point between a and b at which the margin is negative, by golden sections toward its minimum. `value` is the
+// margin there. Returns b if no such point is found.
 template <class Margin>
 double dip_between(double a, double b, const Margin& margin, double& value) {
     constexpr double golden = 0.3819660112501051;

@@ -1,7 +1,8 @@
-// Spatial quantities of rigid bodies, all in world axes about a reference point (one per kinematic tree).
-// A motion is (velocity of the body point at the reference, angular velocity); a force is (force, moment about it).
+// Spatial quantities of rigid bodies, in world axes about a reference point (one per kinematic tree, one per body of a
+// deep tree). A motion is (velocity of the body point at the reference, angular velocity). A force is (force, moment
+// about it).
 //
-// Vectors of three components stand in four lanes, the last of them zero: one register in wide functions.
+// Vectors of three components occupy four lanes, the last of them zero: one register in wide functions.
 #pragma once
 
 #include <cmath>
@@ -17,14 +18,14 @@ using VecX = Eigen::VectorXd;
 using MatX = Eigen::MatrixXd;
 
 struct Vec3 {
-    alignas(32) Lanes x = {};  // the alignment of the wide registers, also where the compiler knows none
+    alignas(32) Lanes x = {};  // alignment of the wide registers, even without AVX2 at compile time
 
     PN_INLINE Vec3() {}
     PN_INLINE explicit Vec3(const Lanes& lanes) : x(lanes) {}
     PN_INLINE Vec3(double a, double b, double c) : x{a, b, c, 0.0} {}
     template <class Derived>
     Vec3(const Eigen::MatrixBase<Derived>& v) : x{v[0], v[1], v[2], 0.0} {}
-    // By hand: a class that copies so is passed in memory, in both versions of a wide function.
+    // Copies written by hand: such a class is passed in memory, in both versions of a wide function.
     PN_INLINE Vec3(const Vec3& o) : x(o.x) {}
     PN_INLINE Vec3& operator=(const Vec3& o) { x = o.x; return *this; }
 
@@ -53,12 +54,12 @@ PN_INLINE Vec3 operator*(double s, const Vec3& a) { return Vec3(s * a.x); }
 PN_INLINE Vec3 operator*(const Vec3& a, double s) { return Vec3(a.x * s); }
 PN_INLINE Vec3 operator/(const Vec3& a, double s) { return Vec3(a.x / s); }
 
-// Components y, z, x.
+// Return the components in the order y, z, x.
 PN_INLINE Vec3 turned_round(const Vec3& a) {
 #if defined(__clang__)
     return Vec3(__builtin_shufflevector(a.x, a.x, 1, 2, 0, 3));
 #else
-    // By halves: registers of two numbers shuffle these, and where there are four GCC sees one permutation.
+    // Shuffle by halves: registers of two numbers can do this, and GCC merges it into one permutation of four.
     using Indices = long long __attribute__((vector_size(16)));
     const TwoLanes low = {a.x[0], a.x[1]}, high = {a.x[2], a.x[3]};
     const TwoLanes yz = __builtin_shuffle(low, high, Indices{1, 2}), x0 = __builtin_shuffle(low, high, Indices{0, 3});
@@ -81,7 +82,7 @@ struct Mat3 {
     PN_INLINE Mat3(const Vec3& a, const Vec3& b, const Vec3& d) : c{a, b, d} {}
     template <class Derived>
     Mat3(const Eigen::MatrixBase<Derived>& m) : c{m.col(0), m.col(1), m.col(2)} {}
-    // By hand, as of a vector: in line wherever it stands.
+    // Copies written by hand as for Vec3: inlined everywhere.
     PN_INLINE Mat3(const Mat3& o) : c{o.c[0], o.c[1], o.c[2]} {}
     PN_INLINE Mat3& operator=(const Mat3& o) {
         for (int k = 0; k < 3; ++k) c[k] = o.c[k];
@@ -141,7 +142,7 @@ PN_INLINE Motion operator+(const Motion& a, const Motion& b) { return {a.lin + b
 // Power of a force on a motion.
 PN_INLINE double dot(const Motion& m, const Force& f) { return sum(m.lin.x * f.lin.x + m.ang.x * f.ang.x); }
 
-// A motion about a reference point that lies r further, and a force about one that lies r before.
+// Shift a motion to a reference point at +r, and a force to a reference point at -r.
 PN_INLINE Motion further(const Motion& m, const Vec3& r) { return {m.lin + m.ang.cross(r), m.ang}; }
 PN_INLINE Force before(const Force& f, const Vec3& r) { return {f.lin, f.ang + r.cross(f.lin)}; }
 
@@ -170,7 +171,7 @@ struct Inertia {
     }
 };
 
-// Inertia of a body and of others that hang on it by joints free to move: its mass depends on the direction.
+// Articulated inertia of a body and the bodies that hang on it by free joints. Its mass depends on the direction.
 struct ArticulatedInertia {
     Mat3 lin, couple, ang;  // force (lin a + couple w, couple^T a + ang w) for the motion (a, w)
 
@@ -190,7 +191,7 @@ PN_INLINE ArticulatedInertia articulated(const Inertia& Y) {
     return {Mat3(Y.mass * x, Y.mass * y, Y.mass * z), Mat3(x.cross(Y.first), y.cross(Y.first), z.cross(Y.first)),
             Y.second};
 }
-// Less what a free dof with this gain f takes of it, which stands to the dof's force u as u / D.
+// Subtract the part u u^T / D that a free dof releases, with the dof's force u = P J and gain = u / D.
 PN_INLINE void release(ArticulatedInertia& P, const Force& u, const Force& gain) {
     for (int k = 0; k < 3; ++k) {
         P.lin.c[k] -= gain.lin[k] * u.lin;
@@ -198,7 +199,7 @@ PN_INLINE void release(ArticulatedInertia& P, const Force& u, const Force& gain)
         P.ang.c[k] -= gain.ang[k] * u.ang;
     }
 }
-// About a reference point that lies r before.
+// Shift an articulated inertia to a reference point at -r.
 PN_INLINE ArticulatedInertia before(const ArticulatedInertia& P, const Vec3& r) {
     const Vec3 &a = P.lin.c[0], &b = P.lin.c[1], &c = P.lin.c[2];
     const Mat3 turned(r[2] * b - r[1] * c, r[0] * c - r[2] * a, r[1] * a - r[0] * b);  // lin [r]

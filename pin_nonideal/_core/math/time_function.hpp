@@ -33,7 +33,7 @@ struct Polynomial {
     }
 };
 
-struct Spline {  // piecewise polynomials of (t - break); the end values are held outside
+struct Spline {  // piecewise cubic polynomials of (t - break), with the end values outside
     std::vector<double> breaks, coefficients;  // 4 per piece, low to high
     Jet operator()(double t) const {
         const bool outside = t < breaks.front() || t > breaks.back();
@@ -54,7 +54,8 @@ inline bool is_constant(const TimeFunction& f) {
     return polynomial && polynomial->coefficients.size() <= 1;
 }
 
-// Times at which the pieces of a function meet, where its derivatives may jump; those of a user's function are not known.
+// Return the times at which the pieces of a function meet. Its derivatives may jump there. None are known for a user's
+// function.
 inline std::vector<double> breaks(const TimeFunction& f) {
     const auto* spline = std::get_if<Spline>(&f);
     return spline ? spline->breaks : std::vector<double>();

@@ -1,13 +1,13 @@
-// Loops over the rows of a block, whose number is one of a few.
+// Loops over the rows of a block, unrolled for small numbers of rows.
 #pragma once
 
 #include <type_traits>
 
 namespace pn {
 
-constexpr int tile = 6;  // rows of an anchor at most
+constexpr int tile = 6;  // maximum number of rows of an anchor
 
-// Calls f with n, 1 to tile, as a constant of the type: loops of a length known to the compiler cost half.
+// Call f with n (1 to `tile`) as a compile-time constant. Loops of known length cost half.
 template <int n = 1, class F>
 inline void with_constant(int value, F&& f) {
     if constexpr (n < tile) {
@@ -16,7 +16,7 @@ inline void with_constant(int value, F&& f) {
     f(std::integral_constant<int, n>());
 }
 
-// The same for any number of rows: f gets a plain int for more than a tile.
+// Call f with any number of rows. f receives a plain int for more rows than `tile`.
 template <class F>
 inline void with_rows(int value, F&& f) {
     if (value <= tile) with_constant(value, f);

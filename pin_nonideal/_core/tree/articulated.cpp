@@ -28,7 +28,8 @@ PN_WIDE int factorize_articulated(const Mechanism& m, BodyTerms& terms) {
     return -1;
 }
 
-// One dof of a sweep toward the roots: what is left of its own force x moves it, the rest of that on its body goes on.
+// Process one dof of a sweep toward the roots. The net force moves the dof, and the rest of the force on the body goes
+// to the parent.
 static PN_INLINE void keep_force(const Mechanism& m, BodyTerms& terms, int dof, double& x) {
     const int i = m.dof_joint[dof];
     const Joint& j = m.joints[i];
@@ -58,7 +59,7 @@ PN_WIDE void scale_row_articulated(const Mechanism& m, BodyTerms& terms, const s
         if (m.is_deep[dofs[l]]) keep_force(m, terms, dofs[l], x[l * stride]);  // Eq. (7)
 }
 
-// Motion of the body of a joint with that of its parent alone, once for all its dofs.
+// Return the motion of the body of a dof. At the first dof of a joint the motion starts as that of the parent body.
 static PN_INLINE Motion& carried(const Mechanism& m, BodyTerms& terms, int dof) {
     const int i = m.dof_joint[dof];
     const Joint& j = m.joints[i];

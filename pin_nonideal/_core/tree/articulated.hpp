@@ -1,8 +1,9 @@
-// The factor of M where the tree is deep, from the articulated-body recursion: M itself, whose condition grows with the
-// fourth power of the depth, is never formed. The innovations factor of M^-1 = (1 - H psi K)^T D^-1 (1 - H psi K)
-// [Rodriguez, Jain, Kreutz-Delgado, 1992] is the same R = L^T D^1/2 as that of the rows (tree/factor.hpp): R^-1 is a sweep
-// toward the roots and R^-T one toward the leaves, each in time with the number of dofs. Forces enter as wrenches on the
-// bodies wherever they are known so; as generalized forces they would be long sums, to be taken apart again.
+// Factor of M for deep trees, from the articulated-body recursion. M itself is never formed, because its condition
+// grows with the fourth power of the depth. The innovations factor of M^-1 = (1 - H psi K)^T D^-1 (1 - H psi K)
+// [Rodriguez, Jain, Kreutz-Delgado, 1992] is the same R = L^T D^1/2 as that of the rows (tree/mass_factor.hpp). R^-1 is
+// a sweep toward the roots and R^-T a sweep toward the leaves. The time of a sweep is linear in the number of dofs.
+// Forces known as wrenches enter on the bodies. As generalized forces they would be long sums that the sweep takes
+// apart again.
 #pragma once
 
 #include <vector>
@@ -11,21 +12,22 @@
 
 namespace pn {
 
-// Gains and pivots of the dofs of deep trees. Returns -1, or the dof whose pivot is not positive.
+// Compute gains and pivots of the dofs of deep trees. Returns -1, or the dof with a pivot that is not positive.
 int factorize_articulated(const Mechanism& m, BodyTerms& terms);
 
-// The sweeps of mass_factor.hpp for the dofs of deep trees. Forces on bodies, about their reference points, add to x where
-// they are given.
+// Sweeps of mass_factor.hpp for the dofs of deep trees. Forces `body` on bodies, about their reference points, add to x
+// if given.
 void solve_R_articulated(const Mechanism& m, BodyTerms& terms, const Force* body, VecX& x);
 void solve_Rt_articulated(const Mechanism& m, BodyTerms& terms, const std::vector<int>& dofs, VecX& x);
-// x := R^-1 x on the dofs listed, descending and closed under ancestors, x by place in the list and `stride` apart; with
-// the forces +-f1 and -+f2 on two bodies.
+// x := R^-1 x on the listed dofs, which are descending and closed under ancestors. The entries of x follow the list,
+// `stride` apart. The wrenches +f1 on the body of joint1 and -f2 on the body of joint2 add to x.
 void scale_row_articulated(const Mechanism& m, BodyTerms& terms, const std::vector<int>& dofs, int joint1, const Force& f1,
                            int joint2, const Force& f2, double* x, int stride);
 
-// Motions of the bodies of deep trees for the velocities x, into Articulation::motions.
+// Compute motions of the bodies of deep trees for the velocities x, into Articulation::motions.
 void move_articulated(const Mechanism& m, BodyTerms& terms, const VecX& x);
-// y := M x on their dofs: of the bodies' inertias as forces on them into `body`, or where it is null summed up the trees.
+// y := M x on the dofs of deep trees. If `body` is given, it takes the inertia forces of the bodies, and y only the
+// armature part. Otherwise y takes both.
 void multiply_M_articulated(const Mechanism& m, BodyTerms& terms, const VecX& x, Force* body, VecX& y);
 
 }  // namespace pn

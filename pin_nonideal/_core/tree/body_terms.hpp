@@ -1,9 +1,9 @@
-// What a pass over the tree finds: placements and motions of the bodies, M(q) and the bias forces.
+// Results of a pass over the tree: placements and motions of the bodies, M(q) and the bias forces.
 //
-// Everything is expressed in world axes about one reference point per kinematic tree: the place of its first joint
-// that turns, frozen for the instant of the evaluation. This keeps numbers small for a robot that has walked far, on a
-// floating base or on sliding joints. In a deep tree each body has its own, its joint's place: about a point a hundred
-// links away an inertia would keep few digits of the body.
+// All quantities are in world axes about one reference point per kinematic tree. It is the origin of the first joint
+// that turns, frozen for the instant of the evaluation. Numbers stay small for a robot far from the world's origin, on
+// a floating base or on sliding joints. In a deep tree each body has its own reference point, the origin of its joint.
+// About a point a hundred links away an inertia would keep few digits of the body.
 #pragma once
 
 #include <vector>
@@ -19,17 +19,17 @@ struct Body {
     Motion v{Vec3::Zero(), Vec3::Zero()};
     Motion a{Vec3::Zero(), Vec3::Zero()};  // acceleration at zero qdd, minus gravity
     Force f{Vec3::Zero(), Vec3::Zero()};   // bias force of the subtree
-    Inertia own, Y;                        // of the body (the own pass's), and of the subtree
+    Inertia own, Y;                        // inertia of the body (own: native pass), and of its subtree (Y)
 };
 
-// What a deep tree keeps instead of rows of M.
+// Quantities of a deep tree that replace the rows of M.
 struct Articulation {
     std::vector<Vec3> shift;  // by joint: from the parent's reference point to its own
     std::vector<Force> bias;  // by joint: bias force of the body alone
-    std::vector<ArticulatedInertia> inertia;  // by joint: of what hangs on it, free to move
-    std::vector<Force> gain;  // by dof: what a unit of force left to move it takes of the force on its body
-    std::vector<Force> forces;    // of the sweep toward the roots
-    std::vector<Motion> motions;  // of that toward the leaves
+    std::vector<ArticulatedInertia> inertia;  // by joint: articulated inertia of its subtree
+    std::vector<Force> gain;  // by dof: force taken from the body per unit of net force on the dof
+    std::vector<Force> forces;    // forces of the sweep toward the roots
+    std::vector<Motion> motions;  // motions of the sweep toward the leaves
 };
 
 struct BodyTerms {
@@ -38,15 +38,14 @@ struct BodyTerms {
     std::vector<Force> Ag;  // subtree momentum per unit velocity of each dof
     VecX nle;               // bias generalized force: Coriolis, centrifugal, gravity
     std::vector<double> M;  // rows of M (Mechanism::row_offset)
-    std::vector<double> L;  // and of its factor, M = L^T D L
+    std::vector<double> L;  // rows of the factor, M = L^T D L
     VecX D, inv_sqrt_D;
-    std::vector<char> locked;  // dofs that cannot move: they drop out of the factor, and R^-1 x is zero there
+    std::vector<char> locked;  // dofs that cannot move, absent from the factor (R^-1 x is zero there)
     VecX q;  // configuration with unit quaternions
     Articulation deep;
 };
 
-// A motion of a body, and an inertia that it carries, from its own axes and origin to the world's axes and the reference
-// point.
+// Transform a motion, and the inertia of a body, from the body's axes and origin to world axes and the reference point.
 PN_INLINE Motion in_world(const Body& b, const Motion& local) {
     const Vec3 ang = b.R * local.ang;
     Motion out{b.p.cross(ang), ang};
@@ -66,17 +65,17 @@ PN_INLINE Inertia in_world(const Body& b, double mass, const Vec3& com, const Ma
     return Y;
 }
 
-// Bias force of a body alone.
+// Return the bias force of one body without its subtree.
 PN_INLINE Force bias_force(const Body& b) {
     Force f = b.own * b.a;
     f += cross(b.v, b.own * b.v);
     return f;
 }
 
-// World position, velocity and classical acceleration (at zero qdd, without gravity) of the point of a body at x.
+// Velocity and classical acceleration (at zero qdd, without gravity) of the point of a body at the world position x.
 PN_INLINE Vec3 velocity_at(const Body& b, const Vec3& x) { return b.v.lin + b.v.ang.cross(x - b.ref); }
 PN_INLINE Vec3 acceleration_at(const Mechanism& m, const Body& b, const Vec3& x) {
-    const Vec3 r = x - b.ref;  // Body::a carries minus gravity, also that of the world
+    const Vec3 r = x - b.ref;  // Body::a includes minus gravity, also for the world
     return b.a.lin + m.gravity + b.a.ang.cross(r) + b.v.ang.cross(b.v.lin + b.v.ang.cross(r));
 }
 

@@ -25,7 +25,7 @@ void quaternion_tangent(const double* q, const double* dq, double* w) {
     Eigen::Map<Vector>{w} = 2.0 * (q[3] * d - dq[3] * a - a.cross(d));
 }
 
-// Below these angles a series of the terms written is exact to rounding, and a quotient of small numbers is not.
+// Angles below which the truncated series is exact to rounding, but the quotient of small numbers is not.
 constexpr double small_half_angle = 1e-8, small_angle = 1e-4, small_cubic_angle = 1e-2;
 
 Quat exponential(const Vector& w) {
@@ -42,7 +42,7 @@ double cubic(double x) {
     return (x - std::sin(x)) / (x * x * x);
 }
 
-// Numbers of a chart that have unit length: a quaternion or (cos, sin), or none.
+// Segment of a chart with unit length: a quaternion or (cos, sin), or none.
 struct Stretch { int first, n; };
 Stretch unit_stretch(const Chart& c) {
     switch (c.kind) {

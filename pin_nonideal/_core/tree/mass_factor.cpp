@@ -7,7 +7,7 @@
 
 namespace pn {
 
-// What sweeps over all dofs is compiled twice, as the pass over bodies is: with deep trees, and without.
+// Sweeps over all dofs are compiled twice, like the pass over bodies: with deep trees, and without.
 
 template <bool some_deep>
 static int factorize_rows(const Mechanism& m, Terms& terms) {
@@ -32,7 +32,7 @@ static int factorize_rows(const Mechanism& m, Terms& terms) {
         terms.inv_sqrt_D[k] = 1.0 / std::sqrt(pivot);
         const double inverse = 1.0 / pivot;
         int s = 1;
-        for (; s < depth; s += 2) {  // two ancestors at a time, whose rows are never the row itself
+        for (; s < depth; s += 2) {  // two ancestors at a time, both other than row k
             const double f = row[s] * inverse, g = row[s + 1] * inverse;
             double* __restrict one = terms.L.data() + m.row_offset[up[s]];
             double* __restrict two = terms.L.data() + m.row_offset[up[s + 1]];
@@ -41,7 +41,7 @@ static int factorize_rows(const Mechanism& m, Terms& terms) {
                 one[t - s] -= f * row[t];
                 two[t - s - 1] -= g * row[t];
             }
-            row[s] = f;  // entries behind are no longer read as M
+            row[s] = f;  // entries up to s + 1 are no longer read as M
             row[s + 1] = g;
         }
         if (s == depth) {
@@ -77,7 +77,7 @@ void solve_R(const Mechanism& m, Terms& terms, VecX& x, const Force* body) {
     solve_R_rows<true>(m, terms, x);
 }
 
-// Row k of R^-T x, once those of its ancestors are there.
+// Compute row k of R^-T x from the rows of its ancestors.
 static inline void solve_Rt_row(const Mechanism& m, const Terms& terms, int k, VecX& x) {
     const double* row = terms.L.data() + m.row_offset[k];
     const int* up = m.ancestors.data() + m.row_offset[k];

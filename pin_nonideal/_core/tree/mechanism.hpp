@@ -1,9 +1,9 @@
 // The tree of joints and bodies as plain numbers, read once from a Pinocchio model.
 //
-// Every joint hangs on one parent; each degree of freedom (dof) hangs on the dof before it on the way to the root.
-// M(q) and its factor are nonzero only where one dof is an ancestor of the other, so both are stored as one short
-// row per dof: the entries of that dof with itself, its parent, its parent's parent, ... up to the root. Dofs of deep
-// trees have no such rows (tree/articulated.hpp).
+// Every joint has one parent. The parent of a degree of freedom (dof) is the dof before it on the path to the root.
+// M(q) and its factor are nonzero only if one dof is an ancestor of the other. Both are stored as one short row per
+// dof: the entries of that dof with itself, its parent, its parent's parent, ... up to the root. Dofs of deep trees
+// have no such rows (tree/articulated.hpp).
 #pragma once
 
 #include <memory>
@@ -20,15 +20,15 @@ struct Joint {
     JointKind kind = JointKind::other;
     bool unbounded = false;  // configuration is (cos, sin) of the angle
     int parent = 0, root = 0;
-    bool deep = false;       // of a deep tree: its body has a reference point of its own, the joint's place
+    bool deep = false;       // belongs to a deep tree: its body has its own reference point at the joint
     int reference = 0;       // joint of the tree's reference point: the first that turns, or the root
-    bool recenters = false;  // this joint is it, and not the root: the reference point moves here
+    bool recenters = false;  // the reference point moves to this joint, which is not the root
     int iq = 0, iv = 0, nv = 0;
     Mat3 R0 = Mat3::Identity();  // placement in the parent joint's frame
     bool aligned = false;        // R0 is the identity
     Vec3 p0 = Vec3::Zero();
     Vec3 axis = Vec3::UnitZ();
-    int axis_index = -1;  // 0, 1, 2 for x, y, z or their opposites; -1 for a general axis
+    int axis_index = -1;  // 0, 1, 2 for x, y, z or their opposites, -1 for a general axis
     double axis_sign = 1.0;
     double pitch = 0.0;
     double mass = 0.0;
@@ -37,35 +37,35 @@ struct Joint {
     std::string name;
 };
 
-// How a stretch of the configuration moves with the velocity (Lie groups of the joints).
+// Segment of the configuration with its Lie group, which relates its rate to the velocity.
 struct Chart {
     enum class Kind { vector, circle, quaternion, plane, pose } kind = Kind::vector;
-    int iq = 0, iv = 0, n = 0;  // n: length of a vector stretch
+    int iq = 0, iv = 0, n = 0;  // n: length of a vector segment
 };
 
-struct Angle {  // a joint whose configuration is an angle, and its place there
+struct Angle {  // a joint whose configuration is an angle, and its index in q
     int joint, iq;
 };
 
-enum class Provider { core, pinocchio };  // who computes kinematics, M and the bias forces
+enum class Provider { core, pinocchio };  // source of kinematics, M and the bias forces
 
 struct Mechanism {
     Provider provider = Provider::core;
     std::vector<Joint> joints;  // joints[0] is the world
-    std::vector<Angle> angles;  // of all joints that have one
+    std::vector<Angle> angles;  // all joints with an angle
     std::vector<Chart> charts;
     int nq = 0, nv = 0;
     Vec3 gravity = Vec3::Zero();
     VecX armature;
     std::vector<int> dof_parent, depth, row_offset;  // row of dof j: row_offset[j] + 0 .. depth[j]
     std::vector<int> dof_joint;  // joint that each dof belongs to
-    std::vector<int> deep_joints, deep_dofs;  // of the deep trees, each after its parent
+    std::vector<int> deep_joints, deep_dofs;  // joints and dofs of deep trees, each after its parent
     std::vector<char> is_deep;                // by dof
     std::vector<int> ancestors;  // dof of each entry of the rows
     int row_entries = 0;
-    std::shared_ptr<const void> model;  // a copy of the pinocchio model, for what only Pinocchio computes
+    std::shared_ptr<const void> model;  // copy of the Pinocchio model, for quantities that only Pinocchio computes
 
-    // Dofs that move the body of a joint, from the body to the root.
+    // Return the dofs that move the body of a joint, from the body to the root.
     std::vector<int> dofs_of(int joint) const;
 };
 

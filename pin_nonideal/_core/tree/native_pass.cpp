@@ -9,7 +9,7 @@ namespace pn {
 
 namespace {
 
-// R0 turned about its column k: columns that are known when this is compiled stay in registers.
+// Rotate R0 about its column k. Columns with a compile-time index stay in registers.
 template <int k>
 PN_INLINE void rotate_about(const Mat3& R0, double c, double s, Mat3& R) {
     constexpr int a = (k + 1) % 3, b = (k + 2) % 3;
@@ -18,7 +18,7 @@ PN_INLINE void rotate_about(const Mat3& R0, double c, double s, Mat3& R) {
     R.col(b) = c * R0.col(b) - s * R0.col(a);
 }
 
-// R0 turned about the joint's axis by the angle with this cosine and sine.
+// Rotate R0 about the joint's axis by the angle with this cosine and sine.
 PN_INLINE void rotate(const Joint& j, const Mat3& R0, double c, double s, Mat3& R) {
     switch (j.axis_index) {
         case 0: return rotate_about<0>(R0, c, j.axis_sign * s, R);
@@ -37,7 +37,7 @@ PN_INLINE Vec3 axis_in_world(const Joint& j, const Mat3& R) {
     return R * j.axis;
 }
 
-// Columns for a dof that turns about a direction through the body's origin, or slides along it.
+// Columns of J for a dof that rotates about an axis through the body's origin, or slides along the axis.
 PN_INLINE Motion turning(const Body& b, const Vec3& axis) { return {b.p.cross(axis), axis}; }
 PN_INLINE Motion sliding(const Vec3& axis) { return {axis, Vec3::Zero()}; }
 
@@ -47,7 +47,7 @@ PN_INLINE Motion relative_velocity(const Joint& j, const std::vector<Motion>& J,
     return r;
 }
 
-// Placement of the joint's moving frame; fills R, p and the reference of body b.
+// Compute the placement of the joint's moving frame into R, p and ref of body b.
 PN_INLINE void place(const Joint& j, const Body& parent, const VecX& q, const CosSin& angle, Body& b,
                      const JointMotion& other) {
     const bool is_root = j.parent == 0;
@@ -105,8 +105,8 @@ PN_INLINE void place(const Joint& j, const Body& parent, const VecX& q, const Co
     }
 }
 
-// Moves the reference point of joint i's tree to its place. The bodies before it only slide, so that their motions do
-// not depend on the reference point.
+// Move the reference point of joint i's tree to joint i. The bodies before joint i only slide, so their motions do not
+// depend on the reference point.
 void recenter(const Mechanism& m, int i, BodyTerms& terms) {
     const Vec3 moved = terms.body[i].p;
     for (int k = m.joints[i].root; k <= i; ++k)
@@ -116,7 +116,7 @@ void recenter(const Mechanism& m, int i, BodyTerms& terms) {
         }
 }
 
-// Columns J of the joint's dofs in world axes.
+// Compute columns J of the joint's dofs in world axes.
 PN_INLINE void columns(const Joint& j, const Body& b, const JointMotion& other, Motion* J) {
     switch (j.kind) {
         case JointKind::revolute: J[0] = turning(b, axis_in_world(j, b.R)); break;
@@ -159,9 +159,11 @@ OwnPass::OwnPass(const Mechanism& m) : cos_sin(m.joints.size()), others(m), rest
     motion.S.resize(most);
 }
 
-// What follows is compiled twice, for mechanisms with deep trees and for those without, which ask nothing about them.
+// The functions below are compiled twice, for mechanisms with deep trees and without. The second version has no checks
+// for deep trees.
 
-// Places body i behind its parent; `shift` is where, in a deep tree.
+// Place body i relative to its parent. In a deep tree, `shift` becomes the vector from the parent's reference point to
+// its own.
 template <bool some_deep>
 static PN_INLINE void place_body(const Mechanism& m, OwnPass& pass, BodyTerms& terms, int i, Vec3& shift) {
     const Joint& j = m.joints[i];
@@ -175,10 +177,10 @@ static PN_INLINE void place_body(const Mechanism& m, OwnPass& pass, BodyTerms& t
     b.p = Vec3::Zero();
 }
 
-// Inertia of a body in its place.
+// Compute the inertia of a placed body.
 static PN_INLINE void weigh_body(const Joint& j, Body& b) { b.Y = b.own = in_world(b, j.mass, j.com, j.inertia); }
 
-// Cosines and sines of angles, by fours; the last group is filled up with the last angle.
+// Compute cosines and sines of angles, four at a time. The last group is padded with the last angle.
 static PN_INLINE void find_cos_sin(OwnPass& pass, const BodyTerms& terms, const std::vector<Angle>& angles) {
     const int n = static_cast<int>(angles.size());
     for (int k = 0; k < n; k += 4) {
@@ -192,7 +194,7 @@ static PN_INLINE void find_cos_sin(OwnPass& pass, const BodyTerms& terms, const 
 PN_WIDE void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms, const std::vector<int>& joints,
                           const std::vector<Angle>& angles) {
     find_cos_sin(pass, terms, angles);
-    Vec3 shift;  // those of the factors stay
+    Vec3 shift;  // local, so that the shifts of the factor remain
     for (int i : joints) place_body<true>(m, pass, terms, i, shift);
 }
 
@@ -205,7 +207,7 @@ static PN_INLINE void place_all(const Mechanism& m, OwnPass& pass, BodyTerms& te
         columns(j, terms.body[i], pass.motion, terms.J.data() + j.iv);
         weigh_body(j, terms.body[i]);
         if (!j.recenters) continue;
-        for (int k = j.root; k < i; ++k)  // about their new reference
+        for (int k = j.root; k < i; ++k)  // inertias about their new reference
             if (m.joints[k].root == j.root) weigh_body(m.joints[k], terms.body[k]);
     }
 }

@@ -1,4 +1,4 @@
-// The core's own pass over the tree: what the configuration decides first, then what the velocity adds.
+// Native pass over the tree: quantities that depend on the configuration first, then those that depend on the velocity.
 #pragma once
 
 #include <vector>
@@ -7,21 +7,21 @@
 
 namespace pn {
 
-struct CosSin {  // of an angle
+struct CosSin {  // cosine and sine of an angle
     double c = 1.0, s = 0.0;
 };
 
 struct OwnPass {
-    std::vector<CosSin> cos_sin;  // of each joint whose configuration is an angle
+    std::vector<CosSin> cos_sin;  // by joint, set if its configuration is an angle
     PinocchioJoints others;       // joints of kind `other`
-    JointMotion motion;           // of the one asked last
-    VecX rest;                    // no velocity, for their placements
+    JointMotion motion;           // motion of the joint evaluated last
+    VecX rest;                    // zero velocity, to evaluate placements of these joints
 
     OwnPass() = default;
     explicit OwnPass(const Mechanism& m);
 };
 
-// Each as the function of this name in terms.hpp, for the configuration in `terms`.
+// Functions of terms.hpp with the same names, for the configuration in `terms`.
 void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms);
 void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms, const std::vector<int>& joints,
                   const std::vector<Angle>& angles);

@@ -12,7 +12,7 @@ namespace pn {
 namespace {
 
 using Model = pinocchio::Model;
-using Vector = Eigen::Ref<const VecX>;  // what the wheel's libraries are compiled for
+using Vector = Eigen::Ref<const VecX>;  // argument type that the wheel's libraries are compiled for
 
 const Model& model_of(const Mechanism& m) { return *static_cast<const Model*>(m.model.get()); }
 
@@ -24,7 +24,7 @@ class LoneJoint {
 public:
     explicit LoneJoint(const pinocchio::JointModel& joint) : model_(with(joint)), data_(model_) {}
 
-    // Placement, motion subspace and bias at a configuration (nq) and velocity (nv) of this joint.
+    // Compute placement, motion subspace and bias at a configuration (nq) and velocity (nv) of this joint.
     const pinocchio::JointData& move(const Eigen::Ref<const VecX>& q, const Eigen::Ref<const VecX>& v) {
         pinocchio::forwardKinematics(model_, data_, q, v);
         return data_.joints[1];
@@ -42,14 +42,14 @@ private:
     pinocchio::Data data_;
 };
 
-// Placement of a body from Pinocchio's, which is about the world's origin.
+// Compute the placement of a body from Pinocchio's placement about the world's origin.
 void place(const Mechanism& m, const pinocchio::Data& data, int i, Body& b) {
     b.R = data.oMi[i].rotation();
     b.ref = data.oMi[m.joints[i].reference].translation();
     b.p = Vec3(data.oMi[i].translation()) - b.ref;
 }
 
-// Calls act(k, column) with each column of a joint's motion subspace, where it lies: no copy on the heap.
+// Call act(k, column) with each column of a joint's motion subspace in place, without a copy on the heap.
 template <class Act>
 void each_column(const Model::JointData& joint, const Act& act) {
     boost::apply_visitor([&](const auto& kind) {
@@ -59,7 +59,7 @@ void each_column(const Model::JointData& joint, const Act& act) {
     }, joint.toVariant());
 }
 
-// Shift, inertia and columns of a body in a deep tree, about its own reference point.
+// Compute shift, inertia and columns of a body in a deep tree, about its own reference point.
 void place_deep(const pinocchio::Data& data, BodyTerms& terms, const Joint& j, size_t i) {
     Body& b = terms.body[i];
     terms.deep.shift[i] = terms.body[j.parent].R * Vec3(data.liMi[i].translation());
@@ -70,7 +70,7 @@ void place_deep(const pinocchio::Data& data, BodyTerms& terms, const Joint& j, s
 }  // namespace
 
 struct PinocchioJoints::Data {
-    std::vector<std::unique_ptr<LoneJoint>> joints;  // by joint; none where the core has a formula
+    std::vector<std::unique_ptr<LoneJoint>> joints;  // by joint, null if the core has a formula
 };
 
 PinocchioJoints::PinocchioJoints() = default;
@@ -116,7 +116,7 @@ PinocchioPass::~PinocchioPass() = default;
 
 PinocchioPass::PinocchioPass(const Mechanism& m)
     : data_(new Data{m.model, model_of(m), pinocchio::Data(model_of(m))}) {
-    // Second derivatives, with the cube of nv: nothing here asks for them.
+    // Free the second derivatives, which take memory with the cube of nv and are not used.
     pinocchio::Data& d = data_->data;
     for (auto* tensor : {&d.kinematic_hessians, &d.d2tau_dqdq, &d.d2tau_dvdv, &d.d2tau_dqdv, &d.d2tau_dadq})
         tensor->resize(0, 0, 0);
@@ -160,7 +160,7 @@ void move_bodies(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms, cons
 void mass_matrix(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms) {
     if (static_cast<int>(m.deep_dofs.size()) == m.nv) return;
     auto& [owner, model, data] = pass.data();
-    // In local axes: about the world's origin a robot that has walked far would lose digits.
+    // Local axes: about the world's origin a robot far away would lose digits.
     pinocchio::crba(model, data, Vector(terms.q), pinocchio::Convention::LOCAL);  // M, Ycrb
     for (size_t i = 1; i < m.joints.size(); ++i) {
         const Joint& j = m.joints[i];

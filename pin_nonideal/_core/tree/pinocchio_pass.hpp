@@ -1,5 +1,5 @@
-// What Pinocchio computes, behind a door without its headers: the motion of joints that only it knows, and with
-// terms="pinocchio" all of Terms. Nothing it holds lasts from one evaluation to the next.
+// Quantities computed by Pinocchio, behind an interface without its headers: the motion of joints that only Pinocchio
+// supports, and all of Terms with terms="pinocchio". No data lasts from one evaluation to the next.
 #pragma once
 
 #include <memory>
@@ -9,21 +9,21 @@
 
 namespace pn {
 
-struct JointMotion {  // of a joint's moving frame: placement behind the joint, motion per dof and bias in its own axes
+struct JointMotion {  // moving frame of a joint: placement from the fixed frame, motion per dof and bias in its own axes
     Mat3 R;
     Vec3 p;
     std::vector<Motion> S;
     Motion bias;
 };
 
-// Joints of kind `other`, one by one.
+// Evaluator of single joints of kind `other`.
 class PinocchioJoints {
 public:
     PinocchioJoints();
     explicit PinocchioJoints(const Mechanism& m);
     PinocchioJoints(PinocchioJoints&&) noexcept;
     ~PinocchioJoints();
-    // `out.S` has room for the dofs of any of them.
+    // Compute the motion of one joint. `out.S` must have room for its dofs.
     void evaluate(const Mechanism& m, int joint, const VecX& q, const VecX& v, JointMotion& out);
 
 private:
@@ -31,11 +31,11 @@ private:
     std::unique_ptr<Data> data_;
 };
 
-// First column of the motion subspace of joint `joint` of a `pinocchio::Model`, in the joint's axes, at its neutral
-// configuration.
+// Return the first column of the motion subspace of joint `joint` of a `pinocchio::Model`, in the joint's axes, at its
+// neutral configuration.
 Motion first_motion(const void* model, int joint);
 
-// Every term by Pinocchio's algorithms, on one pinocchio::Data.
+// All terms by Pinocchio's algorithms, on one pinocchio::Data.
 class PinocchioPass {
 public:
     explicit PinocchioPass(const Mechanism& m);
@@ -49,7 +49,7 @@ private:
     std::unique_ptr<Data> data_;
 };
 
-// Each as the function of this name in terms.hpp, for the configuration in `terms`.
+// Functions of terms.hpp with the same names, for the configuration in `terms`.
 void place_bodies(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms);
 void place_bodies(const Mechanism& m, PinocchioPass& pass, BodyTerms& terms, const std::vector<int>& joints,
                   const std::vector<Angle>& angles);

@@ -22,7 +22,7 @@ int unit_axis(const Vec3& a) {
     return -1;
 }
 
-// Kind and axis from the names that Pinocchio gives its joints.
+// Set kind and axis of a joint from Pinocchio's name for its type.
 void classify(const Model& model, int i, Joint& out) {
     const std::string name = model.joints[i].shortname();
     auto has = [&](const char* part) { return name.find(part) != std::string::npos; };
@@ -48,16 +48,16 @@ void classify(const Model& model, int i, Joint& out) {
     if (out.axis_index >= 0) out.axis_sign = out.axis[out.axis_index];
 }
 
-// Dofs in a row from which on a tree is deep. The rows of M and its factor take time with the square and the cube of
-// that number and lose digits with its fourth power; sweeps by bodies (tree/articulated.hpp) are as fast from 25 dofs on
-// without constraints, from 34 with three rows through all of them and from 43 with six.
+// Dofs in one chain from which a tree is deep. The rows of M and its factor take time with the square and the cube of
+// that number and lose digits with its fourth power. Sweeps by bodies (tree/articulated.hpp) are as fast from 25 dofs
+// on without constraints, from 34 with three rows through all dofs and from 43 with six.
 constexpr int deep_from = 40;
 
 bool slides(const Joint& j) { return j.kind == JointKind::prismatic || j.kind == JointKind::translation; }
 
 const Composite* composite(const Model::JointModel& joint) { return boost::get<Composite>(&joint.toVariant()); }
 
-// Throws for joints whose motion no provider can give, composites that hold such ones included.
+// Throw for joints with a motion that no provider computes, also inside composites.
 void require_motion(const Model::JointModel& joint, const std::string& name) {
     if (joint.shortname().find("Mimic") != std::string::npos)
         throw std::invalid_argument("joint \"" + name + "\" is a mimic joint of Pinocchio; build the " +
@@ -79,7 +79,7 @@ void add_charts(const Model::JointModel& joint, std::vector<Chart>& charts) {
     } else if (nq == nv) {
         Chart* last = charts.empty() ? nullptr : &charts.back();
         if (last && last->kind == Chart::Kind::vector && last->iq + last->n == iq && last->iv + last->n == iv)
-            last->n += nv;  // one stretch of vectors
+            last->n += nv;  // extend the vector segment
         else
             charts.push_back({Chart::Kind::vector, iq, iv, nv});
     } else if (has("FreeFlyer")) {
@@ -95,7 +95,7 @@ void add_charts(const Model::JointModel& joint, std::vector<Chart>& charts) {
     }
 }
 
-// Numbers of a joint and of its body.
+// Read the parameters of a joint and of its body.
 Joint read_joint(const Model& model, int i) {
     const auto& joint = model.joints[i];
     Joint j;
@@ -115,7 +115,8 @@ Joint read_joint(const Model& model, int i) {
     return j;
 }
 
-// Root of joint i's tree, and whether the tree's reference point moves to it: it does where the joints before slide.
+// Find the root of joint i's tree. The tree's reference point moves to joint i if this joint turns and all joints
+// before it slide.
 void find_reference(std::vector<Joint>& joints, int i) {
     Joint& j = joints[i];
     j.root = j.parent == 0 ? i : joints[j.parent].root;
@@ -128,14 +129,14 @@ void find_reference(std::vector<Joint>& joints, int i) {
         if (joints[k].root == j.root) joints[k].reference = i;
 }
 
-// The dof before each on the way to the root.
+// Find the parent of each dof on the path to the root.
 void order_dofs(Mechanism& m) {
     for (std::vector<int>* list : {&m.dof_parent, &m.depth, &m.dof_joint}) list->resize(m.nv);
     for (size_t i = 1; i < m.joints.size(); ++i) {
         const Joint& j = m.joints[i];
         for (int dof = j.iv; dof < j.iv + j.nv; ++dof) {
             m.dof_joint[dof] = static_cast<int>(i);
-            // The first dof of a joint hangs on the last one of the joint before.
+            // The parent of a joint's first dof is the last dof of the parent joint.
             const Joint& before = m.joints[j.parent];
             const int parent = dof > j.iv ? dof - 1 : j.parent == 0 ? -1 : before.iv + before.nv - 1;
             m.dof_parent[dof] = parent;
@@ -144,7 +145,7 @@ void order_dofs(Mechanism& m) {
     }
 }
 
-// Which trees are deep: there each joint is its own reference.
+// Mark the deep trees, in which each joint is its own reference.
 void find_deep_trees(Mechanism& m) {
     std::vector<char> deep(m.joints.size(), 0);  // by root
     for (int dof = 0; dof < m.nv; ++dof)
@@ -172,8 +173,8 @@ void lay_out_rows(Mechanism& m) {
     }
 }
 
-// Pinocchio's crba reads a subtree as one stretch of dofs: each joint must hang on the one before it or on one of its
-// ancestors.
+// Check the numbers of the joints. Pinocchio's crba reads a subtree as one range of dofs. Therefore the parent of each
+// joint must be the joint before it or one of its ancestors.
 void require_branches(const Mechanism& m) {
     for (int i = 2; i < static_cast<int>(m.joints.size()); ++i) {
         const int parent = m.joints[i].parent;
@@ -187,7 +188,7 @@ void require_branches(const Mechanism& m) {
     }
 }
 
-// By their bits: a limit that is no number is the same as itself.
+// Compare bits, so that a NaN limit equals itself.
 bool same(const double* x, const double* y, size_t n) { return std::memcmp(x, y, n * sizeof(double)) == 0; }
 
 template <class Numbers>

@@ -7,16 +7,16 @@ struct _object;
 
 namespace pn {
 
-// Address of the `pinocchio::Model` that the Python object holds; throws std::invalid_argument for anything else.
+// Return the address of the `pinocchio::Model` in a Python object. Throws std::invalid_argument for any other object.
 const void* model_pointer(_object* python_object);
 
-// Whether two of them are the same in all that a scene reads: tree, joints, inertias, frames, gravity, armature and
-// limits. What is told by name only (reference configurations) is left out, and so is what follows from the tree; that is
-// four times as fast as Pinocchio's own comparison.
+// Check if two models are equal in all data that a scene reads: tree, joints, inertias, frames, gravity, armature and
+// limits. Reference configurations and quantities derived from the tree are not compared. The check is four times as
+// fast as Pinocchio's own comparison.
 bool same_model(const void* one, const void* other);
 
-// Reads a pinocchio model (passed as `const pinocchio::Model*`); throws std::invalid_argument for one that has no
-// motion here, or none that `provider` computes.
+// Read a Pinocchio model (passed as `const pinocchio::Model*`). Throws std::invalid_argument for an unsupported joint,
+// or for joint numbers that Provider::pinocchio does not support.
 Mechanism read_mechanism(const void* model, Provider provider);
 
 }  // namespace pn

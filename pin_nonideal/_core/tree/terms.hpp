@@ -1,4 +1,4 @@
-// Kinematics, M(q) and bias forces, from one of two providers: the core's own pass, or Pinocchio's algorithms.
+// Kinematics, M(q) and bias forces from one of two providers: the native pass, or Pinocchio's algorithms.
 #pragma once
 
 #include <variant>
@@ -14,21 +14,21 @@ struct Terms : BodyTerms {
     void allocate(const Mechanism& m);
 };
 
-// Placements, J and inertias of all bodies; or placements alone, of the joints listed (each after its parent), with
-// their angles.
+// Compute placements, J and inertias of all bodies. The second function computes placements alone, of the listed joints
+// (each after its parent) with their angles.
 void place_bodies(const Mechanism& m, Terms& terms, const VecX& q);
 void place_bodies(const Mechanism& m, Terms& terms, const VecX& q, const std::vector<int>& joints,
                   const std::vector<Angle>& angles);
-// Velocities and bias accelerations of bodies in their places.
+// Compute velocities and bias accelerations of placed bodies.
 void move_bodies(const Mechanism& m, Terms& terms, const VecX& v);
-// M(q) of bodies in their places, once for each placement: it sums inertias up the trees.
+// Compute M(q) of placed bodies. Call it once per placement, because it sums inertias up the trees.
 void mass_matrix(const Mechanism& m, Terms& terms);
-// nle of bodies in motion.
+// Compute nle of bodies with known velocities.
 void bias_forces(const Mechanism& m, Terms& terms);
 
-// Bodies in their places and in motion.
+// Compute placements and velocities of the bodies.
 void kinematics(const Mechanism& m, Terms& terms, const VecX& q, const VecX& v);
-// M(q) and nle; needs kinematics.
+// Compute M(q) and nle. Requires kinematics.
 void inertia(const Mechanism& m, Terms& terms);
 
 double kinetic_energy(const Mechanism& m, Terms& terms, const VecX& v);

@@ -11,18 +11,19 @@ namespace {
 
 using ConeKind = ConeElement::Kind;
 
-constexpr double clearly = 1e-7;   // part of |y| |w0| that y . w0 must come below zero by
-constexpr double shown = 1e-9;     // rounding that what must vanish may have
-constexpr double near_edges[] = {1e-5, 1e-4, 1e-3, 1e-6, 1e-7};  // parts of the largest force left of what vanishes
+constexpr double clearly = 1e-7;   // part of |y| |w0| by which y . w0 must be negative
+constexpr double shown = 1e-9;     // tolerance of quantities that must vanish
+constexpr double near_edges[] = {1e-5, 1e-4, 1e-3, 1e-6, 1e-7};  // parts of the largest force that count as zero
 constexpr double dependent = 1e-8;
 constexpr int most_sharpenings = 6;
 
-// How far the rows u of a contact lie outside the dual of its cone.
+// Return the violation of the dual of a contact's cone by its rows u.
 double outside_dual(const ConeElement& e, const Eigen::Ref<const VecX>& u) {
     return std::max(0.0, e.bound * u.tail(e.dim - 1).norm() - u[0]);
 }
 
-// The nearest point to zero of { w_n + p >= 0 of some forces }: a projection, whose optimality is Farkas' alternative.
+// Find y that shows that no forces prevent penetration. It projects zero on { w_n + p >= 0 of some forces }, and
+// Farkas' alternative is the optimality condition.
 bool no_forces(const ConeProblem& p, VecX& y) {
     std::vector<int> rows;
     std::vector<ConeElement> elements = p.elements;
@@ -64,7 +65,7 @@ bool no_forces(const ConeProblem& p, VecX& y) {
     return margin > clearly;
 }
 
-// What is nearly y: forces that balance exactly, nothing where y has nothing, on the edge of a cone where y is near it.
+// Replace y by a nearby y that balances exactly. Small forces become zero, and forces near the edge of a cone move onto it.
 void sharpen(const ConeProblem& p, const MatX& E, double near_edge, VecX& y) {
     const double none = near_edge * y.cwiseAbs().maxCoeff();
     const int rank = static_cast<int>(E.cols());
@@ -91,7 +92,7 @@ void sharpen(const ConeProblem& p, const MatX& E, double near_edge, VecX& y) {
     }
 }
 
-// Whether y of unit length is in the cones, balances by itself, and w0 works against it.
+// Check if y, scaled to unit length, is in the cones, balances by itself, and has negative work on w0.
 bool squeezes(const ConeProblem& p, VecX& y) {
     if (!(y.norm() > 0.0 && y.norm() < HUGE_VAL)) return false;
     y.normalize();
@@ -104,7 +105,7 @@ bool squeezes(const ConeProblem& p, VecX& y) {
     return true;
 }
 
-// The nearest point to -w0 of the forces in the cones that balance by themselves.
+// Find the nearest point to -w0 of the forces in the cones that balance by themselves.
 bool squeezed(const ConeProblem& p, VecX& y) {
     DenseSolver factors;
     factors.factor_orthogonally(p.W().transpose());

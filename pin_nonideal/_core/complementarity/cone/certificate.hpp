@@ -1,4 +1,4 @@
-// Why a cone problem may have no solution, shown by forces that anyone can check.
+// Certificates that a cone problem may have no solution, as forces that anyone can check.
 #pragma once
 
 #include "complementarity/cone/interior_point.hpp"
@@ -7,17 +7,18 @@ namespace pn {
 
 enum class ConeStatus {
     solved,
-    // No forces keep the contacts from being entered: y >= 0 on normals with -(W^T y) in the dual of the cones (for
-    // boxes: its work at their limits counted) and y . w0 < 0, so y . w < 0 whatever f.
+    // No forces prevent penetration. Certificate: y >= 0 on normals with -(W^T y) in the dual of the cones and
+    // y . w0 < 0, so y . w < 0 for any f. Boxes count with their work at the limits.
     infeasible,
-    // The motion drives contacts into each other: y in the cones with W^T y = 0 and y . w0 < 0. A solution exists
-    // whenever there is no such y (Klarbring, Pang, SIAM J. Optim. 8, 1998); with one it may not, and none was found.
+    // The motion drives contacts into each other. Certificate: y in the cones with W^T y = 0 and y . w0 < 0. A solution
+    // exists if there is no such y (Klarbring, Pang, SIAM J. Optim. 8, 1998). With such a y a solution may be missing,
+    // and none was found.
     jammed,
-    // None was found, which proves nothing.
+    // No solution was found. One may still exist.
     failed,
 };
 
-// y in the problem's units, and what it shows; `failed` without any.
+// Compute a certificate y in the problem's units. Returns the status that y shows, or `failed` without a certificate.
 ConeStatus find_certificate(const ConeProblem& problem, VecX& y);
 
 }  // namespace pn

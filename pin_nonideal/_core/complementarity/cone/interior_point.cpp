@@ -13,14 +13,14 @@ using Eigen::Vector3d;
 
 constexpr int most_steps = 60;
 constexpr double gap_tolerance = 1e-15, least_step = 1e-7;
-constexpr double to_boundary = 0.99;   // of the way to the cone's boundary that a step takes
-constexpr double smooth_speed = 1e-12;  // below it a slip has no direction
+constexpr double to_boundary = 0.99;   // part of the way to the cone's boundary that a step takes
+constexpr double smooth_speed = 1e-12;  // slip speed below which the direction is undefined
 
-// Units that make a circular cone of the one |f_t| <= mu f_n: forces (root f_n, f_t / root), velocities the other way.
+// Return the scale that makes the cone |f_t| <= mu f_n circular: forces (root f_n, f_t / root), velocities the other way.
 double root_of(const ConeElement& e) { return e.slides() && e.bound > 0.0 ? std::sqrt(e.bound) : 1.0; }
 bool in_path(const ConeElement& e) { return !e.is(ConeKind::equality); }
 int head_rows(const ConeElement& e) { return e.is(ConeKind::contact) ? 1 : 0; }
-// Tangential rows that may carry a force.
+// Return the number of tangential rows that may carry a force.
 int tail_rows(const ConeElement& e) {
     return e.is(ConeKind::box) ? (e.bound > 0.0 ? e.dim : 0) : e.bound > 0.0 ? e.dim - 1 : 0;
 }
@@ -34,7 +34,7 @@ Vector3d ConePath::tail(const ConeProblem& p, int e, const Eigen::Ref<const VecX
     return out;
 }
 
-// Element e of a force or of a change of it, whose head a box has given.
+// Return the part of element e of a force, or of its change, as a point of the cone. The head of a box is given.
 Cone ConePath::force(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& f, double head) const {
     const double root = root_of(p.elements[e]);
     if (p.elements[e].is(ConeKind::contact)) head = root * f[p.at[e]];
@@ -59,7 +59,7 @@ void ConePath::start(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
     }
 }
 
-// Slip speeds, and what u lacks of w + (mu |w_t|, 0).
+// Update the slip speeds, and the residual of u = w + (mu |w_t|, 0).
 void ConePath::update(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
     auto w = w_.vector(p.n), miss = miss_.vector(p.n);
     p.respond(f, w);
@@ -112,7 +112,7 @@ bool ConePath::factorize(const ConeProblem& p) {
     return true;
 }
 
-// Step to z o y = target with `keep` of the miss left, and the second-order terms of the step before.
+// Compute the step to z o y = target that leaves `keep` of the residual, with the second-order terms of the predictor step.
 void ConePath::direction(const ConeProblem& p, double target, double keep) {
     auto rhs = rhs_.vector(p.n), step = step_.vector(p.n);
     rhs = (keep - 1.0) * miss_.vector(p.n);
@@ -186,7 +186,7 @@ void ConePath::follow(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
             inside = inside && s.z.determinant() > 0.0 && s.y.determinant() > 0.0;
         }
         if (inside) continue;
-        f = kept;  // as near as rounding lets it come
+        f = kept;  // rounding allows no further progress
         return;
     }
 }

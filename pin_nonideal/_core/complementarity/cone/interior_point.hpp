@@ -1,6 +1,6 @@
-// The central path of a cone problem: a primal-dual interior-point method in Nesterov and Todd's scaling, some fifteen
-// steps however singular W is. The correction mu |w_t| of de Saxce enters Newton's equations with its derivative; or it
-// stands still at what it was, which makes each problem convex where W is symmetric.
+// Central path of a cone problem: a primal-dual interior-point method in Nesterov and Todd's scaling, some fifteen
+// steps however singular W is. De Saxce's correction mu |w_t| enters Newton's equations with its derivative
+// (Slip::follows). With Slip::stands it keeps its first value, and each problem is convex if W is symmetric.
 #pragma once
 
 #include "complementarity/cone/problem.hpp"
@@ -12,17 +12,17 @@ class ConePath {
 public:
     enum class Slip { follows, stands };
 
-    // f at the end of the path, as near as rounding lets it come. Standing slip speeds are those under `f` as given.
+    // Compute f at the end of the path, up to rounding. With Slip::stands the slip speeds are those of the given `f`.
     void follow(const ConeProblem& problem, Eigen::Ref<VecX> f, Slip slip);
-    int steps() const { return steps_; }  // of all calls
+    int steps() const { return steps_; }  // total of all calls
 
 private:
     struct State {
-        Cone z, y;       // of the force, and of u
+        Cone z, y;       // points of the force, and of u
         Scaling scaling;
         Cone dy, second;
         double speed = 0.0;  // |w_t|
-        Eigen::Vector3d slip = Eigen::Vector3d::Zero();  // its direction
+        Eigen::Vector3d slip = Eigen::Vector3d::Zero();  // direction of the slip
     };
     Cone force(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& f, double head) const;
     Eigen::Vector3d tail(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& x) const;

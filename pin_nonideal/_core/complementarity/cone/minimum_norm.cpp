@@ -11,13 +11,13 @@ using ConeKind = ConeElement::Kind;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double at_rest = 1e-9;    // w below this part of the largest w0 is none
-constexpr double rounding = 3e-15;  // of the forces
-constexpr double nearly = 1e-12;    // the same where steps gain no more
-constexpr double damping = 1e-10;   // of Newton's method, part of the miss
+constexpr double at_rest = 1e-9;    // w below this part of the largest w0 counts as zero
+constexpr double rounding = 3e-15;  // relative to the forces
+constexpr double nearly = 1e-12;    // the same if steps make no progress
+constexpr double damping = 1e-10;   // damping of Newton's method, relative to the residual
 constexpr int most_steps = 60, most_halvings = 10;
 
-// The nearest point to z of a set, and its derivative there.
+// Nearest point to z of a set, and its derivative.
 struct Nearest {
     Vector3d point = Vector3d::Zero();
     Matrix3d derivative = Matrix3d::Zero();
@@ -51,7 +51,7 @@ Nearest of_ball(const Vector3d& z, double radius) {
     return {radius * t, radius / length * (Matrix3d::Identity() - t * t.transpose())};
 }
 
-// What the modes of w leave to element e, whose forces are z before that; `given` where it is at its limit.
+// Project the forces z of an element on the set that the modes of w allow. A slipping box keeps the forces `given`.
 Nearest nearest(const ConeElement& element, const Vector3d& z, const Vector3d& w, const Vector3d& given) {
     if (element.is(ConeKind::equality)) return {z, Matrix3d::Identity()};
     if (element.is(ConeKind::box))
@@ -64,7 +64,7 @@ Nearest nearest(const ConeElement& element, const Vector3d& z, const Vector3d& w
 
 }  // namespace
 
-// Orthonormal columns of the forces that W answers to, in unscaled units; returns how many.
+// Compute orthonormal columns of the forces that W responds to, in unscaled units. Returns their number.
 int ConeShares::span(const ConeProblem& p) {
     auto transpose = transpose_.matrix(p.n, p.n);
     transpose = p.W().transpose();
@@ -81,7 +81,7 @@ int ConeShares::span(const ConeProblem& p) {
     return rank;
 }
 
-// g = P(z), and the blocks of its derivative one below the other.
+// Compute g = P(z), and the stacked blocks of its derivative.
 void ConeShares::project(const ConeProblem& p, const Eigen::Ref<const VecX>& z, Eigen::Ref<VecX> g,
                          bool differentiate) {
     const auto w = w_.vector(p.n), given = given_.vector(p.n);

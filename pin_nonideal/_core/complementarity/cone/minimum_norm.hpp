@@ -1,4 +1,5 @@
-// Where W does not tell how contacts share a load: of the forces with the same w, the shortest that the cones allow.
+// Minimum-norm forces of contacts that share a load. If W does not determine the shares, these are the shortest forces
+// in the cones with the same w.
 #pragma once
 
 #include "complementarity/cone/problem.hpp"
@@ -7,9 +8,9 @@ namespace pn {
 
 class ConeShares {
 public:
-    // f, a solution, becomes the one of least norm in the units it had before scaling. With E an orthonormal basis of
-    // the forces that W tells apart it is f = P(E y) with E^T f unchanged, P the nearest point of what the modes of w
-    // leave: a cone where nothing moves, a ray where it slips. False if y was not found, and f is as it was.
+    // Replace f, a solution, by the one of minimum norm in the units before scaling. E is an orthonormal basis of the
+    // forces that W distinguishes. The result is f = P(E y) with E^T f unchanged. P projects on the set that the modes
+    // of w allow: a cone if nothing moves, a ray if the contact slips. Returns false and keeps f if y was not found.
     bool even_out(const ConeProblem& problem, Eigen::Ref<VecX> f);
 
 private:

@@ -10,12 +10,12 @@ namespace {
 using ConeKind = ConeElement::Kind;
 using Eigen::Vector3d;
 
-constexpr double rounding = 1e-15, nearly = 1e-11;  // errors that end it; the second where steps gain no more
-constexpr double enough = 1e-4;                     // part of the decrease that a step promises
-constexpr int most_halvings = 7, most_blind = 3;    // steps that may gain nothing, for the modes to change
-constexpr int most_stalled = 2;                     // steps at rounding that gain nothing
+constexpr double rounding = 1e-15, nearly = 1e-11;  // errors that end it, the second if steps make no progress
+constexpr double enough = 1e-4;                     // required part of the predicted decrease
+constexpr int most_halvings = 7, most_blind = 3;    // steps without decrease that let the modes change
+constexpr int most_stalled = 2;                     // steps at rounding without progress
 
-// What the projection of one element's tangential rows is made of.
+// Data of the projection of one element's tangential rows.
 struct Disk {
     Vector3d z = Vector3d::Zero();
     double radius = 0.0, length = 0.0;
@@ -39,7 +39,7 @@ Disk disk_of(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& f, const
 
 }  // namespace
 
-// F of the equations F = 0; returns its squared length.
+// Evaluate F of the equations F = 0. Returns its squared length.
 double ConeNewton::evaluate(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
     auto w = w_.vector(p.n), F = F_.vector(p.n);
     p.respond(f, w);
@@ -104,7 +104,7 @@ void ConeNewton::differentiate(const ConeProblem& p, const Eigen::Ref<const VecX
         const double turn = disk.length > 0.0 ? disk.radius / disk.length : 0.0;
         for (int a = 0; a < disk.dim; ++a) {
             const int row = disk.first + a;
-            for (int b = 0; b < disk.dim; ++b) {  // z turns
+            for (int b = 0; b < disk.dim; ++b) {  // z changes direction
                 const double part = turn * ((a == b ? 1.0 : 0.0) - t[a] * t[b]);
                 J(row, disk.first + b) -= part;
                 J.row(row) += rho * part * W.row(disk.first + b);
@@ -117,7 +117,7 @@ void ConeNewton::differentiate(const ConeProblem& p, const Eigen::Ref<const VecX
     }
 }
 
-// A step as long as it makes the error smaller; false where none does and no more blind ones are left.
+// Take the longest step that reduces the error. Returns false if none does and no blind steps are left.
 bool ConeNewton::advance(const ConeProblem& p, Eigen::Ref<VecX> f, double& merit) {
     auto step = step_.vector(p.n), ahead = ahead_.vector(p.n);
     double length = 1.0;
@@ -136,7 +136,7 @@ bool ConeNewton::advance(const ConeProblem& p, Eigen::Ref<VecX> f, double& merit
     return merit < HUGE_VAL;
 }
 
-// Whether the equations at f are others than those that were factored last. What slips has some of its own everywhere.
+// Check if the equations at f differ from those factored last. A slipping element has different equations at every point.
 bool ConeNewton::changes_piece(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
     constexpr signed char curved = -1, unknown = -2;
     const auto w = w_.vector(p.n);

@@ -1,6 +1,6 @@
 // Newton's method on the modes of a cone problem, in the functions of Alart and Curnier ("A mixed formulation for
-// frictional contact problems prone to Newton like solution methods", 1991): with tau = f_n - rho w_n and
-// z = f_t - rho w_t, a contact has  f_n = max(0, tau)  and  f_t = the nearest point to z of the disk of radius mu tau.
+// frictional contact problems prone to Newton like solution methods", 1991). With tau = f_n - rho w_n and z = f_t - rho
+// w_t, a contact has f_n = max(0, tau). f_t is the nearest point to z of the disk of radius mu tau.
 #pragma once
 
 #include "complementarity/cone/problem.hpp"
@@ -9,13 +9,12 @@ namespace pn {
 
 class ConeNewton {
 public:
-    // Goes on from f; returns the largest error of the equations, as part of what is in play.
-    // f is the best point met.
+    // Iterate from f, and set f to the best point found. Returns the largest relative error of the equations.
     double solve(const ConeProblem& problem, Eigen::Ref<VecX> f, int most_steps);
-    // The error of f as it stands.
+    // Return the relative error of f.
     double error(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
-    bool regular() const { return regular_; }  // whether the last equations had full rank
-    int steps() const { return steps_; }       // of all calls
+    bool regular() const { return regular_; }  // the last equations had full rank
+    int steps() const { return steps_; }       // total of all calls
 
 private:
     double evaluate(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
@@ -26,7 +25,7 @@ private:
 
     DenseSolver solver_;
     Buffer J_, F_, w_, step_, ahead_, best_, size_;
-    std::vector<signed char> piece_;  // of the equations that were factored: modes, where these are all linear
+    std::vector<signed char> piece_;  // by element: mode of the factored equations, if these are linear
     bool regular_ = false;
     int steps_ = 0, blind_ = 0;
 };

@@ -5,9 +5,9 @@
 
 namespace pn {
 
-// Part of the largest response below which an element has none of its own.
+// Part of the largest response below which an element has no response of its own.
 constexpr double no_response = 1e-14;
-// Part of forces in play that counts as what they round to: 1e12 times their rounding.
+// Part of large forces that counts as their rounding: 1e12 times the machine precision.
 constexpr double squeeze = 1e-4;
 
 void ConeProblem::pose(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,

@@ -1,10 +1,11 @@
-// Contact and friction forces f of several elements together, whose velocities or accelerations are w = W f + w0.
+// Contact and friction forces f of several elements together, with the velocities or accelerations w = W f + w0.
 //
-// A contact has the rows (normal, slip directions), one, two or three of them. Its force is in the cone
-// |f_t| <= mu f_n, u = w + (mu |w_t|, 0) in the dual cone, and the two are complementary, f . u = 0: that is w_n >= 0 and
-// f_n >= 0 with f_n w_n = 0, and f_t = -mu f_n w_t / |w_t| where it slips (de Saxce, Feng, "The bipotential method",
-// Math. Comput. Modelling 28, 1998). A box is dry friction of a known limit, |f| <= limit, f = -limit w / |w| where it
-// slips. Numbers in the order of the elements, in units in which the largest w0 and the responses of each are about 1.
+// A contact has one to three rows (normal, slip directions). Its force is in the cone |f_t| <= mu f_n, and
+// u = w + (mu |w_t|, 0) is in the dual cone. Both are complementary, f . u = 0. That is w_n >= 0 and f_n >= 0 with f_n
+// w_n = 0, and f_t = -mu f_n w_t / |w_t| if the contact slips (de Saxce, Feng, "The bipotential method", Math. Comput.
+// Modelling 28, 1998). A box is dry friction of a known limit: |f| <= limit, and f = -limit w / |w| if the element
+// slips. Numbers are in the order of the elements. Units are scaled so that the largest w0 and the responses of each
+// element are about 1.
 #pragma once
 
 #include <vector>
@@ -14,7 +15,7 @@
 namespace pn {
 
 struct ConeElement {
-    enum class Kind { contact, box, equality };  // equality: w = 0, whatever force that takes
+    enum class Kind { contact, box, equality };  // equality: w = 0 by any force
 
     Kind kind = Kind::contact;
     int dim = 3;
@@ -29,11 +30,11 @@ struct ConeElement {
 class ConeProblem {
 public:
     int n = 0;
-    bool associated = false;  // u = w: slip opens the contact as if the cone were the potential
+    bool associated = false;  // u = w (associated law): slip opens the contact
     std::vector<ConeElement> elements;
-    std::vector<int> at;  // first row of each
+    std::vector<int> at;  // first row of each element
 
-    // Takes over W, w0 and the elements, scaled.
+    // Copy W, w0 and the elements, and scale them.
     void pose(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
               const std::vector<ConeElement>& elements);
 
@@ -44,15 +45,15 @@ public:
     Eigen::Map<const VecX> scale() const { return scale_.vector(n); }  // forces are force_unit scale_i f_i
     double force_unit() const { return unit_; }
     int size() const { return static_cast<int>(elements.size()); }
-    // The force that an element answers a unit of velocity with.
+    // Return the force of element e per unit of velocity.
     double stiffness(int e) const { return stiffness_.vector(size())[e]; }
 
     void respond(const Eigen::Ref<const VecX>& f, Eigen::Ref<VecX> w) const {
         w = w0();
         w.noalias() += W() * f;
     }
-    // What the errors of each element's equations are parts of: the largest w0, and what forces much larger than that
-    // round to. Forces that only squeeze do not make an error small.
+    // Compute the scale of the errors of each element's equations: the response to the largest w0, plus the rounding of
+    // much larger forces. Forces that only squeeze do not make an error small.
     void forces_in_play(const Eigen::Ref<const VecX>& f, Eigen::Ref<VecX> size) const;
 
 private:

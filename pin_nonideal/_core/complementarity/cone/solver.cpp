@@ -11,24 +11,24 @@ namespace {
 
 using ConeKind = ConeElement::Kind;
 
-constexpr double solved = 1e-11;     // error that is a solution
-constexpr double no_force = 1e10;    // forces beyond this, in the problem's units, only squeeze
-constexpr double held = 1e-7;        // part of the largest w0 that the end of the central path leaves of none
-constexpr double still = 1e-12;       // part of the largest w0 that is rest
-constexpr double evened = 1e-13;     // the same of even shares
+constexpr double solved = 1e-11;     // error of a solution
+constexpr double no_force = 1e10;    // larger forces, in the problem's units, only squeeze
+constexpr double held = 1e-7;        // velocity of rest at the end of the central path, relative to the largest w0
+constexpr double still = 1e-12;      // velocity of rest of a solution, relative to the largest w0
+constexpr double evened = 1e-13;     // error of a minimum-norm solution
 constexpr int few_steps = 3, first_steps = 20, more_steps = 30;
 constexpr int most_turns = 30, most_rounds = 40, sweeps = 40, most_starts = 100;
 constexpr int few_turns = 10, most_stretches = 60;
 constexpr double relaxation = 0.7;
-// Compliance of contacts and joints beside their own response: it halves from the first to the last.
+// Compliance of elements relative to their own response. It halves from the first value to the last.
 constexpr double first_compliance = 1e-2, least_compliance = 1e-9;
 constexpr int most_approaches = 40;
-constexpr double softer = 0.1;  // from one to the next, where the limit is all that is asked for
-// A miss is of what no forces change where it lasts as elements stiffen: what shares a load, such as the corners of a foot
-// that turns, has velocities that contradict each other by that much of those in play. So small a one is not searched
-// further where any is taken.
+constexpr double softer = 0.1;  // ratio of successive compliances, if only the limit is needed
+// Residual below which the search ends if residuals are accepted, and ratio of successive residuals that counts as
+// stagnation. If the residual stagnates while elements stiffen, no forces change it. Elements that share a load, such
+// as the corners of a turning foot, then have contradicting velocities.
 constexpr double unchangeable = 1e-9, lasts = 0.9;
-constexpr double first_stretch = 0.1, least_stretch = 1e-5;  // of the way from no friction to all
+constexpr double first_stretch = 0.1, least_stretch = 1e-5;  // parts of the way from no friction to full friction
 
 }  // namespace
 
@@ -44,7 +44,7 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
     least_miss_ = HUGE_VAL;
     bool found = search(x, warm);
     ConeStatus status = found ? ConeStatus::solved : find_certificate(problem_, certificate_);
-    if (status == ConeStatus::jammed) found = grow_friction(x);  // a solution may be there all the same
+    if (status == ConeStatus::jammed) found = grow_friction(x);  // a solution may still exist
     if (status == ConeStatus::failed) found = grow_friction(x) || scatter(x) || take_nearest(x);
     if (found && shares_alike_) stiffen(x);
     unique_shares_ = newton_.regular();
@@ -87,7 +87,7 @@ bool ConeComplementarity::hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref
     return true;
 }
 
-// Newton's method from where f is; f stays unless that is a solution.
+// Run Newton's method from f. f changes only if the result is a solution.
 bool ConeComplementarity::polish(Eigen::Ref<VecX> f, int most_steps) {
     auto there = f_.vector(problem_.n);
     there = f;
@@ -108,9 +108,9 @@ bool ConeComplementarity::search(Eigen::Ref<VecX> f, bool warm) {
     return polish(f, more_steps) || approach(f) || take_turns(f) || relax(f);
 }
 
-// Each element gives way by a little of what its force has changed, which makes every problem on the way a regular one,
-// however many elements share a load; forces that change no more give no way (the proximal point algorithm: Rockafellar,
-// SIAM J. Control Optim. 14, 1976).
+// Proximal point algorithm (Rockafellar, SIAM J. Control Optim. 14, 1976). Each element yields in proportion to the
+// change of its force. Every problem on the way is then regular, however many elements share a load. Forces that no
+// longer change cause no compliance.
 bool ConeComplementarity::approach(Eigen::Ref<VecX> f) {
     grown_ = problem_;
     auto last = x_.vector(problem_.n), nearest = nearest_.vector(problem_.n);
@@ -144,7 +144,7 @@ bool ConeComplementarity::approach(Eigen::Ref<VecX> f) {
     return least_miss_ <= unchangeable && take_nearest(f);
 }
 
-// To elements that give way by ever less of their whole force; f stays where that leads to no solution.
+// Solve with compliance to the whole forces that decreases to its limit. f is kept if this gives no solution.
 bool ConeComplementarity::stiffen(Eigen::Ref<VecX> f) {
     grown_ = problem_;
     auto there = x_.vector(problem_.n);
@@ -166,7 +166,7 @@ bool ConeComplementarity::stiffen(Eigen::Ref<VecX> f) {
     return false;
 }
 
-// Of the forces that were approached those that miss least, where they may miss as much.
+// Set f to the stored forces of smallest residual, if this residual is accepted.
 bool ConeComplementarity::take_nearest(Eigen::Ref<VecX> f) {
     if (!(least_miss_ <= most_miss_)) return false;
     f = nearest_.vector(problem_.n);
@@ -174,7 +174,7 @@ bool ConeComplementarity::take_nearest(Eigen::Ref<VecX> f) {
     return true;
 }
 
-// No force pulls, and none leaves its cone, by rounding either.
+// Remove rounding: no force pulls, and none leaves its cone.
 void ConeComplementarity::tidy(Eigen::Ref<VecX> f) const {
     for (int e = 0; e < problem_.size(); ++e) {
         const ConeElement& element = problem_.elements[e];
@@ -187,8 +187,8 @@ void ConeComplementarity::tidy(Eigen::Ref<VecX> f) const {
     }
 }
 
-// Slip speeds held and forces found for them, in turn (Cadoux, "Méthodes d'optimisation pour la dynamique non
-// régulière", 2009).
+// Alternate between slip speeds and the forces for fixed slip speeds (Cadoux, "Méthodes d'optimisation pour la
+// dynamique non régulière", 2009).
 bool ConeComplementarity::take_turns(Eigen::Ref<VecX> f) {
     f.setZero();
     for (int turn = 0; turn < most_turns; ++turn) {
@@ -199,7 +199,7 @@ bool ConeComplementarity::take_turns(Eigen::Ref<VecX> f) {
     return false;
 }
 
-// One element after the other goes to the nearest force that its cone allows.
+// Projected Gauss-Seidel: set one element after the other to the nearest force in its cone.
 bool ConeComplementarity::relax(Eigen::Ref<VecX> f) {
     auto w = w_.vector(problem_.n), x = x_.vector(problem_.n);
     f.setZero();
@@ -225,7 +225,7 @@ bool ConeComplementarity::relax(Eigen::Ref<VecX> f) {
     return false;
 }
 
-// From no friction, where the problem is convex, to all of it.
+// Continuation from zero friction, where the problem is convex, to full friction.
 bool ConeComplementarity::grow_friction(Eigen::Ref<VecX> f) {
     grown_ = problem_;
     double reached = 0.0, stretch = first_stretch;
@@ -256,7 +256,7 @@ bool ConeComplementarity::grow_friction(Eigen::Ref<VecX> f) {
     return false;
 }
 
-// Starts drawn by lot, always the same ones.
+// Random starts with a fixed seed.
 bool ConeComplementarity::scatter(Eigen::Ref<VecX> f) {
     std::minstd_rand lot(1);
     for (int start = 0; start < most_starts; ++start) {

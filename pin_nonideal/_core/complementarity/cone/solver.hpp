@@ -1,9 +1,9 @@
-// The solver of contacts with Coulomb's friction: for accelerations, impacts and time stepping alike. Finds f of the
-// problem of cone/problem.hpp for any square W (of any rank, symmetric or not): Newton's method on the modes, from a
-// warm start or from nothing; where that does not come to rest, from the end of the central path, from elements that
-// give way a little and ever less, from problems with slip speeds held in turn, from forces that are relaxed element by
-// element, from no friction on, and from starts drawn by lot. Buffers grow to the largest problem met; a call that gets
-// by without the last two takes no memory after that.
+// Solver of contacts with Coulomb friction, for accelerations, impacts and time stepping. It finds f of the problem of
+// cone/problem.hpp for any square W (of any rank, symmetric or not). Newton's method on the modes starts from a warm
+// start or from zero. If it fails, the fallbacks are: (1) Newton's method from the end of the central path, (2)
+// proximal points with decreasing compliance, (3) alternation with fixed slip speeds, (4) projected Gauss-Seidel, (5)
+// continuation from zero friction, (6) random starts. Buffers grow to the largest problem. A call without the last two
+// fallbacks allocates no memory after that.
 #pragma once
 
 #include "complementarity/cone/certificate.hpp"
@@ -12,19 +12,19 @@
 
 namespace pn {
 
-// Largest misses, as parts of the velocities in play (the largest |w0|, or |W| |f| where that is more), of the largest
-// force, and of their product.
+// Largest errors, relative to the velocity scale (the largest |w0|, or |W| |f| if that is larger), to the largest
+// force, and to their product.
 struct ConeResiduals {
-    double signorini = 0.0;    // of w_n >= 0, f_n >= 0, f_n w_n = 0
-    double coulomb = 0.0;      // of |f_t| <= mu f_n, |f| <= limit
-    double dissipation = 0.0;  // of f_t . w_t = -mu f_n |w_t|, f . w = -limit |w|
+    double signorini = 0.0;    // error of w_n >= 0, f_n >= 0, f_n w_n = 0
+    double coulomb = 0.0;      // error of |f_t| <= mu f_n, |f| <= limit
+    double dissipation = 0.0;  // error of f_t . w_t = -mu f_n |w_t|, f . w = -limit |w|
 };
 
 class ConeComplementarity {
 public:
-    // f holds a guess of the solution when `warm` (often that of the step before); what it was is of no matter else.
-    // Where it is not `solved`, f is the best that was met and no more than that. Forces that share a load are the
-    // shortest, but where a guess solves the problem as it is and its shares may be kept.
+    // Solve for f. If `warm`, f holds a guess (often the solution of the previous step), otherwise its value is
+    // ignored. If the result is not `solved`, f is the best point found. Forces that share a load have minimum norm.
+    // With `may_keep_shares`, a guess that solves the problem keeps its shares.
     ConeStatus solve(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
                      const std::vector<ConeElement>& elements, bool warm, Eigen::Ref<VecX> f,
                      bool may_keep_shares = false);
@@ -35,17 +35,17 @@ public:
     static ConeResiduals residuals(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
                                    const std::vector<ConeElement>& elements, const Eigen::Ref<const VecX>& f);
 
-    // Where no forces meet the laws to rounding, those that miss them by up to so much of what is in play are a solution,
-    // for those who tell by how much; none by default.
+    // Accept a relative residual up to `most` if no forces meet the laws to rounding. The caller then reports the
+    // residual. By default no residual is accepted.
     void take_misses(double most) { most_miss_ = most; }
 
-    // Where friction follows shares of a load that W does not tell, several motions may solve the problem. The one that is
-    // taken from now on is that of elements which all give way a little alike, in the limit of stiff ones, in whatever order
-    // they come.
+    // Use a uniform compliance. If friction depends on shares of a load that W does not determine, several motions may
+    // solve the problem. This option selects the motion of equally compliant elements, in the limit of stiff ones. It
+    // does not depend on the order of the elements.
     void share_alike(bool on) { shares_alike_ = on; }
 
-    double error() const { return error_; }             // of the equations, as part of what is in play
-    bool unique_shares() const { return unique_shares_; }  // whether it was shown that W tells all of f
+    double error() const { return error_; }             // relative error of the equations
+    bool unique_shares() const { return unique_shares_; }  // W is shown to determine all of f
     const VecX& certificate() const { return certificate_; }
     int newton_steps() const { return newton_.steps(); }
     int path_steps() const { return path_.steps(); }

@@ -6,12 +6,12 @@
 namespace pn {
 
 constexpr int newton_passes = 30;
-constexpr double newton_rounding = 1e-15;  // of the residual, over the solution
-constexpr double stalled = 1e-12;          // the same where rounding is worse: it no longer falls
+constexpr double newton_rounding = 1e-15;  // residual relative to the solution
+constexpr double stalled = 1e-12;          // the same for worse rounding, if the residual no longer falls
 constexpr int growth_passes = 200;
-constexpr double safe_growth = 0.5;      // nobody asks by how much it lies below this
-constexpr double growth_settled = 1e-4;  // part of the bound by which a pass improves it in the end
-constexpr double kept_weight = 1e-2;     // of the weights before, so that none becomes zero and none alternates
+constexpr double safe_growth = 0.5;      // smaller bounds are not improved
+constexpr double growth_settled = 1e-4;  // relative improvement of the bound by a pass that ends the iteration
+constexpr double kept_weight = 1e-2;     // part of the previous weights that stays, so that none becomes zero or alternates
 
 void ReactionEquation::resize(int size, int vectors) {
     constant.resize(size);
@@ -86,7 +86,7 @@ bool ReactionNewton::solve(const ReactionEquation& equation, VecX& y) {
     return false;
 }
 
-// max (L u)_i / u_i over any positive u is such a bound (Collatz and Wielandt).
+// For any positive u, max (L u)_i / u_i is such a bound (Collatz and Wielandt).
 double growth(const MatX& L) {
     double best = L.rowwise().sum().maxCoeff();
     if (best <= safe_growth) return best;

@@ -8,25 +8,25 @@ namespace pn {
 
 namespace {
 
-constexpr int most_halved = 3;            // unknowns
-constexpr double most_work = 20000.0;     // parts of the box, each counted more where its matrices are large
-constexpr double contracting = 0.9;       // growth of the unknowns that follow
-constexpr double least_part = 1e-7;       // of the box: squared it is rounding, to which two solutions touch
-constexpr double alone = 0.9;             // part of its size to which Newton's interval form must shrink a part
-constexpr double margin = 1e-9;           // by which a part and its bounds are taken larger
-constexpr double rounding = 1e-13;        // of a residual, over the terms that it is made of
-constexpr double same_root = 1e-9;        // distance of two solutions over their size
-constexpr double least_determinant = 1e-8;  // smaller ones are not told from zero
-constexpr double at_infinity = 1e-9;      // s of a solution that cannot be told from one with s = 0
-constexpr double far = 100.0;               // a start of Newton's method beyond the bends
+constexpr int most_halved = 3;            // bisected unknowns
+constexpr double most_work = 20000.0;     // parts of the box, weighted by the size of the matrices
+constexpr double contracting = 0.9;       // largest growth of the unknowns that follow
+constexpr double least_part = 1e-7;       // smallest part of the box (its square is rounding, where two solutions merge)
+constexpr double alone = 0.9;             // size to which Newton's interval form must shrink a part, relative to it
+constexpr double margin = 1e-9;           // relative enlargement of a part and its bounds
+constexpr double rounding = 1e-13;        // residual relative to its terms
+constexpr double same_root = 1e-9;        // relative distance of equal solutions
+constexpr double least_determinant = 1e-8;  // smaller determinants count as zero
+constexpr double at_infinity = 1e-9;      // s below which a solution counts as infinite
+constexpr double far = 100.0;               // start of Newton's method beyond the bends of g
 constexpr int follow_passes = 1000, newton_passes = 30;
 
 struct Part {
-    int fixed;  // which coordinate is one: the others run from zero to one, so that the largest is one
-    std::array<double, most_halved + 1> center, half;  // of the unknowns that are halved, then of s
+    int fixed;  // coordinate that is one, while the others run from zero to one
+    std::array<double, most_halved + 1> center, half;  // by bisected unknown, then of s
 };
 
-// y = scale z / s, with max(z of the halved, s) = 1.
+// Search in z with y = scale z / s and max(z of the bisected unknowns, s) = 1.
 class Search {
 public:
     explicit Search(const ReactionEquation& given);
@@ -45,13 +45,13 @@ private:
     void newton_from(VecX z);
 
     int halved() const { return static_cast<int>(halved_.size()); }
-    // The unknown whose place s takes in a part of this kind, or -1.
+    // Return the unknown that s replaces in a part of this kind, or -1.
     int column(const Part& part) const { return part.fixed == halved() ? -1 : halved_[part.fixed]; }
 
     ReactionEquation eq_;
     int n_;
     VecX scale_, in_s_;
-    MatX L_, spread_;  // spread: (1 - L)^-1 of those that follow
+    MatX L_, spread_;  // spread: (1 - L)^-1 of the following unknowns
     std::vector<int> halved_, following_;
     std::vector<Part> parts_;
     ReactionRoots found_;
@@ -65,7 +65,7 @@ MatX among(const MatX& L, const std::vector<int>& rows, const std::vector<int>& 
 }
 
 Search::Search(const ReactionEquation& given) : eq_(given), n_(given.size()) {
-    // Unknowns of the size that the loads without friction give them, alone or through each other.
+    // Scale the unknowns to the size that loads without friction give them, directly or through each other.
     std::fill(eq_.directed.begin(), eq_.directed.end(), char(0));
     eq_.steepest(L_);
     const VecX own = eq_.steepest_in_s();
@@ -82,7 +82,8 @@ Search::Search(const ReactionEquation& given) : eq_(given), n_(given.size()) {
     divide();
 }
 
-// Chooses the unknowns to halve: as few as leave a contraction, those first without which the rest contracts best.
+// Choose the unknowns to bisect: as few as leave a contraction. Each choice is the unknown without which the rest
+// contracts best.
 void Search::divide() {
     for (int i = 0; i < n_; ++i) following_.push_back(i);
     while (!following_.empty() && growth(among(L_, following_, following_)) > contracting) {
@@ -101,7 +102,7 @@ void Search::divide() {
     spread_ = pn::inverse(MatX::Identity(m, m) - among(L_, following_, following_));
 }
 
-// The unknowns that follow, for those that are halved in z; from where z has them. False where that does not end.
+// Compute the following unknowns for the bisected ones in z, starting at z. Returns false if the iteration does not end.
 bool Search::follow(VecX& z, double s) const {
     const int m = static_cast<int>(following_.size());
     if (m == 0) return true;
@@ -113,7 +114,7 @@ bool Search::follow(VecX& z, double s) const {
         eq_.image(trial, s, g);
         for (int i = 0; i < m; ++i) residual[i] = g[following_[i]] - trial[following_[i]];
         const double error = residual.cwiseAbs().maxCoeff();
-        if (error > before * contracting) {  // Newton's step led away: the image itself contracts
+        if (error > before * contracting) {  // Newton's step failed, but the image itself contracts
             eq_.image(z, s, g);
             for (int i : following_) z[i] = g[i];
             trial = z;
@@ -130,7 +131,7 @@ bool Search::follow(VecX& z, double s) const {
     return false;
 }
 
-// Sizes r of what the unknowns may differ from their value in the middle of a part; returns that of s.
+// Compute bounds r on the deviation of the unknowns from their values in the middle of a part. Returns the bound of s.
 double Search::reach(const Part& part, VecX& r) const {
     const double r_s = part.half[halved()];
     r.setZero(n_);
@@ -144,7 +145,8 @@ double Search::reach(const Part& part, VecX& r) const {
     return r_s;
 }
 
-// The slope of g(z, s) - z in a part: within D of A. `column`: of the unknown that is held there, where s varies.
+// Compute A and D such that the slope of g(z, s) - z in a part is within D of A. s replaces the unknown `column`,
+// unless it is -1.
 void Search::interval_slope(const VecX& z, double s, const VecX& r, double r_s, int column, MatX& A, MatX& D) const {
     A = -MatX::Identity(n_, n_);
     D.setZero(n_, n_);
@@ -153,7 +155,7 @@ void Search::interval_slope(const VecX& z, double s, const VecX& r, double r_s, 
         const Eigen::Vector3d load = eq_.vector(k, z, s);
         const Eigen::RowVectorXd lengths = eq_.columns.middleRows<3>(3 * k).colwise().norm();
         const double length = load.norm(), way = lengths.dot(r) + eq_.offset.col(k).norm() * r_s;
-        // Its direction stays within a cone about the one in the middle, or may be any.
+        // The direction of the load stays within a cone about its middle value, or is arbitrary.
         const bool directed = way < length;
         const Eigen::Vector3d u = directed ? Eigen::Vector3d(load / length) : Eigen::Vector3d::Zero();
         const double turn = directed ? 2.0 * std::sin(0.5 * std::asin(way / length)) : 1.0;
@@ -168,7 +170,7 @@ void Search::interval_slope(const VecX& z, double s, const VecX& r, double r_s, 
     D.col(column) = spread_in_s;
 }
 
-// Newton's method with one coordinate held.
+// Run Newton's method with one coordinate fixed.
 bool Search::polish(int column, VecX& z, double& s) const {
     VecX g(n_);
     MatX A, D;
@@ -217,7 +219,7 @@ void Search::split(const Part& part) {
     }
 }
 
-// Whether a part holds no solution, or the one that it holds is kept (Krawczyk's test).
+// Check if a part holds no solution, or if its only solution is stored (Krawczyk's test).
 bool Search::settled(const Part& part) {
     VecX z = VecX::Zero(n_), g(n_), r;
     for (int i = 0; i < halved(); ++i) z[halved_[i]] = part.center[i];

@@ -15,27 +15,28 @@ namespace {
 constexpr int room = most_searched + 1;  // forces, and tau
 using Point = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, room, 1>;
 using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, room, room>;
-using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, room>;  // of one element or vector
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, room>;  // rows of one element or vector
 using Short = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
 using Turned = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
 
 constexpr double inflated = 1.05;      // boxes overlap, so that no solution lies on a border
-constexpr double least_box = 1e-9;     // smaller ones are left undecided
-constexpr double rounding = 1e-14;     // of everything in a box, added to its radius
-constexpr double at_infinity = 1e-9;   // tau below this is no motion
-constexpr double same_motion = 1e-7;   // forces that differ by less, as part of themselves, are the same
-constexpr double shrinks = 0.8;        // of a box's widest side, that makes another pass worth while
-constexpr double least_pivot = 1e-10;  // of W beside its diagonal
+constexpr double least_box = 1e-9;     // smaller boxes stay undecided
+constexpr double rounding = 1e-14;     // rounding in a box, added to its radius
+constexpr double at_infinity = 1e-9;   // tau of a solution at infinity
+constexpr double same_motion = 1e-7;   // relative difference below which forces are equal
+constexpr double shrinks = 0.8;        // reduction of a box's widest side that justifies another pass
+constexpr double least_pivot = 1e-10;  // pivot of W relative to its diagonal
 constexpr int most_undecided = 100, most_boxes = 20000;
 
-// A value known to a radius.
+// Interval of a value: middle and radius.
 struct Length {
     double middle, radius;
     double least() const { return std::max(0.0, middle - radius); }
     double most() const { return middle + radius; }
 };
 
-// A vector linear in the point, known to a radius, and its direction, known to `turn`; where it may vanish, any.
+// Interval of a vector that is linear in the point, and its direction within `turn`. If the vector may vanish, the
+// direction is arbitrary.
 struct Arrow {
     Short middle, along;
     Length length;
@@ -50,7 +51,7 @@ struct Arrow {
     }
 };
 
-// Rows of derivatives, each known to a radius.
+// Intervals of rows of derivatives: middles and radii.
 struct Slopes {
     Rows middle, radius;
 
@@ -67,7 +68,7 @@ struct Limit {
     Slopes slopes;
 };
 
-// An element of the equation in units of its own force, homogeneous in (x, tau).
+// Element of the equation in units of its own force, homogeneous in (x, tau).
 struct Element {
     bool may_stick;
     int row, dim;
@@ -90,7 +91,7 @@ struct Element {
         return out;
     }
 
-    // Whether it neither sticks nor begins to slip anywhere in the box.
+    // Check if the element neither sticks nor begins to slip anywhere in the box.
     bool is_excluded(const Point& x, const Point& radius) const {
         const Length limit = this->limit(x, radius).size;
         const Arrow own(force, x, radius), accelerated(response, x, radius);
@@ -100,7 +101,7 @@ struct Element {
         return (own.middle + limit.middle * along).norm() > own.length.radius + limit.radius + turn * limit.most();
     }
 
-    // What the equation lacks at the box's middle, and how steep that is anywhere in the box.
+    // Return the residual of the equation in the middle of a box. `slopes` bounds its derivatives anywhere in the box.
     Short lack(const Point& x, const Point& radius, Slopes& slopes) const {
         const Limit limit = this->limit(x, radius);
         if (!may_stick) {
@@ -116,7 +117,7 @@ struct Element {
         return force * x - limit.size.middle / point.length.middle * point.middle;
     }
 
-    // Of x - limit p / |p|, p = x - rho alpha beyond the limit.
+    // Return the derivatives of x - limit p / |p|, with p = x - rho alpha beyond the limit.
     Slopes slope_outside(const Arrow& p, const Limit& limit) const {
         const double most = std::min(1.0, limit.size.most() / std::max(p.length.least(), 1e-300));
         const double least = std::min(most, limit.size.least() / p.length.most());
@@ -137,7 +138,7 @@ struct Element {
 
 struct Box {
     Point middle, radius;
-    int face;  // the coordinate that is kept
+    int face;  // index of the fixed coordinate
 
     double widest() const { return radius.maxCoeff(); }
 };
@@ -145,7 +146,7 @@ struct Box {
 struct Search {
     const RestEquation& equation;
     const int n;
-    VecX unit;  // of each force
+    VecX unit;  // unit of each force
     std::vector<Element> elements;
     std::vector<Box> open;
     AllMotions found;
@@ -186,7 +187,7 @@ struct Search {
         return e;
     }
 
-    // A side of the cube of (x, tau), tau >= 0.
+    // Open a face of the cube of (x, tau), with tau >= 0.
     void open_face(int face, double side) {
         if (face == n && side < 0.0) return;
         Box box{Point::Zero(n + 1), Point::Ones(n + 1), face};
@@ -196,7 +197,7 @@ struct Search {
         open.push_back(box);
     }
 
-    // The free coordinates of a point on a face, and back.
+    // Return the free coordinates of a point on a face.
     Point free(const Point& x, int face) const {
         Point out(n);
         for (int k = 0, at = 0; k <= n; ++k)
@@ -210,7 +211,7 @@ struct Search {
         found.forces.push_back(x);
     }
 
-    // The one solution near the middle of a box, where it is a motion.
+    // Store the solution near the middle of a box, if it is a motion.
     void take(Point x) {
         if (x[n] < -at_infinity) return;
         if (x[n] <= at_infinity) {
@@ -222,7 +223,7 @@ struct Search {
         else ++undecided;
     }
 
-    // Krawczyk's test: true when the box is done with; else it may have shrunk.
+    // Krawczyk's test. Returns true if the box is done. Otherwise the box may have shrunk.
     bool decide(Box& box) {
         const Point radius = (inflated * box.radius).array() + rounding * (box.radius.array() > 0.0).cast<double>();
         Square J(n, n), J_radius(n, n);
@@ -300,7 +301,7 @@ bool is_searched(const RestEquation& equation) {
     for (const RestElement& e : equation.elements)
         if (e.middle != 0.0) return false;
     Cholesky cholesky;
-    if (!cholesky.compute(equation.W)) return false;  // redundant elements share in ways without number
+    if (!cholesky.compute(equation.W)) return false;  // redundant elements have infinitely many shares
     const auto pivots = cholesky.factor().diagonal().array().square();
     return (pivots > least_pivot * equation.W.diagonal().array()).all();
 }

@@ -10,19 +10,19 @@ namespace pn {
 
 namespace {
 
-constexpr double difference = 1e-7;      // part of the forces: square root of the rounding, with a margin
-constexpr double least_size = 1e-300;    // of forces that are all zero
-constexpr double safe_pivot = 1e-8;      // of the Cholesky factor of W, beside its diagonal
-constexpr double null_response = 1e-13;  // eigenvalues of W below this part of the largest are none
-constexpr double unmoved = 1e-9;         // part of the loads that what moves nothing may change
+constexpr double difference = 1e-7;      // difference relative to the forces: square root of the rounding, with a margin
+constexpr double least_size = 1e-300;    // scale of forces that are all zero
+constexpr double safe_pivot = 1e-8;      // pivot of the Cholesky factor of W, relative to its diagonal
+constexpr double null_response = 1e-13;  // eigenvalues of W below this part of the largest count as zero
+constexpr double unmoved = 1e-9;         // part of the loads that forces without motion may change
 
-constexpr double limit_rounding = 1e-9;  // part of the limit by which a force that holds may pass it
-constexpr double far = 1e9;              // of forces without end, beside those that limits and accelerations ask for
-constexpr int most_signs = 6;            // elements whose ways of slipping are combined
+constexpr double limit_rounding = 1e-9;  // relative excess of a sticking force over its limit
+constexpr double far = 1e9;              // unbounded forces, relative to those of limits and accelerations
+constexpr int most_signs = 6;            // elements with all combinations of slip signs
 
 auto part(const VecX& x, const RestElement& e) { return x.segment(e.row, e.dim); }
 
-// G with W = G G^T, and the loads' derivatives times G^-T; false where forces that move nothing change a load.
+// Compute G with W = G G^T, and the loads' derivatives times G^-T. Returns false if forces that move nothing change a load.
 bool energy_factor(const RestEquation& equation, MatX& G, MatX& loads) {
     const MatX& W = equation.W;
     Cholesky cholesky;
@@ -249,7 +249,7 @@ double contraction(const RestEquation& equation) {
         for (int k = e.vector; k < e.vector + e.vectors; ++k) l[i] += e.factor * loads.middleRows<3>(3 * k).norm();
         g[i] = G.middleRows(e.row, e.dim).norm();
     }
-    // sum l_i |G_i u| one by one, or by Cauchy and Schwarz with the weights l_i / g_i.
+    // Bound of sum l_i |G_i u| term by term, or by Cauchy and Schwarz with the weights l_i / g_i.
     const double one_by_one = l.dot(g);
     VecX root = VecX::Zero(equation.n);
     for (int i = 0; i < count; ++i)

@@ -1,9 +1,9 @@
-// The equation of rest. With the friction forces x of all elements at rest as unknowns, everything but their limits is
-// linear: slip accelerations are alpha = alpha0 + W x, and limits come from lengths of vectors that are linear in x. An
-// element sticks (alpha = 0, |x| <= limit) or begins to slip (x = -limit alpha / |alpha|); either is
-//     x = P(x - rho alpha),    P the nearest point of the ball of the limit, rho > 0 any.
-// One whose slip is known (it slips already, or is driven) has x = -limit times its direction. If the limits differ
-// forward and backward, the ball lies about their middle. Pure functions on arrays.
+// Rest equation. The unknowns are the friction forces x of all elements at rest. Slip accelerations are
+// alpha = alpha0 + W x, and limits come from lengths of vectors that are linear in x. An element sticks (alpha = 0,
+// |x| <= limit) or begins to slip (x = -limit alpha / |alpha|). In both cases
+//     x = P(x - rho alpha),    P the projection on the ball of radius limit, any rho > 0.
+// If the slip of an element is known (the element slips already, or is driven), x = -limit times its direction. If the
+// limits differ forward and backward, the ball is centered at their middle. Pure functions on arrays.
 #pragma once
 
 #include <functional>
@@ -15,15 +15,15 @@
 namespace pn {
 
 struct RestElement {
-    int row = 0, dim = 1;     // of x
+    int row = 0, dim = 1;     // rows of x
     bool may_stick = true;
-    VecX direction;           // of its slip, where that is known
-    double constant = 0.0;    // limit without any load, of an element that has begun to slip
-    double middle = 0.0;      // and the middle of its limits, where it has one direction
+    VecX direction;           // direction of its slip, if known
+    double constant = 0.0;    // limit of a slipping element without load
+    double middle = 0.0;      // middle of its limits, if it has one direction
     double factor = 1.0;      // static over kinetic limit, or 1 once it has begun to slip
-    double rho = 1.0;         // of the equation: the force that an acceleration asks for
-    int vector = 0, vectors = 0;  // its load: rows of `loads`, three a vector
-    bool directed = false;        // the first component alone, of which nothing below zero is a load
+    double rho = 1.0;         // rho of the equation: force per acceleration
+    int vector = 0, vectors = 0;  // rows of its load in `loads`, three per vector
+    bool directed = false;        // only the first component counts, and only if positive
 };
 
 struct RestEquation {
@@ -32,38 +32,38 @@ struct RestEquation {
     VecX alpha0;
     std::vector<RestElement> elements;
     VecX still;  // load vectors without friction,
-    MatX loads;  // and for a unit of each force
-    // Where laws are known only as functions: slip accelerations and limits before `factor`, asked for forces x.
+    MatX loads;  // and per unit of each force
+    // Set if laws are known only as functions: computes slip accelerations, and limits before `factor`, for the forces x.
     std::function<void(const VecX& x, VecX& alpha, FrictionLimits& limits)> ask;
-    // Part of the limits that is as `fixed` says and not as the load does: on the way from one to the other.
+    // Part of the limits that comes from `fixed` instead of the load (continuation parameter).
     double frozen = 0.0;
     FrictionLimits fixed;
 
     bool loaded() const { return ask || loads.rows() > 0; }
     void respond(const VecX& x, VecX& alpha, FrictionLimits& limits) const;
-    // Derivatives: of alpha (n, n), and of the limits' sizes (elements, n) and middles (n, n).
+    // Compute derivatives of alpha (n, n), of the limits' sizes (elements, n) and of their middles (n, n).
     void differentiate(const VecX& x, MatX& dalpha, MatX& dlimits, MatX& dmiddle) const;
-    // What x lacks, row by row; and the largest of it as part of each element's forces.
+    // Residual of the equation at x by row, and its largest value relative to each element's forces.
     VecX residual(const VecX& x) const;
     double error(const VecX& x) const;
-    // The largest of an element's force and limit and of what would stop it.
+    // Return the largest of an element's force, of its limit and of the force that would stop it.
     double force_in_play(size_t element, const VecX& x, const FrictionLimits& limits) const;
-    // d residual / dx on the branch that x is on.
+    // Return d residual / dx on the branch of x.
     MatX jacobian(const VecX& x) const;
 
-    // Forces under which nothing at rest accelerates, whatever the limits; the least where redundant elements share.
+    // Return forces under which no element at rest accelerates, for any limits. Redundant elements share with minimum norm.
     VecX holding_forces() const;
-    // Which elements stick in the motion with forces x, a solution.
+    // Return the sticking elements in the motion with forces x, a solution.
     std::vector<bool> sticks(const VecX& x) const;
-    // det(I - d limits / d limits) of the implicit equation of the elements that slip there.
+    // Return det(I - d limits / d limits) of the implicit equation of the elements that slip under x.
     double determinant(const VecX& x) const;
-    // The least that it comes to under forces without end, whichever way all slip.
+    // Return the least value of this determinant under unbounded forces, over all slip signs.
     double determinant_far_away() const;
 };
 
-// Where below 1: the motion is unique, and the limits of any two motions differ by this part of what they differ by in
-// turn. With W = G G^T and u = G^T (x - y) for two solutions x, y, |u|^2 <= sum_i |G_i u| |limit_i(x) - limit_i(y)|,
-// and |limit_i(x) - limit_i(y)| <= l_i |u|.
+// Return a bound on the contraction of the limits. If it is below 1, the motion is unique: the difference of the limits
+// of two motions would shrink to this part of itself. With W = G G^T and u = G^T (x - y) for two solutions x, y,
+// |u|^2 <= sum_i |G_i u| |limit_i(x) - limit_i(y)|, and |limit_i(x) - limit_i(y)| <= l_i |u|.
 double contraction(const RestEquation& equation);
 
 }  // namespace pn

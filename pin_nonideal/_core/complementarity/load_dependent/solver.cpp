@@ -10,16 +10,16 @@ namespace pn {
 
 namespace {
 
-constexpr double solved = 1e-13;          // largest error of the equation, as part of each element's forces
-constexpr double rounding = 1e-10;        // the same where no step makes it smaller any more
-constexpr double good_contraction = 0.5;  // of limits and forces in turn; slower ones go to Newton's method
-constexpr double within = 1e-13;          // part of the largest force by which one that holds may pass its limit
-constexpr double least_gain = 1e-3;       // of a step towards forces that hold, part of what they lack
+constexpr double solved = 1e-13;          // largest error of the equation, relative to each element's forces
+constexpr double rounding = 1e-10;        // the same if no step reduces the error
+constexpr double good_contraction = 0.5;  // error ratio of the alternation, above which Newton's method takes over
+constexpr double within = 1e-13;          // excess of a sticking force over its limit, relative to the largest force
+constexpr double least_gain = 1e-3;       // required relative decrease of the residual by a step
 constexpr int most_turns = 40, most_newton = 40, most_halvings = 12;
-constexpr double enough = 1e-4;           // part of the decrease that a Newton step promises
-constexpr double first_stretch = 0.25, least_stretch = 1e-4;  // of the path
+constexpr double enough = 1e-4;           // required part of the predicted decrease
+constexpr double first_stretch = 0.25, least_stretch = 1e-4;  // steps of the continuation parameter
 
-// Limits and forces in turn: for given limits the forces are a convex program.
+// Alternation of limits and forces. For given limits the forces are a convex program.
 struct Turns {
     const RestEquation& equation;
     std::vector<int> dims, rows;
@@ -39,7 +39,8 @@ struct Turns {
             for (int j = 0; j < count; ++j) W(i, j) = e.W(rows[i], rows[j]);
     }
 
-    // Under x: forces of those that slip in any case, limits of those that may stick, and what the others leave for them.
+    // Given x, compute the forces of slipping elements, the limits of sticking candidates, and the accelerations left
+    // for the candidates.
     void ask(const VecX& x, VecX& out, FrictionLimits& held, VecX& own) {
         equation.respond(x, alpha, limits);
         out = x;
@@ -56,7 +57,7 @@ struct Turns {
         own = (alpha + equation.W * (before - x))(rows);
     }
 
-    // The forces that the limits under x allow.
+    // Return the forces that the limits under x allow.
     VecX next(const VecX& x) {
         VecX out, own;
         FrictionLimits held;
@@ -117,8 +118,7 @@ double largest_force_in_play(const RestEquation& equation, const VecX& x, const 
     return size;
 }
 
-// What forces x lack to hold all that rests: accelerations that are left, as the forces they ask for, and what is beyond
-// a limit; and the derivative.
+// Compute the residual of rest: accelerations that are left, as forces, and forces beyond a limit. J is its derivative.
 void lack_of_rest(const RestEquation& equation, const VecX& x, VecX& lack, MatX& J) {
     VecX alpha;
     FrictionLimits limits;
@@ -142,7 +142,7 @@ void lack_of_rest(const RestEquation& equation, const VecX& x, VecX& lack, MatX&
         lack.segment(e.row, e.dim) = e.rho * alpha.segment(e.row, e.dim);
         J.middleRows(e.row, e.dim) = e.rho * dalpha.middleRows(e.row, e.dim);
         const double size = force.norm();
-        if (limits[i] <= no_limit) {  // |x| has a kink there, x has none
+        if (limits[i] <= no_limit) {  // |x| has a kink at zero, x has none
             lack.segment(n + e.row, e.dim) = force;
             J.middleRows(n + e.row, e.dim) = slope.middleRows(e.row, e.dim);
         } else if (size > limits[i]) {
@@ -154,7 +154,7 @@ void lack_of_rest(const RestEquation& equation, const VecX& x, VecX& lack, MatX&
 
 }  // namespace
 
-// Gauss and Newton's method; where limits are linear in the forces, as those of contacts, the lack is convex.
+// Gauss-Newton method. If limits are linear in the forces (contacts), the residual is convex.
 bool hold_at_rest(const RestEquation& equation, VecX& x) {
     VecX lack, there, ahead;
     MatX J, J_there;
@@ -217,7 +217,7 @@ bool solve_rest(const RestEquation& equation, VecX& x) {
     if (!found) found = refine_rest(equation, x = guess);
     if (!found) found = follow_path(equation, x = guess);
     if (!found) return false;
-    const VecX at_limits = Turns(equation).next(x);  // what slips has its limit, to the last bit
+    const VecX at_limits = Turns(equation).next(x);  // slipping forces are exactly at their limits
     if (equation.error(at_limits) <= solved + equation.error(x)) x = at_limits;
     return true;
 }

@@ -1,21 +1,21 @@
-// One solution of the equation of rest, from a first guess: limits and forces in turn, then Newton's method, then a path
-// from limits that stand still to those that follow the load.
+// One solution of the rest equation, from a first guess. The methods are an alternation of limits and forces, then
+// Newton's method, then a path from fixed limits to those of the loads.
 #pragma once
 
 #include "complementarity/load_dependent/equation.hpp"
 
 namespace pn {
 
-// Forces x in place of the guess; false if none was found, which is no proof that there is none.
+// Solve for the forces x from the guess in x. Returns false if no solution was found. One may still exist.
 bool solve_rest(const RestEquation& equation, VecX& x);
-// Newton's method alone, near a solution.
+// Refine x near a solution by Newton's method alone.
 bool refine_rest(const RestEquation& equation, VecX& x);
 
-// Forces x under which everything at rest stays there, from a first guess: where nothing accelerates and no force passes
-// its limit. False where none was found; x is then the nearest to it.
+// Find forces x that keep all elements at rest, from a first guess: zero accelerations, and no force beyond its limit.
+// Returns false if none were found. x is then the nearest point found.
 bool hold_at_rest(const RestEquation& equation, VecX& x);
 
-// Slip accelerations a little beyond the load of a solution x, by the limits that it has.
+// Return slip accelerations slightly beyond the load of a solution x, with the limits at x.
 VecX onset_accelerations(const RestEquation& equation, const VecX& x);
 
 }  // namespace pn

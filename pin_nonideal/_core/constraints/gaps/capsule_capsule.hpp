@@ -17,7 +17,7 @@ struct CapsulesRow {
     static constexpr Shown shown = Shown::contact;
 
     Frame frame1, frame2;
-    double half1, half2, radius;  // radius: the sum of both
+    double half1, half2, radius;  // radius: sum of both radii
 
     static constexpr auto data() {
         return std::tuple(Datum{"frame1", &CapsulesRow::frame1}, Datum{"frame2", &CapsulesRow::frame2},
@@ -32,7 +32,7 @@ struct CapsulesRow {
     PN_INLINE void residual(const Sides& s, Out& out) const {
         out.residual[0] = NearestPoints<Sides>(s, half1, half2).distance - radius;  // Eq. (2)
     }
-    // The force at the first point: the second lies on its line.
+    // The force acts at the first nearest point. The second lies on its line of action.
     template <class Sides, class Out>
     PN_INLINE void place(const Sides& s, Out& out) const {
         const NearestPoints<Sides> p(s, half1, half2);

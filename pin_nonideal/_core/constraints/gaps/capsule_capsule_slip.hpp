@@ -1,4 +1,4 @@
-// Directions of friction: sliding of a sphere or capsule along another one, at the place where they touch.
+// Directions of friction: sliding of a sphere or capsule along another one, at their contact point.
 #pragma once
 
 #include <tuple>

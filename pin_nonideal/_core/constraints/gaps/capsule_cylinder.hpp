@@ -1,4 +1,4 @@
-// The gap between a segment with a radius, a capsule or a rounded edge, and a cylinder or cone.
+// The gap between a capsule or a rounded edge (a segment with a radius) and a cylinder or cone.
 #pragma once
 
 #include <tuple>
@@ -18,7 +18,7 @@ struct LineRow {
 
     Frame frame1, frame2;
     Revolved solid;
-    double half1, radius;  // half the segment; the sum of both radii
+    double half1, radius;  // half length of the segment, and sum of both radii
 
     static constexpr auto data() {
         return std::tuple(Datum{"frame1", &LineRow::frame1}, Datum{"frame2", &LineRow::frame2},

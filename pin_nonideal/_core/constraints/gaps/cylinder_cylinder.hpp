@@ -18,7 +18,7 @@ struct RimsRow {
 
     Frame frame1, frame2;
     Revolved first, second;
-    double radius;  // the sum of both
+    double radius;  // sum of both radii
 
     static constexpr auto data() {
         return std::tuple(Datum{"frame1", &RimsRow::frame1}, Datum{"frame2", &RimsRow::frame2},
@@ -33,7 +33,7 @@ struct RimsRow {
     PN_INLINE void residual(const Sides& s, Out& out) const {
         out.residual[0] = NearestOfRims<Sides>(s, first, second).distance - radius;  // Eq. (2)
     }
-    // The force at the place that slides: the other lies on its line.
+    // The force acts at the nearest point that slides. The other one lies on its line of action.
     template <class Sides, class Out>
     PN_INLINE void place(const Sides& s, Out& out) const {
         const NearestOfRims<Sides> p(s, first, second);

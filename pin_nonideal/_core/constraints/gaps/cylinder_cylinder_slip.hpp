@@ -40,7 +40,7 @@ struct RimsSlipRows : SlipDirections {
     }
 
 private:
-    // The radius around the body on which the place slides.
+    // Return the radius around the body on which the nearest point slides.
     template <class Nearest>
     PN_INLINE double around(const Nearest& p) const { return p.turned ? radius2 : radius1; }
     template <class Sides>

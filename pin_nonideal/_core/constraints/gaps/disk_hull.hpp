@@ -18,7 +18,7 @@ struct RimRow {
 
     Frame frame1, frame2;
     Hull solid;
-    double rim, radius;  // of the disk, and around the hull
+    double rim, radius;  // radius of the disk, and radius around the hull
 
     static constexpr auto data() {
         return std::tuple(Datum{"frame1", &RimRow::frame1}, Datum{"frame2", &RimRow::frame2},
@@ -39,7 +39,7 @@ struct RimRow {
         out.residual[0] = p.distance - radius;
         out.wrench[0] = force_at(p.place, p.n);
     }
-    // Over a face as over a plane; beside an edge as that edge over the disk.
+    // Over a face the rates are those of a disk over a plane. Beside an edge they are those of the edge over the disk.
     template <class Sides, class Out>
     PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
         const NearestOfRim<Sides> p(s, solid, rim);

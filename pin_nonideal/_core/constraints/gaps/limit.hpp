@@ -1,4 +1,4 @@
-// A joint goes no further than its stop: sign (q - bound) stays positive.
+// A joint stays within its stop: sign (q - bound) stays nonnegative.
 #pragma once
 
 #include <tuple>
@@ -17,7 +17,7 @@ struct LimitRow {
     static constexpr Shown shown = Shown::nothing;
 
     int joint;
-    double bound, sign;  // sign: +1 of a lower stop, -1 of an upper one
+    double bound, sign;  // sign: +1 for a lower stop, -1 for an upper one
 
     static constexpr auto data() {
         return std::tuple(Datum{"joint", &LimitRow::joint}, Datum{"bound", &LimitRow::bound},

@@ -1,5 +1,6 @@
-// The lowest point of an ellipsoid over a plane of frame 2. Its semiaxes lie along the axes of frame 1, about its origin;
-// with one of them zero it is a disk, as the face of a wheel or of a can is, and its lowest point one of the rim.
+// The lowest point of an ellipsoid over a plane of frame 2. The semiaxes lie along the axes of frame 1, about its
+// origin. An ellipsoid with one zero semiaxis is a disk, such as the face of a wheel or of a can. Its lowest point lies
+// on the rim.
 #pragma once
 
 #include <cmath>
@@ -8,17 +9,17 @@
 
 namespace pn {
 
-// Sine of the angle between a disk and the plane below which all its rim is lowest, and its middle stands for it.
+// Sine of the angle between a disk and the plane below which the whole rim is lowest. The center then represents the rim.
 constexpr double flat_disk = 1e-14;
 
 template <class Sides>
 struct LowestOnEllipsoid {
     using Vec = typename Sides::Vec;
     using Scalar = typename Sides::Scalar;
-    Vec e[3], n;        // its axes, and the normal of the plane
-    Scalar part[3];     // of the normal along each axis, times the square of the semiaxis
-    Scalar depth;       // of the lowest point under the middle
-    Vec place;          // of it
+    Vec e[3], n;        // axes of the ellipsoid, and normal of the plane
+    Scalar part[3];     // component of the normal along each axis, times the squared semiaxis
+    Scalar depth;       // depth of the lowest point below the center
+    Vec place;          // the lowest point
     bool flat = false;  // no point is lower than the others
 
     PN_INLINE LowestOnEllipsoid(const Sides& s, const Vec3& normal, const Vec3& semiaxes)
@@ -37,7 +38,7 @@ struct LowestOnEllipsoid {
         for (int k = 0; k < 3; ++k) place = place - (part[k] / depth) * e[k];
     }
 
-    // Its velocity: it moves on the body as the plane turns against that.
+    // Return the velocity of the lowest point, which moves on the body as the plane rotates relative to the body.
     PN_INLINE Vec velocity(const Sides& s, const Vec3& semiaxes) const {
         Vec out = s.a.velocity(place);
         if (flat) return out;

@@ -1,4 +1,4 @@
-// The point of a segment of body 1 that is nearest to a cylinder or cone in frame 2, and how it moves.
+// The point of a segment of body 1 that is nearest to a cylinder or cone in frame 2, and its motion.
 #pragma once
 
 #include <algorithm>
@@ -10,13 +10,13 @@
 
 namespace pn {
 
-// Slope of the distance along the segment that rounding leaves where it is least.
+// Slope of the distance along the segment that counts as zero, due to rounding.
 constexpr double level_line = 1e-15;
-// Its curvature, in parts of the inverse of the segment's length, below which all places along it are as near.
+// Curvature of the distance times half the segment, below which all points of the segment are equally near.
 constexpr double straight_line = 1e-12;
-// Slope beyond which the nearest place is a kink of the distance, inside the solid.
+// Slope at the nearest point beyond which this point is a kink of the distance, inside the solid.
 constexpr double kink = 1e-9;
-// A search that only halves ends after so many looks; one of Newton's takes three to eight.
+// Maximum number of evaluations. Bisection alone ends within this number, and Newton's method takes three to eight.
 constexpr int most_line_looks = 100;
 
 template <class Sides>
@@ -24,14 +24,14 @@ struct NearestAlongLine {
     using Vec = typename Sides::Vec;
     using Scalar = typename Sides::Scalar;
     using OnSolid = NearestOnRevolved<Sides>;
-    Vec middle, e;        // of the segment, and along it
-    Scalar part;          // where on it, from its middle
-    OnSolid at;           // the nearest point there
+    Vec middle, e;        // midpoint and direction of the segment
+    Scalar part;          // position of the nearest point along e, from the midpoint
+    OnSolid at;           // nearest point of the solid
     Scalar bend;          // curvature of the distance along the segment
-    bool free = false;    // inside the segment, and nearest by a curvature
+    bool free = false;    // the point is inside the segment, at a smooth minimum
 
-    // The distance of a place from a convex solid is convex along the segment: its slope, the normal along the segment,
-    // only grows. Newton's steps find where it is none, between ends that close in.
+    // The distance of a point to a convex solid is convex along the segment. Its slope, the component of the normal
+    // along the segment, only grows. Newton's method finds the zero of the slope between bounds that close in.
     PN_INLINE NearestAlongLine(const Sides& s, const Revolved& solid, const Vec& x, const Vec& along, double half)
         : middle(x), e(along), part(first(s, solid, half)), at(there(s), solid), bend(0.0) {
         if (half == 0.0) return;
@@ -48,7 +48,7 @@ struct NearestAlongLine {
             (slope > 0.0 ? high_seen : low_seen) = true;
             if (!(high > low)) break;
             const Scalar newton = fast ? Scalar(part - slope / bend) : Scalar(slope > 0.0 ? low : high);
-            // An end may be the nearest place; between two that were seen it lies inside.
+            // An end may be the nearest point. Between two evaluated bounds the nearest point lies inside.
             Scalar next = newton;
             if (!(newton < high)) next = high_seen ? Scalar(0.5 * (low + high)) : high;
             if (!(newton > low)) next = low_seen ? Scalar(0.5 * (low + high)) : low;
@@ -62,7 +62,7 @@ struct NearestAlongLine {
         at = OnSolid(there(s), solid);
         bend = e.dot(at.turning(e));
     }
-    // Along z of frame 1, about its origin.
+    // Segment along z of frame 1, about its origin.
     PN_INLINE NearestAlongLine(const Sides& s, const Revolved& solid, double half)
         : NearestAlongLine(s, solid, s.a.x, s.a.R * Vec3::UnitZ(), half) {}
     PN_INLINE Vec place() const { return middle + part * e; }
@@ -73,7 +73,8 @@ private:
         out.a.x = place();
         return out;
     }
-    // The place that is nearest to the solid's axis; where they are parallel, the middle of what lies beside the solid.
+    // Return the point nearest to the solid's axis. If the segment is parallel to the axis, return the middle of its
+    // part beside the solid.
     PN_INLINE Scalar first(const Sides& s, const Revolved& solid, double half) const {
         const Vec axis = s.b.R * Vec3::UnitZ(), apart = middle - s.b.x;
         const Scalar cosine = e.dot(axis), square = 1.0 - cosine * cosine, up = apart.dot(axis);
@@ -89,22 +90,22 @@ private:
     }
 };
 
-// How it moves: it slides along the segment so that the normal stays at a right angle to that.
+// Motion of the nearest point. It slides along the segment so that the normal stays perpendicular to the segment.
 template <class Sides>
 struct AlongLineMotion {
     using Vec = typename Sides::Vec;
     using Scalar = typename Sides::Scalar;
-    Vec u;       // velocity of body 1 against body 2 at the nearest place of the segment
-    Scalar slides;  // that place along it
+    Vec u;       // velocity of body 1 against body 2 at the nearest point of the segment
+    Scalar slides;  // velocity of the nearest point along the segment
     Vec dn;      // rate of the normal
-    Scalar drift;   // of the distance: its second rate at zero acceleration
+    Scalar drift;   // bias of the distance: its second rate at zero acceleration
 
     PN_INLINE AlongLineMotion(const Sides& s, const NearestAlongLine<Sides>& p)
         : u(), slides(0.0), dn(), drift(0.0) {
         const Vec c = p.place();
         u = s.a.velocity(c) - s.b.velocity(c);
         const Vec turning = p.at.turning(u);
-        // Of the slope of the distance along the segment, at a place that stays on it.
+        // Rate of the slope of the distance along the segment, at a point fixed to the segment.
         const Scalar rate = turning.dot(p.e) + p.at.n.dot((s.a.omega() - s.b.omega()).cross(p.e));
         if (p.free) slides = -rate / p.bend;
         dn = s.b.omega().cross(p.at.n) + turning + slides * p.at.turning(p.e);

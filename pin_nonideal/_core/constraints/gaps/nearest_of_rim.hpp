@@ -1,5 +1,6 @@
-// The point of a disk that is nearest to a convex hull: its lowest one over the face that this stands over, else the one
-// that faces the nearest edge. The disk lies across z of frame 1, about its origin; the hull stands in frame 2.
+// The point of a disk that is nearest to a convex hull. If the disk stands over a face, this is its lowest point.
+// Otherwise it is the point that faces the nearest edge. The disk lies across z of frame 1, about its origin. The hull
+// lies in frame 2.
 #pragma once
 
 #include <optional>
@@ -18,10 +19,10 @@ struct NearestOfRim {
     using Lowest = LowestOnEllipsoid<Sides>;
     using Line = NearestAlongLine<Sides>;
     Vec n;            // from the hull to the disk
-    Vec place;        // on the disk
-    Scalar distance;  // less than zero where the disk has entered a face
-    std::optional<Lowest> lowest;  // over a face
-    std::optional<Line> line;      // else of the nearest edge, to the disk as a cylinder without length
+    Vec place;        // nearest point of the disk
+    Scalar distance;  // negative if the disk penetrates a face
+    std::optional<Lowest> lowest;  // set over a face
+    std::optional<Line> line;      // else set: nearest edge, with the disk as a cylinder of zero length
 
     PN_INLINE NearestOfRim(const Sides& s, const Hull& hull, double rim) : n(), place(), distance(0.0) {
         if (!find_face(s, hull, rim)) find_edge(s, hull, rim);
@@ -53,7 +54,7 @@ private:
             const double half = 0.5 * way.norm();
             const Vec middle = s.b.x + s.b.R * Vec3(hull.points[edge.from] + 0.5 * way);
             const Vec along = s.b.R * Vec3(way / (2.0 * half)), apart = s.a.x - middle;
-            // No nearer than the edge is to the disk's middle, less the rim.
+            // Lower bound: distance of the edge to the disk's center, less the radius.
             const Scalar part = along.dot(apart);
             const Scalar beside = part > half ? Scalar(half) : part < -half ? Scalar(-half) : part;
             if (line && Vec(apart - beside * along).norm() - rim > distance) continue;

@@ -1,9 +1,9 @@
-// The nearest points of two cylinders, cones or disks without radius around them, and how they move. Axes are z of both
+// The nearest points of two cylinders, cones or disks without radius around them, and their motion. Axes are z of both
 // frames, about their origins.
 //
-// They lie on a rim of one of both and somewhere on the other, or else on both sides. Solids are convex: what is nearest to
-// the whole disk of a rim cuts the places that are nearer to half the plane, and planes along the normal between the nearest
-// points show that there are no nearer ones.
+// Either one point lies on a rim of one solid and the other anywhere on the second solid, or the points lie on both
+// sides. The solids are convex. Therefore the slope of the distance at a point of a disk excludes half of the plane of
+// the disk. Planes perpendicular to the normal between the nearest points prove that no points are nearer.
 #pragma once
 
 #include <cmath>
@@ -15,22 +15,23 @@
 
 namespace pn {
 
-// Slope of the distance around a rim that rounding leaves where it is least.
+// Slope of the distance around a rim that counts as zero, due to rounding.
 constexpr double level_rim = 1e-15;
-// Curvature of the distance, over the inverse of the radius, below which all places around a rim are as near.
+// Curvature of the distance times the radius, below which all points of a rim are equally near.
 constexpr double straight_rim = 1e-12;
-// Slope beyond which the nearest place is a kink of the distance, inside the solid.
+// Slope at the nearest point beyond which this point is a kink of the distance, inside the solid.
 constexpr double rim_kink = 1e-9;
-// Part of the size of both within which planes show that no points are nearer.
+// Tolerance of the proof that no points are nearer, relative to the size of both solids.
 constexpr double shown_nearest = 1e-14;
-// A search that only halves ends after so many looks; one of Newton's takes three to eight.
+// Maximum number of evaluations. Bisection alone ends within this number, and Newton's method takes three to eight.
 constexpr int most_rim_looks = 80;
-// Chords of a disk, halved each time, and the angle around what they find in which Newton's steps go on.
+// Bisections over the chords of a disk, and half angle [rad] of the arc in which Newton's method continues from the result.
 constexpr int most_chords = 40;
 constexpr double beside_chords = 1e-3;
 
-// A place on body 1 and the nearest one of a solid on body 2. As body 1 moves the place slides along `along` so that it
-// stays the nearest: around a rim, along a side too, or not at all. bend: of the distance along them.
+// Point of body 1 and the nearest point of a solid on body 2. As body 1 moves, the point slides along the first `free`
+// directions of `along` and stays the nearest. It slides around a rim (1), on a side (2), or not at all (0). `bend`
+// holds the second derivatives of the distance along these directions.
 template <class Sides>
 struct NearestToRevolved {
     using Vec = typename Sides::Vec;
@@ -39,7 +40,7 @@ struct NearestToRevolved {
     NearestOnRevolved<Sides> at;
     int free = 0;
     Vec along[2];
-    Scalar bend[3] = {Scalar(0.0), Scalar(0.0), Scalar(0.0)};  // 00, 01, 11
+    Scalar bend[3] = {Scalar(0.0), Scalar(0.0), Scalar(0.0)};  // entries 00, 01, 11
 
     PN_INLINE NearestToRevolved(const Sides& s, const Vec& x, const Revolved& solid)
         : place(x), at(there(s, x), solid), along() {}
@@ -50,13 +51,13 @@ struct NearestToRevolved {
     }
 };
 
-// The place of a rim of body 1 that is nearest to the solid, as long as none inside the rim is nearer.
+// The point of a rim of body 1 that is nearest to the solid, as long as no point inside the rim is nearer.
 template <class Sides>
 struct NearestAroundRim {
     using Vec = typename Sides::Vec;
     using Scalar = typename Sides::Scalar;
     using OnSolid = NearestOnRevolved<Sides>;
-    struct Way { Scalar x, y; };  // from the middle, in the axes of the rim
+    struct Way { Scalar x, y; };  // vector from the center, in the axes of the rim
     Vec ex, ey, middle;
     double radius;
 
@@ -64,9 +65,9 @@ struct NearestAroundRim {
         : ex(s.a.R * Vec3::UnitX()), ey(s.a.R * Vec3::UnitY()), middle(s.a.x + s.a.R * Vec3(0.0, 0.0, height)),
           radius(rim) {}
 
-    // From a place inside the rim or on it the distance only grows up its slope: the nearest place of the whole disk lies in
-    // the other half of the plane. So an arc of the rim closes in, first half of it, and Newton's steps go on inside it;
-    // where two arcs are left, chords of the disk tell which.
+    // Find the nearest point. The distance only grows up its slope, so the nearest point of the whole disk lies in the
+    // other half of the plane. An arc of the rim, at first half of it, closes in, and Newton steps continue inside the
+    // arc. If two arcs remain, chords of the disk select one.
     PN_INLINE NearestToRevolved<Sides> find(const Sides& s, const Revolved& solid) const {
         NearestToRevolved<Sides> out(s, middle, solid);
         if (radius == 0.0) return out;
@@ -76,7 +77,7 @@ struct NearestAroundRim {
         for (int look = 0; look < most_rim_looks; ++look) {
             const OnSolid at = nearest(s, solid, now);
             const Way slope = slope_of(at);
-            if (!(dot(slope, slope) > level_rim * level_rim)) break;  // the solid lies below the whole of it
+            if (!(dot(slope, slope) > level_rim * level_rim)) break;  // the solid lies below the whole disk
             const Scalar around = cross(now, slope), outward = dot(now, slope), steep = around < 0.0 ? -around : around;
             if (!(steep > level_rim) && !(outward > 0.0)) break;
             if (!cut(arc, now, slope)) {
@@ -105,7 +106,7 @@ private:
         return {a.x / length, a.y / length};
     }
     static PN_INLINE Way turned(const Way& a, const Scalar& by) { return unit({a.x - by * a.y, a.y + by * a.x}); }
-    // Counted around the axis, of no more than half the rim.
+    // Arc of at most half the rim, counted around the axis.
     struct Arc {
         Way low, high;
         PN_INLINE bool holds(const Way& way) const { return cross(low, way) > 0.0 && cross(way, high) > 0.0; }
@@ -114,7 +115,7 @@ private:
             return dot(sum, sum) > level_rim ? unit(sum) : Way{-low.y, low.x};
         }
     };
-    // Along the chord from a place of the arc; false where that would leave a piece at either end.
+    // Cut the arc along the chord through a point of the arc. Returns false if a piece would remain at either end.
     static PN_INLINE bool cut(Arc& arc, const Way& now, const Way& slope) {
         const Way down = unit({-slope.x, -slope.y});
         const Scalar part = 2.0 * dot(now, down);
@@ -127,7 +128,8 @@ private:
         if (arc.holds(across)) (ahead ? arc.high : arc.low) = across;
         return true;
     }
-    // The nearest place of the whole disk, chord after chord along a way: the least distance of these is convex across it.
+    // Return the direction of the nearest point of the whole disk, by bisection over the chords along `way`. The least
+    // distance of a chord is convex across them.
     PN_INLINE Way of_chords(const Sides& s, const Revolved& solid, const Way& way) const {
         const Vec along = out(way), beside = around(way);
         Way found = way;
@@ -137,7 +139,7 @@ private:
             const NearestAlongLine<Sides> line(s, solid, middle + radius * part * beside, along, half);
             const bool inside = half > line.part && -half < line.part;
             const Scalar ahead = line.part / radius, far = inside ? Scalar(0.0) : Scalar(part / ahead);
-            // The ends of chords lie on the rim, and recede along it.
+            // The ends of the chords lie on the rim and recede along it.
             (line.at.n.dot(beside) - far * line.at.n.dot(along) > 0.0 ? high : low) = part;
             found = {ahead * way.x - part * way.y, ahead * way.y + part * way.x};
         }
@@ -154,7 +156,8 @@ private:
         const Vec t = around(way);
         return t.dot(at.turning(t));
     }
-    // Down the slope at the middle; over a face toward the middle of the solid.
+    // Return the first direction: down the slope at the center, or toward the center of the solid if the slope vanishes
+    // over a face.
     PN_INLINE Way start(const Sides& s, const OnSolid& at) const {
         const Way slope = slope_of(at);
         if (dot(slope, slope) > level_rim) return unit({-slope.x, -slope.y});
@@ -176,16 +179,16 @@ private:
     }
 };
 
-// The nearest points of both.
+// The nearest points of two solids.
 template <class Sides>
 struct NearestOfRims {
     using Vec = typename Sides::Vec;
     using Scalar = typename Sides::Scalar;
     using Found = NearestToRevolved<Sides>;
-    bool turned = false;  // the place that slides is on body 2
+    bool turned = false;  // the point that slides is on body 2
     Found found;
     Vec n;            // from body 2 to body 1
-    Scalar distance;  // less than zero where one has entered the side or a face of the other
+    Scalar distance;  // negative if one solid penetrates the side or a face of the other
 
     PN_INLINE NearestOfRims(const Sides& s, const Revolved& first, const Revolved& second)
         : found(s, s.a.x, second), n(), distance(HUGE_VAL) {
@@ -218,14 +221,14 @@ private:
         const Found there = rim.find(s, other);
         if (there.at.distance < distance) take(there, of_second);
     }
-    // Whether planes across the normal through both places leave the solids on either side.
+    // Check if planes perpendicular to the normal through both points separate the solids.
     PN_INLINE bool is_nearest(const Vec& apart, const Vec& e1, const Vec& e2, const Revolved& first,
                               const Revolved& second) const {
         const Scalar between = n.dot(apart) - first.support(Scalar(-n.dot(e1)), Scalar(n.cross(e1).norm())) -
                                second.support(Scalar(n.dot(e2)), Scalar(n.cross(e2).norm()));
         return between > distance - shown_nearest * (first.reach + second.reach);
     }
-    // Lines of both sides that cross: their common normal stands at a known angle to both axes.
+    // Find the nearest points on crossing lines of both sides. Their common normal has a known angle to both axes.
     PN_INLINE bool find_sides(const Sides& s, const Revolved& first, const Revolved& second) {
         using std::sqrt;
         if (first.half == 0.0 || second.half == 0.0) return false;
@@ -238,7 +241,7 @@ private:
         if (!(left > 0.0)) return false;
         const Scalar root = sqrt(left), across = w.dot(apart) < 0.0 ? Scalar(-root) : root;
         const Vec normal = part1 * e1 + part2 * e2 + across * w;
-        // Lines from the middles of both sides.
+        // Lines through the middles of both sides.
         const Vec out1 = (up1 * e1 - normal) / Scalar(first.side_out());
         const Vec out2 = (normal - up2 * e2) / Scalar(second.side_out());
         const Vec line1 = e1 + first.widening() * out1, line2 = e2 + second.widening() * out2;
@@ -264,21 +267,22 @@ private:
     }
 };
 
-// How they move. u, dn and drift as of body 1 against body 2, or the other way round where the second one's place slides.
+// Motion of the nearest points. u, dn and drift are those of body 1 against body 2, or the reverse if the point on body
+// 2 slides.
 template <class Sides>
 struct RimsMotion {
     using Vec = typename Sides::Vec;
     using Scalar = typename Sides::Scalar;
-    Vec u;       // velocity of the place, as it stays on its body
-    Vec slides;  // along its body
+    Vec u;       // relative velocity at the point, fixed to its body
+    Vec slides;  // sliding velocity of the point along its body
     Vec dn;      // rate of the normal
-    Scalar drift;  // of the distance: its second rate at zero acceleration
+    Scalar drift;  // bias of the distance: its second rate at zero acceleration
 
     PN_INLINE RimsMotion(const Sides& s, const NearestToRevolved<Sides>& p) : u(), slides(), dn(), drift(0.0) {
         const Vec& c = p.place;
         u = s.a.velocity(c) - s.b.velocity(c);
         const Vec turning = p.at.turning(u), omega = s.a.omega() - s.b.omega();
-        Scalar rate[2] = {Scalar(0.0), Scalar(0.0)};  // of the slopes along
+        Scalar rate[2] = {Scalar(0.0), Scalar(0.0)};  // rates of the slopes along the free directions
         for (int k = 0; k < p.free; ++k) rate[k] = turning.dot(p.along[k]) + p.at.n.dot(omega.cross(p.along[k]));
         if (p.free == 1) slides = (-rate[0] / p.bend[0]) * p.along[0];
         if (p.free == 2) {

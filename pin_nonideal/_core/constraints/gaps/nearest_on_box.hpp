@@ -10,9 +10,9 @@ struct NearestOnBox {
     using Vec = typename Sides::Vec;
     using Scalar = typename Sides::Scalar;
     Vec e[3];                                // axes of the box
-    bool beyond[3] = {false, false, false};  // along which of them the point lies beyond it
-    Vec n;                                   // from the nearest point on the box; inside, out of its nearest face
-    Scalar distance;                         // less than zero inside
+    bool beyond[3] = {false, false, false};  // axes along which the point lies beyond the box
+    Vec n;                                   // from the nearest point on the box (inside: out of the nearest face)
+    Scalar distance;                         // negative inside
 
     PN_INLINE NearestOnBox(const Sides& s, const Vec3& half)
         : e{s.b.R * Vec3::UnitX(), s.b.R * Vec3::UnitY(), s.b.R * Vec3::UnitZ()}, n(), distance(0.0) {
@@ -45,7 +45,7 @@ struct NearestOnBox {
         }
     }
 
-    // How n turns against the box as the point moves with u against it: not over a face.
+    // Return the rate of n relative to the box, for a point with the relative velocity u. It is zero over a face.
     PN_INLINE Vec turning(const Vec& u) const {
         Vec along = Vec();
         int free = 0;

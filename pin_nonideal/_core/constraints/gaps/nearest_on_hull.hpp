@@ -1,4 +1,4 @@
-// The point of a convex hull that is nearest to the origin of frame 1. The hull stands in the axes of frame 2.
+// The point of a convex hull that is nearest to the origin of frame 1. The hull lies in the axes of frame 2.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace pn {
 template <class Sides>
 struct NearestOnHull;
 
-// A convex solid with flat faces: its corners, the plane of each face, and the edges, where two faces meet.
+// Convex solid with flat faces: its corners, the planes of its faces, and its edges, each between two faces.
 struct Hull {
     static constexpr const char *gap = "hull", *slip = "hull_slip";
     template <class Sides>
@@ -21,17 +21,17 @@ struct Hull {
     };
     struct Face {
         Vec3 normal = Vec3::Zero();  // outward
-        double offset = 0.0;         // of its plane from the origin, along the normal
+        double offset = 0.0;         // distance of its plane from the origin, along the normal
         std::vector<Vec3> sides;     // normals of its edges, in its plane and outward
-        std::vector<double> ends;    // offsets of these
+        std::vector<double> ends;    // offsets of its edges along these normals
     };
     std::vector<Vec3> points;
     std::vector<Face> faces;
     std::vector<Edge> edges;
-    double reach = 0.0;  // of the farthest corner from the origin
+    double reach = 0.0;  // distance of the farthest corner from the origin
 
     Hull() = default;
-    // Planes as four numbers, normal and offset; edges as two corners and the two faces that meet there.
+    // Each plane is four numbers, normal and offset. Each edge is two corners and the two faces that meet there.
     Hull(const std::vector<Vec3>& corners, const std::vector<double>& planes, const std::vector<int>& meetings)
         : points(corners), faces(planes.size() / 4) {
         for (size_t f = 0; f < faces.size(); ++f) {
@@ -46,7 +46,7 @@ struct Hull {
         }
         for (const Vec3& point : points) reach = std::max(reach, point.norm());
     }
-    // Largest component of its points along a direction in its axes.
+    // Return the largest component of the points along a direction in the hull's axes.
     double support(const Vec3& direction) const {
         double most = direction.dot(points[0]);
         for (const Vec3& point : points) most = std::max(most, direction.dot(point));
@@ -61,7 +61,7 @@ struct Hull {
     }
     template <class Vec>
     static PN_INLINE auto product(const Vec3& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-    // Whether a point outside a face lies over it.
+    // Check if a point outside a face lies over the face.
     template <class Vec>
     static PN_INLINE bool stands_over(const Vec& at, const Face& face) {
         for (size_t k = 0; k < face.sides.size(); ++k)
@@ -70,7 +70,7 @@ struct Hull {
     }
 
 private:
-    // The other face slopes away beyond the edge, so its normal leans outward there.
+    // The other face slopes away beyond the edge, so its normal has an outward component there.
     void add_side(const Edge& edge, int face, int other) {
         Vec3 side = faces[face].normal.cross(points[edge.to] - points[edge.from]).normalized();
         if (side.dot(faces[other].normal) < 0.0) side = -side;
@@ -83,10 +83,10 @@ template <class Sides>
 struct NearestOnHull {
     using Vec = typename Sides::Vec;
     using Scalar = typename Sides::Scalar;
-    Vec n;                                   // from the nearest point on the hull; inside, out of its nearest face
-    Vec along;                               // of the edge that it is on
-    bool on_face = false, on_edge = false;  // where that point is, or at a corner
-    Scalar distance;                         // less than zero inside
+    Vec n;                                   // from the nearest point on the hull (inside: out of the nearest face)
+    Vec along;                               // direction of the nearest edge
+    bool on_face = false, on_edge = false;  // location of the nearest point (neither: a corner)
+    Scalar distance;                         // negative inside
 
     PN_INLINE NearestOnHull(const Sides& s, const Hull& hull) : n(), along(), distance(0.0) {
         const Vec e[3] = {s.b.R * Vec3::UnitX(), s.b.R * Vec3::UnitY(), s.b.R * Vec3::UnitZ()};
@@ -97,7 +97,7 @@ struct NearestOnHull {
         along = turned(e, along);
     }
 
-    // How n turns against the hull as the point moves with u against it: not over a face.
+    // Return the rate of n relative to the hull, for a point with the relative velocity u. It is zero over a face.
     PN_INLINE Vec turning(const Vec& u) const {
         if (on_face) return Vec();
         const Vec free = on_edge ? Vec(u - along.dot(u) * along) : u;
@@ -108,7 +108,7 @@ private:
     static PN_INLINE Scalar product(const Vec3& a, const Vec& b) { return Hull::product(a, b); }
     static PN_INLINE Vec turned(const Vec (&e)[3], const Vec& x) { return x[0] * e[0] + x[1] * e[1] + x[2] * e[2]; }
 
-    // The face that the point stands over, or inside the hull the nearest one.
+    // Find the face below the point. Inside the hull, find the nearest face.
     PN_INLINE bool find_face(const Vec& at, const Hull& hull) {
         int least = -1;
         bool outside = false;

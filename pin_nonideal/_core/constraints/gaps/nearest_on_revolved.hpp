@@ -1,5 +1,5 @@
-// The point of a cylinder or cone that is nearest to the origin of frame 1. Its axis is z of frame 2, its middle the origin;
-// the radii of its faces may differ, and one be zero; without length it is a disk.
+// The point of a cylinder or cone that is nearest to the origin of frame 1. Its axis is z of frame 2, and its middle is
+// the origin. The radii of its faces may differ, and one may be zero. A solid without length is a disk.
 #pragma once
 
 #include <algorithm>
@@ -17,23 +17,24 @@ struct Revolved {
     template <class Sides>
     using Nearest = NearestOnRevolved<Sides>;
     double half = 0.0, below = 0.0, above = 0.0;  // half the length, and the radii of both faces
-    double reach = 0.0;                           // of the farther rim from the middle
+    double reach = 0.0;                           // distance of the farther rim from the middle
 
     Revolved() = default;
     Revolved(double length_half, double radius_below, double radius_above)
         : half(length_half), below(radius_below), above(radius_above),
           reach(std::hypot(half, std::max(below, above))) {}
-    // Largest component of its points along a direction in its axes.
+    // Return the largest component of the points along a direction in the solid's axes.
     double support(const Vec3& direction) const {
         return support(direction[2], std::hypot(direction[0], direction[1]));
     }
-    // The same of one with a component along the axis, and the rest across it.
+    // Same for a direction with the given components along the axis and across it.
     template <class Scalar>
     PN_INLINE Scalar support(const Scalar& along, const Scalar& across) const {
         const Scalar high = half * along + above * across, low = below * across - half * along;
         return high > low ? high : low;
     }
-    // Of a side: components of its normal away from the axis and along it, radius in the middle, growth along the axis.
+    // Side of the solid: components of its normal away from the axis and along it, radius in the middle, growth along
+    // the axis.
     double side_out() const { return 2.0 * half / std::hypot(2.0 * half, below - above); }
     double side_up() const { return (below - above) / std::hypot(2.0 * half, below - above); }
     double middle() const { return 0.5 * (below + above); }
@@ -45,10 +46,10 @@ struct NearestOnRevolved {
     using Vec = typename Sides::Vec;
     using Scalar = typename Sides::Scalar;
     Vec axis, out;            // along the axis, and away from it toward the point
-    Vec n;                    // from the nearest point on the solid; inside, out of its nearest face
-    Scalar distance;          // less than zero inside
-    bool on_rim = false;      // that point is on a rim, or at the tip
-    Scalar turns = Scalar(0.0);  // of n about the axis, over the velocity of the point around it
+    Vec n;                    // from the nearest point on the solid (inside: out of the nearest face)
+    Scalar distance;          // negative inside
+    bool on_rim = false;      // the nearest point is on a rim, or at the tip
+    Scalar turns = Scalar(0.0);  // rate of n about the axis, per velocity of the point around the axis
 
     PN_INLINE NearestOnRevolved(const Sides& s, const Revolved& solid)
         : axis(s.b.R * Vec3::UnitZ()), out(s.b.R * Vec3::UnitX()), n(), distance(0.0) {
@@ -80,7 +81,7 @@ struct NearestOnRevolved {
         }
     }
 
-    // How n turns against the solid as the point moves with u against it.
+    // Return the rate of n relative to the solid, for a point with the relative velocity u.
     PN_INLINE Vec turning(const Vec& u) const {
         const Vec around = u - out.dot(u) * out - axis.dot(u) * axis;
         Vec sum = turns * around;

@@ -1,4 +1,4 @@
-// Height of a sphere's (or point's) center over the plane of frame 2 equals its radius.
+// The height of a sphere's (or point's) center over the plane of frame 2 equals its radius.
 #pragma once
 
 #include <tuple>

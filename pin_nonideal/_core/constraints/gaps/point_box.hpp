@@ -1,4 +1,4 @@
-// The gap between a sphere and a box, both with a radius: all within the second of a box along the axes of frame 2.
+// The gap between a sphere and a rounded box: a box along the axes of frame 2 with a radius around it.
 #pragma once
 
 #include <tuple>
@@ -18,7 +18,7 @@ struct BoxRow {
 
     Frame frame1, frame2;
     Vec3 half;
-    double radius;  // the sum of both
+    double radius;  // sum of both radii
 
     static constexpr auto data() {
         return std::tuple(Datum{"frame1", &BoxRow::frame1}, Datum{"frame2", &BoxRow::frame2},

@@ -1,5 +1,5 @@
-// The nearest points of two segments, one on a body each, how they move, and the directions of a contact there. Spheres
-// and capsules are segments with a radius, and a point is one without either.
+// The nearest points of two segments, one on each body, their motion, and the directions of a contact there. Spheres
+// and capsules are segments with a radius. A point is a segment without length and radius.
 #pragma once
 
 #include <cmath>
@@ -8,7 +8,7 @@
 
 namespace pn {
 
-// Sine squared of the angle between two segments below which their nearest points are no longer told apart.
+// Squared sine of the angle between two segments below which they count as parallel.
 constexpr double parallel_segments = 1e-12;
 
 // Segments x + s e, |s| <= half, of frames 1 and 2 along their z axes.
@@ -17,9 +17,9 @@ struct NearestPoints {
     using Vec = typename Sides::Vec;
     using Scalar = typename Sides::Scalar;
     Vec e1, e2, c1, c2;        // axes and nearest points
-    Vec n;                     // from the second to the first
+    Vec n;                     // from the second point to the first
     Scalar distance;
-    bool free1 = false, free2 = false;  // inside its segment, and not at an end
+    bool free1 = false, free2 = false;  // the point lies inside its segment, not at an end
 
     PN_INLINE NearestPoints(const Sides& s, double half1, double half2)
         : e1(s.a.R * Vec3::UnitZ()), e2(s.b.R * Vec3::UnitZ()) {
@@ -48,14 +48,15 @@ private:
     }
 };
 
-// How they move: the sliding along the segments keeps the line between them at right angles to those it is inside of.
+// Motion of the nearest points. They slide so that the line between them stays perpendicular to each segment with a
+// free point.
 template <class Sides>
 struct NearestMotion {
     using Vec = typename Sides::Vec;
     using Scalar = typename Sides::Scalar;
     Vec u;             // velocity of body 1 at c1 against body 2 at c2
-    Vec along1, along2;  // of the nearest points along their segments
-    Vec dn;            // rate of the direction between them
+    Vec along1, along2;  // velocities of the nearest points along their segments
+    Vec dn;            // rate of n
 
     PN_INLINE NearestMotion(const Sides& s, const NearestPoints<Sides>& p)
         : u(s.a.velocity(p.c1) - s.b.velocity(p.c2)), along1(), along2(), dn() {
@@ -63,7 +64,7 @@ struct NearestMotion {
         const Scalar cosine = p.e1.dot(p.e2);
         const Scalar r1 = s.a.omega().cross(p.e1).dot(d) + p.e1.dot(u);
         const Scalar r2 = s.b.omega().cross(p.e2).dot(d) + p.e2.dot(u);
-        // r1 + s1' - s2' cosine = 0 and r2 + s1' cosine - s2' = 0, each where its point is free.
+        // r1 + s1' - s2' cosine = 0 and r2 + s1' cosine - s2' = 0, each if its point is free.
         Scalar rate1 = 0.0, rate2 = 0.0;
         const Scalar square = 1.0 - cosine * cosine;
         if (p.free1 && p.free2 && square > parallel_segments) {
@@ -81,8 +82,8 @@ struct NearestMotion {
     }
 };
 
-// Directions along a contact whose normal n is free to turn: those of body 2, turned with it the shortest way from a
-// direction `pole` of body 2. Only at -pole they jump.
+// Directions along a contact with a normal n that is free to turn. They are directions of body 2, rotated the shortest
+// way from a direction `pole` of body 2 to n. They jump only at n = -pole.
 template <class Sides>
 struct TurningTangents {
     using Vec = typename Sides::Vec;
@@ -105,7 +106,7 @@ struct TurningTangents {
     }
 };
 
-// Rows of sliding along directions that turn, at a place of contact that moves with the rate `moves`.
+// Set the rows of sliding along turning directions, at a contact point that moves with the rate `moves`.
 template <class Sides, class Out>
 PN_INLINE void slide(const Sides& s, Out& out, const TurningTangents<Sides>& along, const typename Sides::Vec& contact,
                      const typename Sides::Vec& moves) {

@@ -10,7 +10,7 @@
 
 namespace pn {
 
-// Solid: a shape in the axes of frame 2 that knows its nearest point, how far it reaches, and its supporting planes.
+// Solid: a shape in the axes of frame 2 that computes its nearest point, its reach and its supporting planes.
 template <class Solid>
 struct SolidRow {
     static constexpr const char* name = Solid::gap;
@@ -21,7 +21,7 @@ struct SolidRow {
 
     Frame frame1, frame2;
     Solid solid;
-    double radius;  // the sum of both
+    double radius;  // sum of both radii
 
     static constexpr auto data() {
         return std::tuple(Datum{"frame1", &SolidRow::frame1}, Datum{"frame2", &SolidRow::frame2},

@@ -1,4 +1,4 @@
-// A gap as the user's functions give it.
+// A gap from the user's functions.
 #pragma once
 
 #include "constraints/rows/user.hpp"
@@ -30,7 +30,7 @@ struct UserGapRow {
         gap(s.t, s.q, out.scratch);
         out.residual[0] = out.scratch[0];  // Eq. (2)
     }
-    // A and b come together.
+    // The user's function computes A and b together.
     template <class State, class Out>
     PN_INLINE void rows(const State& s, Out& out) const {
         function(s.t, s.q, s.v, out.A, out.b);

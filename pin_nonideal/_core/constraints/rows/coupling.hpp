@@ -1,4 +1,4 @@
-// q1 = ratio q2 + offset: gears, belts.
+// Coupling of two joints, such as gears and belts: q1 = ratio q2 + offset.
 #pragma once
 
 #include <tuple>
@@ -16,8 +16,8 @@ struct CouplingRows {
     static constexpr Shown shown = Shown::gear;
 
     int joint1, joint2;
-    double ratio, offset, period;  // period of the residual for joints that turn without end; 0: none
-    bool position;                 // false: no angle tells the residual, and only the rate is bound
+    double ratio, offset, period;  // period of the residual for unbounded joints (0: none)
+    bool position;                 // false: no angle determines the residual, and only the rate is constrained
 
     static constexpr auto data() {
         return std::tuple(Datum{"joint1", &CouplingRows::joint1}, Datum{"joint2", &CouplingRows::joint2},

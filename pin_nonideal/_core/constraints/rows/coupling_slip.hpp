@@ -1,4 +1,4 @@
-// Direction of friction: sliding of the teeth or threads of a coupling, as weights of the velocities of its joints.
+// Direction of friction: sliding of the teeth or threads of a coupling, a weighted sum of the velocities of its joints.
 #pragma once
 
 #include <tuple>

@@ -10,10 +10,10 @@
 
 namespace pn {
 
-// Sine of half an angle below which the angle is taken from its series: the next term, 3/20 n^4 of it, is 2e-17.
+// Sine of half an angle below which a series gives the angle. The next term of its factor, 3/20 n^4, is 2e-17.
 constexpr double small_turn = 1e-4;
 
-// Rotation vector.
+// Return the rotation vector of R.
 template <class Vec, class Mat>
 Vec logarithm(const Mat& R) {
     using std::atan2;

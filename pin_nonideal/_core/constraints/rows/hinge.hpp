@@ -1,4 +1,4 @@
-// Origins of two frames coincide, and the axis of frame 1 with that of frame 2.
+// The origins of two frames coincide, and so do their axes.
 #pragma once
 
 #include <tuple>
@@ -10,7 +10,7 @@
 
 namespace pn {
 
-// Sine of the angle between the axes below which it equals the angle to rounding.
+// Sine of the angle between the axes below which sine and angle are equal to rounding.
 constexpr double small_sine = 1e-9;
 
 struct HingeRows {
@@ -31,8 +31,8 @@ struct HingeRows {
     bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return false; }
 
-    // The axis e of frame 1 stays normal to n1 and n2 of frame 2; the angle between the axes scales the residual, so
-    // that it tells the gap also when they point apart.
+    // The axis e of frame 1 stays normal to n1 and n2 of frame 2. The angle between the axes scales the residual, so
+    // that the residual measures the error of opposed axes too.
     template <class Sides, class Out>
     PN_INLINE void residual(const Sides& s, Out& out) const {
         using Scalar = typename Sides::Scalar;
@@ -61,7 +61,7 @@ struct HingeRows {
     }
 
 private:
-    // e . n for n fixed in body 2.
+    // Set row k to the rate and bias of e . n, for n fixed in body 2.
     template <class Sides, class Out>
     PN_INLINE void axis_row(const Sides& s, Out& out, int k, const typename Sides::Vec& n) const {
         const auto e = s.a.R * axis, w = e.cross(n);

@@ -1,4 +1,4 @@
-// Direction of friction: turning about the common axis of a hinge anchor.
+// Direction of friction: rotation about the common axis of a hinge anchor.
 #pragma once
 
 #include <tuple>

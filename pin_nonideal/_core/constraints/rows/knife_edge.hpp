@@ -1,4 +1,4 @@
-// No velocity of a frame's origin along the frame's axis: a skate.
+// The origin of a frame has no velocity along an axis of the frame: a skate.
 #pragma once
 
 #include <tuple>
@@ -14,7 +14,7 @@ struct KnifeRows {
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr Shown shown = Shown::edge;
 
-    Frame frame1, frame2;  // the latter is the world's
+    Frame frame1, frame2;  // frame2 is the world's
     Vec3 axis;
 
     static constexpr auto data() {

@@ -18,7 +18,7 @@ struct MotionRows {
 
     int joint;
     TimeFunction function;
-    double period;  // of the residual for a joint that turns without end; 0: none
+    double period;  // period of the residual for an unbounded joint (0: none)
 
     static constexpr auto data() {
         return std::tuple(Datum{"joint", &MotionRows::joint}, Datum{"function", &MotionRows::function},

@@ -52,7 +52,7 @@ struct RollingRows {
 
 private:
     template <class Sides>
-    struct Contact {  // the place of contact, and how it moves
+    struct Contact {  // contact point and its rate
         using Vec = typename Sides::Vec;
         Vec point, rate;
         typename Sides::Scalar support = 1.0;  // height of the center over the radius

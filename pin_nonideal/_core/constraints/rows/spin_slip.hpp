@@ -1,5 +1,5 @@
-// Directions of friction: turning of body 1 against body 2 about axes of frame 2, all three of a ball joint or some of a
-// contact.
+// Directions of friction: rotation of body 1 against body 2 about axes of frame 2 (all three for a ball joint, some for
+// a contact).
 #pragma once
 
 #include <tuple>

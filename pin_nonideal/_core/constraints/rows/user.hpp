@@ -1,4 +1,4 @@
-// A a = b as the user's functions give it.
+// Rows A a = b from the user's functions.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@ namespace pn {
 struct UserRows {
     static constexpr const char* name = "user";
     static constexpr Role role = Role::constraint;
-    // A may depend on v, and then the rate is not A v + phi_t.
+    // A may depend on v. The rate is then not A v + phi_t.
     static constexpr bool constant_A = false, affine_rate = false, comparable_rows = false;
     static constexpr Shown shown = Shown::nothing;
 
@@ -37,7 +37,7 @@ struct UserRows {
         residual_function(s.t, s.q, out.scratch);
         for (int k = 0; k < count; ++k) out.residual[k] = out.scratch[k];
     }
-    // A and b come together.
+    // The user's function computes A and b together.
     template <class State, class Out>
     PN_INLINE void rows(const State& s, Out& out) const {
         function(s.t, s.q, s.v, out.A, out.b);

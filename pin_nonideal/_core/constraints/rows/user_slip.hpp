@@ -1,4 +1,4 @@
-// Directions of friction as the user's function gives them.
+// Directions of friction from the user's function.
 #pragma once
 
 #include <functional>
@@ -11,7 +11,7 @@
 
 namespace pn {
 
-// Difference in time by which the directions' own rates are taken: rounding and the second derivative share the error.
+// Time difference [s] for the rates of the directions. It balances rounding against the truncation error.
 constexpr double direction_step = 1e-6;
 
 struct UserSlipRows {
@@ -38,7 +38,7 @@ struct UserSlipRows {
         directions(s.t, s.q, out.scratch);
         for (int k = 0; k < count; ++k) out.A.row(k) = out.scratch.segment(k * s.v.size(), s.v.size()).transpose();
     }
-    // The drift is d(n(t, q))/dt . v, by a difference along the motion.
+    // Compute the bias d(n(t, q))/dt . v by a central difference along the motion.
     template <class State, class Out>
     PN_INLINE void rate_and_drift(const State& s, Out& out) const {
         const double h = direction_step;
