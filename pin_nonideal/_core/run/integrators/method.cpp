@@ -125,7 +125,7 @@ constexpr double rk4_C[] = {
     0.0, 0.5, 0.5, 1.0,
 };
 
-// What does not fit ends the compilation.
+// Stop the compilation if the lengths of a table do not fit.
 constexpr void require(bool fits) {
     if (!fits) throw std::logic_error("lengths of a table");
 }
@@ -181,7 +181,7 @@ constexpr Method scheme(const char* name, Method::Scheme scheme) {
     return m;
 }
 
-// SciPy's, looked at in the middle of a step.
+// Methods of SciPy, sampled in the middle of a step.
 constexpr double outside_C[] = {0.0, 0.5};
 constexpr Method outside(const char* name, bool one_step) {
     Method m = scheme(name, Method::Scheme::outside);

@@ -34,7 +34,7 @@ void StepPolynomials::at(size_t step, double part, double* out) const {
     for (int i = 0; i < size_; ++i) out[i] /= weights;
 }
 
-// The stretch between breaks of the step that begins at t; at the end of the run, that of the last step.
+// Set the stretch between breaks: of the step that begins at t, or of the last step at the end of the run.
 static void enter_stretch(const Program& p, Workspace& w, double t, double end) {
     const auto first = p.breaks.begin(), last = p.breaks.end();
     const auto next = t < end ? std::upper_bound(first, last, t) : std::lower_bound(first, last, t);
