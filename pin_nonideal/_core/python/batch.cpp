@@ -117,8 +117,8 @@ std::vector<Kept> run_all(const Program& p, const Array2& q, const Array2& v, Op
     return kept;
 }
 
-// Return t, q, v, then per run the number of samples, the largest violation and the number of steps, and a list of the
-// stopped runs with their exceptions.
+// Return t, q and v, then per run the number of samples, the largest violation and the number of steps. The last item
+// is a list of the stopped runs with their exceptions.
 nb::tuple rollout_arrays(const Program& p, const Array2& q, const Array2& v, const Options& options, int threads,
                          const std::vector<NumberTuple>& names, const Array2& values) {
     std::vector<Kept> all = run_all(p, q, v, options, threads, names, values);

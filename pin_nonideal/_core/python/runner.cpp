@@ -48,7 +48,7 @@ void Runner::choose_modes(double t, const std::optional<std::vector<Mode>>& mode
     choose_friction(t, modes, nullptr);
 }
 
-// Close the touching contacts that do not separate and carry nonnegative loads. Given modes are those of all elements.
+// Close the touching contacts that do not separate and carry nonnegative loads. Given modes apply to all elements.
 void Runner::choose_contacts(double t, const std::optional<std::vector<Mode>>& modes) {
     set_closed(*p, *w, std::vector<char>(p->gaps.size(), 0));
     ClosingQuestion question;

@@ -60,8 +60,8 @@ struct Runner {
     Numbers row_lengths(const Array& q_in, const Array& v_in, double t, bool own);
     // Return the slip directions of all friction elements as rows, whose rates are slip velocities.
     Numbers slip_rows(const Array& q_in, const Array& v_in, double t);
-    // Return six numbers in world axes for each contact between two frames: a point on the line of the normal force,
-    // and the normal along which the row pushes the body of frame 1.
+    // Return six numbers in world axes for each contact between two frames. They are a point on the line of the normal
+    // force, and the normal along which the row pushes the body of frame 1.
     Numbers pressing_lines(const Array& q_in, const Array& v_in, double t);
     // Return M (dense, by rows) and the bias forces.
     std::pair<Numbers, Numbers> terms(const Array& q_in, const Array& v_in);

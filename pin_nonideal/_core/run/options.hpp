@@ -37,10 +37,11 @@ struct Options {
     enum class Told { go_on, stop, torque };
     std::function<Told(double t, const VecX& q, const VecX& v, VecX& torque)> callback;
     std::function<void(double t)> tick;  // progress and interruption, called every few steps
-    // Called once if the run will be slow because its steps resolve a fast motion. Arguments: time [s], dof whose force
-    // contributes most to the motion, rate of the motion [1/s], and whether the motion decays or oscillates.
+    // Called once if the run will be slow because its steps resolve a fast motion.
+    // Arguments: time [s], dof whose force contributes most to the motion, rate of the motion [1/s], true if the motion
+    // decays (false if it oscillates).
     std::function<void(double t, int dof, double rate, bool decays)> hint;
-    std::function<void(const std::string& state)> save;  // writes a checkpoint; empty: none
+    std::function<void(const std::string& state)> save;  // writes a checkpoint, empty: none
     Clock::duration save_interval{};                     // wall time between two checkpoints
 };
 

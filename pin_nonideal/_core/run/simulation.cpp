@@ -120,8 +120,7 @@ void Simulation::run() {
     if (options.save) save();
 }
 
-// Save or interrupt the run if requested. Return false if the run must stop. Runs are interrupted or saved only here:
-// the state between two steps is all that the next step needs.
+// Runs are interrupted or saved only here, because the state between two steps is all that the next step needs.
 bool Simulation::between_steps() {
     try {
         if (options.tick && ++ticks % steps_a_tick == 0) options.tick(t);

@@ -54,7 +54,7 @@ protected:
     bool leaves_rate(const Proposal& proposal) const;
 
     bool done() const { return t >= t_end || value_events.ends_run(); }
-    // Save or interrupt the run if requested. Return false if the run must stop.
+    // Report progress, save, check the limits of the run and call the callback. Return false if the run must stop.
     bool between_steps();
     void save();
 

@@ -35,8 +35,8 @@ struct Probe {
 
 Probe probe(const TimeFunction& f, double t) { return {t, evaluate(f, t)}; }
 
-// Compute the change of the rate beyond the integral of the accelerations, plus the change of the value beyond the
-// integral of the rates over the interval length. Both integrals use the trapezoidal rule, the second with its
+// Compute the change of the rate beyond the integral of the accelerations. Add the change of the value beyond the
+// integral of the rates, over the length of the interval. Both integrals use the trapezoidal rule, the second with its
 // correction.
 double rate_defect(const Probe& a, const Probe& b) {
     const double h = b.t - a.t;

@@ -42,8 +42,8 @@ constexpr double moved_part = 1e-6;
 // two rates for which their secant is used. `short_of_root`: distance kept from the root of the secant, relative to the
 // distance to it.
 constexpr double release_width = 1e-12, least_fall = 0.7, short_of_root = 1e-2;
-// Extension of a repeated step that does not show the release of its interpolant: first relative to the step, then by a
-// factor.
+// Extension of a repeated step that does not show the release of its interpolant. The first extension is relative to
+// the step, and each further one is longer by a factor.
 constexpr double least_later = 1e-11, further_part = 10.0;
 
 // Number of parts of a step at rest. Sticking elements are checked at the end of each part.
@@ -100,11 +100,11 @@ void EventLocator::correct_end_to(double size) {
     system_.project_and_evaluate(stepper_.t0 + stepper_.h, stepper_.y1, stepper_.end_rate());
 }
 
-// Check if a step misses the rest of slip in several directions, at which it should end. Slip turns as it comes to
-// rest. The component across the final direction vanishes as a power 1 + k of the component along it, with any k > 0.
-// No polynomial resolves this. When the component along the direction has vanished, the remaining slip is an error of
-// the step. The error estimate counts as well, because the stages of the repeated step lie at other times than those of
-// the accepted step.
+// Check if a step misses the rest of slip in several directions, at which it should end.
+// Slip turns as it comes to rest. The component across the final direction vanishes as a power 1 + k of the component
+// along it, for any k > 0. No polynomial resolves this. When the component along the direction has vanished, the
+// remaining slip is an error of the step. The error estimate counts as well, because the repeated step has its stages
+// at other times than the accepted step.
 bool EventLocator::misses_rest(const Watch& watch) const {
     if (watch.kind != Watch::Kind::slip || p.frictions[watch.index].dim == 1) return false;
     if (!stepper_.method.adaptive() || stepper_.method.outside()) return false;
@@ -139,8 +139,9 @@ void EventLocator::correct_instant(const Crossing& crossing, double full) {
     const bool known_rate = of_gap || (watch.kind == Watch::Kind::slip && p.frictions[watch.index].dim == 1);
     const double resolution = time_rounding * std::max(std::abs(stepper_.t0), full);
     double rate = crossing.slope / full;
-    // Bracket of the instant. Without it Newton's method could run to the step's end, past other events. This happens
-    // if the motion differs from the interpolant, or if a gap that others hold on its plane has only a rounding rate.
+    // Bracket of the instant. Without a bracket Newton's method could run to the step's end, past other events. Two
+    // cases cause this: the motion differs from the interpolant, or other contacts hold the gap, so that its rate is
+    // only rounding.
     double size = stepper_.h, here = margin_at_end(watch), low = 0.0, high = full;
     const double still = of_gap ? rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff()) : 0.0;
     for (int it = 0; it < correction_passes; ++it) {

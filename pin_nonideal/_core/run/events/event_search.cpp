@@ -17,11 +17,11 @@ namespace pn {
 namespace {
 
 // --- Candidates for a crossing. Speeds [rad/s or m/s] are relative to 1 + the largest speed of the scene.
-// Rounding tolerances of a friction limit, relative to it: for a constant force, and for the force / limit ratio at the
+// Rounding tolerances relative to a friction limit: for a constant force, and for the force / limit ratio at the
 // stages.
 constexpr double limit_rounding = 1e-12, share_rounding = 1e-9;
-// Safety margins of the force / limit ratio between the stages: factor on the rise of a parabola above three stages,
-// and fraction of the ratio's range.
+// Safety margins of the force / limit ratio between the stages. The first is a factor on the rise of a parabola above
+// three stages, the second a fraction of the ratio's range.
 constexpr double times_parabola = 3.0, range_between = 0.02;
 // Allowed reverse speed of an element that has just begun to slip, relative to the speed of rest.
 constexpr double fresh_slip = 1e-3;

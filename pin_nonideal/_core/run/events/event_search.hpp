@@ -1,6 +1,8 @@
-// Search for the first zero crossing of a margin in a step just taken. Margins are the slip speed of a slipping
-// element, the distance of a sticking element to its limit, the normal force of a contact, and the gap of an open
-// contact.
+// Search for the first zero crossing of a margin in a step just taken. There are four kinds of margins:
+// - slip speed of a slipping element,
+// - distance of a sticking element to its limit,
+// - normal force of a contact,
+// - gap of an open contact.
 //
 // Speeds, forces and limits at the stages show which margins may have crossed. The method's own interpolant locates the
 // crossing. Slip uses interpolated velocities, which need no evaluation. Sticking uses the rate of the integrated force
@@ -43,8 +45,8 @@ public:
     double margin(const Watch& watch, double t, const VecX& y);
 
 private:
-    // Evaluation of a margin inside the step: from the interpolated velocities or force / limit ratios alone, by
-    // kinematics, or by a whole evaluation.
+    // Evaluation of a margin inside the step: interpolated velocities, interpolated force / limit ratios, kinematics,
+    // or a whole evaluation.
     enum class Source { velocities, shares, kinematics, evaluation };
 
     double noise() const;

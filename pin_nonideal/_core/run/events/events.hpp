@@ -14,8 +14,8 @@ namespace pn {
 // empty without an event.
 std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event);
 
-// Return the changes of modes since `before`: contacts that open or close, then elements that stick or slip, and the
-// element `turned`, which has reversed.
+// Return the changes of modes since `before`. Contacts that open or close come first, then elements that stick or slip.
+// The element `turned` has reversed.
 std::vector<Event> changes_since(const System& system, double t, const std::vector<char>& closed,
                                  const std::vector<Mode>& before, int turned = -1);
 
@@ -23,8 +23,8 @@ std::vector<Event> changes_since(const System& system, double t, const std::vect
 bool contacts_strike(System& system, double t, const VecX& y, bool starts);
 // Check if a contact that is still open would strike at (t, y), as at events of another kind.
 bool contacts_land(System& system, double t, const VecX& y);
-// Impact of contacts, which changes the velocity: one event per contact with an impulse, work of the contacts, and work
-// of moving constraints [J].
+// Impact of contacts, which changes the velocity: one event per contact with an impulse, work of the contacts [J], and
+// work of moving constraints [J].
 struct Strike {
     std::vector<Event> events;
     double work = 0.0, work_of_constraints = 0.0;

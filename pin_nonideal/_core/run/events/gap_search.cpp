@@ -40,8 +40,8 @@ void GapSearch::bound_rates() {
     }
 }
 
-// Return bounds of the second derivative of a gap between the step's ends. For a user's gap they are multiples of the
-// second derivatives of its cubic between the ends and of its acceleration at the end.
+// Return bounds of the second derivative of a gap between the step's ends. For a user's gap they are estimates:
+// multiples of the second derivatives of the cubic between the ends, and of the acceleration at the end.
 GapSearch::Bends GapSearch::bends(int gap, const Look& end) const {
     if (Reach::knows(p, gap)) return {reach_.bound(w, gap), reach_.rise(w, gap)};
     const double h = stepper_.h, change = (end.width - start_.width[gap]) / h;

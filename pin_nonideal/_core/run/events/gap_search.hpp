@@ -1,6 +1,6 @@
-// Search for the first closing of an open gap in a step just taken. Widths and rates at two instants and the bound on
-// the second derivative (contact/bounds/curvature.hpp) can prove that the gap stays open in between. Otherwise the
-// stretch is halved, on the method's own interpolant, so no closing is missed.
+// Search for the first closing of an open gap in a step just taken. Widths, rates and a bound on the second derivative
+// (contact/bounds/curvature.hpp) can prove that the gap stays open between two instants. Otherwise the stretch is
+// halved on the method's own interpolant, so no closing is missed.
 #pragma once
 
 #include <algorithm>

@@ -10,8 +10,8 @@ namespace pn {
 
 // Minimum width of a far gap, in travels of one step. Narrower gaps would be rechecked at once.
 constexpr double steps_of_far = 2.0;
-// A far gap is monitored again if it can be closed by `asked_again` times the travel since its last sample plus
-// `steps_ahead` times the travel of the step.
+// Factors on the travel since a far gap's last sample, and on the travel in one step. The gap is monitored again if
+// their sum can close it.
 constexpr double asked_again = 2.0, steps_ahead = 2.0;
 // Rounding of a difference of travels, relative to the travel so far.
 constexpr double way_rounding = 1e-15;

@@ -65,7 +65,7 @@ public:
     // dof since the last sample, or since the state at which these steps began. `leave_far` then makes wide gaps far.
     const std::vector<int>& come(const VecX& way);
     void leave_far();
-    // Begin time stepping: all gaps are near except those that are known to be far and wider than `least`.
+    // Begin time stepping: all gaps become near, except far gaps wider than `least`.
     void begin_time_steps(double least);
 
     GapState& gaps;

@@ -1,5 +1,5 @@
-// Touching contacts in a run: impacts, the end of bouncing that is too low to be integrated, and samples of the open
-// gaps for the next step.
+// Handling of touching contacts in a run: impacts, the end of low bouncing, and samples of the open gaps for the next
+// step.
 #pragma once
 
 #include "run/output/output.hpp"

@@ -49,7 +49,7 @@ void ModeChanges::change(FoundEvent event) {
     bridge(event.of_gap() ? 0 : event.index);
 }
 
-// End the bouncing. A low flight may have no known motion, which time stepping bridges if possible.
+// End the bouncing. If the motion of a low flight is not found, bridge it by time stepping if possible.
 void ModeChanges::end_bouncing() {
     try {
         landing_.end_bouncing(torques_.next_stop(options_.end()));

@@ -28,8 +28,8 @@ struct Bouncing {
     System& system;
     double lowest;
 
-    // Times until the first low gap lands, until the first other gap lands, and until a slip comes to rest (infinite if
-    // none). `leaves`: time until the last leaving gap is no longer low.
+    // Times until the first low gap lands, until the first other gap lands, and until a slip rests (infinite if none).
+    // `leaves`: time until the last leaving gap is no longer low.
     struct Next {
         double low = never, high = never, rest = never, leaves = 0.0;
         int element = -1;  // element that comes to rest

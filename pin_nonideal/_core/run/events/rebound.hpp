@@ -1,6 +1,6 @@
 // End of bouncing. Flights too low to be separated from rounding are not searched for touches. Gaps follow parabolas
-// under the current acceleration and strike again, until none approaches or leaves, or until a higher gap lands. The
-// number of flights is finite: the last ones vanish in rounding, and the instants add up to the limit of the
+// under the current acceleration and strike again. This ends if no gap approaches or leaves, or if a higher gap lands.
+// The number of flights is finite: the last ones vanish in rounding. The instants add up to the limit of the
 // accumulation. Flights that do not die out (restitution 1) end as well, because their energy is only rounding.
 #pragma once
 
@@ -14,8 +14,8 @@ struct Rest {
     double work = 0.0;  // work of all impacts, plus other energy changes of the flights [J]
 };
 
-// Bounce from the state (t, y) just after an impact, with known modes, at most to `stop`. Return nothing if no flight
-// is low. The state, its rate and the workspace become those of the end.
+// Bounce from the state (t, y) just after an impact, with given modes, at most to `stop`. Return nothing if no flight
+// is low. The state, its rate and the workspace are set to the end of the bouncing.
 std::optional<Rest> bounce_to_rest(System& system, double t, double stop, VecX& y, VecX& dy);
 
 }  // namespace pn

@@ -1,8 +1,8 @@
 // Events at sign changes of values: user functions, and the effort left in drives.
 //
-// A step is sampled on the method's own interpolant, at its end and at places inside, to detect values that cross zero
-// and return. It is repeated up to the first crossing, and its end is corrected until the value there is zero. An event
-// is therefore as accurate as a step.
+// A step is sampled on the method's own interpolant, at its end and at places inside. The inner samples detect values
+// that cross zero and return. The step is repeated up to the first crossing, and its end is corrected until the value
+// there is zero. An event is therefore as accurate as a step.
 #pragma once
 
 #include <vector>
@@ -25,7 +25,7 @@ public:
     bool locate(bool ends_at_event);
     // Count the events at the end of a step of time stepping, whose end stays.
     void look_at_end(double t, const VecX& y);
-    // Values with an event at the end of the step, and the recorded events.
+    // Values with an event at the end of the step. `tell` appends their events.
     const std::vector<int>& found() const { return found_; }
     void tell(double t, std::vector<Event>& events) const;
     // Check if an event has ended the run.
@@ -49,7 +49,7 @@ private:
     const std::vector<UserEvent>& asked_;
     System& system_;
     Stepper& stepper_;
-    std::vector<int> drives_;     // dofs with bounded effort, whose values follow those of the user
+    std::vector<int> drives_;     // dofs with bounded effort, their values follow the user's values
     std::vector<double>& side_;   // current sign of each value, 0 if zero since the start
     std::vector<long> count_;
     // Demanded effort of all drives, cached for the last state.

@@ -13,12 +13,12 @@ class Notices {
 public:
     Notices(System& system, Stepper& stepper, Progress& progress, Recording& out);
 
-    // Record contacts and wheels in tension, once at each begin.
+    // Record contacts and wheels in tension, once each time the tension begins.
     void pulls(const std::optional<FoundEvent>& event) {
         if (!p.contacts.empty()) tell_pulls(event);
     }
-    // Record an instant from which the laws allow several motions, or no motion at the end of a time step, once at each
-    // begin. Return the recorded instant, which can lie inside the step.
+    // Record the instant from which the laws allow several motions, once each time. At the end of a time step this
+    // includes laws that allow no motion. Return the recorded instant, which can lie inside the step.
     std::optional<double> several(bool after_step) {
         const bool before = progress_.several;
         progress_.several = w.state.unique == Uniqueness::several || w.now.several || w.now.no_motion;

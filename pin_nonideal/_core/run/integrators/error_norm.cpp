@@ -24,8 +24,8 @@ constexpr double residual_spacings = 8.0;
 // Rounding of the time in a step's stages, in floating-point spacings. It moves prescribed motions.
 constexpr double time_spacings = 4.0;
 
-// First step [Hairer, Norsett, Wanner, sec. II.4]: move of Euler's rule relative to the size of the state, and the
-// method's error, estimated from the derivatives, relative to the tolerance.
+// First step [Hairer, Norsett, Wanner, sec. II.4]. The move of Euler's rule is bounded relative to the size of the
+// state. The error of the method, estimated from the derivatives, is bounded relative to the tolerance.
 constexpr double first_part = 0.01;
 // Negligible norm of a state or rate, and the trial step [s] for it. Negligible second derivative, and the step for it
 // relative to the trial. Maximum growth over the trial.

@@ -19,19 +19,19 @@ public:
     void raise(VecX& rounding, const VecX& dy, const VecX& y);
     // Return the root mean square of dy at y, each coordinate relative to its tolerance.
     double operator()(const VecX& dy, const VecX& y);
-    // Return the same norm for the move of a step's end by a projection: of positions, and of velocities if stages are
-    // not projected. No component is removed.
+    // Return the same norm for the move of a step's end by a projection. It includes velocities only if stages are not
+    // projected. No component is removed.
     double of_projection(const VecX& dy, const VecX& y0, const VecX& y1, double t, double h);
     // Return a speed relative to the tolerance of the largest velocity, which set_tolerances has set.
     double of_speed(double speed) const;
-    // Return the first step of a method of this order from y, where the rate is dy, at most `limit`. Leaves the
+    // Return the first step of a method of this order from the state y with rate dy, at most `limit`. Leaves the
     // workspace at another state.
     double initial_step(int order, double t, const VecX& y, const VecX& dy, double limit);
 
 private:
     // Convert dy at y to tangent coordinates.
     void to_tangent(const VecX& dy, const VecX& y);
-    // Raise the magnitudes to those of tangent coordinates, velocities and law states at y.
+    // Raise the magnitudes to the sizes of tangent coordinates, velocities and law states at y.
     void magnitude(const VecX& y);
 
     System& system_;

@@ -10,8 +10,8 @@ namespace {
 // Speed [rad/s or m/s] from which every decade is recorded. Smaller speeds are ordinary.
 constexpr double least_speed = 1.0, decade = 10.0;
 // Decades in each half of a growth. Exponential growth takes equal time for both halves. Under a constant force, or in
-// a motion polynomial in time, the second half takes much longer. Near a singular position, or under a force that grows
-// with a power of the speed, it takes much less, and the steps end by themselves.
+// a motion polynomial in time, the second half takes much longer. It takes much less near a singular position, or under
+// a force that grows with a power of the speed. Such runs end by themselves as their steps shrink.
 constexpr size_t half = 3;
 constexpr double as_fast = 0.8, much_faster = 100.0;
 // A chaotic motion with a source of energy grows by a power of time. Its last decade takes at least `many_steps` steps.

@@ -1,8 +1,9 @@
 // Coefficients of the methods.
 //
-// dop853: the method of order 8 of Dormand and Prince with embedded orders 5 and 3 and the dense output of order 7, in
-// Hairer, Norsett, Wanner, "Solving Ordinary Differential Equations I", 2nd ed. dopri5: Dormand and Prince (1980) with
-// Shampine's dense output of order 4. Rows of A are stored below the diagonal, one after the other.
+// dop853: method of order 8 of Dormand and Prince, with embedded orders 5 and 3 and dense output of order 7. [Hairer,
+// Norsett, Wanner, "Solving Ordinary Differential Equations I", 2nd ed.]
+// dopri5: Dormand and Prince (1980), with Shampine's dense output of order 4.
+// Rows of A are stored below the diagonal, one after the other.
 #include "run/integrators/method.hpp"
 
 #include <cstddef>

@@ -18,8 +18,8 @@ struct Method {
     int order = 1, stages = 1;
     const double *A = nullptr, *B = nullptr, *C = nullptr;  // rows of A below the diagonal, one after the other
 
-    // Weights of the error estimate over the stages, and over the rate at the step's end if that is also a stage (first
-    // same as last). A second, coarser estimate guards against zeros of the first.
+    // Weights of the error estimate over the stages. They include the rate at the step's end if it is the first stage
+    // of the next step (first same as last). A second, coarser estimate guards against zeros of the first.
     const double *E = nullptr, *E_coarse = nullptr;
     bool first_same_as_last = false;
     double stability = 0.0;  // stability limit of a step, in units of the time in which a motion decays

@@ -115,8 +115,8 @@ void Collocation::evaluate_stages(bool first) {
     }
 }
 
-// Compute the derivatives of the acceleration by each direction, including the loads that follow it. They are taken at
-// the step's end, where the workspace is after the last stage.
+// Compute the derivatives of the acceleration by each direction, including the loads that follow it. The workspace is
+// at the step's end, after the last stage.
 void Collocation::find_response() {
     Workspace& w = system_.w;
     const double end = step_.t0 + step_.h;

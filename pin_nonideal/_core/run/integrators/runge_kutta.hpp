@@ -1,6 +1,6 @@
-// Explicit Runge-Kutta methods: one stepping routine on flat arrays for all tables. A system has
-//     derivative(t, y, dy)   and   normalize(y), which restores lengths that must be one,
-// and the norm of an error is 1 at the tolerance.
+// Explicit Runge-Kutta methods: one stepping routine on flat arrays for all tables. A system provides
+//     derivative(t, y, dy)   and   normalize(y),
+// and `normalize` restores unit lengths. The norm of an error is 1 at the tolerance.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Semi-implicit Euler of order 1: v1 = v0 + h a(q0, v0), and q1 is q0 moved by h v1 with a correction toward the
+// Semi-implicit Euler of order 1: v1 = v0 + h a(q0, v0). q1 is q0 moved by h v1, with a correction toward the
 // constraints. Law states and work follow Euler's rule.
 #pragma once
 

@@ -8,9 +8,9 @@ namespace pn {
 
 namespace {
 
-// The next step aims at error = safety^order. The change of the error from step to step then seldom rejects a step. On
-// smooth motions it takes a sixth fewer evaluations for the same error than 0.9, with which a third of the steps fails.
-// A retried step has a known error, and aims closer.
+// The next step aims at error = safety^order. The change of the error from step to step then seldom rejects a step.
+// With 0.9 a third of the steps fails, and smooth motions need a sixth more evaluations for the same error. The error
+// of a retried step is given, so it aims closer.
 constexpr double safety = 0.65, retry_safety = 0.9, shrink_limit = 0.2, growth_limit = 10.0;
 
 // Return the rounding of an acceleration at the sine s to a singular position, with pivot = s^2. Unit roundoff grows by

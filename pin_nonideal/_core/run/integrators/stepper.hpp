@@ -16,10 +16,10 @@ public:
 
     const Method& method;
 
-    // Compute y1 by one step of size h from (t0, y0), where the rate must be known. If collocation fails, y1 = y0.
+    // Compute y1 by one step of size h from (t0, y0). The rate at the start must be set. If collocation fails, y1 = y0.
     void take(double t, double size);
-    // Move the end by a time so short that the rate there stays constant. The rate must be known. The interpolant is
-    // discarded.
+    // Move the end by a time so short that the rate there stays constant. The rate at the end must be set. The
+    // interpolant is discarded.
     void move_end(double dt);
     // Repeat the step with another length. Throw a Failure if it is not solved.
     void take_again(double size);
@@ -50,7 +50,7 @@ public:
     void end_directions() const { if (collocates_) collocation_.take_directions_at(1.0); }
     void forget() { collocation_.forget(); }
 
-    // Known rates of the step just taken, in order of time: at its start, at stages before its end, and at its end.
+    // Rates of the step just taken, in order of time: at its start, at stages before its end, and at its end.
     struct Look {
         double part;
         const VecX* rate;

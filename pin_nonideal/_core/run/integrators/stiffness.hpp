@@ -1,5 +1,5 @@
-// Guard against stiff runs: stability of the explicit method limits the steps of a smooth motion, and more steps are
-// left than the run may take.
+// Guard against stiff runs. In a stiff run stability of the explicit method limits the steps, although the motion is
+// smooth. More steps are then left than the run may take.
 #pragma once
 
 #include "run/output/checkpoint.hpp"
@@ -17,7 +17,7 @@ public:
     // and after. Throw a Failure with the stiff dof and its rate [1/s]. Call the hint of the options if a fast motion
     // makes the run slow, but not endless.
     void look();
-    // Start the step count at the begin of a run.
+    // Restart the step count for a new run.
     void forget();
     // Throw the same Failure at once if the fastest decaying mode is too fast for time steps of this size.
     void require_time_steps(double size);

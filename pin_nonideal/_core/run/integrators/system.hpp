@@ -1,10 +1,11 @@
-// Right-hand side of y' = f(t, y) on the flat state y = (q, v, z, work, watch), with the law states z and the integrals
-// of the ledger's powers, work.
-// watch has two entries per friction element, whose rates the stages store.
-// - Sticking element: the rate is force / limit. It makes step control resolve a load that changes while nothing moves,
-// and shows if a limit was passed at a stage.
-// - Slipping element: the rates are its slip speed and the rate of its slip speed. They show if it came to rest inside
-// the step.
+// Right-hand side of y' = f(t, y) on the flat state y = (q, v, z, work, watch). z are the law states, and work the
+// integrals of the ledger's powers.
+//
+// watch has two entries per friction element, whose rates the stages store:
+// - Sticking element: the rate is force / limit. Step control then resolves a load that changes while nothing moves.
+// The stages show if a limit was passed.
+// - Slipping element: the rates are the slip speed and the derivative of the slip speed. They show if slip came to rest
+// inside the step.
 // One entry per gap follows. Its rate is the normal force while the gap is closed. If redundant contacts share the
 // force, it is +1 while nonnegative loads exist, else -1.
 //

@@ -1,5 +1,5 @@
-// Dense output: interpolant of every step by its values at Chebyshev points, which define one polynomial, and other
-// data that a sample inside the step needs.
+// Dense output: interpolant of every step, and other data that a sample inside the step needs. The interpolant is
+// stored by its values at Chebyshev points, which define one polynomial.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ struct DenseOutput {
     std::vector<double> states;  // y without watch at each point, step by step
     std::vector<std::int8_t> modes;  // modes of the elements over each step
     // Slip directions of all elements at each point, if an element has several directions. A step that did not solve
-    // for them stores those of its end.
+    // for them stores the directions at its end.
     std::vector<double> directions;
     std::vector<std::int8_t> sought;  // whether the step solved for the directions
     std::vector<double> torque;  // torque held over each step, NaN if none, empty if the run holds none

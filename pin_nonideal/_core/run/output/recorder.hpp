@@ -54,8 +54,8 @@ constexpr EventKind event_kinds[] = {
 struct Recording {
     std::vector<double> t, q, v, violation, violation_rate;
     std::vector<double> a, tau, F_ideal, F_nonideal, lam, lam_ideal, energy, power, z;
-    // Force of each law on the dofs that it acts on, friction limit of each element, and reactions: of each joint, then
-    // of each block of `reaction_blocks`, [force; moment] in its own axes and in world axes.
+    // Force of each law on its dofs, and friction limit of each element. Reactions of each joint, then of each block of
+    // `reaction_blocks`: force and moment in its own axes, then in world axes.
     std::vector<double> law_forces, limits, reactions;
     std::vector<double> contact_forces;  // force on the body of each contact's frame, in world axes [N]
     std::vector<std::int8_t> modes, closed;

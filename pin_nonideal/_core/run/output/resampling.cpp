@@ -48,7 +48,7 @@ static void hold(const Program& p, Workspace& w, const InsideStates& inside, siz
     if (w.now.has_override) w.now.override_torque = inside.torque[k];
 }
 
-// Sets the directions of slip of a state: from the step's polynomial if the step solved for them, else from the slip.
+// Set the slip directions of a state: from the step's polynomial if the step solved for them, else from the slip.
 static void take_directions(const Program& p, Workspace& w, const System& system, const InsideStates& inside, size_t k) {
     RunState& state = w.state;
     state.seeks_directions = false;

@@ -17,7 +17,7 @@ constexpr double least_part = 1e-9;
 constexpr double least_cut = 1e-3;
 
 // Check if another step from the same state may have another result. Reasons are time, user functions, or steps of
-// another method between those of time stepping.
+// another method in between.
 bool may_differ(const Program& p, const Options& options) {
     return options.method.scheme != Method::Scheme::moreau || p.asks_functions || p.moves_in_time || options.callback ||
            std::holds_alternative<SampledTorque>(p.actuation) || std::holds_alternative<TorqueTable>(p.actuation);
@@ -50,8 +50,8 @@ bool TimeStepping::rests() const {
     return lasts_ && (system_.velocity(now_.y).array() == 0.0).all() && is_immobile(p, w);
 }
 
-// Check if accelerations and forces are needed at the step's end: by a sample, after the run, or by slip whose
-// direction or limit depends on them.
+// Check if accelerations and forces are needed at the step's end: by a sample, by the end of the run, or by slip. Slip
+// needs them if its direction or limit depends on them.
 bool TimeStepping::asks_for_motion(double end, double t_end) const {
     if (asked_always_ || end >= t_end || end >= options_.end() || output_.next() <= end + same_time(end)) return true;
     return std::any_of(w.now.slipping.begin(), w.now.slipping.end(), [&](int e) {

@@ -17,7 +17,7 @@ public:
 
     // Take one step of this size, not beyond `stop` or the end of the run.
     void step(double size, double stop, double t_end);
-    // Reset the state for torques that may have changed since the last step.
+    // Mark the state as changing, because torques may have changed since the last step.
     void forget() { stands_ = false; }
 
 private:

@@ -1,8 +1,8 @@
-// Time stepping at velocity level (Moreau's midpoint rule), with the slip velocities u at the step's end and the
-// percussions P:
-//     M (v1 - v0) = h (F + C) + A^T P + N^T P_f, A v1 + phi_t = 0,
-// and P_f opposes u within h times its limit. The scheme has order 1 and no creep: sticking elements have zero
-// velocity. All elements are solved together in every step.
+// Time stepping at velocity level (Moreau's midpoint rule). With the slip velocities u at the step's end and the
+// percussions P,
+//     M (v1 - v0) = h (F + C) + A^T P + N^T P_f,   A v1 + phi_t = 0.
+// P_f opposes u within h times its limit. The scheme has order 1 and no creep: sticking elements have zero velocity.
+// All elements are solved together in every step.
 #pragma once
 
 #include <vector>
@@ -22,8 +22,8 @@ class Moreau {
 public:
     explicit Moreau(System& system);
 
-    // Take one step of size h from y at t. The energy that the scheme itself adds goes into moved_energy. The modes
-    // become those of the step's end. The caller must project and evaluate the end.
+    // Take one step of size h from y at t. The energy added by the scheme itself is added to moved_energy. The modes
+    // are set for the step's end. The caller must project and evaluate the end.
     void step(double t, double h, VecX& y, double& moved_energy);
 
 private:

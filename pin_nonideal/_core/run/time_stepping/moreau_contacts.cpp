@@ -29,8 +29,8 @@ constexpr double contracting = 0.5;
 constexpr double limit_rounding = 1e-9;   // distance of a force at its limit, relative to the limit
 constexpr double width_rounding = 1e-12;   // uncertainty of a gap at rest, relative to the scene's size
 constexpr double least_response = 1e-13;  // minimum response of a row under the constraints, relative to its free response
-// Accepted residual relative to the velocities, if corners of a turning body share its load and its step has no exact
-// solution. Also the accepted error of a limit, relative to the forces. The statistics report both.
+// Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners share
+// its load. Also the accepted error of a limit, relative to the forces. The statistics report both.
 constexpr double most_miss = 1e-7;
 
 }  // namespace
@@ -144,8 +144,8 @@ const VecX& MoreauContacts::way_since_last() {
     return force_;
 }
 
-// Find the contacts whose gap is closed at the step's middle, and those that were closed. Their loads decide if they
-// stay closed.
+// Find the contacts whose gap is closed at the step's middle, and contacts that were closed before. Their loads decide
+// if they stay closed.
 void MoreauContacts::find_touching(double t) {
     touching_.clear();
     for (int i : watch_.come(way_since_last())) {
@@ -181,7 +181,7 @@ void MoreauContacts::add_part(Part part, int block, int kept, ConeElement elemen
     cones_.push_back(element);
 }
 
-// Add the rows of contacts with their sliding, then those of the other dry friction.
+// Add the rows of contacts with their sliding, then the rows of other dry friction.
 void MoreauContacts::add_rows() {
     rows_.clear();
     parts_.clear();

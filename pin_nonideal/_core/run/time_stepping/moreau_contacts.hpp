@@ -21,9 +21,9 @@ public:
     // If they already penetrate, the middle of the step may reach half of the remaining rounding. Deeper edges and rims
     // have no defined normal, and may pass through each other.
     double allowed(double t, double h, const VecX& y);
-    // Take one step of size h from y at t. The work of contacts along their normals goes into impact_energy, the energy
-    // that the scheme itself adds into moved_energy. The modes become those of the step's end. The caller must project
-    // and evaluate the end.
+    // Take one step of size h from y at t. The work of contacts along their normals is added to impact_energy. The
+    // energy added by the scheme itself is added to moved_energy. The modes are set for the step's end. The caller must
+    // project and evaluate the end.
     void step(double t, double h, VecX& y, double& moved_energy, double& impact_energy);
 
 private:
