@@ -22,9 +22,9 @@ struct System {
     Workspace& w;
     const bool energy;  // integrate the powers of the ledger
     // Project the stages first. Near a singular position the motion off the constraints differs wildly from the motion
-    // on them. The projected equation y' = f(P(y)) has the same solutions.
+    // on them. The projected equation y' = f(P(y)) has the same solutions without this difference.
     bool on_constraints = false;
-    bool seeks_directions = true;  // steps can solve for slip directions
+    bool seeks_directions = true;  // steps can solve for slip directions that slow slip does not define
     double smallest_pivot = 1.0;  // smallest pivot of the rows' factor since the last reset
     double moved_energy = 0.0;    // energy change by the last projection of a step's end [J], if the ledger is kept
     const int nq, nv, nz, nw, ne, ng, ns, ny;  // sizes of q, v, z, work, elements, gaps, y without watch, y
