@@ -1,5 +1,4 @@
-// Arrays in and out, and the other plain data of Python's calls. Everything a user can pass wrong has been checked in
-// Python before it comes here.
+// Arrays and other plain data of calls from Python. Python checks user input before it reaches the core.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +9,7 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
-#include <nanobind/stl/string.h>  // in every source alike: what a source does not know it would take for a class
+#include <nanobind/stl/string.h>  // in every source: without it a source treats strings as a class
 
 #include "constraints/geometry.hpp"
 
@@ -27,25 +26,24 @@ inline Eigen::Map<const RowMajor> map(const Array2& a) {
     return {a.data(), static_cast<Eigen::Index>(a.shape(0)), static_cast<Eigen::Index>(a.shape(1))};
 }
 
-// Arrays that Python gets.
+// Arrays returned to Python.
 using Numbers = nb::ndarray<nb::numpy, double, nb::ndim<1>>;
 using Table = nb::ndarray<nb::numpy, double, nb::ndim<2>>;
 
-inline Numbers to_numpy(std::vector<double>&& x) {  // its numbers stay where they are
+inline Numbers to_numpy(std::vector<double>&& x) {  // moves the buffer without a copy
     auto* kept = new std::vector<double>(std::move(x));
-    kept->reserve(1);  // an array has an address, one without numbers too
+    kept->reserve(1);  // an empty array needs an address too
     nb::capsule owner(kept, [](void* v) noexcept { delete static_cast<std::vector<double>*>(v); });
     return Numbers(kept->data(), {kept->size()}, owner);
 }
 inline Numbers to_numpy(const double* data, size_t n) { return to_numpy(std::vector<double>(data, data + n)); }
 inline Numbers to_numpy(const VecX& x) { return to_numpy(x.data(), x.size()); }
 
-// The array that a function of the user is called with: the next call brings its numbers in the same one, unless it was
-// kept.
+// Array argument of a user function. The next call reuses the array, unless the function has kept it.
 class HandedArray {
 public:
     HandedArray() = default;
-    HandedArray(const HandedArray&) {}  // a copy of the function has its own
+    HandedArray(const HandedArray&) {}  // a copy of the function has its own array
     HandedArray& operator=(const HandedArray&) = delete;
 
     const nb::object& operator()(const double* x, size_t n) {
@@ -67,7 +65,7 @@ private:
     size_t size_ = 0;
 };
 
-// Arrays of n numbers that Python gets again and again: NumPy copies one that is kept faster than it takes over another.
+// Arrays of n numbers that are returned repeatedly. A copy of a kept array in NumPy is faster than a new owned buffer.
 class NumpyCopies {
 public:
     explicit NumpyCopies(size_t n) : numbers_(to_numpy(std::vector<double>(n))), copy_(nb::cast(numbers_).attr("copy")) {}
@@ -86,7 +84,7 @@ inline void read_into(const nb::object& from, VecX& to) {
     to = map(a);
 }
 
-using FrameTuple = std::tuple<int, std::vector<double>, std::vector<double>>;  // joint, R by rows, p
+using FrameTuple = std::tuple<int, std::vector<double>, std::vector<double>>;  // joint, R (by rows), p
 
 inline Vec3 vec3(const std::vector<double>& x) { return Vec3(x[0], x[1], x[2]); }
 
@@ -95,7 +93,7 @@ inline Frame frame_of(const FrameTuple& f) {
             vec3(std::get<2>(f))};
 }
 
-// A function of Python, or None.
+// Python function, or None.
 template <class Signature>
 using Function = std::optional<nb::typed<nb::callable, Signature>>;
 

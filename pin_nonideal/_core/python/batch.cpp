@@ -20,8 +20,8 @@ namespace pn {
 
 namespace {
 
-// What is kept of some runs in a row: times, configurations and velocities of their samples, one after the other, and by
-// run how many these are, the largest violation and the number of steps.
+// Results of consecutive runs: times, configurations and velocities of their samples, concatenated. Per run also the
+// number of samples, the largest violation and the number of steps.
 struct Kept {
     std::vector<double> t, q, v, samples, violation, steps;
     struct Stop {
@@ -44,8 +44,8 @@ struct Kept {
     }
 };
 
-// Numbers of all samples, n each, by run and sample. They are written by threads: the pages of a large array take longer
-// to come than what stands on them.
+// Array of all samples, n numbers each, by run and sample. Threads write it, because the page faults of a large array
+// take longer than the copy.
 struct Laid {
     std::vector<double> Kept::* field;
     size_t n, most;
@@ -57,7 +57,7 @@ struct Laid {
         const nb::capsule owner(to, [](void* data) noexcept { delete[] static_cast<double*>(data); });
         numbers = Numbers(to, {runs * most * n}, owner);
     }
-    // Of some runs, from number `first` on; not a number beyond the last sample of a run.
+    // Write runs from number `first` on, with NaN after the last sample of a run.
     void lay(const Kept& some, size_t first) const {
         const double* from = (some.*field).data();
         double* at = to + first * most * n;
@@ -70,7 +70,7 @@ struct Laid {
     }
 };
 
-// A number of each run.
+// Return one number per run.
 Numbers joined(const std::vector<Kept>& all, std::vector<double> Kept::* field) {
     std::vector<double> out;
     for (const Kept& some : all) out.insert(out.end(), (some.*field).begin(), (some.*field).end());
@@ -88,7 +88,8 @@ nb::object what_stopped(const Kept::Stop& run) {
     }
 }
 
-// Threads draw some runs at a time, so many times each: neighbors in memory belong to one of them, and they end together.
+// Number of blocks of consecutive runs per thread. Neighbors in memory then belong to one thread, and the threads end
+// at about the same time.
 constexpr size_t draws = 32;
 
 std::vector<Kept> run_all(const Program& p, const Array2& q, const Array2& v, Options options, int threads,
@@ -116,7 +117,8 @@ std::vector<Kept> run_all(const Program& p, const Array2& q, const Array2& v, Op
     return kept;
 }
 
-// t, q, v, then by run the number of samples, the largest violation and the number of steps, and what stopped which.
+// Return t, q and v, then per run the number of samples, the largest violation and the number of steps. The last item
+// is a list of the stopped runs with their exceptions.
 nb::tuple rollout_arrays(const Program& p, const Array2& q, const Array2& v, const Options& options, int threads,
                          const std::vector<NumberTuple>& names, const Array2& values) {
     std::vector<Kept> all = run_all(p, q, v, options, threads, names, values);

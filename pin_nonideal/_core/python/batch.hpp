@@ -1,4 +1,4 @@
-// Many runs as arrays: samples of states alone, without an object for each run.
+// Many runs as arrays of state samples, without an object per run.
 #pragma once
 
 #include "python/arrays.hpp"

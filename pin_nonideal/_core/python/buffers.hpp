@@ -1,4 +1,4 @@
-// States and torques from plain buffers, for what is called in tight loops.
+// States and torques from plain buffers, for calls in tight loops.
 #pragma once
 
 #include <algorithm>
@@ -8,9 +8,9 @@
 
 namespace pn {
 
-constexpr double unit_tolerance = 1e-6;  // of quaternions and (cos, sin) pairs, as at Python's door
+constexpr double unit_tolerance = 1e-6;  // tolerance of unit quaternions and (cos, sin) pairs, as in Python's checks
 
-// A contiguous buffer of doubles, without the detour over an array object.
+// Contiguous buffer of doubles, without an intermediate array object.
 class NumberBuffer {
 public:
     NumberBuffer(nb::handle object, int flags) {

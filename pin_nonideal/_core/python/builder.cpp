@@ -60,10 +60,10 @@ std::shared_ptr<const Program> Builder::finish() const {
 
 namespace {
 
-// Limits (forward, backward) by t, q, v and the reaction.
+// User function of t, q, v and the reactions. It returns the limits (forward, backward).
 using UserLimit = Function<std::pair<double, double>(double, Numbers, Numbers, ReactionView)>;
 
-// Frictional elements, which act along their directions of slip.
+// Bind friction elements, which act along their directions of slip.
 void bind_friction(nb::class_<Builder>& builder) {
     builder
         .def("add_friction", [](Builder& b, int law, int block, const std::string& name, Friction::Load load,

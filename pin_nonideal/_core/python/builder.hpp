@@ -1,4 +1,4 @@
-// A program in the making: Python gives plain numbers and functions, and asks for what is finished.
+// Builder of a program. Python passes plain numbers and functions, and receives the finished program.
 #pragma once
 
 #include <memory>
@@ -9,7 +9,7 @@
 
 namespace pn {
 
-// A scene on its way into the core: Python adds constraints, laws and forces, and finishes the program.
+// Scene under construction: Python adds constraints, laws and forces, and finishes the program.
 struct Builder {
     std::shared_ptr<Program> p = std::make_shared<Program>();
 
@@ -17,11 +17,11 @@ struct Builder {
     // Return the index of the new block or law. Directions of friction follow all constraints.
     int add(const std::string& name, Kind kind, Role role);
     int add_law(const std::string& name);
-    // The contact that was added last may open. Those that may follow all that are kept.
+    // Make the contact that was added last unilateral. Unilateral contacts follow all bilateral contacts.
     void let_open(double restitution);
-    // Rows of contacts in the order of these blocks.
+    // Order the rows of contacts like these blocks.
     void order_contacts(const std::vector<int>& blocks);
-    // A program of its own, which nothing that is added later changes.
+    // Return an independent program, which later additions do not change.
     std::shared_ptr<const Program> finish() const;
 };
 

@@ -1,4 +1,4 @@
-// The user's Python functions as the core calls them: with the lock held, arrays copied both ways.
+// User functions in Python, as called by the core: with the GIL held, and arrays copied both ways.
 #pragma once
 
 #include <functional>
@@ -9,7 +9,7 @@
 
 namespace pn {
 
-// What a user's law may ask about the reactions while it runs.
+// Reactions that a user law can read while it runs.
 struct ReactionView {
     const Program* p;
     Workspace* w;
@@ -18,14 +18,18 @@ struct ReactionView {
     Numbers of_block(int block) const;
 };
 
-// ("polynomial", [c...]), ("sinusoid", [a, f, phase, offset]), ("spline", [breaks], [coefficients]) or a function.
+// Return the time function of ("polynomial", [c...]), ("sinusoid", [a, f, phase, offset]), ("spline", [breaks],
+// [coefficients]) or a Python function.
 TimeFunction time_function(const nb::object& f);
 
-// f(t, q, v) -> torques, generalized forces or rates; f(t, q) -> residuals or a direction; f(t, q, v) -> rows A and b.
+// User functions in the core:
+// - f(t, q, v) -> torques, generalized forces or rates,
+// - f(t, q) -> residuals or a direction,
+// - f(t, q, v) -> rows A and b.
 using OfState = void(double t, const VecX& q, const VecX& v, VecX& out);
 using OfPosition = void(double t, const VecX& q, VecX& out);
 using Rows = void(double t, const VecX& q, const VecX& v, MatX& A, VecX& b);
-// The same as Python sees them.
+// Signatures of the same functions in Python.
 template <class Signature> struct Seen;
 template <> struct Seen<OfState> { using Type = Numbers(double, Numbers, Numbers); };
 template <> struct Seen<OfPosition> { using Type = Numbers(double, Numbers); };
@@ -38,10 +42,10 @@ template <>
 std::function<OfPosition> user_function(nb::callable f);
 template <>
 std::function<Rows> user_function(nb::callable f);
-// f(t) -> force and moment.
+// Wrap a user function f(t) -> force and moment.
 std::function<void(double, double*)> wrench_function(nb::object f);
 
-// Limit of friction, and force of a law; both may ask about the reactions.
+// Wrap a user's friction limit, or the force of a user's law. Both can read the reactions.
 decltype(Friction::user_limit) limit_function(nb::object f);
 decltype(UserLaw::function) law_function(nb::object f, int states, bool reads_reactions);
 

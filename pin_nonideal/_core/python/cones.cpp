@@ -12,7 +12,7 @@ namespace pn {
 
 namespace {
 
-// Rows of W come as they stand in Python's memory; the core keeps columns.
+// Cone solver on arrays. W arrives row by row from Python, and the core stores columns.
 struct ConeSolver {
     ConeComplementarity solver;
     MatX W;
@@ -45,7 +45,8 @@ void bind_cones(nb::module_& m) {
     nb::class_<ConeSolver>(m, "ConeSolver")
         .def(nb::init<>())
         .def("solve", &ConeSolver::solve, "W"_a, "w0"_a, "dims"_a, "bounds"_a, "contacts"_a, "start"_a = nb::none())
-        .def("again", [](ConeSolver& s, int count, bool warm) {  // the last problem, for counts of memory and of steps
+        // Repeats the last problem, for counts of allocations and steps.
+        .def("again", [](ConeSolver& s, int count, bool warm) {
             for (int k = 0; k < count; ++k) s.solver.solve(s.W, s.w0, s.elements, warm, s.f);
         }, "count"_a, "warm"_a)
         .def_prop_ro("f", [](const ConeSolver& s) { return to_numpy(s.f); }, own)

@@ -1,4 +1,4 @@
-// The solver of contacts and friction on arrays.
+// Solver of contacts and friction on arrays.
 #pragma once
 
 #include "python/arrays.hpp"

@@ -25,7 +25,7 @@ std::vector<ConstraintRows> constraint_rows(const Program& p) {
 
 namespace {
 
-// What Python gives for a datum, and what becomes of it.
+// Conversion of a Python argument to a data member.
 template <class Value>
 struct From {
     using Given = Value;
@@ -42,7 +42,7 @@ struct From<Vec3> {
     static Vec3 make(const Given& x) { return vec3(x); }
 };
 template <>
-struct From<Hull> {  // corners, planes and edges, one number after the other
+struct From<Hull> {  // corners, planes and edges, as flat lists
     using Given = std::tuple<std::vector<double>, std::vector<double>, std::vector<int>>;
     static Hull make(const Given& x) {
         const auto& [numbers, planes, edges] = x;
@@ -63,14 +63,14 @@ struct From<TimeFunction> {
     static TimeFunction make(const Given& x) { return time_function(x); }
 };
 template <class Signature>
-struct From<std::function<Signature>> {  // a function of the user, or None where it may be left out
+struct From<std::function<Signature>> {  // user function, or None if it is optional
     using Given = Function<typename Seen<Signature>::Type>;
     static std::function<Signature> make(const Given& f) {
         return f ? user_function<Signature>(*f) : std::function<Signature>();
     }
 };
 
-// Builder.add_<name>(name, data...) of one kind: what it says that it is made of, Python may give.
+// Bind Builder.add_<name>(name, data...) of one kind of rows. The arguments are the declared data of the kind.
 template <class K, class... Value>
 void bind_kind(nb::class_<Builder>& builder, const Datum<K, Value>&... data) {
     builder.def((std::string("add_") + K::name).c_str(),

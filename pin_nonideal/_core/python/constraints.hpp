@@ -1,4 +1,4 @@
-// Constraints and directions of friction: how Python adds them, and what it may ask of their rows.
+// Constraints and friction directions: bindings that add them, and properties of their rows.
 #pragma once
 
 #include <string>
@@ -8,13 +8,13 @@
 
 namespace pn {
 
-// What Python may ask of the rows of a constraint or contact.
+// Properties of the rows of a constraint or contact.
 struct ConstraintRows {
     std::string name;
-    int first, count;             // among the rows of all descriptions
-    std::vector<bool> holonomic;  // each of them: a position stands behind it
-    bool moves_in_time;           // by itself, or a function of the user says how
-    Shown shown;                  // what a replay shows of it
+    int first, count;             // first row and number of rows, among all descriptions
+    std::vector<bool> holonomic;  // per row: true for a position constraint
+    bool moves_in_time;           // explicitly, or through a user function
+    Shown shown;                  // display kind in a replay
 };
 std::vector<ConstraintRows> constraint_rows(const Program& p);
 

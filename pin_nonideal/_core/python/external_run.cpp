@@ -18,15 +18,15 @@ namespace pn {
 
 namespace {
 
-using Tick = Function<void(double)>;                       // with the time
-using Interpolant = nb::typed<nb::callable, Numbers(double)>;  // the state at a time inside a step
+using Tick = Function<void(double)>;                       // argument: time [s]
+using Interpolant = nb::typed<nb::callable, Numbers(double)>;  // time inside a step -> state
 
 Options with_events(Options options, const std::vector<UserEventTuple>& events) {
     options.events = user_events(events);
     return options;
 }
 
-// A run with all that it works in.
+// Run with its options, workspace and results.
 struct Followed {
     std::shared_ptr<const Program> p;
     Options options;

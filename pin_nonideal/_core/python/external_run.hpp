@@ -1,4 +1,4 @@
-// Runs whose steps an integrator of Python takes.
+// Bindings of runs whose steps are taken by an integrator in Python.
 #pragma once
 
 #include "python/arrays.hpp"

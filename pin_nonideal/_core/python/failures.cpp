@@ -6,7 +6,7 @@
 
 namespace pn {
 
-static PyObject* core_failure = nullptr;  // the exception's type, alive as long as the module
+static PyObject* core_failure = nullptr;  // type of the exception, alive as long as the module
 
 static nb::list arrays(const std::vector<VecX>& all) {
     nb::list list;

@@ -1,4 +1,4 @@
-// A failure of the core as the exception that Python sees: `CoreFailure` with kind, time, elements and value.
+// Failures of the core as Python exceptions: `CoreFailure` with kind, time, elements and value.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -9,7 +9,7 @@ namespace pn {
 
 namespace nb = nanobind;
 
-// What Python sees of a failure: an exception with its kind, time, elements and value.
+// Return the exception of a failure, with its kind, time, elements, value and solutions.
 nb::object failure_object(const Failure& failure);
 
 void bind_failures(nb::module_& m);

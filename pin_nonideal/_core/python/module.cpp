@@ -1,4 +1,4 @@
-// Python's door to the core: a Builder makes a program, a Runner evaluates and runs it.
+// Python bindings of the core: a Builder makes a program, a Runner evaluates and runs it.
 #include <string>
 
 #include <nanobind/stl/string.h>
@@ -21,7 +21,7 @@ using namespace pn;
 using namespace nanobind::literals;
 
 NB_MODULE(_core, m) {
-    nb::set_leak_warnings(false);  // a user's function may hold the scene that holds it: a cycle, not a fault
+    nb::set_leak_warnings(false);  // a user function can hold its own scene: a cycle, not a leak
     m.attr("pinocchio_version") = PIN_NONIDEAL_PINOCCHIO_VERSION;
     m.attr("state_layout") = state_layout() + " for Pinocchio " PIN_NONIDEAL_PINOCCHIO_VERSION;
     bind_failures(m);
@@ -36,7 +36,7 @@ NB_MODULE(_core, m) {
     bind_program(m);
     bind_cones(m);
 
-    // The friction program on arrays, for tests against enumeration.
+    // Friction program on arrays, for tests against enumeration.
     m.def("friction_program", [](const Array2& W, const Array& alpha0, const std::vector<int>& dims,
                                  const Array& limits) {
         return to_numpy(friction_program(map(W), map(alpha0), dims, map(limits)));

@@ -1,4 +1,4 @@
-// Python's RunOptions as the core reads them.
+// Conversion of Python's RunOptions to core options.
 #pragma once
 
 #include <string>
@@ -9,16 +9,17 @@
 namespace pn {
 
 inline bool any_object(PyObject*) { return true; }
-// Python's own, read later.
+// RunOptions object of Python, converted later.
 class RunOptions : public nb::object {
     NB_OBJECT_DEFAULT(RunOptions, nb::object, "pin_nonideal.simulation.options.RunOptions", any_object)
 };
 
-// A function of the user t, q, v -> number, the direction in which it counts, and how many of it end the run.
+// User event: function t, q, v -> number, direction of the crossings that count, and number of events that ends the
+// run.
 using OfInstant = nb::typed<nb::callable, double(double, Numbers, Numbers)>;
 using UserEventTuple = std::tuple<OfInstant, int, long>;
 std::vector<UserEvent> user_events(const std::vector<UserEventTuple>& given);
-// Called between steps with t, q, v -> True to stop, torques, or None.
+// Callback between steps: t, q, v -> True to stop, torques, or None.
 using Callback = Function<nb::object(double, Numbers, Numbers)>;
 decltype(Options::callback) user_callback(const Callback& given);
 
@@ -26,7 +27,7 @@ decltype(Options::callback) user_callback(const Callback& given);
 
 namespace nanobind::detail {
 
-// The one place that reads Python's RunOptions.
+// Type caster of Python's RunOptions. No other code reads its fields.
 template <>
 struct type_caster<pn::Options> {
     NB_TYPE_CASTER(pn::Options, const_name("pin_nonideal.simulation.options.RunOptions"))

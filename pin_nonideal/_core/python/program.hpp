@@ -1,4 +1,4 @@
-// The finished program as Python sees it.
+// Bindings of the finished program.
 #pragma once
 
 #include "python/arrays.hpp"

@@ -1,4 +1,4 @@
-// A run that is carried again and again in one workspace: what it works in is made once.
+// Run that is repeated in one workspace, with its objects made once.
 #pragma once
 
 #include <memory>
@@ -11,8 +11,8 @@ namespace pn {
 
 class KeptRun {
 public:
-    // From a state to the end, in a workspace that is as good as new; `first`: the state of a new one. Program, workspace
-    // and options are those of the first call until `forget`. What the run leaves lies in `out` until the next.
+    // Run from a state to the end, in a workspace that is reset first. `first`: run state of a new workspace. Program,
+    // workspace and options are those of the first call until `forget`. The results stay in `out` until the next call.
     void carry(const Program& p, Workspace& w, const RunState& first, const Options& options, const VecX& q0,
                const VecX& v0) {
         clear_samples();
@@ -26,12 +26,12 @@ public:
         } catch (...) {
             out.error = std::current_exception();
         }
-        if (out.failure || out.error) forget();  // it is no place to go on from
+        if (out.failure || out.error) forget();  // a stopped run cannot continue
     }
 
     void forget() { run_.reset(); }
 
-    // The room of samples of states is kept for the next run, unless they were taken away.
+    // Results. The memory of state samples is kept for the next run, unless the results were moved out.
     Recording out;
 
 private:
@@ -50,13 +50,13 @@ private:
     std::unique_ptr<SteppedRun> run_;
 };
 
-// One thread's room: a workspace with the state of a new one, and the run that works in it, used again and again.
+// Workspace of one thread with its initial run state, and a run in it. Both are used for many runs.
 struct Room {
     std::unique_ptr<Workspace> own;
     RunState first;
     KeptRun run;
 
-    // `anew`: nothing of the runs before is used again.
+    // `anew`: make a new workspace and run.
     void carry(const Program& p, const Options& options, bool anew, const VecX& q0, const VecX& v0) {
         if (!own || anew) {
             run.forget();

@@ -1,4 +1,4 @@
-// Workspaces that are used again for another run, as good as new ones.
+// Reset of workspaces that are used for another run.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 namespace pn {
 
-// Back to what a new workspace is, of all that a run reads before it writes it. `first`: the state of a new one.
+// Reset every field that a run reads before it writes it. `first`: run state of a new workspace.
 inline void clear(const Program& p, Workspace& w, const RunState& first) {
     const Vec3 none = Vec3::Zero();
     w.state = first;

@@ -1,4 +1,4 @@
-// Programs of the runs of a batch that differ in numbers.
+// Programs of batch runs that differ in parameters.
 #pragma once
 
 #include <string>
@@ -12,8 +12,8 @@ namespace pn {
 
 using NumberTuple = std::tuple<std::string, int, std::string>;  // a NumberName
 
-// Programs of the runs of a batch, which differ in some numbers: one for each thread, with the numbers of its run. They
-// are copied and let go by the thread that holds Python, since they hold its functions.
+// Programs of batch runs that differ in parameters: one program per thread, with the parameters of its current run. The
+// thread that holds the GIL copies and destroys the programs, because they hold Python functions.
 class RunPrograms {
    public:
     RunPrograms(const Program& p, const std::vector<NumberTuple>& names, const Array2& values, int threads)

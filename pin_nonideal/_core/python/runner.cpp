@@ -49,7 +49,7 @@ void Runner::choose_modes(double t, const std::optional<std::vector<Mode>>& mode
     choose_friction(t, modes, nullptr);
 }
 
-// Contacts that touch and do not leave are closed, as far as their loads press; modes given are those of all elements.
+// Close the touching contacts that do not separate and carry nonnegative loads. Given modes apply to all elements.
 void Runner::choose_contacts(double t, const std::optional<std::vector<Mode>>& modes) {
     set_closed(*p, *w, std::vector<char>(p->gaps.size(), 0));
     ClosingQuestion question;
@@ -63,7 +63,7 @@ void Runner::choose_contacts(double t, const std::optional<std::vector<Mode>>& m
 }
 
 void Runner::choose_friction(double t, const std::optional<std::vector<Mode>>& modes, const RestingMotion* together) {
-    ModeQuestion asked = first_question(*p, *w, t, q, v);  // which way what slips goes, too
+    ModeQuestion asked = first_question(*p, *w, t, q, v);  // sets the slip directions, too
     if (!modes) {
         if (together) together->answer(*p, *w, asked);
         return resolve_modes(*p, *w, t, q, v, asked);
@@ -90,7 +90,7 @@ void Runner::acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle
 
 namespace {
 
-// Lets functions of time stand still while it lives.
+// Guard that freezes functions of time during its lifetime.
 class Frozen {
 public:
     Frozen(Evaluation& now, bool frozen) : now_(now) { now_.frozen = frozen; }
@@ -183,7 +183,7 @@ Numbers Runner::row_lengths(const Array& q_in, const Array& v_in, double t, bool
         const Block& block = p->blocks[i];
         std::vector<int> rows(block.total);
         std::iota(rows.begin(), rows.end(), 0);
-        evaluate_block(*p, *w, t, v, i);  // of open contacts too
+        evaluate_block(*p, *w, t, v, i);  // also for open contacts
         (own ? own_lengths : greatest_lengths)(p->mechanism, w->now.terms, block, rows, w->now.values[i], length);
     };
     for (int i = 0; i < p->constraints; ++i) find(i, lengths.data() + p->blocks[i].user_row);
@@ -201,7 +201,7 @@ Numbers Runner::slip_rows(const Array& q_in, const Array& v_in, double t) {
     std::vector<double> rows;
     for (const Friction& f : p->frictions) {
         const Block& block = p->blocks[f.block];
-        evaluate_block(*p, *w, t, v, f.block);  // of open contacts too
+        evaluate_block(*p, *w, t, v, f.block);  // also for open contacts
         std::vector<double> local(block.support.size() * f.dim);
         fill_A(block, p->mechanism, w->now.terms, w->now.values[f.block], local.data());
         for (int k = 0; k < f.dim; ++k) {
@@ -256,7 +256,7 @@ std::tuple<Numbers, Numbers, double, double, double> Runner::project(const Array
 
 Options& Runner::read(const nb::object& run_options) {
     if (!asked.is(run_options)) {
-        run_.forget();  // it works with the ones before
+        run_.forget();  // the kept run uses the old options
         asked.reset();
         options = nb::cast<Options>(run_options);
         asked = run_options;
@@ -264,7 +264,8 @@ Options& Runner::read(const nb::object& run_options) {
     return options;
 }
 
-// The run of short calls, of which very many are alike, is kept; what else is asked for leaves more behind than samples.
+// Check if a run records only samples of states. Such a run is kept for the next call, because very many short calls
+// are alike.
 static bool is_plain(const Options& o) {
     return !o.record.evaluates() && !o.record.dense && o.max_wall == 0.0 && o.events.empty() &&
            !o.callback && !o.save;
@@ -296,7 +297,7 @@ Outcome Runner::simulate(const Array& q_in, const Array& v_in) {
 Outcome Runner::resume(const nb::bytes& state, const Options& with) {
     const std::string bytes(static_cast<const char*>(state.data()), state.size());
     Recording recording;
-    run_.forget();  // it works in the workspace before
+    run_.forget();  // the kept run uses the old workspace
     w = std::make_unique<Workspace>(*p);
     {
         nb::gil_scoped_release release;
@@ -343,9 +344,9 @@ nb::class_<Runner> bind_runner(nb::module_& m) {
         .def("project", &Runner::project, "q"_a, "v"_a, "t"_a, "far"_a)
         .def("time_evaluations", &Runner::time_evaluations, "q"_a, "v"_a, "t"_a, "count"_a)
         .def_prop_ro("rank", &Runner::constraint_rank)
-        // Where several motions are possible: goes on with the one nearest to that before, and does not fail.
+        // If several motions are possible: true takes the one nearest to the last motion, false raises.
         .def_prop_rw("continues", [](Runner& r) { return r.w->continues; }, [](Runner& r, bool on) { r.w->continues = on; })
-        // How the rows were factored last: smallest pivot, orthogonal road taken, redundant, refined.
+        // Last factorization of the rows: smallest pivot, orthogonal factorization used, redundant, refined.
         .def_prop_ro("factorization", [](Runner& r) {
             const RowSystem& s = r.w->now.rows;
             return std::make_tuple(s.min_pivot, s.orthogonal, s.redundant, s.refine);

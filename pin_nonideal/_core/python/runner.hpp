@@ -1,4 +1,4 @@
-// Evaluations of single states, and one run after another.
+// Evaluations of single states, and consecutive runs.
 #pragma once
 
 #include <memory>
@@ -13,76 +13,78 @@
 
 namespace pn {
 
-// Eq. (40) at one state, with what its friction does.
+// Solution of Eq. (40) at one state, with its friction.
 struct Instant {
     Numbers a, F_ideal, F_nonideal, C, F, lam, lam_ideal;
     int rank;
     std::vector<Mode> modes;
-    std::vector<std::int8_t> closed;  // of each contact
+    std::vector<std::int8_t> closed;  // per contact
     std::vector<Numbers> friction;  // force of each element along its directions
     std::vector<double> limits;
-    std::optional<bool> unique;  // nothing: not shown
+    std::optional<bool> unique;  // no value: not proven
 };
 
-// A run that has ended.
+// Results of a finished run.
 struct Outcome {
     Counters counters;
     Recording recording;
 };
 
-// One workspace and the program it belongs to: evaluates states, and carries runs.
+// Program with one workspace, for evaluations of states and for runs.
 struct Runner {
     std::shared_ptr<const Program> p;
     std::unique_ptr<Workspace> w;
-    RunState first;  // of a new workspace
+    RunState first;  // run state of a new workspace
     VecX q, v;
 
-    // What the last run was asked for, a RunOptions of Python, and as the core reads it; functions are those of one run.
+    // RunOptions of the last run in Python, and their conversion. Functions belong to one run only.
     nb::object asked;
     Options options;
 
     explicit Runner(std::shared_ptr<const Program> program);
 
-    // The options of a run, which are read where they are not those of the last.
+    // Return the converted options of a run. They are converted again only if the object differs from that of the last
+    // run.
     Options& read(const nb::object& run_options);
 
-    // Writes the acceleration into `out`, an array of nv numbers; plain buffers, since this is called in tight loops.
+    // Write the acceleration into `out`, an array of nv numbers. Uses plain buffers, for calls in tight loops.
     void acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle tau, nb::handle out);
-    // Frozen: at a state of rest, as if functions of time stood still there.
+    // Solve Eq. (40) at one state. `frozen`: functions of time stand still, for states of rest.
     Instant solve(const Array& q_in, const Array& v_in, double t, const std::optional<Array>& tau,
                   const std::optional<std::vector<Mode>>& modes, bool frozen);
     int constraint_rank() const;
-    // All rows of all constraints, dropped ones too: A (by rows), b, residual, rate.
+    // Return all rows of all constraints, including removed rows: A (by rows), b, residual, rate.
     std::tuple<Numbers, Numbers, Numbers, Numbers> rows(const Array& q_in, const Array& v_in, double t);
-    // The greatest length that each of these rows could have at q, then each direction of the frictional elements.
+    // Return the greatest length that each of these rows can have at q, then of each direction of the friction
+    // elements. `own`: return the actual lengths. Lengths use the metric of M^-1.
     Numbers row_lengths(const Array& q_in, const Array& v_in, double t, bool own);
-    // Directions along which frictional elements slip: rows of all, whose rates are slip velocities.
+    // Return the slip directions of all friction elements as rows, whose rates are slip velocities.
     Numbers slip_rows(const Array& q_in, const Array& v_in, double t);
-    // Of each contact between two frames a point of the line along which it presses, and the normal that its row pushes
-    // the body of frame 1 along, in world axes: six numbers each.
+    // Return six numbers in world axes for each contact between two frames. They are a point on the line of the normal
+    // force, and the normal along which the row pushes the body of frame 1.
     Numbers pressing_lines(const Array& q_in, const Array& v_in, double t);
-    // M (dense, by rows) and the bias forces.
+    // Return M (dense, by rows) and the bias forces.
     std::pair<Numbers, Numbers> terms(const Array& q_in, const Array& v_in);
-    // Kinetic energy, and potential energy in gravity [J].
+    // Return the kinetic energy, and the potential energy in gravity [J].
     std::pair<double, double> energies(const Array& q_in, const Array& v_in);
-    // q and v on the constraints, and the largest residual before (beyond `far` nothing moves), residual and rate
-    // after.
+    // Project q and v onto the constraints. Return q, v, the largest residual before, and the residual and rate after.
+    // If the residual before exceeds `far`, nothing moves.
     std::tuple<Numbers, Numbers, double, double, double> project(const Array& q_in, const Array& v_in, double t,
                                                                  double far);
     double time_evaluations(const Array& q_in, const Array& v_in, double t, int count);
 
-    // With the options read last.
+    // Simulate with the options read last.
     Outcome simulate(const Array& q_in, const Array& v_in);
     Outcome resume(const nb::bytes& state, const Options& with);
 
 private:
-    KeptRun run_;  // of fixed steps, which records states
+    KeptRun run_;  // kept run, which records only states
 
-    // What does not fit is refused here and explained in Python.
+    // Set the state and the torques. Throw std::invalid_argument if they do not fit the model, which Python explains.
     void set(const Array& q_in, const Array& v_in, const std::optional<Array>& tau);
-    // All rows of all constraints and contacts, at one state.
+    // Evaluate all rows of all constraints and contacts at one state.
     void place_rows(const Array& q_in, const Array& v_in, double t);
-    // Modes by velocity, and at rest by the complementarity problem; or the ones given.
+    // Set the modes: the given ones, else by velocity, and at rest by the complementarity problem.
     void choose_modes(double t, const std::optional<std::vector<Mode>>& modes);
     void choose_contacts(double t, const std::optional<std::vector<Mode>>& modes);
     void choose_friction(double t, const std::optional<std::vector<Mode>>& modes, const RestingMotion* together);

@@ -25,11 +25,11 @@ namespace {
 
 using Array3 = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 using Indices = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Tick = Function<void(double)>;     // with the time
-using Save = Function<void(nb::bytes)>;  // with the state of a checkpoint
-using Hint = Function<void(double, int, double, bool)>;  // at steps that follow a fast motion
+using Tick = Function<void(double)>;     // argument: time [s]
+using Save = Function<void(nb::bytes)>;  // argument: state of a checkpoint
+using Hint = Function<void(double, int, double, bool)>;  // arguments: time [s], dof, rate [1/s], decays
 
-// Now and then between two steps: Python's signals, and progress.
+// Check Python's signals and report progress between two steps, at most every 50 ms.
 void watch(Options& o, const Tick& tick) {
     o.tick = [tick, last = std::chrono::steady_clock::now()](double t) mutable {
         const auto now = std::chrono::steady_clock::now();
@@ -58,7 +58,7 @@ void tell(Options& o, const Hint& hint) {
     };
 }
 
-// Samples inside steps of a run with record "dense": states there, and what each of their steps held.
+// Sample inside the steps of a run with record "dense", from the states there and the data stored with each step.
 Outcome samples_inside(const Program& p, const Options& options, const Array& t, const Array2& y, const Array2& modes,
                       const Array2& directions, const Array2& sought, const Array2& torque, const Array& moved) {
     InsideStates inside;
@@ -86,7 +86,7 @@ Outcome samples_inside(const Program& p, const Options& options, const Array& t,
     return {w.counters, std::move(out)};
 }
 
-// States at parts of the steps of an interpolant, by its values at the points of each step.
+// Return the states at parts of the steps of an interpolant, from its values at the points of each step.
 Numbers inside_steps(const Array3& states, const Indices& step, const Array& part) {
     const size_t size = states.shape(2);
     const StepPolynomials steps(states.data(), static_cast<int>(states.shape(1)), static_cast<int>(size));
@@ -95,7 +95,7 @@ Numbers inside_steps(const Array3& states, const Indices& step, const Array& par
     return to_numpy(std::move(out));
 }
 
-// What stopped a run: a failure of the core, what a function of the user raised, or None.
+// Return the exception that stopped a run (failure of the core, or exception of a user function), or None.
 nb::object stopped(const Outcome& outcome) {
     const Recording& r = outcome.recording;
     if (r.failure) return failure_object(*r.failure);
@@ -109,10 +109,10 @@ nb::object stopped(const Outcome& outcome) {
     }
 }
 
-// Recorded numbers as an array that keeps their run alive; empty when they were not recorded.
+// Return recorded numbers as an array that keeps their run alive. The array is empty if they were not recorded.
 template <class Number>
 auto shown(std::vector<Number>& numbers, nb::handle run) {
-    numbers.reserve(1);  // an array has an address, one without numbers too
+    numbers.reserve(1);  // an empty array needs an address too
     return nb::ndarray<nb::numpy, Number, nb::ndim<1>>(numbers.data(), {numbers.size()}, run);
 }
 template <auto field>
@@ -152,8 +152,8 @@ decltype(Options::callback) user_callback(const Callback& given) {
     };
 }
 
-// q and v of many states on the constraints, by rows, and the largest residual and rate of each afterwards: NaN where
-// the state could not be taken. On several threads, each state as by Runner::project.
+// Project many states onto the constraints on several threads, each as by Runner::project. Return q and v by rows, and
+// the largest residual and rate of each state afterwards. Both are NaN if the projection failed.
 static std::tuple<Numbers, Numbers, Numbers, Numbers> nearest_states(const Program& p, const Array2& q_in,
                                                                      const Array2& v_in, double t, double far,
                                                                      int threads, const std::vector<NumberTuple>& names,
@@ -166,7 +166,7 @@ static std::tuple<Numbers, Numbers, Numbers, Numbers> nearest_states(const Progr
     std::atomic<bool> stopped{false};
     share_out(q.rows(), threads, stopped, [&](size_t i, int k) {
         const Program& mine = programs.of(i, k);
-        // A workspace knows the terms of its configuration, which other numbers change.
+        // A workspace caches terms of its configuration, which other parameters change.
         if (!spaces[k] || !names.empty()) spaces[k] = std::make_unique<Workspace>(mine);
         VecX q_one = q.row(i), v_one = v.row(i);
         try {
@@ -176,13 +176,13 @@ static std::tuple<Numbers, Numbers, Numbers, Numbers> nearest_states(const Progr
             q.row(i) = q_one;
             v.row(i) = v_one;
         } catch (...) {
-            // Told where the state is taken alone.
+            // The error is reported when the state is projected alone.
         }
     });
     return {to_numpy(q.data(), q.size()), to_numpy(v.data(), v.size()), to_numpy(after), to_numpy(rate)};
 }
 
-// A program with the numbers of one run.
+// Return a program with the parameters of one run.
 static std::shared_ptr<const Program> with_numbers(const Program& p, const std::vector<NumberTuple>& names,
                                                    const Array2& values) {
     return std::make_shared<Program>(RunPrograms(p, names, values, 1).of(0, 0));
@@ -200,8 +200,8 @@ static bool is_interrupt(const std::exception_ptr& error) {
     }
 }
 
-// Outcomes of runs from many states, on several threads, each in a room of its own. Where one is interrupted
-// all stop, and those not begun are None.
+// Return the outcomes of runs from many states, on several threads, each with its own workspace. An interrupt stops all
+// runs. Runs that have not begun are None.
 static nb::typed<nb::list, std::optional<Outcome>> rollout(const Program& p, const Array2& q, const Array2& v,
                                                            Options options, int threads,
                                                            const std::vector<NumberTuple>& names, const Array2& values) {
@@ -214,7 +214,7 @@ static nb::typed<nb::list, std::optional<Outcome>> rollout(const Program& p, con
     const auto stop = [&stopped](double t) {
         if (stopped) throw Failure(Failure::Kind::interrupted, t);
     };
-    Options own = options;  // of the caller's thread, to which Python tells its signals
+    Options own = options;  // options of the caller's thread, which receives Python's signals
     watch(own, {});
     own.tick = [stop, signals = own.tick](double t) {
         stop(t);
@@ -230,7 +230,7 @@ static nb::typed<nb::list, std::optional<Outcome>> rollout(const Program& p, con
             if (is_interrupt(room.run.out.error)) stopped = true;
             outcomes[i] = Outcome{room.own->counters, std::exchange(room.run.out, {})};
         });
-    } catch (...) {  // a run that the interrupt ended tells of it
+    } catch (...) {  // the outcome of an interrupted run reports the interrupt
         const auto tells = [](const std::optional<Outcome>& one) {
             const auto failure = one ? one->recording.failure : std::nullopt;
             return failure && failure->kind == Failure::Kind::interrupted;

@@ -1,4 +1,4 @@
-// Runs as Python asks for them, one or many at once, and what they leave behind.
+// Bindings of runs, one or many at once, and of their results.
 #pragma once
 
 #include "python/runner.hpp"

@@ -19,7 +19,7 @@ namespace pn {
 
 namespace {
 
-// Periods that a run of a stepper is planned for, and samples at events after which their room is given back.
+// Planned number of periods of a stepper's run, and number of samples at events after which the samples are cleared.
 constexpr double planned_periods = 1e6;
 constexpr size_t most_samples = 100;
 constexpr double never = 1e300;  // the time to the next sample [s]
@@ -36,7 +36,7 @@ Options options_of(const std::string& method, double period, double dt, double r
     return options;
 }
 
-// A run with all that it works in.
+// Run with its options, workspace and results.
 struct Stepped {
     std::shared_ptr<const Program> p;
     double period;
@@ -88,7 +88,7 @@ struct Stepped {
         });
     }
 
-    // A run that stopped is no place to go on from.
+    // Call `act` without the GIL. If `act` throws, discard the run, because a stopped run cannot continue.
     template <class Act>
     void attempt(const Act& act) {
         try {

@@ -1,4 +1,4 @@
-// Runs that Python takes period by period.
+// Bindings of runs that Python advances period by period.
 #pragma once
 
 #include "python/arrays.hpp"

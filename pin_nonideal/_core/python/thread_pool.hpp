@@ -1,4 +1,4 @@
-// Work that threads share.
+// Parallel loop over threads.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +16,8 @@ namespace pn {
 
 inline int useful_threads(size_t count, int threads) { return static_cast<int>(std::min<size_t>(threads, count)); }
 
-// Calls work(i, k) for every i below `count`, drawn from one counter by threads k; number 0 is the caller's. What one of
-// them throws, a signal of Python's among it, stops the drawing and is thrown at the end.
+// Call work(i, k) for every i below `count`, drawn from one counter by threads k. Thread 0 is the caller's. An
+// exception of a thread, or a Python signal, stops the loop and is thrown at the end.
 template <class Work>
 void share_out(size_t count, int threads, std::atomic<bool>& stopped, Work work) {
     nb::gil_scoped_release release;

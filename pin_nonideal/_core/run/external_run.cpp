@@ -9,10 +9,11 @@
 
 namespace pn {
 
-// Relative step of central differences: the cube root of the rounding, where rounding and curvature cost the same.
+// Relative step of central differences: cube root of the unit roundoff, which balances rounding and truncation errors.
 constexpr double difference = 6e-6;
-// Acceleration of an onset beside that of its friction alone, whose inverse is the rate at which the direction relaxes over
-// the time since the onset: implicit steps follow it to about thirty.
+// Minimum slip acceleration at an onset, relative to the acceleration by friction alone. The inverse ratio is the rate
+// at which the slip direction relaxes, times the time since the onset. Implicit steps resolve inverse ratios up to
+// about 30.
 constexpr double least_onset = 1.0 / 30.0;
 
 void FollowedRun::derivative(double at, const VecX& y_outside, VecX& rate_outside) {
@@ -22,7 +23,7 @@ void FollowedRun::derivative(double at, const VecX& y_outside, VecX& rate_outsid
     rate_outside = inside_rate_.head(system.ns);
 }
 
-// The steps of positions stay bounded when a joint has turned many times.
+// Positions use an absolute step, which stays small after many turns of a joint.
 MatX FollowedRun::jacobian(double at, const VecX& y_outside) {
     const int n = system.ns;
     MatX out = MatX::Zero(n, n);
@@ -50,7 +51,8 @@ std::optional<int> FollowedRun::singular_onset() {
     return std::nullopt;
 }
 
-// Events came too thick a moment ago: implicit steps go over them with the modes as they are.
+// Check if a chatter event was recorded less than `chatter_time` ago. Implicit steps then keep the modes and locate no
+// events.
 bool FollowedRun::bridges_cluster() const {
     return !out.events.empty() && out.events.back().kind == Event::Kind::chatter &&
            t < out.events.back().time + chatter_time;

@@ -1,6 +1,6 @@
-// A run whose steps an integrator outside the core takes. It asks for rates under the modes of the step at hand; the
-// core follows each step, and does with it what it does with its own: the step's end is put on the constraints, it ends
-// at the first event inside, and samples are recorded.
+// Run whose steps are taken by an integrator outside the core. The integrator evaluates rates under the modes of the
+// current step. The core then treats each step like its own. It projects the step's end onto the constraints, ends the
+// step at the first event inside, and records samples.
 #pragma once
 
 #include <algorithm>
@@ -14,22 +14,23 @@ class FollowedRun : public Simulation {
 public:
     using Simulation::Simulation;
 
-    // dy/dt of y = (q, v, states of laws, work of the ledger's columns), and its derivatives by y by central differences.
+    // Compute dy/dt of y = (q, v, law states, work of the ledger's columns), and its Jacobian by y with central
+    // differences.
     void derivative(double at, const VecX& y_outside, VecX& rate_outside);
     MatX jacobian(double at, const VecX& y_outside);
-    // Follows a step from the present state to one at `end`; whether the integrator has to start again, from the present
-    // state as it is then.
+    // Follow a step from the current state to one at time `end`. Return true if the integrator must restart from the
+    // current state.
     bool follow(double end, const OutsideStep::Interpolant& interpolant);
 
-    // The time at which the integrator's next step has to end: the next break of a function of time, `end` at most.
+    // Return the latest end time of the integrator's next step: the next break of a time function, at most `end`.
     double stop_before(double end) {
         if (p.searches_breaks) breaks.look(end);
         return std::min(end, breaks.next());
     }
 
-    // An element of several directions whose slip begins from rest so slowly, beside the acceleration that its friction
-    // alone would cause, that its direction relaxes faster than any step of an integrator without that direction among
-    // its unknowns; none at most states.
+    // Return an element with several slip directions whose slip begins very slowly from rest, if there is one. Slow is
+    // relative to the acceleration by its friction alone. The slip direction then relaxes faster than any step of an
+    // integrator that does not solve for the direction.
     std::optional<int> singular_onset();
 
     double time() const { return t; }
@@ -41,7 +42,7 @@ private:
     bool bridges_cluster() const;
 
     VecX inside_, inside_rate_;
-    double moved_before_ = 0.0;  // energy, by projections that the integrator went on from
+    double moved_before_ = 0.0;  // projection energy up to the state from which the integrator continues
 };
 
 }  // namespace pn

@@ -12,30 +12,31 @@ namespace pn {
 
 namespace {
 
-// At rest only the functions of the user tell when it ends. They are evaluated in steps of this length at most [s], or
-// of this part of the rest so far.
+// Maximum step while the scene is at rest: absolute [s], and relative to the duration of the rest. Only user functions
+// can end the rest, so they are evaluated at least this often.
 constexpr double rest_step = 0.1, rest_part_step = 0.002;
-// A step that falls short of the stop by less than this part goes there; one that takes more than this part of the way
-// is made one of two even steps instead of a long and a tiny one.
+// Steps longer than `whole_way` times the remaining time end at the stop. Steps longer than `even_part` times the
+// remaining time are cut to that length. Two even steps then replace a long and a tiny one.
 constexpr double whole_way = 1.0 - 1e-10, even_part = 0.5;
 
-// Part of a step that is tried next where the event inside it is not found.
+// Factor on the step size if event location fails.
 constexpr double shortened = 0.3;
-// Steps shorter than this [s, and of the time] go on where their constraints turn or open, which the next one shows.
+// Minimum step [s, or relative to the time] for which the projection of the step's end counts as an error. Constraints
+// that turn or open in a shorter step are detected in the next one.
 constexpr double shortest_measured = 1e-7;
-// A step of fewer spacings of floating-point times than these leads nowhere.
+// Minimum step, in floating-point spacings of the time. Smaller steps raise a Failure.
 constexpr double least_spacings = 4.0;
-// A run that has come less than this part of its way after so many steps never ends.
+// Minimum progress after `early_steps` steps, relative to the duration. Slower runs raise a Failure.
 constexpr long early_steps = 20000;
 constexpr double least_progress = 1e-10;
 
-// Progress is told after so many steps.
+// Number of steps between two progress reports.
 constexpr long steps_a_tick = 16;
 
-// The step after one that ended before a rest takes this part of the time to it, so that the rest lies inside.
+// Step after one that ended before a rest, relative to the time to the rest. The rest then lies inside the step.
 constexpr double past_rest = 1.02;
 
-// Where directions are not found in a step of this length [s], the method asked for has to find a way.
+// If collocation fails in steps shorter than this [s], the selected method takes the next trial.
 constexpr double shortest_sought = 1e-9;
 
 }  // namespace
@@ -55,7 +56,8 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       clusters(system, *this, run_options, stiffness, time_stepping, recording),
       modes(system, *this, run_options, torques, output, landing, clusters, recording) {
     y = rate = configured_y = VecX::Zero(system.ny);
-    // Time stepping finds its motion in velocities; of accelerations, which are recorded only, the nearest do.
+    // Time stepping solves for velocities. Accelerations are only recorded, so the solution nearest to the last one
+    // suffices.
     const bool in_time = options.method.scheme == Method::Scheme::moreau;
     w.continues = options.continues || (in_time && system.ng > 0);
     slip_at_start.assign(p.frictions.size(), 0.0);
@@ -110,7 +112,7 @@ void Simulation::run() {
         accept(proposal, event);
         record(event);
     }
-    if (t < t_end) {  // ended by the user, with a last sample here
+    if (t < t_end) {  // ended by the user: record a last sample
         system.read(y);
         if (!w.now.no_motion) evaluate(p, w, t, system.q, system.v);
         output.now();
@@ -118,7 +120,7 @@ void Simulation::run() {
     if (options.save) save();
 }
 
-// The only place where a run is interrupted or saved: what is left here is all that the next step needs.
+// Runs are interrupted or saved only here, because the state between two steps is all that the next step needs.
 bool Simulation::between_steps() {
     try {
         if (options.tick && ++ticks % steps_a_tick == 0) options.tick(t);
@@ -154,7 +156,7 @@ Simulation::Proposal Simulation::propose() {
     const bool adaptive = options.method.adaptive();
     if (p.searches_breaks) breaks.look(std::min(t_end, t + (adaptive ? h : options.dt)), adaptive);
     double stop = torques.next_stop(t_end);
-    if (!adaptive)  // the fixed grid, whatever events cut out of it
+    if (!adaptive)  // stay on the fixed grid, also after an event inside a step
         stop = std::min(stop, options.t0 + (whole_lengths(t - options.t0, options.dt) + 1.0) * options.dt);
     const double remaining = stop - t;
     double size = adaptive ? h : remaining;
@@ -186,18 +188,18 @@ void Simulation::pass_break() {
 // --- Integrate ------------------------------------------------------------------------------------------------------
 
 std::optional<double> Simulation::integrate(const Proposal& proposal) {
-    opened.reset();  // of this step alone: a shorter one may fail for another reason
+    opened.reset();  // valid for this step only: a shorter one may fail for another reason
     watched = system.watches();
     if (watched) before_step = w.state;
     const int active = system.active();
     stepper.y0.head(system.ns) = y.head(system.ns);
-    stepper.y0.segment(system.ns, active - system.ns).setZero();  // what elements watch is theirs over one step
+    stepper.y0.segment(system.ns, active - system.ns).setZero();  // watch entries integrate over one step only
     stepper.start_rate().head(active) = rate.head(active);
     try {
         return try_step(proposal);
     } catch (const Failure& failure) {
-        // A stage may leave the domain where the step is too long; a shorter one decides whether it is the motion.
-        // Where the motion runs away no step is short enough, and that is what is wrong.
+        // A stage can leave the domain if the step is too long. A shorter step shows if the motion itself fails. If the
+        // motion diverges, no step is short enough, and the step-size failure is reported.
         const double tiny = tiny_step_at(t);
         const bool runs_away = tiny * system.velocity(rate).norm() > system.velocity(y).norm();
         if (!options.method.adaptive() || (proposal.size < tiny && !runs_away) ||
@@ -208,7 +210,7 @@ std::optional<double> Simulation::integrate(const Proposal& proposal) {
     }
 }
 
-// One step; where its error is allowed its end is projected and evaluated.
+// Take one step. If its error is accepted, project and evaluate its end.
 std::optional<double> Simulation::try_step(const Proposal& proposal) {
     const double size = proposal.size;
     const double start_pivot = w.now.rows.distance;
@@ -238,7 +240,8 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
     stepper.learn();
     if (needs_end) error = stepper.error();
     if (measures) {
-        // Where the constraints drive the motion the stages do not see this error: the projection takes it back.
+        // If constraints drive the motion, the stages do not contain this error. The projection removes it, so its move
+        // is measured.
         moved_ -= stepper.y1;
         error = std::max(error, norm.of_projection(moved_, stepper.y0, stepper.y1, t, size));
     }
@@ -274,7 +277,7 @@ bool Simulation::locate_event(const Proposal& proposal) {
         find_event();
         return true;
     } catch (const Failure& failure) {
-        // The step taken again up to an event went where the whole one did not: it is too long.
+        // The repeated step failed although the whole step did not, so the step is too long.
         const double tiny = tiny_step_at(t);
         if (!options.method.adaptive() || proposal.size < tiny || failure.kind == Failure::Kind::interrupted) throw;
     }
@@ -284,27 +287,29 @@ bool Simulation::locate_event(const Proposal& proposal) {
     return false;
 }
 
-// A method with an error takes it from there; events, functions, and what is recorded beside the state ask for it.
+// Adaptive methods, events, law states, user functions, callbacks, checkpoints and records beyond the state need the
+// acceleration at the step's end.
 bool Simulation::leaves_rate(const Proposal& proposal) const {
     return stops_there && proposal.last && proposal.stop >= t_end && !options.method.adaptive() &&
            !system.has_events() && system.nz == 0 && !p.asks_functions && value_events.empty() &&
            !options.record.evaluates() && !options.record.dense && !options.callback && !options.save;
 }
 
-// Where no step is short enough other modes may lead on from where it began, or time stepping.
+// If no step is short enough, continue from the step's start with other modes or by time stepping. Return false if
+// neither applies.
 bool Simulation::goes_on(const Failure& failure) {
     const bool may_end = modes.may_end(failure), leads_on = ModeChanges::leads_on(failure);
     if (!may_end && !leads_on) return false;
     try {
         back_to_start();
         if (may_end && modes.leave()) return true;
-    } catch (const Failure& at_start) {  // the motion of these modes does not even begin
+    } catch (const Failure& at_start) {  // the current modes have no motion at the step's start
         if (at_start.kind == Failure::Kind::interrupted) throw;
     }
     return leads_on && modes.step_over(failure);
 }
 
-// Modes, and what hangs on them, as the step began.
+// Restore the modes and the dependent rows and forces of the step's start.
 void Simulation::back_to_start() {
     if (watched) {
         set_contacts(p, w, before_step.closed, before_step.mode);

@@ -1,4 +1,4 @@
-// The time loop: propose a step, integrate it, control the error, locate an event, accept, record.
+// Time loop: propose a step, integrate it, control the error, locate an event, accept, record.
 #pragma once
 
 #include <optional>
@@ -13,10 +13,10 @@
 
 namespace pn {
 
-// Runs into `out`; failures end the run there and keep the samples.
+// Simulate from (q0, v0) into `out`. A failure ends the run, is stored in `out`, and keeps the samples.
 void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, const Options& options, Recording& out);
-// Goes on in a new workspace from the state that `save` was given, with the same options; throws std::invalid_argument
-// when the state does not fit.
+// Resume a run in a new workspace from the bytes that `save` received, with the same options. Throw
+// std::invalid_argument if the bytes do not fit the scene.
 void resume(const Program& p, Workspace& w, const std::string& state, const Options& options, Recording& out);
 
 class Simulation : protected Progress {
@@ -24,19 +24,19 @@ public:
     Simulation(const Program& p, Workspace& w, const Options& options, Recording& out);
     void start(const VecX& q0, const VecX& v0);
     void restore(const std::string& state);
-    // To the end, from the start or from a restored state.
+    // Integrate to the end, from the start or from a restored state.
     void run();
 
 protected:
     struct Proposal {
         double size;
-        double stop;  // the step must not go beyond
-        bool last;    // it ends there
+        double stop;  // latest end time of the step
+        bool last;    // the step ends at `stop`
     };
 
-    // The six verbs of a step. Integrating gives the norm of the error, 1 at the tolerance, or nothing where the step
-    // would pass too near a singular position; what the control of the error refuses is proposed again, and so is a step
-    // inside which an event cannot be located.
+    // Six phases of a step. `integrate` returns the error norm, 1 at the tolerance. It returns nothing if the step
+    // would pass too near a singular position. A step is proposed again if its error is rejected or if an event inside
+    // cannot be located.
     Proposal propose();
     std::optional<double> integrate(const Proposal& proposal);
     bool control_error(const Proposal& proposal, std::optional<double> error);
@@ -50,11 +50,11 @@ protected:
     void back_to_start();
 
     std::optional<double> try_step(const Proposal& proposal);
-    // Whether nothing asks for the acceleration at the end of this step.
+    // Check if the acceleration at the end of this step is not needed.
     bool leaves_rate(const Proposal& proposal) const;
 
     bool done() const { return t >= t_end || value_events.ends_run(); }
-    // Whether the run goes on.
+    // Report progress, save, check the limits of the run and call the callback. Return false if the run must stop.
     bool between_steps();
     void save();
 
@@ -82,15 +82,15 @@ protected:
     TimeStepping time_stepping;
     Clusters clusters;
     ModeChanges modes;
-    VecX moved_;  // by the projection of the step's end
+    VecX moved_;  // move by the projection of the step's end
     long ticks = 0;
     Clock::time_point next_save;
     const Clock::time_point begun = Clock::now();
-    std::optional<FoundEvent> event;  // in the step just taken
-    RunState before_step;      // where anything was closed or rubbed
-    bool watched = false;      // it did, as the step began
-    bool stops_there = false;  // at t_end: nobody goes on from the state that is left
-    std::optional<Failure> opened;  // a loop that a trial of this step could not close
+    std::optional<FoundEvent> event;  // event in the step just taken
+    RunState before_step;      // run state at the step's start, set if `watched`
+    bool watched = false;      // a contact was closed or an element active at the step's start
+    bool stops_there = false;  // no other period continues from the state at t_end
+    std::optional<Failure> opened;  // loop that a trial of this step could not close
 };
 
 }  // namespace pn

@@ -9,7 +9,7 @@ void SteppedRun::begin(const VecX& q0, const VecX& v0, double period, bool only)
     event.reset();
     opened.reset();
     choice.forget();
-    out.steps = 0;  // a run of its own: what watches over runs that get nowhere counts anew
+    out.steps = 0;  // the guards against runs without progress count from zero
     periods_ = 0;
     t_end = options.t0 + period;
     stops_there = only;

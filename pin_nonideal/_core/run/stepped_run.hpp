@@ -1,5 +1,5 @@
-// A run that its caller takes period by period, with torques of its own: each period begins where the last one ended,
-// with the steps, modes and factors that it left.
+// Run that the caller advances period by period, with its own torques. Each period starts from the state, step size,
+// modes and factors that the last one left.
 #pragma once
 
 #include "run/simulation.hpp"
@@ -10,12 +10,12 @@ class SteppedRun : public Simulation {
 public:
     using Simulation::Simulation;
 
-    // From a state on, at the time that the options say, for a first period; nothing is left of what was before. `only`:
-    // no other period follows, so that its end needs no acceleration where nothing records one.
+    // Start from (q0, v0) at time `options.t0` for a first period, and discard the previous state. `only`: no other
+    // period follows, so the final acceleration is skipped if nothing records it.
     void begin(const VecX& q0, const VecX& v0, double period, bool only);
-    // Torques in place of the actuation's from here on; the derivative is taken anew.
+    // Replace the actuation torques from now on, and recompute the rate.
     void set_torque(const VecX& torque) { torques.set(torque); }
-    // To the end of the next period.
+    // Integrate to the end of the next period.
     void advance(double period);
 
     double time() const { return t; }

@@ -10,7 +10,7 @@ namespace pn {
 
 namespace {
 
-// The quotient may miss a whole number by so much of itself and of one.
+// Rounding tolerance of the quotient: relative, and absolute.
 constexpr double quotient_rounding = 1e-14, count_rounding = 1e-9;
 
 }  // namespace
@@ -49,7 +49,7 @@ void Torques::set(const VecX& torque) {
     take_rate_anew();
 }
 
-// At the state that was read last.
+// Recompute the rate at the state that was read last.
 void Torques::take_rate_anew() {
     begin_step(p, w, now_.t, system_.q, system_.v);
     system_.rate_of_evaluation(now_.t, now_.y, now_.rate);

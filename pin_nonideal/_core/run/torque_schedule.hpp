@@ -1,5 +1,5 @@
-// Torques that change between two steps: of sampled control, of a callback, or of a caller. Each jump ends a step, and
-// the rate is taken anew behind it.
+// Torques that change between two steps: by sampled control, by a callback, or by the caller. Each jump ends a step,
+// and the rate is recomputed after it.
 #pragma once
 
 #include "run/events/breaks.hpp"
@@ -10,15 +10,15 @@ class Torques {
 public:
     Torques(System& system, Progress& progress, const Options& options, Output& output, Breaks& breaks);
 
-    // Behind a break of functions of time that was reached: a step of time stepping finds velocities that jump itself.
+    // Pass a break of time functions if one was reached. Time stepping computes velocity jumps itself.
     void enter() { if (breaks_.reached()) breaks_.enter(); }
-    // Of sampled control, where its next period begins now.
+    // Sample the sampled control if its next period begins now.
     void sample();
-    // Of the callback, where it gives some; whether the run goes on.
+    // Call the user's callback, and set the torques that it returns. Return false if the callback ends the run.
     bool ask_callback();
-    // In place of the actuation's from here on.
+    // Replace the actuation torques from now on.
     void set(const VecX& torque);
-    // The next time at which actuation jumps or bends, or a function of time breaks; the end of the run at most.
+    // Return the next time at which the actuation jumps or kinks or a time function breaks, at most `t_end`.
     double next_stop(double t_end) const;
 
 private:
@@ -33,7 +33,7 @@ private:
     Breaks& breaks_;
 };
 
-// Number of whole lengths in a time that should be a multiple of them, but for rounding.
+// Return the number of whole lengths in a time, with a tolerance for multiples that rounding makes shorter.
 double whole_lengths(double time, double length);
 
 }  // namespace pn

@@ -15,16 +15,17 @@ namespace pn {
 
 namespace {
 
-// A rate that changes by less than this part of the velocities in play (and of one) goes on.
+// Maximum change of a continuous rate, relative to 1 + the largest velocity.
 constexpr double rate_rounding = 1e-11;
-// A change of a rate is looked into where accelerations leave this part of it unexplained; one of an acceleration where it
-// is this part of the acceleration.
+// Thresholds that start the search for a jump. `unexplained`: change of the rate beyond the integral of the
+// accelerations, relative to the rate. `uneven`: change of the acceleration, relative to the acceleration.
 constexpr double unexplained = 1e-4, uneven = 0.2;
-// A jump keeps at least this part of such a change in one half of the stretch; a smooth function leaves less.
+// A jump keeps at least this fraction of the initial defect in one half of each bisected interval. A smooth function
+// keeps less.
 constexpr double kept_part = 0.3;
-// A value that jumps by more than this is no motion [m or rad].
+// Maximum jump of a value [m or rad]. Larger jumps raise a Failure.
 constexpr double value_jump = 1e-9;
-// Intervals of an adaptive step, which may be long, between whose ends a function of the user's is compared.
+// Number of intervals of an adaptive step in which a user function is checked. Adaptive steps can be long.
 constexpr int adaptive_intervals = 16;
 
 struct Probe {
@@ -34,8 +35,9 @@ struct Probe {
 
 Probe probe(const TimeFunction& f, double t) { return {t, evaluate(f, t)}; }
 
-// The change of the rate beyond the integral of the accelerations, and the change of the value beyond that of the rates, by
-// the trapezoidal rule and its correction.
+// Compute the change of the rate beyond the integral of the accelerations. Add the change of the value beyond the
+// integral of the rates, over the length of the interval. Both integrals use the trapezoidal rule, the second with its
+// correction.
 double rate_defect(const Probe& a, const Probe& b) {
     const double h = b.t - a.t;
     const double rate = b.f[1] - a.f[1] - 0.5 * h * (a.f[2] + b.f[2]);
@@ -52,7 +54,8 @@ double rate_size(const Probe& a, const Probe& b) {
 
 double acceleration_change(const Probe& a, const Probe& b) { return std::abs(b.f[2] - a.f[2]); }
 
-// The jump inside that makes most of the defect, between two neighboring numbers; nothing where the function is smooth.
+// Return the first point after the jump that causes most of the defect, to neighboring floating-point times. Return
+// nothing if the function is smooth.
 std::optional<Probe> find_jump(const TimeFunction& f, Probe& a, Probe b, double (*defect)(const Probe&, const Probe&)) {
     const double least = kept_part * defect(a, b);
     for (;;) {
@@ -115,8 +118,8 @@ bool Breaks::pass() {
     return jumps;
 }
 
-// M (v+ - v-) = A^T I, A v+ + phi_t+ = 0: of constraints alone. Contacts strike afterwards, and dry friction, whose forces
-// are finite, gives no impulse.
+// Solve M (v+ - v-) = A^T I, A v+ + phi_t+ = 0 for the constraints alone. Contact impacts follow afterwards. Dry
+// friction has finite forces and gives no impulse.
 void Breaks::jump(const std::vector<double>& before, const std::vector<double>& after) {
     output_.before_jump();
     system_.read(now_.y);

@@ -1,4 +1,4 @@
-// Times at which functions of time break: steps end there, and the next step takes the functions as they are behind. If
+// Times at which time functions break. Steps end there, and the next step evaluates the functions after the break. If
 // the rate of a prescribed motion jumps, an impulse of the motion's rows makes the velocity jump.
 #pragma once
 
@@ -14,16 +14,17 @@ class Breaks {
 public:
     Breaks(System& system, Progress& progress, Output& output, Recording& out);
 
-    // At the time now: rows are evaluated as behind the last break, and as before the next.
+    // Set the stretch between the last break and the next one at the current time. Rows are evaluated within this
+    // stretch.
     void enter();
-    // The next break, or infinity; and whether it is now.
+    // Time of the next break (infinity if none), and a check if it is reached.
     double next() const { return next_; }
     bool reached() const { return now_.t >= next_; }
-    // Goes behind the break that was reached, where the rate is taken anew; whether the velocity has jumped. Modes of
-    // contacts and friction behind a jump are still to be found.
+    // Pass the break that was reached, and recompute the rate. Return true if the velocity has jumped. The caller must
+    // then select the modes of contacts and friction.
     bool pass();
-    // Looks for a break of a function of the user's in a step from now to `end`. A pulse that begins and ends within one of
-    // its sixteen intervals is not seen.
+    // Search for a break of a user function in a step from the current time to `end`. A pulse inside one interval of
+    // the search is not detected (16 intervals for adaptive steps, else 1).
     void look(double end, bool adaptive = true);
 
 private:

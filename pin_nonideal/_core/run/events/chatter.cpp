@@ -6,10 +6,11 @@ namespace pn {
 
 namespace {
 
-// This many events within the chatter's time make the run go on by time stepping for a while, in so many steps. Where
-// it goes on right after, the while is made longer by this factor, up to the longest [s].
+// Number of events within `chatter_time` that starts a stretch of time stepping with `chatter_steps` steps. If events
+// crowd again right after it, the next stretch is longer by `chatter_growth`, up to `longest_chatter` [s].
 constexpr int chatter_events = 60;
-// Changes at so many instants in that time, of which the last leads nowhere, dwindle to rest.
+// Number of instants with mode changes within `chatter_time` that counts as an accumulation (Zeno) if the last one
+// finds no motion.
 constexpr size_t dwindling_events = 6;
 constexpr int chatter_steps = 50;
 constexpr double chatter_growth = 2.0, longest_chatter = 1e-2;
@@ -30,7 +31,7 @@ bool Clusters::bridge(int element, double t_end) {
         step_over(element, t_end);
         return true;
     }
-    recent.clear();  // steps of SciPy's methods go on without a look at events
+    recent.clear();  // steps of SciPy's methods continue without event location
     out_.events.push_back({now_.t, Event::Kind::chatter, element});
     return false;
 }
@@ -47,7 +48,7 @@ bool Clusters::dwindles() const {
     return last.size() == dwindling_events && now_.t - last.front() <= chatter_time;
 }
 
-// Twice the last one where events went on crowding right after it.
+// Return the length [s] of the next stretch: twice the last one if events crowded again right after it.
 double Clusters::next_stretch() const {
     const std::vector<double>& recent = now_.recent_events;
     const double first = recent.empty() ? now_.t : recent.front();

@@ -1,4 +1,4 @@
-// Events that come too thick (chatter) are bridged by time stepping, which needs none.
+// Chatter: crowded events are bridged by time stepping, which locates no events.
 #pragma once
 
 #include "run/integrators/stiffness.hpp"
@@ -6,24 +6,24 @@
 
 namespace pn {
 
-constexpr double chatter_time = 1e-4;  // for which events that come too thick are stepped over [s]
+constexpr double chatter_time = 1e-4;  // window of the event count, and shortest stretch of time stepping [s]
 
 class Clusters {
 public:
     Clusters(System& system, Progress& progress, const Options& options, StiffnessGuard& stiffness,
              TimeStepping& time_stepping, Recording& out);
 
-    // An event that changes the motion, now.
+    // Count an event at the current time that changes the motion.
     void count() { now_.recent_events.push_back(now_.t); }
-    // An instant at which modes change.
+    // Record the current time as an instant of mode changes.
     void remember();
-    // Goes on by time stepping for a while where events come too thick, the last of this element; whether it did. The
-    // modes are to be found anew then.
+    // Bridge a stretch by time stepping if events crowd. `element`: friction element of the last event. Return true if
+    // a stretch was bridged. The caller must then select the modes.
     bool bridge(int element, double t_end);
-    // Whether this event, whose motion was not found, is one of several that came closer and closer: what is left of them
-    // until they rest is less than a step can tell.
+    // Check if an event without a known motion ends an accumulation of mode changes. A step cannot resolve the
+    // remaining time until rest.
     bool dwindles() const;
-    // Goes on by time stepping for a while.
+    // Bridge one stretch by time stepping.
     void step_over(int element, double t_end);
 
 private:

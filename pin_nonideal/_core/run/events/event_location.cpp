@@ -18,32 +18,36 @@ namespace {
 
 using EventKind = FoundEvent::Kind;
 
-// Slip of several directions below this has come to rest in fixed steps, which do not locate it.
+// Speed below which slip in several directions has come to rest in fixed steps, relative to 1 + the largest velocity.
+// Fixed steps do not locate this rest.
 constexpr double arrived_speed = 1e-7;
-// Slip that has more than this part left of what its step began with, and more than this speed, passes by rest.
+// Slip passes by rest if it keeps more than `rest_part` of its speed at the step's start and exceeds `passing_speed`.
 constexpr double rest_part = 0.05, passing_speed = 1e-6;
-// A fixed step covers this part of the time to rest, and this part of its own length at least.
+// Length of a fixed step toward a rest: relative to the time to the rest, and minimum relative to the full step.
 constexpr double part_toward_rest = 0.5, least_shortened = 1e-3;
-// A step that misses a rest ends before it, by this part of the time to it. A step that begins with slip of fewer
-// tolerances than this may end at rest in any case.
+// A step that misses a rest ends before it, by `part_before_rest` of the time to the rest. If slip begins with fewer
+// than `negligible_slip` tolerances, the step may end at the rest.
 constexpr double part_before_rest = 0.1, negligible_slip = 10.0;
 
-// --- The step taken again
+// --- Repeated step
 constexpr int correction_passes = 12;
-// Gaps that close almost together change places so often, where the step taken again is not quite its interpolant.
+// Maximum number of earlier gaps that replace a crossing. The repeated step differs slightly from its interpolant, so
+// gaps that close almost together can change their order.
 constexpr int most_closed_before = 4;
 constexpr double time_rounding = 2e-16, corrected_width = 1e-13;
-// Part of the step as it ends by which its end moves along the rate there, instead of the step being taken again: what
-// that leaves out is half the square of it, of the step's own change of the rate. A flight may be a millionth of the step
-// that was tried, and moving by all of it would leave out its fall.
+// Maximum move of the step's end along the rate there, relative to the step. Longer moves repeat the step. A move
+// neglects half of its square times the change of the rate per step. A flight can be a millionth of the tried step, and
+// a move over all of it would neglect the fall.
 constexpr double moved_part = 1e-6;
-// The instant of a release is found to this part of the step or of the time. A secant of the rates beyond it is believed
-// where they have fallen to this part, and keeps off its root by this part of the way.
+// Location of a release. `release_width`: tolerance relative to the step or the time. `least_fall`: maximum ratio of
+// two rates for which their secant is used. `short_of_root`: distance kept from the root of the secant, relative to the
+// distance to it.
 constexpr double release_width = 1e-12, least_fall = 0.7, short_of_root = 1e-2;
-// Where the step does not show yet what its interpolant does, it goes on by this part of it, then by so many times that.
+// Extension of a repeated step that does not show the release of its interpolant. The first extension is relative to
+// the step, and each further one is longer by a factor.
 constexpr double least_later = 1e-11, further_part = 10.0;
 
-// A step at rest is divided into so many parts, at whose ends it is asked whether what sticks holds.
+// Number of parts of a step at rest. Sticking elements are checked at the end of each part.
 constexpr int places_inside = 8;
 
 }  // namespace
@@ -77,7 +81,7 @@ double EventLocator::margin_at_end(const Watch& watch) {
     return search_.margin(watch, stepper_.t0 + stepper_.h, stepper_.y1);
 }
 
-// Slip of several directions that has come to rest at the end of a fixed step.
+// Check if slip in several directions has come to rest at the end of a fixed step.
 bool EventLocator::has_arrived(int e) const {
     if (p.frictions[e].dim == 1 || stepper_.method.adaptive()) return false;
     const double speed = system_.velocity(stepper_.y1).cwiseAbs().maxCoeff();
@@ -90,17 +94,18 @@ void EventLocator::end_step_at(double size) {
     system_.project_and_evaluate(stepper_.t0 + size, stepper_.y1, stepper_.end_rate());
 }
 
-// The step's end moves a little, or the step is taken again.
+// Move the step's end to `size`, or repeat the step if the move is too long.
 void EventLocator::correct_end_to(double size) {
     if (std::abs(size - stepper_.h) > moved_part * stepper_.h) return end_step_at(size);
     stepper_.move_end(size - stepper_.h);
     system_.project_and_evaluate(stepper_.t0 + stepper_.h, stepper_.y1, stepper_.end_rate());
 }
 
-// Slip of several directions turns as it comes to rest. The component across the final direction vanishes as a power
-// 1 + k of the component along it, with any k > 0, which no polynomial follows to the end. At the instant at which the
-// component along has vanished, the slip that is left is an error of the step. The error estimate counts as well, since
-// the stages of the step taken again lie at other times than those of the accepted step.
+// Check if a step misses the rest of slip in several directions, at which it should end.
+// Slip turns as it comes to rest. The component across the final direction vanishes as a power 1 + k of the component
+// along it, for any k > 0. No polynomial resolves this. When the component along the direction has vanished, the
+// remaining slip is an error of the step. The error estimate counts as well, because the repeated step has its stages
+// at other times than the accepted step.
 bool EventLocator::misses_rest(const Watch& watch) const {
     if (watch.kind != Watch::Kind::slip || p.frictions[watch.index].dim == 1) return false;
     if (!stepper_.method.adaptive() || stepper_.method.outside()) return false;
@@ -110,7 +115,7 @@ bool EventLocator::misses_rest(const Watch& watch) const {
     return !(accurate && rests) && norm_.of_speed(system_.slip(stepper_.start_rate(), watch.index)) > negligible_slip;
 }
 
-// Ends the step before the rest. The steps that follow begin with less slip, and their errors are smaller in proportion.
+// End the step before the rest. The following steps begin with less slip, and their errors are proportionally smaller.
 void EventLocator::end_before_rest() {
     const double to_rest = stepper_.h;
     end_step_at((1.0 - part_before_rest) * to_rest);
@@ -118,7 +123,7 @@ void EventLocator::end_before_rest() {
     time_to_rest_ = part_before_rest * to_rest;
 }
 
-// Takes the step again up to the event, or to an earlier time if it misses a rest.
+// Repeat the step up to the event, or up to an earlier time if it misses a rest.
 void EventLocator::step_onto(const Crossing& crossing) {
     const double full = stepper_.h;
     time_to_rest_.reset();
@@ -127,22 +132,23 @@ void EventLocator::step_onto(const Crossing& crossing) {
     if (misses_rest(crossing.watch)) end_before_rest();
 }
 
-// Corrects the instant by the margin that is left there. Its rate is known for slip along one direction; in other cases it
-// is that of the interpolant, then a secant's.
+// Correct the instant by Newton's method on the remaining margin. The rate of the margin is known for gaps and for slip
+// along one direction. Other margins use the rate of the interpolant, then a secant.
 void EventLocator::correct_instant(const Crossing& crossing, double full) {
     const Watch& watch = crossing.watch;
     const bool of_gap = watch.kind == Watch::Kind::gap;
     const bool known_rate = of_gap || (watch.kind == Watch::Kind::slip && p.frictions[watch.index].dim == 1);
     const double resolution = time_rounding * std::max(std::abs(stepper_.t0), full);
     double rate = crossing.slope / full;
-    // Between an instant before it and one behind it: where the motion is not that of the interpolant, or where what others
-    // hold on its plane has no rate but rounding, Newton's method would lead on to the step's end, past other events.
+    // Bracket of the instant. Without a bracket Newton's method could run to the step's end, past other events. Two
+    // cases cause this: the motion differs from the interpolant, or other contacts hold the gap, so that its rate is
+    // only rounding.
     double size = stepper_.h, here = margin_at_end(watch), low = 0.0, high = full;
     const double still = of_gap ? rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff()) : 0.0;
     for (int it = 0; it < correction_passes; ++it) {
         if (of_gap) rate = gap_rate(p, w, watch.index);
         else if (known_rate) rate = slip_rate_along_mode(p, w, watch.index);
-        if (!(rate < -still)) return;  // it hardly dipped: from here on it moves away again, and no root lies ahead
+        if (!(rate < -still)) return;  // the margin grows from here on, and no root lies ahead
         (here > 0.0 ? low : high) = size;
         double next = size - here / rate;
         if (!(next >= low && next <= high)) next = 0.5 * (low + high);
@@ -155,8 +161,8 @@ void EventLocator::correct_instant(const Crossing& crossing, double full) {
     }
 }
 
-// Slip of several directions may turn far without coming to rest. It has come to rest when hardly anything is left of
-// the slip that the step began with.
+// Check if slip in several directions turns without coming to rest. At rest hardly any of the slip at the step's start
+// is left.
 bool EventLocator::passes_by_rest(int e) const {
     if (p.frictions[e].dim == 1) return false;
     const double speed = system_.velocity(stepper_.y1).cwiseAbs().maxCoeff();
@@ -179,23 +185,23 @@ std::optional<FoundEvent> EventLocator::locate() {
         crossing = before;
         step_onto(*crossing);
     }
-    if (const auto lifted = lift_together()) return lifted;  // which may come earlier
+    if (const auto lifted = lift_together()) return lifted;  // which may be earlier
     if (!crossing || time_to_rest_) return release_together();
     const Watch& watch = crossing->watch;
     const bool reverses = watch.kind == Watch::Kind::slip && passes_by_rest(watch.index);
-    if (const auto released = release_together()) return released;  // which may come earlier
+    if (const auto released = release_together()) return released;  // which may be earlier
     if (watch.kind == Watch::Kind::gap) return found(EventKind::touch, watch.index);
     if (watch.kind == Watch::Kind::load) return found(EventKind::lift, watch.index);
     if (watch.kind == Watch::Kind::contact) return found(EventKind::pull, watch.index);
     return found(reverses ? EventKind::reversal : EventKind::rest_or_limit, watch.index);
 }
 
-// How fast what stuck before begins to slip at a state of the step, where forces within all limits do not hold it any
-// more; nothing where they do.
+// Return the acceleration with which sticking elements begin to slip at a state of the step. Return nothing if forces
+// within all limits can hold them.
 std::optional<double> EventLocator::release_rate(double t, const VecX& y, const std::vector<Mode>& modes,
                                                  ModeQuestion& asked) {
     system_.read(y);
-    // What has just come to rest may be found to slip the other way: the step has its own directions, taken again or not.
+    // Selecting modes can reverse the slip of an element that has just come to rest. The step keeps its own directions.
     const std::vector<Vec3> directions = w.state.slip_direction, last_directions = w.state.last_direction;
     asked = {modes, {}, {}};
     for (int e = 0; e < system_.ne; ++e)
@@ -206,7 +212,7 @@ std::optional<double> EventLocator::release_rate(double t, const VecX& y, const 
         for (int e : asked.at_rest)
             if (modes[e] == sticking && w.state.mode[e] != sticking)
                 rate = std::max(rate, std::abs(slip_rate_along_mode(p, w, e)));
-    } catch (const Failure& failure) {  // they do not stick; the contacts that may open decide with them what they do
+    } catch (const Failure& failure) {  // sticking fails: unilateral contacts change together with the elements
         if (p.gaps.empty() || failure.kind != Failure::Kind::not_converged) throw;
         rate = HUGE_VAL;
     }
@@ -217,7 +223,7 @@ std::optional<double> EventLocator::release_rate(double t, const VecX& y, const 
     // Contacts hold as long as any forces within their cones do, not only those of minimum norm.
     const bool hold = rate > noise && !p.gaps.empty() && closed_contacts_hold(p, w, t, system_.q, system_.v);
     begin_step(p, w, t, system_.q, system_.v);
-    if (rate <= noise || hold) return std::nullopt;  // what the others hold does not move, whatever its force
+    if (rate <= noise || hold) return std::nullopt;  // an element held by others does not move, whatever its force
     return rate;
 }
 
@@ -225,7 +231,7 @@ std::optional<double> EventLocator::release_rate_at_end(const std::vector<Mode>&
     return release_rate(stepper_.t0 + stepper_.h, stepper_.y1, modes, asked);
 }
 
-// Whether all loads that redundant contacts share can press, at the step's end and at its stages.
+// Check if nonnegative loads exist for the closed contacts, at the start, at the stages and at the end of the step.
 bool EventLocator::all_press() {
     for (const Stepper::Look& look : stepper_.looks())
         for (int i : w.now.touching)
@@ -233,8 +239,8 @@ bool EventLocator::all_press() {
     return true;
 }
 
-// Redundant contacts stay closed as long as some loads do that press all of them, whatever their least-norm split says.
-// Halves the step down to the instant from which on none do.
+// Locate the lift-off of redundant contacts. They stay closed as long as nonnegative loads exist, even if the
+// minimum-norm loads are not all nonnegative. Bisects the step for the first instant without nonnegative loads.
 std::optional<FoundEvent> EventLocator::lift_together() {
     if (p.gaps.empty() || !w.now.rows.redundant || all_press()) return std::nullopt;
     double low = 0.0, high = stepper_.h;
@@ -245,19 +251,19 @@ std::optional<FoundEvent> EventLocator::lift_together() {
     }
     if (low > 0.0) {
         end_step_at(low);
-        if (const auto released = release_together()) return released;  // before
+        if (const auto released = release_together()) return released;  // the release is earlier
     }
     end_step_at(high);
     return FoundEvent{EventKind::lift, -1, stepper_.t0 + stepper_.h};
 }
 
-// The part of the step at which, by its interpolant, nothing holds any more what begins to slip at its end at this rate.
-// Closes in from beyond by the rates at which slip begins there, which fall to zero toward it where limits do not jump,
-// and by halves else.
+// Return the part of the step at which its interpolant releases the sticking elements. `rate`: their slip acceleration
+// at the step's end. The search approaches the instant from later times. It uses secants of the acceleration, which
+// falls to zero toward the instant if limits do not jump, and bisection otherwise.
 double EventLocator::release_part(double rate, const std::vector<Mode>& modes, ModeQuestion& asked) {
     const double full = stepper_.h, width = release_width * std::max(std::abs(stepper_.t0) / full, 1.0);
     double low = 0.0, high = 1.0, beyond = 0.0, rate_beyond = 0.0;
-    bool falls = false;  // the rate, as the instant comes near
+    bool falls = false;  // the rate falls toward the instant
     VecX y(system_.ny);
     stepper_.make_interpolant();
     while (high - low > width) {
@@ -283,8 +289,8 @@ double EventLocator::release_part(double rate, const std::vector<Mode>& modes, M
     return high;
 }
 
-// While nothing moves, steps are long beside what functions of time may do: whether what sticks holds is asked inside
-// as well. The step ends at the first place where it does not.
+// Check sticking elements inside a step at rest, and end the step at the first place of release. Return their slip
+// acceleration there. Steps at rest can be long relative to changes of user functions.
 std::optional<double> EventLocator::release_rate_inside(const std::vector<Mode>& modes, ModeQuestion& asked) {
     if (!p.asks_functions || (system_.velocity(stepper_.y1).array() != 0.0).any()) return std::nullopt;
     const double whole = stepper_.h;
@@ -301,9 +307,9 @@ std::optional<double> EventLocator::release_rate_inside(const std::vector<Mode>&
     return std::nullopt;
 }
 
-// Where redundant elements stick together, the multiplier of one says little: they hold as long as some forces within
-// all limits do, those of elements included that slip but do not move. The step is taken again up to where its
-// interpolant shows that none do, and a little further where the step itself does not show it yet.
+// Locate the release of redundant sticking elements. The multiplier of a single element decides nothing: the elements
+// hold as long as some forces within all limits do. Elements that slip without moving are included. The step is
+// repeated up to the release on its interpolant. It is extended slightly if its own end does not show the release.
 std::optional<FoundEvent> EventLocator::release_together() {
     if (!w.state.indeterminate) return std::nullopt;
     const std::vector<Mode> modes = w.state.mode;

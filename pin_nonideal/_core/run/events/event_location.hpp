@@ -1,8 +1,8 @@
-// Where an event lies inside a step.
+// Location of an event inside a step.
 //
-// The search on the interpolant gives the first guess of the instant; the step is then taken again up to there, so that an
-// event is as accurate as a step, and its end is moved by the remaining margin. Toward a rest of slip in several
-// directions a step that does not reach it within the tolerance ends before it, and a shorter one follows.
+// The search on the interpolant gives a first guess of the instant. The step is then repeated up to that instant, so an
+// event is as accurate as a step. The remaining margin corrects the step's end. A step can miss the rest of slip in
+// several directions by more than the tolerance. It then ends before the rest, and a shorter step follows.
 #pragma once
 
 #include <optional>
@@ -15,15 +15,15 @@ namespace pn {
 
 struct FoundEvent {
     enum class Kind {
-        rest_or_limit,      // an element has come to rest, or what sticks has reached its limit
-        released_together,  // redundant elements at rest cannot hold any longer, this one among them
-        reversal,           // the slip of an element has turned without coming to rest
-        pull,               // a contact that is kept begins to pull
-        lift,               // one that may open carries nothing any more, or several together cannot press
+        rest_or_limit,      // a friction element comes to rest, or a sticking element reaches its limit
+        released_together,  // redundant sticking elements begin to slip, including this one
+        reversal,           // the slip of an element reverses without coming to rest
+        pull,               // a bilateral contact begins to carry tension
+        lift,               // a unilateral contact loses its load, or several together have no nonnegative loads
         touch,              // a gap closes
-        user,               // a function of the user crosses zero
+        user,               // a user function crosses zero
     } kind;
-    int index;  // of the friction element, of the contact that pulls, or of the gap; -1 for several gaps
+    int index;  // index of the friction element, the contact in tension or the gap, -1 for several gaps
     double time;
 
     bool changes_modes() const { return kind != Kind::reversal && kind != Kind::pull && kind != Kind::user; }
@@ -32,16 +32,17 @@ struct FoundEvent {
 
 class EventLocator {
 public:
-    // Slip speed of each element of several directions when its step began, and whether each contact pulls by then.
+    // `slip_at_start`: slip speed at the step's start of each element with several directions. `pulls`: true for each
+    // contact in tension at that time.
     EventLocator(System& system, Stepper& stepper, ErrorNorm& norm, const std::vector<double>& slip_at_start,
                  const std::vector<char>& pulls, GapWatch& watch);
 
-    // Ends the step just taken at its first event; the workspace is evaluated at the step's end either way.
+    // End the step just taken at its first event. The workspace is evaluated at the step's end in either case.
     std::optional<FoundEvent> locate();
-    // Time from the step's end to the rest of slip before which it was ended, if it was.
+    // Return the time from the step's end to the rest of slip before which the step was ended, if any.
     std::optional<double> time_to_rest() const { return time_to_rest_; }
 
-    // Fixed steps shrink toward the rest of a slip of several directions, whose direction may turn fast at the end. The
+    // Shorten a fixed step toward the rest of slip in several directions, whose direction can turn fast at the end. The
     // workspace must be evaluated at the step's start.
     double shorten_toward_rest(const VecX& rate, double size);
 

@@ -16,36 +16,38 @@ namespace pn {
 
 namespace {
 
-// --- What may have happened in a step. Speeds [rad/s or m/s] grow with the largest of the scene, as 1 + speed.
-// Part of a limit by which rounding may pass it: of a force that stands still, and of the share that stages see.
+// --- Candidates for a crossing. Speeds [rad/s or m/s] are relative to 1 + the largest speed of the scene.
+// Rounding tolerances relative to a friction limit: for a constant force, and for the force / limit ratio at the
+// stages.
 constexpr double limit_rounding = 1e-12, share_rounding = 1e-9;
-// What a parabola through the shares at three stages rises above them counts so often, and their range by this part: the
-// share itself may go further between the stages.
+// Safety margins of the force / limit ratio between the stages. The first is a factor on the rise of a parabola above
+// three stages, the second a fraction of the ratio's range.
 constexpr double times_parabola = 3.0, range_between = 0.02;
-// Part of the speed of rest by which an element that has just begun to slip may lie on the other side.
+// Allowed reverse speed of an element that has just begun to slip, relative to the speed of rest.
 constexpr double fresh_slip = 1e-3;
-// A least speed between two stages counts as a dip below zero where it is below this part of the speeds' range: the
-// cubics through the stages miss the motion by less.
+// A minimum speed between two stages counts as a dip below zero if it is below this fraction of the speeds' range. The
+// error of the cubics through the stages is smaller.
 constexpr double dip_part = 0.02;
 
 // --- The interpolant
-constexpr int location_grid = 24;  // points of a step at which a margin is looked at first
+constexpr int location_grid = 24;  // grid intervals of a step at which a margin is sampled first
 constexpr double apart = 1.0 / location_grid;
-constexpr double beyond = 2.0;     // part of a step: none of it
-// A parabola through three points lies lower than the middle one by an eighth of its second difference at most; twice
-// that is looked into.
+constexpr double beyond = 2.0;     // part of the step that means no crossing
+// A parabola through three points falls below the middle one by at most 1/8 of its second difference. Dips up to twice
+// that depth are searched.
 constexpr double parabola_part = 0.25;
-// A margin that is so far below zero, in parts of that at the step's start, where it should be zero has leapt there; and
-// parts of a time that tell an instant from the next.
+// `leap_part`: negative margin that counts as a jump, relative to the margin at the step's start. `leap_digits`:
+// relative time difference that separates two instants.
 constexpr double leap_part = 1e-3, leap_digits = 1e-15;
-constexpr double slope_part = 1e-4;  // of the step, over which the rate of a margin is a difference
-constexpr double doubted_part = 1e-2;  // of the change of a share, to which an interpolant of low order tells it
-// What the shares' rates tell is confirmed in so many evaluations, until a correction is this part of the step: what is
-// left is the square of it, and the step taken again corrects that.
+constexpr double slope_part = 1e-4;  // step of the difference for the rate of a margin, relative to the step
+// Error of a force / limit ratio that comes from an interpolant of low order, relative to its change.
+constexpr double doubted_part = 1e-2;
+// Maximum evaluations that confirm an interpolated crossing, and tolerance of the correction relative to the step. The
+// remaining error is the square of the correction, which the repeated step corrects.
 constexpr int confirmations = 3;
 constexpr double confirmed_width = 1e-4;
-// A margin leaps where the shares' rates say that it is gone and more than this part of it is left. The polynomial through
-// rates before a leap and behind it falls so steeply that a correction by its slope is tiny wherever the leap lies.
+// A margin jumps if more than this fraction of it is left at the interpolated crossing. The polynomial through rates
+// before and after a jump is very steep, so slope corrections are tiny wherever the jump lies.
 constexpr double left_part = 0.1;
 
 }  // namespace
@@ -69,18 +71,18 @@ double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
     return held.limit * (1.0 + limit_rounding) - held.force.norm();
 }
 
-// --- What may have crossed ------------------------------------------------------------------------------------------
+// --- Candidates for a crossing ---------------------------------------------------------------------------------------
 
 double EventSearch::noise() const {
     return fresh_slip * rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff());
 }
 
-// By how much what lingers at rest may go against its mode.
+// Return the speed with which an element of deferred sticking may slip against its mode.
 double EventSearch::allowance(int e) const {
     return w.state.lingers[e] ? raised_rest * (1.0 + system_.velocity(stepper_.y0).cwiseAbs().maxCoeff()) : 0.0;
 }
 
-// Whether what sticks is past its limit at the step's end, or may have been inside, between two stages.
+// Check if a sticking element is beyond its limit at the step's end, or may have been between two stages.
 bool EventSearch::may_reach_limit(int e) {
     const std::vector<Stepper::Look>& looks = stepper_.looks();
     const auto share = [&](size_t k) { return system_.share(*looks[k].rate, e); };
@@ -99,11 +101,11 @@ bool EventSearch::may_reach_limit(int e) {
     return std::max(most, -least) + times_parabola * rise + range_between * range > 1.0 + limit_rounding;
 }
 
-// Whether what slips goes the other way at the step's end, or may have done so inside.
+// Check if a slipping element has reversed at the step's end, or may have done so inside.
 bool EventSearch::may_stop(int e) const { return slip_along_mode(p, w, e) + allowance(e) < -noise() || dips(e); }
 
-// A dip through zero and back. Speeds and their rates are known at the stages and at both ends: cubics through them
-// tell where one may have been below zero in between.
+// Check if a slip speed may dip through zero and back. Speeds and their rates are known at the stages and at both ends.
+// The minima of the cubics through them decide.
 bool EventSearch::dips(int e) const {
     if (stepper_.method.order < 2) return false;
     const std::vector<Stepper::Look>& looks = stepper_.looks();
@@ -117,7 +119,7 @@ bool EventSearch::dips(int e) const {
         below |= k > 0 && k + 1 < looks.size() && speed(k) < below_rest;
     }
     if (below) return true;
-    if (most <= allowed - below_rest) return false;  // held by what sticks, it never left rest
+    if (most <= allowed - below_rest) return false;  // held by sticking elements, it never left rest
     const double dip = dip_part * (most - least);
     for (size_t k = 0; k + 1 < looks.size(); ++k) {
         const double length = (looks[k + 1].part - looks[k].part) * stepper_.h;
@@ -128,7 +130,7 @@ bool EventSearch::dips(int e) const {
     return false;
 }
 
-// Contacts that begin to pull: one of those that share a load, where none of them pulls yet.
+// Add contacts that begin to carry tension: one of each load-sharing group in which no contact carries tension yet.
 void EventSearch::add_pulls(std::vector<Watch>& list) {
     const auto may_pull = [&](int i) { return !pulls_[i] && normal_force(p, w, i) < 0.0; };
     const int n = static_cast<int>(p.contacts.size());
@@ -145,7 +147,7 @@ void EventSearch::add_pulls(std::vector<Watch>& list) {
     }
 }
 
-// Whether the normal force of a closed contact pulls at the step's end, or may have done so inside, between two stages.
+// Check if the normal force of a closed contact is negative at the step's end, or may have been between two stages.
 bool EventSearch::may_pull(int gap) {
     const std::vector<Stepper::Look>& looks = stepper_.looks();
     const auto load = [&](size_t k) { return system_.load(*looks[k].rate, gap); };
@@ -160,7 +162,8 @@ bool EventSearch::may_pull(int gap) {
     return least - times_parabola * fall - range_between * (most - least) < -load_rounding(p, w, gap);
 }
 
-// What lies past its event at the step's end (the workspace is evaluated there), or may have crossed inside.
+// Return the margins that are negative at the step's end, or may have crossed zero inside. The workspace must be
+// evaluated at the step's end.
 std::vector<Watch> EventSearch::crossed() {
     std::vector<Watch> list;
     if (stepper_.method.order > 1) add_pulls(list);
@@ -172,14 +175,14 @@ std::vector<Watch> EventSearch::crossed() {
         }
     }
     if (p.gaps.empty()) return list;
-    if (!w.now.rows.redundant)  // those are asked together
+    if (!w.now.rows.redundant)  // redundant loads are checked together
         for (int i : w.now.touching)
             if (!is_bare(p, i) && may_pull(i)) list.push_back({Watch::Kind::load, i});
     for (const GapSearch::Doubt& doubt : gaps_.doubtful()) list.push_back({Watch::Kind::gap, doubt.gap});
     return list;
 }
 
-// Of the gaps that were in doubt over the step.
+// Only candidate gaps of the step are checked.
 std::optional<Crossing> EventSearch::entered(const Watch& touches) {
     std::optional<Crossing> out;
     if (gaps_.doubted().empty()) return out;
@@ -195,7 +198,7 @@ std::optional<Crossing> EventSearch::entered(const Watch& touches) {
     return out;
 }
 
-// --- Where it crosses -----------------------------------------------------------------------------------------------
+// --- Location of a crossing -----------------------------------------------------------------------------------------
 
 bool EventSearch::integrates() const { return stepper_.method.order > 1 && !stepper_.method.outside(); }
 
@@ -211,13 +214,14 @@ double EventSearch::interpolated_share(int e, double part) const {
     return stepper_.interpolated_rate(part, system_.ns + 2 * e);
 }
 
-// How far the interpolated share of what sticks may be off: by what the further stages of the interpolant show, which
-// are as good as itself; without them by what the others show, and by a part of the share's change.
+// Return the error bound of the interpolated force / limit ratio of a sticking element. It comes from the further
+// stages of the interpolant, which are as accurate as the interpolant. Without further stages it comes from the other
+// stages and from a fraction of the ratio's change.
 double EventSearch::share_error(int e) const {
     const Method& method = stepper_.method;
     const bool further = method.further_stages > 0;
     double error = 0.0;
-    if (stepper_.collocates()) {  // its polynomial misses the rates at the step's ends alone
+    if (stepper_.collocates()) {  // its polynomial differs from the rates only at the step's ends
         for (const Stepper::Look& look : stepper_.looks())
             error = std::max(error, std::abs(interpolated_share(e, look.part) - system_.share(*look.rate, e)));
         return error;
@@ -261,13 +265,13 @@ double EventSearch::margin_inside(const Watch& watch, Source source, double part
     return margin(watch, t, probe_);
 }
 
-// Whether slip falls by more than a speed of rest over the step, at the rate that it starts with.
+// Check if slip falls by more than the speed of rest over the step, at the rate of the step's start.
 bool EventSearch::slows_down(int e, double rest) const {
     return stepper_.h * system_.slip_rate(stepper_.start_rate(), e) < -rest;
 }
 
-// Part of the step at which a watched margin first falls below zero, on a grid and between its points; beyond the step
-// where it does not.
+// Return the part of the step at which a margin first falls below zero, searched on a grid and between its points.
+// Return `beyond` if it does not.
 double EventSearch::first_crossing(const Watch& watch, Source source) {
     const auto margin_at = [&](double part) { return margin_inside(watch, source, part); };
     double g[location_grid + 1];
@@ -279,8 +283,8 @@ double EventSearch::first_crossing(const Watch& watch, Source source) {
     for (int k = 1; k <= location_grid; ++k) {
         g[k] = margin_at(k * apart);
         if (begins && g[k] < 0.0) {
-            // Slip of several directions that has just begun may first turn into its own; it has come to rest again
-            // where it rose before. What slows down did not begin: it came to rest just as the step before ended.
+            // Slip in several directions that has just begun may first turn. It has come to rest again only if it rose
+            // before. Slip that decreases from the start came to rest at the end of the last step.
             const bool turns = slips && p.frictions[watch.index].dim > 1 && !slows_down(watch.index, rest);
             const double part = k > 1 ? 0.0 : root_after_start(apart, g[1], turns ? rest : 0.0, margin_at);
             if (part > 0.0 || !turns) return part;
@@ -297,8 +301,9 @@ double EventSearch::first_crossing(const Watch& watch, Source source) {
     return beyond;
 }
 
-// Newton's method on the motion that the interpolant gives, from where the shares' rates say that a limit was reached;
-// nothing where it does not converge, or where the margin there is still near what it was as the step began: it leaps.
+// Confirm a crossing by Newton's method on the interpolated motion, from the crossing of the interpolated rates. Return
+// nothing if it does not converge. Return nothing either if the margin there is still near its value at the step's
+// start, since the margin then jumps.
 std::optional<double> EventSearch::confirm(const Watch& watch, double part, double slope, double at_start) {
     for (int it = 0; it < confirmations && slope < 0.0; ++it) {
         const double here = margin_inside(watch, Source::evaluation, part);
@@ -312,8 +317,8 @@ std::optional<double> EventSearch::confirm(const Watch& watch, double part, doub
     return std::nullopt;
 }
 
-// What a contact carries falls below zero in one leap where its place changes: a corner that comes to an edge flies off.
-// The event is behind it, by digits of the time that tell it from the instant before.
+// Return the crossing of a contact load that jumps below zero, as when a corner reaches an edge. The event lies after
+// the jump, by the smallest time difference that separates two instants. Return nothing if the load does not jump.
 std::optional<Crossing> EventSearch::behind_leap(const Watch& watch, Source from, double part) {
     if (!(margin_inside(watch, from, part) < -leap_part * margin_inside(watch, from, 0.0))) return std::nullopt;
     part = std::max(part, leap_digits * (std::abs(stepper_.t0) + stepper_.h) / stepper_.h);
@@ -336,7 +341,7 @@ Crossing EventSearch::cross(const Watch& watch, Source from) {
     return {watch, part, (margin_inside(watch, from, after) - margin_inside(watch, from, before)) / slope_part};
 }
 
-// The crossing that the shares' rates tell, as the motion on the interpolant has it.
+// Confirm a crossing of the interpolated rates on the interpolated motion.
 Crossing EventSearch::confirmed(const Crossing& told) {
     system_.read(stepper_.y1);
     if (told.watch.kind == Watch::Kind::load) {
@@ -353,7 +358,7 @@ std::optional<Crossing> EventSearch::first() {
     const std::vector<Watch> watches = crossed();
     if (watches.empty()) return std::nullopt;
     stepper_.make_interpolant();
-    std::vector<std::pair<Crossing, bool>> list;  // and whether it is sure
+    std::vector<std::pair<Crossing, bool>> list;  // crossing, and whether it is confirmed
     for (const Watch& watch : watches) {
         const Source from = source(watch);
         list.emplace_back(cross(watch, from), from != Source::shares);

@@ -1,9 +1,12 @@
-// Where in a step just taken a margin first crosses zero: of the slip speed of what slips, of what is left to the limit of
-// what sticks, of the normal force of a contact, of the gap of an open one.
+// Search for the first zero crossing of a margin in a step just taken. There are four kinds of margins:
+// - slip speed of a slipping element,
+// - distance of a sticking element to its limit,
+// - normal force of a contact,
+// - gap of an open contact.
 //
-// Speeds, forces and limits at the stages tell what may have crossed. The method's own interpolant tells where: of slip
-// by its velocities, which take no evaluation, of what sticks by the rate of the shares that it integrates, which one or
-// two evaluations confirm.
+// Speeds, forces and limits at the stages show which margins may have crossed. The method's own interpolant locates the
+// crossing. Slip uses interpolated velocities, which need no evaluation. Sticking uses the rate of the integrated force
+// / limit ratio, which one or two evaluations confirm.
 #pragma once
 
 #include <optional>
@@ -14,35 +17,36 @@
 
 namespace pn {
 
-// What may cross zero inside the step.
+// Margin that may cross zero inside the step.
 struct Watch {
     enum class Kind { slip, stick, contact, load, gap } kind;
-    int index;  // of the friction element, or of the contact: of one that is kept, or of a gap
+    int index;  // index of the friction element, the bilateral contact or the gap
 };
 
 struct Crossing {
     Watch watch;
-    double part, slope;  // of the step, and the rate of the margin there over the step
-    bool leaps = false;  // the margin is no root: it falls below zero at once
+    double part, slope;  // part of the step, and rate of the margin there per step
+    bool leaps = false;  // the margin jumps below zero without a root
 };
 
 class EventSearch {
 public:
-    // Whether each contact pulls by the step's start.
+    // `pulls`: true for each contact in tension at the step's start.
     EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls, GapWatch& watch);
 
-    // The first crossing; the workspace must be evaluated at the step's end, and is so again where there is none.
+    // Return the first crossing. The workspace must be evaluated at the step's end. If there is no crossing it is
+    // evaluated there again.
     std::optional<Crossing> first();
-    // The step has been taken again up to an event: a gap that its end is beyond, but one that touches there; the deepest.
-    // It is closed before that, where the motion is not quite that of the interpolant.
+    // Return the deepest penetrating gap at the end of a repeated step, other than the gap that touches there. This gap
+    // closed before, because the motion differs slightly from the interpolant.
     std::optional<Crossing> entered(const Watch& touches);
 
-    // Positive before the event, zero at it. The workspace must be evaluated at the state.
+    // Return a margin, positive before the event and zero at it. The workspace must be evaluated at the state.
     double margin(const Watch& watch, double t, const VecX& y);
 
 private:
-    // How a margin is found inside the step: from the interpolated velocities or shares alone, by kinematics, or by a
-    // whole evaluation.
+    // Evaluation of a margin inside the step: interpolated velocities, interpolated force / limit ratios, kinematics,
+    // or a whole evaluation.
     enum class Source { velocities, shares, kinematics, evaluation };
 
     double noise() const;
@@ -72,7 +76,7 @@ private:
     Workspace& w;
     const std::vector<char>& pulls_;
     GapSearch gaps_;
-    double doubt_ = 0.0;        // of the share that is looked at
+    double doubt_ = 0.0;        // error of the sampled force / limit ratio
     VecX probe_, probe_rate_;
 };
 

@@ -14,9 +14,9 @@ namespace pn {
 
 namespace {
 
-// Slip below this [rad/s or m/s] has no direction worth keeping.
+// Minimum slip speed [rad/s or m/s] that defines a slip direction.
 constexpr double directed_slip = 1e-12;
-// Part of its limit by which a sticking element may pass it by rounding.
+// Rounding tolerance of the limit of a sticking element, relative to the limit.
 constexpr double limit_rounding = 1e-9;
 
 bool hardly_moves(const System& system, int e) {
@@ -24,8 +24,8 @@ bool hardly_moves(const System& system, int e) {
     return slip <= raised_rest * (1.0 + system.v.cwiseAbs().maxCoeff());
 }
 
-// Modes of the elements at rest together, and the state that goes with them; those that turn out to move are taken off
-// the list.
+// Select the modes of all elements at rest together, and project the state. Elements that turn out to move are removed
+// from the list.
 void resolve_together(System& system, double t, ModeQuestion& asked, bool strikes) {
     const Program& p = system.p;
     Workspace& w = system.w;
@@ -33,10 +33,10 @@ void resolve_together(System& system, double t, ModeQuestion& asked, bool strike
     for (;;) {
         resolve_modes(p, w, t, system.q, system.v, asked);
         if (!strikes) keep_moving(p, w, t, system.v);
-        // What sticks from now on has no slip velocity at all, not one of rounding.
+        // Sticking elements get zero slip velocity, without rounding.
         project(p, w, t, system.q, system.v);
         begin_step(p, w, t, system.q, system.v);
-        // Nearly redundant elements that stuck together leave one that slips a velocity, which may oppose its mode.
+        // Nearly redundant sticking elements can leave a slipping element a velocity that opposes its mode.
         const auto moving = std::stable_partition(resting.begin(), resting.end(), [&](int e) {
             return hardly_moves(system, e) || slip_along_mode(p, w, e) >= 0.0;
         });
@@ -46,8 +46,8 @@ void resolve_together(System& system, double t, ModeQuestion& asked, bool strike
     }
 }
 
-// Whether the elements that stick share their load in several ways: one of them is beyond its limit, or the one that
-// reached it sticks on.
+// Check if the sticking elements share their load in several ways. Then one of them is beyond its limit, or the element
+// that reached its limit still sticks.
 bool shares_load(System& system, double t, const std::vector<int>& resting, int held) {
     const Program& p = system.p;
     Workspace& w = system.w;
@@ -59,7 +59,8 @@ bool shares_load(System& system, double t, const std::vector<int>& resting, int 
     return shares;
 }
 
-// Slip of several directions that begins from rest has no velocity to tell its direction: steps seek it.
+// Request collocation steps if slip in several directions begins from rest. Its velocity does not define a direction
+// yet.
 void seek_directions(System& system, const std::vector<int>& resting, bool sought) {
     const auto begins = [&](int e) { return system.p.frictions[e].dim > 1 && slips(system.w.state.mode[e]); };
     bool& seeks = system.w.state.seeks_directions;
@@ -67,7 +68,8 @@ void seek_directions(System& system, const std::vector<int>& resting, bool sough
             ((seeks && sought && turning(system)) || std::any_of(resting.begin(), resting.end(), begins));
 }
 
-// What came to rest in vain lingers there, until its mode changes or it moves.
+// Defer the sticking of an element that came to rest but must slip on. The deferral ends when its mode changes or it
+// moves.
 void linger(RunState& state, const std::vector<Mode>& before, const FoundEvent& event) {
     for (size_t e = 0; e < before.size(); ++e)
         if (before[e] != state.mode[e]) state.lingers[e] = 0;
@@ -89,16 +91,16 @@ Event::Kind kind_of_change(Mode before, Mode after) {
 
 namespace {
 
-// Modes of stick and slip for the contacts that are closed, and the state on the constraints that goes with them.
+// Selection of the stick-slip modes of a given active set, with the projected state.
 struct FrictionSwitch {
     System& system;
     double t;
-    const std::optional<FoundEvent>& event;  // of friction, if it is one
+    const std::optional<FoundEvent>& event;  // event that causes the switch, if any
     const std::vector<Mode>& before;
     ModeQuestion asked;
-    int held = -1;  // what has just reached its limit
+    int held = -1;  // element that has just reached its limit
 
-    // `together`: of all contacts, where that is known.
+    // `together`: onset motion of all contacts, if known.
     void find(const RestingMotion* together) {
         const Program& p = system.p;
         Workspace& w = system.w;
@@ -107,7 +109,7 @@ struct FrictionSwitch {
             return keep_on_planes();
         }
         const bool known = event && !event->of_gap();
-        const bool strikes = event && event->kind == FoundEvent::Kind::touch;  // what stuck may move
+        const bool strikes = event && event->kind == FoundEvent::Kind::touch;  // sticking elements may move
         asked = event && !strikes ? question(p, w, system.v, known ? event->index : -1)
                                   : first_question(p, w, t, system.q, system.v);
         held = known && before[event->index] == sticking && !is_open(p, w, event->index) ? event->index : -1;
@@ -118,7 +120,7 @@ struct FrictionSwitch {
             resolve_together(system, t, asked, strikes);
     }
 
-    // What sticks until it has just come to its limit: it gives way.
+    // Return the elements that stuck until they reached their limit at this event.
     std::vector<int> breaking() const {
         std::vector<int> list;
         if (!event || event->of_gap()) return list;
@@ -128,7 +130,7 @@ struct FrictionSwitch {
         return list;
     }
 
-    // What touches lies on its plane, and moves along it.
+    // Project closed contacts onto their planes, in position and velocity.
     void keep_on_planes() {
         const std::vector<char>& closed = system.w.state.closed;
         if (std::find(closed.begin(), closed.end(), char(1)) == closed.end()) return;
@@ -137,13 +139,13 @@ struct FrictionSwitch {
     }
 };
 
-// What has come to rest but for rounding.
+// Set the velocity to zero if only rounding of it is left.
 void rest(System& system, double t) {
     system.v.setZero();
     begin_step(system.p, system.w, t, system.q, system.v);
 }
 
-// Contacts among those that rest on each other are closed, and the rest of the modes with them.
+// Select the active set of the resting contacts, and the stick-slip modes with it.
 void close_and_find(System& system, double t, bool starts, FrictionSwitch& friction) {
     const Program& p = system.p;
     const auto& event = friction.event;
@@ -176,7 +178,7 @@ std::vector<Event> changes_since(const System& system, double t, const std::vect
         if (closed[i] != now.closed[i])
             changes.push_back({t, closed[i] ? Event::Kind::lift_off : Event::Kind::touch_down, p.gaps[i].block});
     for (int e = 0; e < system.ne; ++e) {
-        const bool begins = before[e] == unloaded && slips(now.mode[e]);  // a contact that slides from the first
+        const bool begins = before[e] == unloaded && slips(now.mode[e]);  // a contact that slides as soon as it closes
         if (e == turned || (before[e] != now.mode[e] && now.mode[e] != unloaded && !begins))
             changes.push_back({t, kind_of_change(before[e], now.mode[e]), e});
     }
@@ -227,7 +229,7 @@ Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool boun
     const std::vector<char>& touch = system.touching.at(p, system.w, t, system.q, system.v, starts).touch;
     const Impact impact = strike(p, system.w, t, system.q, system.v, touch, bounces);
     system.write(y);
-    set_closed(p, system.w, closed);  // what changes by it is still to be found
+    set_closed(p, system.w, closed);  // the modes after the impact are selected later
     set_modes(p, system.w, modes);
     Strike out;
     double largest = 0.0;

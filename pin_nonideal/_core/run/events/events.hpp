@@ -1,4 +1,4 @@
-// What happens at an event of stick and slip: new modes for all elements at rest together.
+// Mode switches at events of stick and slip: new modes for all elements at rest together.
 #pragma once
 
 #include <optional>
@@ -9,36 +9,36 @@
 
 namespace pn {
 
-// New modes at (t, y), which is brought onto the constraints; without an event, as at the start of a run, for every
-// element by its velocity. The workspace ends evaluated there, with the rate in dy. Returns what has changed, nothing
-// where there was no event.
+// Select new modes at (t, y), and project y onto the constraints. Without an event, as at the start of a run, every
+// element gets its mode from its velocity. The workspace ends evaluated there, with the rate in dy. Return the changes,
+// empty without an event.
 std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event);
 
-// What has changed between modes before and now: contacts that open or close, then elements that stick or slip, and one
-// that has `turned`.
+// Return the changes of modes since `before`. Contacts that open or close come first, then elements that stick or slip.
+// The element `turned` has reversed.
 std::vector<Event> changes_since(const System& system, double t, const std::vector<char>& closed,
                                  const std::vector<Mode>& before, int turned = -1);
 
-// Whether contacts strike at (t, y): they touch and approach each other.
+// Check if contacts strike at (t, y): they touch and approach each other.
 bool contacts_strike(System& system, double t, const VecX& y, bool starts);
-// Whether one of them is open as yet: it lands where something else happens.
+// Check if a contact that is still open would strike at (t, y), as at events of another kind.
 bool contacts_land(System& system, double t, const VecX& y);
-// Their impact, which changes the velocity: an event a contact with an impulse, the work of these, and that of moving
-// constraints.
+// Impact of contacts, which changes the velocity: one event per contact with an impulse, work of the contacts [J], and
+// work of moving constraints [J].
 struct Strike {
     std::vector<Event> events;
     double work = 0.0, work_of_constraints = 0.0;
 };
 Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool bounces = true);
 
-// Whether some element of several directions slips.
+// Check if an element with several directions slips.
 bool turning(const System& system);
 
-// Kind of the event in which the mode of an element changes so.
+// Return the kind of event for a change of an element's mode.
 Event::Kind kind_of_change(Mode before, Mode after);
 
-// Keeps the slip directions at a step's end for the next step; the slip speeds go into `slip`. The slip that is left of an
-// element that has `arrived` at rest is an error of the step: this slip, and slower slip, does not change its direction.
+// Store the slip directions at a step's end for the next step, and the slip speeds in `slip`. The remaining slip of an
+// element that has `arrived` at rest is an error of the step. Slip up to this speed does not change a direction.
 void remember_directions(System& system, std::vector<double>& slip, int arrived = -1);
 
 }  // namespace pn

@@ -12,13 +12,13 @@ namespace pn {
 
 namespace {
 
-// Accelerations between the stages of an accepted step stay below so many times the largest at the stages.
+// Bound of the accelerations between the stages of an accepted step, relative to the largest one at the stages.
 constexpr double between_stages = 2.0;
-// A gap that hovers about its plane is not followed further than so many looks: it has closed.
+// Maximum number of samples of a gap that stays near its plane. After that it counts as closed.
 constexpr int most_looks = 4000;
-// Bodies are allowed this many times their travel, for what projections add.
+// Safety factor on the travel of bodies, for the moves of projections.
 constexpr double travel_factor = 2.0;
-constexpr double rate_rounding = 1e-12;  // part of the rates of a gap that moves evenly
+constexpr double rate_rounding = 1e-12;  // rounding of the rate change of a gap with constant rate, relative to the rates
 
 }  // namespace
 
@@ -26,7 +26,7 @@ GapSearch::GapSearch(System& system, Stepper& stepper, GapWatch& watch)
     : system_(system), stepper_(stepper), p(system.p), w(system.w), watch_(watch), start_(watch.gaps), reach_(system.p),
       speed_(VecX::Zero(system.nv)), acceleration_(speed_), probe_(VecX::Zero(system.ny)) {}
 
-// Largest |v| and |a| of each dof over the step, from the rates at the stages.
+// Bound |v| and |a| of each dof over the step, from the rates at the stages.
 void GapSearch::bound_rates() {
     const int nq = system_.nq, nv = system_.nv;
     acceleration_.setZero();
@@ -35,13 +35,13 @@ void GapSearch::bound_rates() {
     const double *v0 = stepper_.y0.data() + nq, *v1 = stepper_.y1.data() + nq;
     for (int k = 0; k < nv; ++k) {
         acceleration_[k] *= between_stages;
-        // Never farther from both ends than their mean and what half a step of acceleration adds.
+        // The speed exceeds the mean of both ends by at most half a step of acceleration.
         speed_[k] = 0.5 * (std::abs(v0[k]) + std::abs(v1[k])) + 0.5 * stepper_.h * acceleration_[k];
     }
 }
 
-// Bounds of a gap between the step's ends; of one of the user's, so many times what its cubic between them and its
-// motion at the end show.
+// Return bounds of the second derivative of a gap between the step's ends. For a user's gap they are estimates:
+// multiples of the second derivatives of the cubic between the ends, and of the acceleration at the end.
 GapSearch::Bends GapSearch::bends(int gap, const Look& end) const {
     if (Reach::knows(p, gap)) return {reach_.bound(w, gap), reach_.rise(w, gap)};
     const double h = stepper_.h, change = (end.width - start_.width[gap]) / h;
@@ -52,7 +52,7 @@ GapSearch::Bends GapSearch::bends(int gap, const Look& end) const {
     return {most, most};
 }
 
-// Of gaps that were not looked at in the steps before.
+// Sample gaps at the step's start that the steps before have skipped.
 void GapSearch::look_at_starts(const std::vector<int>& gaps) {
     system_.read(stepper_.y0);
     kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
@@ -88,7 +88,8 @@ const std::vector<GapSearch::Doubt>& GapSearch::doubtful() {
     return doubtful_;
 }
 
-// The two parabolas of the bound through both ends lie below the gap; where the higher of them is least it stands.
+// Check if a gap stays open between two samples. The two parabolas of the bound through both samples lie below the gap.
+// The gap is open if the larger of them is positive at its lowest point.
 bool GapSearch::stays_open(int gap, const Look& a, const Look& b, double bound) const {
     const double length = (b.part - a.part) * stepper_.h, least = -rounding_;
     if (!(a.width > least) || !(b.width > least)) return false;
@@ -97,7 +98,7 @@ bool GapSearch::stays_open(int gap, const Look& a, const Look& b, double bound) 
         return stays_apart(kind, *a.separation, *b.separation, bound, reach_.speed(gap), length, least);
     }
     if (has_lowest_point(p, gap)) return stays_above(a.width, b.width, 0.5 * bound * length * length, least);
-    const double change = b.rate - a.rate + bound * length;  // negative: no bound at all
+    const double change = b.rate - a.rate + bound * length;  // negative: no valid bound
     if (change <= 0.0) return change >= -rate_rounding * (std::abs(a.rate) + std::abs(b.rate));
     const double meet = (a.width - b.width + b.rate * length + 0.5 * bound * length * length) / change;
     if (!(meet > 0.0 && meet < length)) return true;
@@ -109,7 +110,7 @@ bool GapSearch::same_bodies(int gap, int other) const {
     return (a.joint1 == b.joint1 && a.joint2 == b.joint2) || (a.joint1 == b.joint2 && a.joint2 == b.joint1);
 }
 
-// A copy of it is closed: this one goes with that.
+// Check if a duplicate of the gap is closed. The gap follows the duplicate.
 bool GapSearch::has_held_copy(int gap) const {
     const std::vector<int>& touching = w.now.touching;
     return std::any_of(touching.begin(), touching.end(), [&](int held) { return are_copies(p, held, gap); });
@@ -156,7 +157,7 @@ GapSearch::Look GapSearch::look(int gap, double part) {
     return above(out, level_here(gap, part));
 }
 
-// The root between an instant at which the gap is open, or where it has just closed, and one at which it is through.
+// Return the root between a sample with the gap open or just closed and a sample with penetration.
 GapSearch::Touch GapSearch::between(int gap, const Look& a, const Look& b) {
     const double part =
         root_between(a.part, a.width, b.part, b.width, [&](double at) { return look(gap, at).width; });
@@ -167,18 +168,18 @@ std::optional<GapSearch::Touch> GapSearch::search(int gap, const Look& a, const 
     const double bound = bends.below;
     if (stays_open(gap, a, b, bound)) return std::nullopt;
     const double length = (b.part - a.part) * stepper_.h;
-    // It goes on closing all the way.
+    // The gap closes monotonically.
     if (b.width < -rounding_ && a.rate + bends.above * length < 0.0) return between(gap, a, b);
     if (bends.above * length * length < rounding_ || looks_ > most_looks) {
-        // Bodies that slide from one place to the next, a corner from a face on to an edge, bring the gap of the next down
-        // to zero there, where it stays: nothing touches before it goes below.
+        // Bodies can slide to the next contact point, as a corner from a face onto an edge. The gap of that point then
+        // comes down to zero and stays there. It does not touch before it becomes negative.
         const bool rests = stepper_.t0 < start_.rests_until[gap];
         const bool has_closed = looks_ > most_looks && !rests && !(a.separation && slides_on(gap));
         if (a.width > 0.0 && b.width < -rounding_) return between(gap, a, b);
         if (b.width < -rounding_ || has_closed) return Touch{b.part, b.rate * stepper_.h};
         return std::nullopt;
     }
-    // What leaves its plane is sure to be above it for half the time that the bound gives it.
+    // A gap that leaves its plane is open for at least half of the time that the bound gives.
     if (a.width <= rounding_ && a.rate > 0.0 && !a.separation && !has_lowest_point(p, gap)) {
         const double sure = a.part + a.rate / (bound * stepper_.h);
         if (sure < 0.5 * (a.part + b.part) && sure > a.part) {

@@ -1,6 +1,6 @@
-// Where in a step just taken an open gap first closes. Widths and rates at two instants and the bound on the second
-// derivative between them (contact/reach.hpp) show that it stays open in between, or the stretch is halved, on the
-// method's own interpolant: nothing is leapt over.
+// Search for the first closing of an open gap in a step just taken. Widths, rates and a bound on the second derivative
+// (contact/bounds/curvature.hpp) can prove that the gap stays open between two instants. Otherwise the stretch is
+// halved on the method's own interpolant, so no closing is missed.
 #pragma once
 
 #include <algorithm>
@@ -15,26 +15,28 @@ class GapSearch {
 public:
     GapSearch(System& system, Stepper& stepper, GapWatch& watch);
 
-    // Gaps that may close in the step; the workspace must be evaluated at its end, and stays so.
-    struct Bends { double below, above; };  // least (less than zero) and largest second derivative
+    // Candidates: gaps that may close in the step. The workspace must be evaluated at the step's end, and stays so.
+    struct Bends { double below, above; };  // bounds of the second derivative: magnitude below zero, and largest value
     struct Doubt {
         int gap;
-        GapLook end;  // of the step
-        Bends bends;  // over it
+        GapLook end;  // sample at the step's end
+        Bends bends;  // bounds over the step
     };
     const std::vector<Doubt>& doubtful();
-    const std::vector<Doubt>& doubted() const { return doubtful_; }  // as found last
-    // Part of the step at which one of them closes, and its rate there over the step. Leaves the workspace elsewhere.
+    const std::vector<Doubt>& doubted() const { return doubtful_; }  // candidates of the last search
+    // Part of the step at which a candidate closes, and rate of the gap there per step. The search leaves the workspace
+    // at another state.
     struct Touch { double part, slope; };
-    std::optional<Touch> first_touch(int gap);  // of them
-    // What the gap counts from in this step: rounding may leave it below its plane, from where it rises.
+    std::optional<Touch> first_touch(int gap);  // `gap`: a candidate
+    // Return the zero level of the gap in this step. Rounding can leave a rising gap below its plane at the start.
     double plane(int gap) const { return start_.rate[gap] > 0.0 ? std::min(0.0, start_.width[gap]) : 0.0; }
 
 private:
     using Look = GapLook;
     Look look(int gap, double part);
     Look look_at_start(int gap) const;
-    // Above what the gap counts from: its plane, or between round bodies the lowest place that they touch at.
+    // Measure a sample from a zero level: the plane, or for round bodies the lowest contact point of the same two
+    // bodies.
     Look above(Look look, double level) const;
     double level_here(int gap, double part) const;
     bool stays_open(int gap, const Look& a, const Look& b, double bound) const;
@@ -43,7 +45,7 @@ private:
     void bound_rates();
     bool same_bodies(int gap, int other) const;
     bool has_held_copy(int gap) const;
-    bool slides_on(int gap) const;  // the same two bodies touch elsewhere
+    bool slides_on(int gap) const;  // the same two bodies touch at another point
     void look_at_starts(const std::vector<int>& gaps);
     Bends bends(int gap, const Look& end) const;
 
@@ -55,7 +57,7 @@ private:
     GapState& start_;
     Reach reach_;
     std::vector<Doubt> doubtful_;
-    std::vector<int> held_;  // closed ones of round bodies: a place that the same two bodies come to next is no lower
+    std::vector<int> held_;  // closed gaps of round bodies, their next contact point is not lower
     VecX speed_, acceleration_, probe_;
     double rounding_ = 0.0;
     int looks_ = 0;

@@ -8,13 +8,14 @@
 
 namespace pn {
 
-// A gap is far from so many times the way of a step on: nearer ones would be asked again at once.
+// Minimum width of a far gap, in travels of one step. Narrower gaps would be rechecked at once.
 constexpr double steps_of_far = 2.0;
-// A far gap is looked at when so many times the way since it was, and so many steps, might close it.
+// Factors on the travel since a far gap's last sample, and on the travel in one step. The gap is monitored again if
+// their sum can close it.
 constexpr double asked_again = 2.0, steps_ahead = 2.0;
-// Part of the ways so far that rounding may leave of their difference.
+// Rounding of a difference of travels, relative to the travel so far.
 constexpr double way_rounding = 1e-15;
-// A gap that was asked in vain is not asked again for this long [s]; then for as long as it has been in vain.
+// Minimum time [s] before a blocked gap is retried. Later it is retried after as long as it has been blocked.
 constexpr double least_rest = 1e-4;
 
 GapWatch::GapWatch(System& system, GapState& state)
@@ -87,8 +88,8 @@ void GapWatch::leave_far() {
     if (leave) gaps.find_near();
 }
 
-// Those that have used up half their width are looked at at the step's end: they are sure to be open in it, and none has to
-// be looked at behind.
+// Monitor the far gaps whose bodies may have traveled half of the width. If a gap is proven open over the step, it is
+// sampled at the step's end only. Other gaps are returned in `unseen_`, for a sample at the step's start.
 void GapWatch::ask_far() {
     const Ways& here = gaps.ways;
     gaps.ask = HUGE_VAL;
@@ -114,7 +115,7 @@ void GapWatch::ask_far() {
     if (found) gaps.find_near();
 }
 
-// A step that is tried again: what was to be looked at at its end has not been.
+// Undo the last step, which is repeated: gaps to be sampled at its end were not sampled.
 void GapWatch::take_back() {
     for (int i : gaps.near_gaps) {
         if (gaps.near[i] != GapState::from_the_end) continue;

@@ -1,4 +1,4 @@
-// Gaps from step to step: how wide they are, and which of them are far, so that steps need not look at them.
+// Gaps from step to step: their widths, and the far gaps that steps need not sample.
 #pragma once
 
 #include <algorithm>
@@ -11,39 +11,39 @@
 
 namespace pn {
 
-// A gap at one instant, and how the round bodies of it face each other.
+// Sample of a gap at one instant, with the separation of its round bodies.
 struct GapLook {
     double part, width, rate;
     std::optional<Separation> separation;
 
-    // Of the gap that the workspace is evaluated for.
+    // Return the sample of a gap for which the workspace is evaluated.
     static GapLook here(const Program& p, const Workspace& w, int gap, double part);
 };
 
-// Gaps at a step's start, as they were looked at last. One that is wide beside what its bodies can come in a step is far:
-// it is not looked at, step after step, until their ways since then add up to its width.
+// Gaps at a step's start, as sampled last. A gap is far if it is wide relative to the travel of its bodies in a step.
+// Steps skip far gaps until the travel since the last sample adds up to the width.
 struct GapState {
     std::vector<double> width, rate;
     std::vector<Separation> separation;
-    static constexpr char from_the_end = 2;  // near, and not looked at before the end of the step at hand
-    std::vector<char> near, far;           // looked at in each step, or far; neither where closed, or nothing moves
-    std::vector<double> way, turn, apart;  // of far ones: their bodies' ways when they were looked at (contact/ways.hpp)
+    static constexpr char from_the_end = 2;  // near, but first sampled at the end of the current step
+    std::vector<char> near, far;           // near: sampled in each step, far: skipped, neither: closed or immovable
+    // Travel of the bodies of far gaps at the last sample (contact/bounds/travel.hpp).
+    std::vector<double> way, turn, apart;
     Ways ways;
-    double ask = 0.0;            // the scene's way at which far ones are asked again
-    bool current = false;        // of the state now, or of the step that led to it
-    std::vector<int> near_gaps;  // in order
-    // Of one that others hold on its plane, and that did not close when it was asked to: since when that is so, and until
-    // when it is not asked again.
+    double ask = 0.0;            // travel of the scene at which far gaps are rechecked
+    bool current = false;        // the samples belong to the current state, or to the step that led to it
+    std::vector<int> near_gaps;  // indices of near gaps, ascending
+    // For a touching gap that the solver left open: time of the first attempt, and time before which it is not retried.
     std::vector<double> vain_since, rests_until;
 
-    // `round`: whether any of so many gaps is that of round bodies.
+    // `round`: true if a gap is between round bodies.
     explicit GapState(size_t gaps = 0, bool round = false)
         : width(gaps, 0.0), rate(gaps, 0.0), separation(round ? gaps : 0), near(gaps, 0), far(gaps, 0), way(gaps, 0.0),
           turn(gaps, 0.0), apart(gaps, 0.0), vain_since(gaps, 0.0), rests_until(gaps, -HUGE_VAL) {}
     void keep(int gap, const GapLook& look);
     void find_near();
     void ask_in_vain(int gap, double t);
-    // Contacts have changed: all are asked again.
+    // Retry all blocked gaps, after a change of contacts.
     void ask_anew() { std::fill(rests_until.begin(), rests_until.end(), -HUGE_VAL); }
 };
 
@@ -51,31 +51,32 @@ class GapWatch {
 public:
     GapWatch(System& system, GapState& gaps);
 
-    // At the state that the system has read and the workspace is evaluated at. Of all gaps, as a run begins or after
-    // anything but a step; or after a step that was followed to its end, of those that are near.
+    // Sample gaps at the state that the system has read and the workspace is evaluated at. `look_at_all` samples all
+    // gaps, at the start of a run or after a change other than a step. `go_on` samples the near gaps after a step that
+    // was followed to its end.
     void look_at_all(double t);
     void go_on(double t);
 
-    // Over a step just taken, of length h with the largest |v| of each dof. Far gaps that the ways of their bodies may have
-    // closed by its end are near from here on: those returned were not looked at in the steps before.
+    // Follow a step just taken, of length h with the largest |v| of each dof. Far gaps that the travel of their bodies
+    // may close by the step's end become near. Return the new near gaps that must be sampled at the step's start.
     const std::vector<int>& follow(const VecX& speed, double h);
 
-    // Time stepping looks once a step, at its middle: of the gaps that are near there those are far from then on that are
-    // wide. `way`: how far each dof has come since the last look, or since the state at which these steps began.
+    // Return the near gaps for the sample of time stepping, taken once per step at its middle. `way`: travel of each
+    // dof since the last sample, or since the state at which these steps began. `leave_far` then makes wide gaps far.
     const std::vector<int>& come(const VecX& way);
     void leave_far();
-    // There all are near but those that are known to be far, and wider than `least`.
+    // Begin time stepping: all gaps become near, except far gaps wider than `least`.
     void begin_time_steps(double least);
 
     GapState& gaps;
     const WayBound ways;
-    // Each of the near ones at the end of the step at hand, where that was followed.
+    // samples of the near gaps at the end of the current step, if it was followed
     std::vector<GapLook> end;
     bool followed = false;
 
 private:
-    void look(double t, int gap);  // here
-    // Far or near, by its width as just looked at.
+    void look(double t, int gap);  // at the current state
+    // Classify a gap as far or near by its last width.
     void place(int gap);
     void step(const VecX& speed, double h);
     void ask_far();

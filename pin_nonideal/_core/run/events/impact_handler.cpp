@@ -11,9 +11,9 @@ namespace pn {
 
 namespace {
 
-// Part of the works of an impact that rounding may make a gain of.
+// Energy gain of an impact that counts as rounding, relative to its works.
 constexpr double gain_rounding = 1e-12;
-// Impacts at one instant, of which each throws others onto their planes that had been leaving them.
+// Maximum number of consecutive impacts at one instant. An impact can make other contacts approach again.
 constexpr int most_at_once = 100;
 
 }  // namespace

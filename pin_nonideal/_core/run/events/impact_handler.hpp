@@ -1,5 +1,5 @@
-// What a run does where contacts touch: they strike, what bounces too low to be integrated comes to rest, and the gaps
-// that are left open are looked at for the next step.
+// Handling of touching contacts in a run: impacts, the end of low bouncing, and samples of the open gaps for the next
+// step.
 #pragma once
 
 #include "run/output/output.hpp"
@@ -10,12 +10,14 @@ class Landing {
 public:
     Landing(System& system, Progress& progress, GapWatch& watch, const Options& options, Output& output, Recording& out);
 
-    // Impacts of contacts that touch and approach each other, until none does; whether there was one.
+    // Apply impacts of contacts that touch and approach each other, until none does. Return true if there was an
+    // impact.
     bool strike(bool starts);
-    // The end of bouncing behind a strike, not beyond `stop` nor the next sample; where there is none the state stays.
+    // Advance to the end of bouncing after an impact, not beyond `stop` or the next sample. Without low bouncing the
+    // state stays.
     void end_bouncing(double stop);
-    // Widths and rates of the gaps at the state now, from which the next step starts; of a step that was followed to its
-    // end the near ones.
+    // Sample widths and rates of the gaps at the current state, from which the next step starts. `whole_step`: sample
+    // only near gaps, after a step that was followed to its end.
     void remember_gaps(bool whole_step = false);
 
 private:

@@ -8,9 +8,9 @@
 
 namespace pn {
 
-// So many tiny steps lie at the least between two places at which modes are left that go no further.
+// Minimum time between two forced mode switches, in tiny steps.
 static constexpr double leaving_apart = 1e3;
-// Slip below this speed [m/s or rad/s] rests soon, or is about to begin.
+// Maximum speed [m/s or rad/s] of slip that is about to rest or to begin, relative to 1 + the largest velocity.
 static constexpr double creeping = 1e-8;
 
 static bool of_modes(const Failure& failure) {
@@ -49,7 +49,7 @@ void ModeChanges::change(FoundEvent event) {
     bridge(event.of_gap() ? 0 : event.index);
 }
 
-// Among ever lower flights as well some motion may not be found.
+// End the bouncing. If the motion of a low flight is not found, bridge it by time stepping if possible.
 void ModeChanges::end_bouncing() {
     try {
         landing_.end_bouncing(torques_.next_stop(options_.end()));
@@ -58,7 +58,7 @@ void ModeChanges::end_bouncing() {
     }
 }
 
-// What was shown to have no motion, or several, is what the user is told.
+// A proof of no motion, or of several motions, is reported to the user.
 bool ModeChanges::leads_on(const Failure& failure) {
     const bool shown = failure.solutions != Failure::Solutions::not_told;
     return failure.kind == Failure::Kind::step_size || (of_modes(failure) && !shown);
@@ -90,7 +90,7 @@ void ModeChanges::bridge(int element) {
     if (clusters_.bridge(element, options_.end())) go_on_with_new_modes();
 }
 
-// What contacts that may open do, and was not found: of which nothing is shown.
+// Check if the solver failed in a scene with unilateral contacts, which proves nothing.
 bool ModeChanges::undecided(const Failure& failure) const {
     return failure.kind == Failure::Kind::not_converged && system_.ng > 0;
 }
@@ -103,14 +103,14 @@ bool ModeChanges::step_over(const Failure& failure) {
         try {
             go_on_with_new_modes();
             return true;
-        } catch (const Failure& again) {  // a little later it is as it was
+        } catch (const Failure& again) {  // the solver fails again a little later
             if (!undecided(again)) throw;
         }
         if (now_.t >= options_.end()) return true;
     }
 }
 
-// Whether all that slips is about to rest.
+// Check if all slipping elements are about to rest.
 bool ModeChanges::creeps() const {
     const double least = creeping * (1.0 + system_.velocity(now_.y).cwiseAbs().maxCoeff());
     const std::vector<int>& slipping = w.now.slipping;
@@ -125,7 +125,7 @@ void ModeChanges::go_on_with_new_modes() {
     output_.configured_now();
 }
 
-// What the motion was until no modes were found for what follows.
+// Restore the motion before the mode switch that failed, and record it.
 void ModeChanges::keep_last(const RunState& before, bool struck) {
     set_contacts(p, w, before.closed, before.mode);
     w.state = before;
@@ -135,7 +135,7 @@ void ModeChanges::keep_last(const RunState& before, bool struck) {
         begin_step(p, w, now_.t, system_.q, system_.v);
         evaluate(p, w, now_.t, system_.q, system_.v);
         output_.now();
-    } catch (const Failure&) {  // the sample before is the last: what failed first is what the user is told
+    } catch (const Failure&) {  // the previous sample is the last, and the first failure is reported
     }
 }
 

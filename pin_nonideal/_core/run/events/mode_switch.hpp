@@ -1,4 +1,4 @@
-// Events that change the modes of contacts and friction, and what is done where modes end without one.
+// Mode switches of contacts and friction: at events, and forced switches if the current modes have no further motion.
 #pragma once
 
 #include "run/events/chatter.hpp"
@@ -8,7 +8,7 @@
 
 namespace pn {
 
-// Steps below this part of the time are short enough to tell what fails of its own.
+// Length of a tiny step, relative to the time, in seconds below 1 s. In shorter steps the motion itself fails.
 constexpr double tiny_step = 1e-10;
 inline double tiny_step_at(double t) { return tiny_step * std::max(1.0, std::abs(t)); }
 
@@ -17,18 +17,19 @@ public:
     ModeChanges(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
                 Landing& landing, Clusters& clusters, Recording& out);
 
-    // Modes and state from the event on, which has been reached.
+    // Switch modes and state at an event that has been reached.
     void change(FoundEvent event);
-    // Where no step is short enough the motion may end that these modes have, unless those found when it did last lead no
-    // further either. What comes next is asked as far beyond as the shortest step goes; false where nothing is found.
+    // Forced switch: if no step is short enough, the motion of the current modes may have ended. `may_end` is false if
+    // the last forced switch was less than `leaving_apart` tiny steps ago. `leave` selects modes one tiny step ahead.
+    // It returns false if it finds none.
     bool may_end(const Failure& failure) const;
     bool leave();
-    // Whether no motion or no step was found, which proves nothing.
+    // Check if the failure only means that no motion or no step was found, which proves nothing.
     static bool leads_on(const Failure& failure);
-    // What is left of events that dwindle, or of slip that creeps, to rest is stepped over where no motion of theirs was
-    // found, or no step short enough, and so is what contacts that may open do where that was not found; whether it was.
+    // Bridge by time stepping if no motion or no short enough step was found. Applies to an accumulation of events, to
+    // creeping slip, and to unilateral contacts without a solution. Return false if it does not apply.
     bool step_over(const Failure& failure);
-    // Where events come too thick they are bridged, and the run goes on with modes of its new state.
+    // Bridge crowded events, and select modes at the new state.
     void bridge(int element);
 
 private:

@@ -15,10 +15,11 @@ namespace pn {
 
 namespace {
 
-// Flights lower than this part of the scene's size [m] are too low to be integrated.
+// Maximum height of flights that are too low to be integrated, relative to the scene's size.
 constexpr double low_flight = 4e-12;
-// Of so many flights the second half takes less than this part of the time of the first where they die out; else, with
-// restitution of 1, they would go on without end, and what lands next comes to rest.
+// Number of flights after which the bouncing is judged. It dies out if the second half takes less than `hardly_shorter`
+// of the time of the first half. With a restitution of 1 it does not die out, and contacts that land later come to
+// rest.
 constexpr int most_bounces = 10000;
 constexpr double hardly_shorter = 0.9;
 constexpr double never = std::numeric_limits<double>::infinity();
@@ -27,11 +28,11 @@ struct Bouncing {
     System& system;
     double lowest;
 
-    // Times until the first gap in low flight is back, until the first of the others lands, and until a slip comes to
-    // rest; infinite where nothing does. And until the last of those that leave is no longer low.
+    // Times until the first low gap lands, until the first other gap lands, and until a slip rests (infinite if none).
+    // `leaves`: time until the last leaving gap is no longer low.
     struct Next {
         double low = never, high = never, rest = never, leaves = 0.0;
-        int element = -1;  // that comes to rest
+        int element = -1;  // element that comes to rest
         double time() const { return std::min(low, rest); }
         bool stays_low() const { return (low < never || rest < leaves) && high > time(); }
     };
@@ -47,7 +48,7 @@ struct Bouncing {
             const double fall = -gap_acceleration(p, w, i), rise = std::max(0.0, rate);
             const bool touches = width <= touching_width;
             if (touches && std::abs(rate) <= still && fall <= acceleration_rounding(p, w, i)) continue;
-            const double height = touches ? 0.0 : width;  // what touches lies on its plane, but for rounding
+            const double height = touches ? 0.0 : width;  // a touching gap lies on its plane up to rounding
             const double back = landing(height, rate, fall);
             const double most = height + (rise > 0.0 ? 0.5 * rise * rise / fall : 0.0);
             const bool is_low = back < never && most <= lowest;
@@ -65,7 +66,8 @@ struct Bouncing {
         return out;
     }
 
-    // Of a gap that is so wide, changes at this rate and falls back.
+    // Return the time until a gap of this width and rate closes under the constant acceleration -fall, infinite if it
+    // does not.
     static double landing(double width, double rate, double fall) {
         const double square = rate * rate + 2.0 * fall * width;
         if (!(square >= 0.0)) return never;

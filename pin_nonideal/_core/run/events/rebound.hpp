@@ -1,7 +1,7 @@
-// The end of bouncing. Flights too low to be told from rounding are not searched for touches: gaps fly as parabolas under
-// the acceleration at hand, and strike again, until none of them approaches or leaves any more, or one that flies higher
-// lands. Their number is finite, the last ones are lost in rounding, and the instants add up to the limit of the
-// accumulation. Flights that do not die out, with restitution of 1, end as well: what they hold is no more than rounding.
+// End of bouncing. Flights too low to be separated from rounding are not searched for touches. Gaps follow parabolas
+// under the current acceleration and strike again. This ends if no gap approaches or leaves, or if a higher gap lands.
+// The number of flights is finite: the last ones vanish in rounding. The instants add up to the limit of the
+// accumulation. Flights that do not die out (restitution 1) end as well, because their energy is only rounding.
 #pragma once
 
 #include "run/events/events.hpp"
@@ -9,13 +9,13 @@
 namespace pn {
 
 struct Rest {
-    double time = 0.0;  // of the end
+    double time = 0.0;  // time of the end [s]
     std::vector<Event> events;
-    double work = 0.0;  // of all impacts, and what the flights change of the energy beside
+    double work = 0.0;  // work of all impacts, plus other energy changes of the flights [J]
 };
 
-// From the state (t, y) just behind an impact, whose modes are known, not beyond `stop`; nothing where no flight is low.
-// The state, its rate and the workspace become those of the end.
+// Bounce from the state (t, y) just after an impact, with given modes, at most to `stop`. Return nothing if no flight
+// is low. The state, its rate and the workspace are set to the end of the bouncing.
 std::optional<Rest> bounce_to_rest(System& system, double t, double stop, VecX& y, VecX& dy);
 
 }  // namespace pn

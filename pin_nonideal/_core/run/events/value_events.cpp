@@ -11,19 +11,19 @@ namespace pn {
 
 namespace {
 
-constexpr int looks = 5;      // into each step
+constexpr int looks = 5;      // samples of each step
 constexpr double beyond = 2.0;
 constexpr int corrections = 12;
-// Parts of the step: in which its end is found, and in which the slope of a value is taken.
+// Relative to the step: tolerance of the corrected end, and difference step for the slope of a value.
 constexpr double corrected_width = 1e-14, slope_part = 1e-4;
-// Of the step: an event of friction and one of the user this near to each other are at one time.
+// Maximum time difference of a friction event and a user event that coincide, relative to the step.
 constexpr double same_part = 1e-12;
-// An event this near to the step's start, in spacings of the time, has happened there.
+// Shortest step up to an event, in floating-point spacings of the time.
 constexpr double start_spacings = 8.0;
 
 double sign(double x) { return (x > 0.0) - (x < 0.0); }
 
-// Those whose drives may be asked for more than they have.
+// Return the dofs with bounded drive effort.
 std::vector<int> bounded_drives(const Program& p) {
     std::vector<int> dofs;
     for (int dof = 0; p.limits_effort() && dof < p.mechanism.nv; ++dof)
@@ -46,7 +46,7 @@ double ValueEvents::value(int k, double t, const VecX& y) {
     return asked_[k].function(t, system_.q, system_.v);
 }
 
-// Negative where more is asked than the drive has. All drives are asked at once.
+// Return the effort left in a drive, negative if the demand exceeds it. The demands of all drives are computed at once.
 double ValueEvents::effort_left(int dof, double t, const VecX& y) {
     if (!asked_before_ || t != asked_time_ || asked_y_ != y.head(system_.ns)) {
         asked_before_ = true;
@@ -69,7 +69,7 @@ void ValueEvents::start(double t, const VecX& y) {
     for (int k = 0; k < size(); ++k) side_[k] = sign(value(k, t, y));
 }
 
-// Where a value is zero at the start of a run it has no sign before it takes one, which is no event.
+// A value that is zero at the start of a run has no sign. Its first sign is no event.
 double ValueEvents::first_crossing(int k) {
     double before = 0.0;
     for (int i = 1; i <= looks; ++i) {
@@ -95,7 +95,8 @@ void ValueEvents::end_step_at(double size) {
     system_.project_and_evaluate(stepper_.t0 + size, stepper_.y1, stepper_.end_rate());
 }
 
-// Secants on the length of the step, from the slope that the interpolant has at the crossing.
+// Repeat the step up to a crossing. Secants correct its length, starting with the slope of the interpolant at the
+// crossing.
 void ValueEvents::step_onto(int k, double part) {
     const double full = stepper_.h, t0 = stepper_.t0;
     const double least = start_spacings * (std::nextafter(std::abs(t0), HUGE_VAL) - std::abs(t0));
@@ -129,7 +130,7 @@ void ValueEvents::count(int k) {
     ends_run_ |= k < users() && asked_[k].terminal > 0 && count_[k] >= asked_[k].terminal;
 }
 
-// Events that happen together with the one that the step ends at, and signs of all others.
+// Count events that coincide with the event at the step's end, and store the signs of all other values.
 void ValueEvents::take_signs() {
     for (int k = 0; k < size(); ++k) {
         const double here = sign(value(k, stepper_.t0 + stepper_.h, stepper_.y1));

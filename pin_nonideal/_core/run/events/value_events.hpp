@@ -1,8 +1,8 @@
-// Events that values tell by a change of sign: functions of the user, and what drives have left of their effort.
+// Events at sign changes of values: user functions, and the effort left in drives.
 //
-// A step is looked at on the method's own interpolant, at its end and at places inside, so that what crosses zero and
-// comes back is met as well. It is taken again up to the first crossing, and its end moved until the value there is zero:
-// an event is as accurate as a step.
+// A step is sampled on the method's own interpolant, at its end and at places inside. The inner samples detect values
+// that cross zero and return. The step is repeated up to the first crossing, and its end is corrected until the value
+// there is zero. An event is therefore as accurate as a step.
 #pragma once
 
 #include <vector>
@@ -18,17 +18,17 @@ public:
     ValueEvents(const std::vector<UserEvent>& asked, System& system, Stepper& stepper, Progress& progress);
 
     bool empty() const { return count_.empty(); }
-    // Signs at the start of a run.
+    // Store the signs at the start of a run.
     void start(double t, const VecX& y);
-    // Looks at the step just taken, which may end at an event of friction, and ends it at the first event in it; whether
-    // it ends at another time now. The workspace must be evaluated at its end, and is so again.
+    // Search the step just taken, which may end at a friction event, and end it at the first value event. Return true
+    // if its end has changed. The workspace must be evaluated at the step's end, and is evaluated there again.
     bool locate(bool ends_at_event);
-    // The same for a step of time stepping, which stays as it is.
+    // Count the events at the end of a step of time stepping, whose end stays.
     void look_at_end(double t, const VecX& y);
-    // Events at the end of the step.
+    // Values with an event at the end of the step. `tell` appends their events.
     const std::vector<int>& found() const { return found_; }
     void tell(double t, std::vector<Event>& events) const;
-    // Whether one of them ends the run.
+    // Check if an event has ended the run.
     bool ends_run() const { return ends_run_; }
 
 private:
@@ -39,7 +39,7 @@ private:
     double value_inside(int k, double part);
     int direction(int k) const { return k < users() ? asked_[k].direction : 0; }
     bool counts(int k) const { return direction(k) == 0 || direction(k) == -side_[k]; }
-    // Part of the step at which this one first happens, beyond it where it does not.
+    // Return the part of the step at which value k first crosses zero, `beyond` if it does not.
     double first_crossing(int k);
     void end_step_at(double size);
     void step_onto(int k, double part);
@@ -49,10 +49,10 @@ private:
     const std::vector<UserEvent>& asked_;
     System& system_;
     Stepper& stepper_;
-    std::vector<int> drives_;     // dofs whose effort is bounded: values behind those of the user
-    std::vector<double>& side_;   // sign of each value by now; 0 where it has been zero since the start
+    std::vector<int> drives_;     // dofs with bounded effort, their values follow the user's values
+    std::vector<double>& side_;   // current sign of each value, 0 if zero since the start
     std::vector<long> count_;
-    // What is asked of all drives where they were looked at last.
+    // Demanded effort of all drives, cached for the last state.
     bool asked_before_ = false;
     double asked_time_ = 0.0;
     VecX asked_y_, asked_torque_;

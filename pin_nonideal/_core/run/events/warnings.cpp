@@ -5,7 +5,7 @@
 
 namespace pn {
 
-// Part of a step to which the instant is found from which on several motions are possible.
+// Tolerance of the first instant with several motions, relative to the step.
 constexpr double several_width = 1e-12;
 
 Notices::Notices(System& system, Stepper& stepper, Progress& progress, Recording& out)
@@ -37,8 +37,8 @@ std::optional<double> Notices::begin_several(bool after_step) {
     return at;
 }
 
-// Halves the step just taken, on its interpolant, toward the last instant at which its motion is the only one. The
-// workspace is left as it was.
+// Return the first instant with several motions, by bisection of the step just taken on its interpolant. The workspace
+// is restored.
 double Notices::last_unique() {
     const RunState kept = w.state;
     stepper_.make_interpolant();

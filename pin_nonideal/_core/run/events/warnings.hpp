@@ -1,5 +1,5 @@
-// What a run tells of its motion where no mode changes: contacts that are kept though they pull, and where the laws begin
-// to allow other motions too.
+// Events of a run without a mode change: bilateral contacts in tension, and instants from which the laws allow several
+// motions.
 #pragma once
 
 #include <optional>
@@ -13,12 +13,12 @@ class Notices {
 public:
     Notices(System& system, Stepper& stepper, Progress& progress, Recording& out);
 
-    // Contacts and wheels that have to pull, told once each time they begin.
+    // Record contacts and wheels in tension, once each time the tension begins.
     void pulls(const std::optional<FoundEvent>& event) {
         if (!p.contacts.empty()) tell_pulls(event);
     }
-    // Where the laws begin to allow other motions too, or none at the end of a step of time stepping, told once each time;
-    // returns when, where that lies inside the step.
+    // Record the instant from which the laws allow several motions, once each time. At the end of a time step this
+    // includes laws that allow no motion. Return the recorded instant, which can lie inside the step.
     std::optional<double> several(bool after_step) {
         const bool before = progress_.several;
         progress_.several = w.state.unique == Uniqueness::several || w.now.several || w.now.no_motion;

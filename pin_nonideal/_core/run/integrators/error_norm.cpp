@@ -11,23 +11,24 @@ namespace pn {
 
 namespace {
 
-// Part of its limit to which the force of a sticking element is resolved over a step.
+// Tolerance of the force of a sticking element over a step, relative to its limit.
 constexpr double share_part = 1e-4;
-// A load that jumps keeps its error in steps however short; shorter ones than this pass over it [s].
+// Shortest step [s] that resolves a load. The error of a load that jumps does not decrease with the step, so shorter
+// steps skip it.
 constexpr double shortest_resolved = 1e-9;
-// Rounding in one velocity, as a part of the largest: a joint that constraints drive slowly beside fast ones has no
-// digits below it, and no step is short enough to find some.
+// Rounding of a velocity, relative to the largest one. A joint that constraints drive slowly beside fast joints has no
+// digits below it at any step size.
 constexpr double velocity_rounding = 64 * std::numeric_limits<double>::epsilon();
-// Residuals below so many times the rounding that a projection leaves are no error of a step.
+// Residuals below this multiple of the rounding of a projection are no error of a step.
 constexpr double residual_spacings = 8.0;
-// A prescribed motion moves by the rounding of the time; the moves of a step's stages are so many spacings off.
+// Rounding of the time in a step's stages, in floating-point spacings. It moves prescribed motions.
 constexpr double time_spacings = 4.0;
 
-// The first step [Hairer, Norsett, Wanner, sec. II.4]: Euler's rule may move by this part of the state's own size, and
-// the method's error, by the derivatives seen there, by this part of the tolerance.
+// First step [Hairer, Norsett, Wanner, sec. II.4]. The move of Euler's rule is bounded relative to the size of the
+// state. The error of the method, estimated from the derivatives, is bounded relative to the tolerance.
 constexpr double first_part = 0.01;
-// Sizes that say nothing, and the step [s] tried then; a second derivative that is none, and the part of the first
-// trial that is taken then; growth over the first trial.
+// Negligible norm of a state or rate, and the trial step [s] for it. Negligible second derivative, and the step for it
+// relative to the trial. Maximum growth over the trial.
 constexpr double nothing = 1e-5, smallest_trial = 1e-6, no_curvature = 1e-15, flat_part = 1e-3, most_growth = 100.0;
 
 }  // namespace
@@ -62,7 +63,7 @@ void ErrorNorm::set_tolerances(const VecX& y0, const VecX& y1, double h) {
     limited_ = false;
     const int nv = system_.nv;
     for (int k = 0; k < static_cast<int>(rounding_.size()); ++k) {
-        // Positions follow velocities of the stages, which have the rounding of accelerations over the step.
+        // Positions integrate the velocities of the stages, which have the rounding of accelerations over the step.
         const double rate = rounding_[k] + (k < nv ? std::abs(h) * rounding_[nv + k] : 0.0);
         const double least = std::abs(h) * rate;
         limited_ |= least > tolerance_[k];
@@ -88,7 +89,8 @@ double ErrorNorm::operator()(const VecX& dy, const VecX& y) {
     int n = 2 * nv + nz;
     to_tangent(dy, y);
     if (system_.on_constraints) {
-        // What the rows forbid is removed by the projection at the step's end; near a singular position it is noise.
+        // The projection at the step's end removes motion against the rows. Near a singular position this motion is
+        // noise.
         remove_normal_move(system_.p, system_.w, tangent_.head(nv));
         remove_normal_velocity(system_.p, system_.w, tangent_.segment(nv, nv));
     }
@@ -99,7 +101,7 @@ double ErrorNorm::operator()(const VecX& dy, const VecX& y) {
     }
     for (int e : system_.w.now.loaded) {
         if (system_.w.state.mode[e] != sticking) continue;
-        // The load of a contact may jump, over an edge: steps too short to tell its time pass it.
+        // The load of a contact can jump at an edge. Steps too short to resolve the jump skip it.
         if (system_.p.frictions[e].gap >= 0 && !resolves_shares_) continue;
         const double x = system_.share(dy, e) / share_tolerance_;
         sum += x * x;

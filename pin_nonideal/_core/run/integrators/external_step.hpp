@@ -1,5 +1,5 @@
-// A step that an integrator outside the core has taken. Its interpolant is the integrator's, and the core looks at the
-// rates at its ends and at the places of the method's C.
+// Step taken by an integrator outside the core, with that integrator's interpolant. The core evaluates rates at the
+// step's ends and at the abscissas C of the method.
 #pragma once
 
 #include <cmath>
@@ -13,18 +13,18 @@ namespace pn {
 
 class OutsideStep {
 public:
-    using Interpolant = std::function<void(double t, VecX& y)>;  // y without watch
+    using Interpolant = std::function<void(double t, VecX& y)>;  // y without the watch entries
 
     OutsideStep(const Method& method, Step& step) : method_(method), step_(step), inside_(step.y0) {}
     void set_interpolant(Interpolant interpolant) { interpolant_ = std::move(interpolant); }
 
-    // y1 at the step's end, or at an earlier one.
+    // Compute y1 at the step's end, or at an earlier end.
     template <class System>
     void advance(System& system) {
         interpolate(1.0, step_.y1);
         system.normalize(step_.y1);
     }
-    // The rates inside.
+    // Evaluate the rates inside the step.
     template <class System>
     void look_inside(System& system) {
         for (int i = 1; i < method_.stages; ++i) {
@@ -35,7 +35,7 @@ public:
     template <class System>
     void make_interpolant(System&) {}
     void interpolate(double part, VecX& y) const { interpolant_(step_.t0 + part * step_.h, y); }
-    // Its rate is not known.
+    // Return one entry of the interpolant, and NaN for its unknown rate.
     std::pair<double, double> interpolated(double part, int index) const {
         interpolate(part, inside_);
         return {inside_[index], NAN};

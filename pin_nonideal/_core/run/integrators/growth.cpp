@@ -7,19 +7,20 @@ namespace pn {
 
 namespace {
 
-// Speeds below this [rad/s or m/s] are any motion's; from there on every decade is kept in mind.
+// Speed [rad/s or m/s] from which every decade is recorded. Smaller speeds are ordinary.
 constexpr double least_speed = 1.0, decade = 10.0;
-// Decades of a growth, in two halves. Exponential growth takes as long for both. Under a constant force, or a polynomial of
-// time, the second half takes much longer; near a singular position, or under a force that grows with a power of the speed,
-// much less, and the steps end by themselves.
+// Decades in each half of a growth. Exponential growth takes equal time for both halves. Under a constant force, or in
+// a motion polynomial in time, the second half takes much longer. It takes much less near a singular position, or under
+// a force that grows with a power of the speed. Such runs end by themselves as their steps shrink.
 constexpr size_t half = 3;
 constexpr double as_fast = 0.8, much_faster = 100.0;
-// A chaotic motion with a source of energy grows by a power of time. Its last decade takes so many steps, and each decade
-// takes longer than the one before, on the mean less than so many times as long; under a constant force it takes ten times
-// as long, and near a singular position it is shorter.
+// A chaotic motion with a source of energy grows by a power of time. Its last decade takes at least `many_steps` steps.
+// Each decade takes longer than the one before, on average less than `longer` times as long. Under a constant force a
+// decade takes ten times as long, and near a singular position it is shorter.
 constexpr long many_steps = 1000;
 constexpr double longer = 5.0;
-// Growth by more than this in one fixed step is the method's: the step is too long, and the motion overflows.
+// Maximum growth in one fixed step that counts. Faster growth comes from the method: the step is too long, and the
+// motion overflows.
 constexpr double growth_in_step = 0.1;
 
 }  // namespace
@@ -68,7 +69,7 @@ void GrowthGuard::judge() {
     throw Failure(Failure::Kind::growing, progress_.t, {dof, largest_source()}, rate);
 }
 
-// 0 of the actuation, 1 of the given forces, 2 of the laws.
+// Return the source of the largest power: 0 actuation, 1 applied forces, 2 laws.
 int GrowthGuard::largest_source() const {
     const Evaluation& now = system_.w.now;
     const VecX speed = progress_.y.segment(system_.nq, system_.nv).cwiseAbs();

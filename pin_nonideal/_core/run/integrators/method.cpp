@@ -1,8 +1,9 @@
 // Coefficients of the methods.
 //
-// dop853: the method of order 8 of Dormand and Prince with embedded orders 5 and 3 and the dense output of order 7, in
-// Hairer, Norsett, Wanner, "Solving Ordinary Differential Equations I", 2nd ed. dopri5: Dormand and Prince (1980) with
-// Shampine's dense output of order 4. Rows of A are stored below the diagonal, one after the other.
+// dop853: method of order 8 of Dormand and Prince, with embedded orders 5 and 3 and dense output of order 7. [Hairer,
+// Norsett, Wanner, "Solving Ordinary Differential Equations I", 2nd ed.]
+// dopri5: Dormand and Prince (1980), with Shampine's dense output of order 4.
+// Rows of A are stored below the diagonal, one after the other.
 #include "run/integrators/method.hpp"
 
 #include <cstddef>
@@ -125,7 +126,7 @@ constexpr double rk4_C[] = {
     0.0, 0.5, 0.5, 1.0,
 };
 
-// What does not fit ends the compilation.
+// Stop the compilation if the lengths of a table do not fit.
 constexpr void require(bool fits) {
     if (!fits) throw std::logic_error("lengths of a table");
 }
@@ -181,7 +182,7 @@ constexpr Method scheme(const char* name, Method::Scheme scheme) {
     return m;
 }
 
-// SciPy's, looked at in the middle of a step.
+// Methods of SciPy, sampled in the middle of a step.
 constexpr double outside_C[] = {0.0, 0.5};
 constexpr Method outside(const char* name, bool one_step) {
     Method m = scheme(name, Method::Scheme::outside);

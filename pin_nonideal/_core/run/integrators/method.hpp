@@ -1,5 +1,5 @@
-// A method of integration is data: adding an explicit Runge-Kutta pair is one table in method.cpp, and its name there.
-// The steps of those that lie outside the core are followed.
+// Integration methods as data. A new explicit Runge-Kutta pair is one table in method.cpp, and its name there. The core
+// follows the steps of methods outside the core.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace pn {
 
-// Stages of a method, the rate at the step's end, and further stages of its interpolant.
+// Maximum number of rates: stages, rate at the step's end, and further stages of the interpolant.
 constexpr int most_rates = 16;
 
 struct Method {
@@ -18,15 +18,16 @@ struct Method {
     int order = 1, stages = 1;
     const double *A = nullptr, *B = nullptr, *C = nullptr;  // rows of A below the diagonal, one after the other
 
-    // Weights of the error estimate over the stages, and over the rate at the step's end where that is one too (first
-    // same as last). A second, coarser one guards against zeros of the first.
+    // Weights of the error estimate over the stages. They include the rate at the step's end if it is the first stage
+    // of the next step (first same as last). A second, coarser estimate guards against zeros of the first.
     const double *E = nullptr, *E_coarse = nullptr;
     bool first_same_as_last = false;
-    double stability = 0.0;  // steps are stable up to this length over the time in which a motion decays
-    bool one_step = true;    // remembers no earlier steps, so that it goes on from a state that was put in place
+    double stability = 0.0;  // stability limit of a step, in units of the time in which a motion decays
+    bool one_step = true;    // uses no earlier steps, so it can continue from a projected state
 
-    // The interpolant is the cubic through both ends and their rates, with further terms of weights D over all rates, of
-    // further stages too; or a polynomial in the part of the step, with coefficients P.
+    // The interpolant has one of two forms:
+    // - the cubic through both ends and their rates, plus terms of weights D over all rates, including further stages,
+    // - a polynomial in the part of the step, with coefficients P.
     int further_stages = 0, terms = 0, powers = 0;
     const double *A_further = nullptr, *C_further = nullptr, *D = nullptr, *P = nullptr;
 

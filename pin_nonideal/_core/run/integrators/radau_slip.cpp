@@ -18,18 +18,18 @@ using radau::with_weights;
 
 namespace {
 
-// The error estimate: the defect of the polynomial's rate at the start, in this part of the step. Of a smooth motion
-// that is the interpolant's error, a few times over.
+// Error estimate: defect of the polynomial's rate at the start, times this part of the step. For a smooth motion it is
+// a few times the error of the interpolant.
 constexpr double defect_part = 1.0 / (2 * Collocation::stages + 1);
 
 constexpr int most_iterations = 14;
-constexpr double farthest_turn = 1.5;     // of a direction in the first iteration: a step that is not too long
-// Of the tolerance, to which the stages are solved: what their changes still add up to, or the first change alone.
+constexpr double farthest_turn = 1.5;     // largest turn of a direction in the first iteration, else the step is too long
+// Convergence, relative to the tolerance: sum of the remaining changes, or the first change alone.
 constexpr double solved_part = 0.05, solved_at_once = 0.005;
-constexpr double diverging = 0.9, diverging_first = 3.0;  // ratio of two changes at which the iteration is given up
-constexpr double rounding_part = 0.5;     // of the tolerance: changes below it that no longer shrink are rounding
-constexpr double perturbation = 1e-6;     // of a direction, for its response: root of the rounding, with a margin
-constexpr double rank_threshold = 1e-5;   // of the turns that slip at rest leaves open, and of the step's fastest slip
+constexpr double diverging = 0.9, diverging_first = 3.0;  // ratio of two changes at which the iteration stops
+constexpr double rounding_part = 0.5;     // relative to the tolerance: smaller changes that no longer shrink are rounding
+constexpr double perturbation = 1e-6;     // step of a direction for its response: above the root of the rounding
+constexpr double rank_threshold = 1e-5;   // relative: for turns that slip at rest leaves open, and slip at rest itself
 
 }  // namespace
 
@@ -43,7 +43,7 @@ Collocation::Collocation(Step& step, System& system, ErrorNorm& norm) : step_(st
 
 double Collocation::part(int stage) { return points[stage]; }
 
-// The elements whose directions are sought: those of several directions that slip.
+// Collect the elements with unknown directions: slipping elements with several directions.
 void Collocation::gather() {
     const Program& p = system_.p;
     elements_.clear();
@@ -60,7 +60,7 @@ void Collocation::gather() {
         for (int k = 0; k < e.dim; ++k) start_n_[e.row + k] = system_.w.state.slip_direction[e.index][k];
 }
 
-// Stages guessed by the step's last trial, of another length.
+// Initialize the stages from the last trial of the step, which had another length.
 void Collocation::stretch() {
     const double ratio = step_.h / known_size_;
     const std::vector<VecX> n_before = n_;
@@ -76,7 +76,7 @@ void Collocation::stretch() {
     Y_.swap(next_);
 }
 
-// Stages guessed by the rate at the start, in room for as many elements as there are.
+// Initialize the stages by the rate at the start, and size the buffers for the elements.
 void Collocation::go_straight_on() {
     sigma_.resize(elements_.size(), stages);
     G_.resize(system_.nv, rows_);
@@ -115,8 +115,8 @@ void Collocation::evaluate_stages(bool first) {
     }
 }
 
-// How the acceleration answers to each direction, with the loads that follow it; at the step's end, where the workspace
-// stands after the last stage.
+// Compute the derivatives of the acceleration by each direction, including the loads that follow it. The workspace is
+// at the step's end, after the last stage.
 void Collocation::find_response() {
     Workspace& w = system_.w;
     const double end = step_.t0 + step_.h;
@@ -133,7 +133,7 @@ void Collocation::find_response() {
     }
 }
 
-// Unit vectors across the direction of an element; one component of a direction is below the root of a third.
+// Unit vectors across the direction of an element. One component of a direction is at most the root of 1/3.
 constexpr double one_third_root = 0.5774;
 static void tangents(const VecX& n, int row, int dim, MatX& T, int column) {
     if (dim == 2) {
@@ -157,7 +157,7 @@ void Collocation::add_tangents(int i) {
     Q_[i].noalias() = G_ * T_[i];
 }
 
-// Turns of all directions at once: across n the slip velocity u_i that the rates give must vanish,
+// Solve for the turns of all directions together. Across n the slip velocity u_i from the rates must vanish,
 //     T^T (u_i + A_i h sum_j a_ij G T_j turn_j) - sigma_i turn_i = 0.
 void Collocation::solve_turns() {
     const int m = tangents_, nv = system_.nv, nq = system_.nq;
@@ -191,7 +191,7 @@ void Collocation::solve_turns() {
     turn_ = -least_squares(K_, residual_, rank_threshold);
 }
 
-// Turns the directions, and the accelerations with them.
+// Turn the directions, and update the accelerations.
 void Collocation::turn_directions() {
     for (int i = 0; i < stages; ++i) {
         turned_[i] = n_[i];
@@ -202,7 +202,7 @@ void Collocation::turn_directions() {
     }
 }
 
-// The stages' states under the turned directions.
+// Update the states of the stages under the turned directions.
 void Collocation::move_stages() {
     const int nq = system_.nq;
     const auto integrate = [&](int from, int size) {
@@ -296,7 +296,7 @@ double Collocation::error() {
         error_ -= (part * table.at_start[j]) * F_[j];
         speed += table.at_start[j] * sigma_.col(j);
     }
-    // What of it only turns directions dies out as they relax: (1 - part df/dv)^-1.
+    // Components of the error along slip directions decay as the directions relax. Filter them by (1 - part df/dv)^-1.
     MatX K = part * P_[0] * Q_[0];
     for (size_t at = 0; at < elements_.size(); ++at)
         for (int k = 0; k < elements_[at].dim - 1; ++k) {
@@ -325,7 +325,7 @@ double Collocation::interpolated(double part, int index) const {
     return value;
 }
 
-// Of the polynomial through the stages' rates.
+// Return one entry of the polynomial through the stages' rates.
 double Collocation::interpolated_rate(double part, int index) const {
     double rate = 0.0, sum = 0.0;
     for (int j = 0; j < stages; ++j) {

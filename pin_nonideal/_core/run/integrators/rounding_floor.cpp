@@ -11,18 +11,19 @@ namespace pn {
 
 namespace {
 
-// Only runs that take so many steps, as noise that asks for ever shorter ones makes them, are held to their rounding: what
-// is measured is a bound that most runs are far better than. It is measured so many steps apart: seven evaluations among
-// hundreds.
+// Number of steps from which rounding is measured, and steps between two measurements (seven evaluations each). Noise
+// that demands ever shorter steps causes such runs. The measured value is a bound that most runs stay far below, so
+// shorter runs ignore it.
 constexpr long many_steps = 20000, apart = 64;
-// A measurement is a sample: the rounding of another step may be so many times it, and is taken for half of what it was
-// before at least.
+// Safety factor on a measurement, which is only a sample. Part of the previous value that bounds the next one from
+// below.
 constexpr double sample_factor = 3.0, lasting_part = 0.5;
-// Changes of the last digits are a fixed sequence, so that runs repeat; each of so many spacings of the numbers at most.
+// Generator of changes of the last digits. The sequence is fixed, so that runs repeat. `most_spacings`: maximum change
+// in floating-point spacings.
 constexpr unsigned long long multiplier = 6364136223846793005ULL, increment = 1442695040888963407ULL;
 constexpr double most_spacings = 16.0;
 constexpr int samples = 3;
-const double second_difference = std::sqrt(6.0);  // deviation of its rounding, over that of a rate
+const double second_difference = std::sqrt(6.0);  // standard deviation of its rounding, relative to that of a rate
 
 }  // namespace
 
@@ -36,8 +37,9 @@ RoundingFloor::RoundingFloor(System& system, Stepper& stepper, ErrorNorm& norm, 
     raised_ = sample_factor * std::sqrt(sum) / StepControl::aim(method);
 }
 
-// What changes of the last digits of the state make of its rates: every rounding on the way is another then. Opposite
-// changes make opposite differences but for rounding, whose second difference has the variance 1 + 1 + 4.
+// Measure the rounding of the rates by changes of the last digits of the state, which alter every rounding on the way.
+// Opposite changes make opposite differences except for rounding. The second difference has the variance 1 + 1 + 4
+// times that of a rate.
 void RoundingFloor::measure() {
     const double at = stepper_.t0 + stepper_.h, epsilon = std::numeric_limits<double>::epsilon();
     const RunState kept = system_.w.state;
@@ -50,7 +52,7 @@ void RoundingFloor::measure() {
         for (int k = 0; k < n; ++k) {
             draw = multiplier * draw + increment;
             const double part = static_cast<double>(static_cast<long long>(draw)) * 0x1p-63;
-            change_[k] = most_spacings * epsilon * part * stepper_.y1[k];  // what rests goes on resting
+            change_[k] = most_spacings * epsilon * part * stepper_.y1[k];  // zero entries stay zero
         }
         noise_ = -2.0 * stepper_.end_rate();
         for (const double side : {1.0, -1.0}) {

@@ -1,4 +1,4 @@
-// The floor of the step control: an acceleration has rounding, and no step is short enough to meet a tolerance below it.
+// Floor of the step control. Accelerations have rounding, and no step is short enough to meet a tolerance below it.
 #pragma once
 
 #include "run/output/checkpoint.hpp"
@@ -10,9 +10,9 @@ class RoundingFloor {
 public:
     RoundingFloor(System& system, Stepper& stepper, ErrorNorm& norm, Progress& progress, Recording& out);
 
-    // After a step that the error control accepts, with the workspace evaluated at its end, and left so: measures the
-    // rounding of the rates now and then in runs of many steps. The norm takes it for part of the tolerance, as much as
-    // lets rounding alone make the next step no shorter: noise, which would ask for shorter steps for ever, asks for none.
+    // Measure the rounding of the rates at intervals, in runs with many steps. Call it after a step that the error
+    // control accepts. The workspace is evaluated at the step's end before and after. The norm raises the tolerance by
+    // the rounding, so that noise alone does not shorten the next step.
     void look();
 
 private:
@@ -23,7 +23,7 @@ private:
     ErrorNorm& norm_;
     Progress& progress_;
     Recording& out_;
-    double raised_ = 0.0;  // of the rounding of a rate, over the step, what its tolerance is raised to
+    double raised_ = 0.0;  // factor from the rounding of a rate to the raised tolerance, per step
     VecX change_, probe_, rate_, noise_;
 };
 

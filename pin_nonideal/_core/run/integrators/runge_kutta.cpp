@@ -4,7 +4,7 @@
 
 namespace pn {
 
-// out = y + (part_0 K_0 + ... + part_{n-1} K_{n-1}) for as many numbers from i as `Several` holds.
+// Compute out = y + (part_0 K_0 + ... + part_{n-1} K_{n-1}) for the entries from i that `Several` holds.
 template <class Several>
 static PN_INLINE void add_weighted_at(int i, const VecX& y, const double* part, const WeightedSum& sum, VecX& out) {
     Several x, k;
@@ -81,7 +81,7 @@ void RungeKutta::interpolate(double part, VecX& y) const {
     sum.setZero();
     for (int i = static_cast<int>(coefficients_.size()) - 1; i >= 0; --i) {
         sum += coefficients_[i].head(n);
-        // ((...) (1 - part)) part, alternating from the last coefficient; or powers of it
+        // Horner's scheme: factors part and 1 - part alternate, or all factors are part.
         sum *= method_.P || i % 2 == 0 ? part : 1.0 - part;
     }
     sum += step_.y0.head(n);

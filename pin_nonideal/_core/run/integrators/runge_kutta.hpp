@@ -1,6 +1,6 @@
-// Explicit Runge-Kutta methods: one stepping routine on flat arrays for all tables. A system has
-//     derivative(t, y, dy)   and   normalize(y), which restores lengths that must be one,
-// and the norm of an error is 1 at the tolerance.
+// Explicit Runge-Kutta methods: one stepping routine on flat arrays for all tables. A system provides
+//     derivative(t, y, dy)   and   normalize(y),
+// and `normalize` restores unit lengths. The norm of an error is 1 at the tolerance.
 #pragma once
 
 #include <cmath>
@@ -11,7 +11,7 @@
 
 namespace pn {
 
-// A weighted sum of rates: those whose weight is not zero, where they stand.
+// Weighted sum of rates: nonzero weights, and pointers to their rates.
 struct WeightedSum {
     int terms = 0;
     double weight[most_rates];
@@ -19,7 +19,7 @@ struct WeightedSum {
     WeightedSum(const double* weights, int n, const std::vector<VecX>& rates);
 };
 
-// out = y + h (a_0 K_0 + ... + a_{n-1} K_{n-1}), of the first `size` numbers; out may be y.
+// Compute out = y + h (a_0 K_0 + ... + a_{n-1} K_{n-1}) for the first `size` entries. `out` may be y.
 void add_weighted(int size, const VecX& y, double h, const WeightedSum& sum, VecX& out);
 
 class RungeKutta {
@@ -28,7 +28,7 @@ public:
     RungeKutta(const RungeKutta&) = delete;  // its sums point into the step's rates
     RungeKutta& operator=(const RungeKutta&) = delete;
 
-    // y1, from y0 and the rate there.
+    // Compute y1 from y0 and the rate there.
     template <class System>
     void advance(System& system) {
         for (int i = 1; i < method_.stages; ++i) {
@@ -39,7 +39,7 @@ public:
         system.normalize(step_.y1);
     }
 
-    // Norm of the error estimate.
+    // Return the norm of the error estimate.
     template <class Norm>
     double error(Norm& norm) {
         error_.head(step_.active).setZero();
@@ -58,7 +58,7 @@ public:
         return std::abs(step_.h) * fine * fine / std::sqrt(fine * fine + coarse_part * coarse * coarse);
     }
 
-    // The interpolant over the step; the rate at its end must be known.
+    // Make the interpolant over the step. The rate at the step's end must be known.
     template <class System>
     void make_interpolant(System& system) {
         for (int i = 0; i < method_.further_stages; ++i) {
@@ -69,13 +69,13 @@ public:
         else sum_terms();
     }
     void interpolate(double part, VecX& y) const;
-    // One number of it, and its change over the step at that rate.
+    // Return one entry of the interpolant, and its rate per step.
     std::pair<double, double> interpolated(double part, int index) const;
-    // Where the last stage was evaluated, until the interpolant is made.
+    // State of the last stage, until the interpolant is made.
     const VecX& last_stage() const { return stage_; }
 
 private:
-    // Of the square of the coarse estimate in the size of both. [Hairer, Norsett, Wanner, eq. II.10.17]
+    // Weight of the squared coarse estimate in the combined norm. [Hairer, Norsett, Wanner, eq. II.10.17]
     static constexpr double coarse_part = 0.01;
 
     void sum_powers();
@@ -86,7 +86,7 @@ private:
     VecX stage_, error_;
     std::vector<WeightedSum> to_stage_, to_errors_, to_further_, to_terms_;
     WeightedSum to_end_;
-    std::vector<VecX> coefficients_;  // of the interpolant
+    std::vector<VecX> coefficients_;  // coefficients of the interpolant
 };
 
 }  // namespace pn

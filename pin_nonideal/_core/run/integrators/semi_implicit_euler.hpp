@@ -1,5 +1,5 @@
-// Semi-implicit Euler: v1 = v0 + h a(q0, v0), and q1 is q0 moved by h v1, near the constraints; states of laws and work
-// by Euler's rule. Order 1.
+// Semi-implicit Euler of order 1: v1 = v0 + h a(q0, v0). q1 is q0 moved by h v1, with a correction toward the
+// constraints. Law states and work follow Euler's rule.
 #pragma once
 
 #include <utility>
@@ -13,12 +13,12 @@ class SemiImplicitEuler {
 public:
     explicit SemiImplicitEuler(Step& step) : step_(step), delta_(step.y0) {}
 
-    // y1, from y0 and the rate there; the workspace must be evaluated at y0.
+    // Compute y1 from y0 and the rate there. The workspace must be evaluated at y0.
     void advance(System& system);
-    // What the projection of the step's end has shown helps the next step.
+    // Store the multipliers that the projection of the step's end has shown, for the next step.
     void learn(System& system) const;
 
-    // The interpolant is a line.
+    // The interpolant is linear.
     void make_interpolant(System&) { delta_ = step_.y1 - step_.y0; }
     void interpolate(double part, VecX& y) const;
     std::pair<double, double> interpolated(double part, int index) const {

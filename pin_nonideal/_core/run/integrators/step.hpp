@@ -1,4 +1,4 @@
-// One step of integration on a flat state y, and the rates found on its way.
+// Integration step on a flat state y, with its rates.
 #pragma once
 
 #include <vector>
@@ -11,10 +11,10 @@ struct Step {
     double t0 = 0.0, h = 0.0;
     VecX y0, y1;
     int stages = 1;
-    int states;  // numbers of y from which the rates follow; after them what elements and gaps are watched by
-    int active;  // numbers of y that change in this step: none of what is watched where all is open
-    // Of the stages, the first at y0; then the one at y1, which is the caller's to find; then those of further stages
-    // of the interpolant.
+    int states;  // number of entries of y that determine the rates, the watch entries follow
+    int active;  // number of entries of y that change in this step, without watch entries of inactive elements
+    // Rates of the stages, the first at y0. The rate at y1 follows, which the caller computes. The further stages of
+    // the interpolant follow last.
     std::vector<VecX> rates;
 
     Step(int stage_count, int rate_count, int state_count, int size)

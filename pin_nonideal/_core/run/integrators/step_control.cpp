@@ -8,15 +8,16 @@ namespace pn {
 
 namespace {
 
-// The next step aims at error = safety^order, so far below the tolerance that what the motion adds to the error from
-// one step to the next seldom rejects it: over smooth motions a sixth fewer evaluations to the same error than with 0.9,
-// where a third of the steps fails. A step tried again knows its error, and aims closer.
+// The next step aims at error = safety^order. The change of the error from step to step then seldom rejects a step.
+// With 0.9 a third of the steps fails, and smooth motions need a sixth more evaluations for the same error. The error
+// of a retried step is given, so it aims closer.
 constexpr double safety = 0.65, retry_safety = 0.9, shrink_limit = 0.2, growth_limit = 10.0;
 
-// Unit roundoff in an acceleration at a sine s to a singular position: 1/s of it in the place, 1/s^2 in the velocity
-// after projection, 1/s^3 where the rows are solved.
+// Return the rounding of an acceleration at the sine s to a singular position, with pivot = s^2. Unit roundoff grows by
+// 1/s in the position, by 1/s^2 in the velocity after projection, and by 1/s^3 in the solution of the rows.
 double rounding_at(double pivot) { return std::numeric_limits<double>::epsilon() / (pivot * std::sqrt(pivot)); }
-// A step whose evaluations come nearer than this part of its way through is shortened so, which moves them elsewhere.
+// A step is shortened by `detour` if an evaluation is nearer to a singular position than `clearance` times the step's
+// way. Its evaluations then lie elsewhere.
 constexpr double clearance = 0.04, detour = 0.85;
 constexpr int detour_limit = 3;
 

@@ -14,7 +14,7 @@ Stepper::Stepper(const Method& chosen, System& system, ErrorNorm& norm)
     for (int i = 0; i < stages; ++i)
         if (i == 0 || (method.C && method.C[i] < 1.0)) looks_.push_back({i == 0 ? 0.0 : method.C[i], &rates[i]});
     std::stable_sort(looks_.begin(), looks_.end(), [](const Look& a, const Look& b) { return a.part < b.part; });
-    // Of stages at one instant the last is the best.
+    // Keep the last stage at each instant, which is the most accurate.
     const auto same = [](const Look& a, const Look& b) { return a.part == b.part; };
     looks_.erase(looks_.begin(), std::unique(looks_.rbegin(), looks_.rend(), same).base());
     collocation_looks_.push_back({0.0, &rates[0]});
@@ -23,7 +23,7 @@ Stepper::Stepper(const Method& chosen, System& system, ErrorNorm& norm)
     for (auto* list : {&looks_, &collocation_looks_}) list->push_back({1.0, &end_rate()});
 }
 
-// Calls `use` with the stepper that the method has; time stepping is no business of these.
+// Call `use` with the scheme of the method. Time stepping has none here.
 template <class Scheme, class Use>
 static void with_scheme(Scheme& scheme, const Use& use) {
     if (auto* runge_kutta = std::get_if<RungeKutta>(&scheme)) use(*runge_kutta);
@@ -40,7 +40,7 @@ void Stepper::take(double t, double size) {
     if (collocates_) {
         collocation_.advance();
         if (collocation_.is_solved() || method.adaptive()) return;
-        RunState& state = system_.w.state;  // the next trial of a fixed step is no shorter
+        RunState& state = system_.w.state;  // a fixed step has no shorter trial
         collocates_ = state.seeks_directions = false;
         state.last_direction = state.slip_direction;
     }

@@ -1,4 +1,4 @@
-// A step of the method that a run was asked for; which stepper takes it is chosen once.
+// Step of the method of a run. The scheme of the method is selected once.
 #pragma once
 
 #include <variant>
@@ -16,38 +16,41 @@ public:
 
     const Method& method;
 
-    // y1 = one step of size h from (t0, y0); the rate there must be known. The step stands still where it is not solved.
+    // Compute y1 by one step of size h from (t0, y0). The rate at the start must be set. If collocation fails, y1 = y0.
     void take(double t, double size);
-    // Moves the end by a time so short that the rate there, which must be known, does not change. The interpolant is lost.
+    // Move the end by a time so short that the rate there stays constant. The rate at the end must be set. The
+    // interpolant is discarded.
     void move_end(double dt);
-    // The same step, of another length. Throws a Failure where it is not solved.
+    // Repeat the step with another length. Throw a Failure if it is not solved.
     void take_again(double size);
-    // The step from t that an integrator outside has taken, and the rates inside it.
+    // Follow a step from t that an outside integrator has taken, and evaluate the rates inside.
     void follow(double t, double size, OutsideStep::Interpolant interpolant);
-    // Norm of the error estimate, 1 at the tolerance; 0 of methods without one.
+    // Return the norm of the error estimate, 1 at the tolerance, or 0 for methods without one.
     double error();
-    // What the method's last stage was evaluated at, until there is an interpolant; of explicit Runge-Kutta methods.
+    // State of the last stage of an explicit Runge-Kutta method, until there is an interpolant.
     const VecX& last_stage() const { return std::get<RungeKutta>(scheme_).last_stage(); }
-    // What the projection of the end of an accepted step has shown, for methods that use it.
+    // Store data from the projection of an accepted step's end, for methods that use it.
     void learn();
 
-    // Interpolant over the step; needs the rate at its end. Leaves the workspace at other states.
+    // Interpolant over the step, which needs the rate at the step's end. Leaves the workspace at other states.
     void make_interpolant();
     void interpolate(double part, VecX& y) const;
-    // One number of it (lengths that must be one are not restored), and its rate.
+    // Return one entry of the interpolant, or its rate. Unit lengths are not restored.
     double interpolated(double part, int index) const;
     double interpolated_rate(double part, int index) const;
     bool has_interpolant() const { return has_interpolant_; }
 
-    // Whether the step sought the directions of slip by collocation, and where that has to go on for a time.
+    // Check if the step solved for the directions of slip by collocation.
     bool collocates() const { return collocates_; }
-    // How fast directions of slip, or any velocity as the stages of another method see it, relax beside the step.
+    // Return a relaxation rate times the step: of slip directions after collocation, else of velocities, estimated from
+    // the last two evaluations.
     double stiffness() const;
-    // Back to the directions of the step's end, after looking into it; and the step is done.
+    // Restore the directions of the step's end after samples inside the step. `forget` discards the warm start for the
+    // next step.
     void end_directions() const { if (collocates_) collocation_.take_directions_at(1.0); }
     void forget() { collocation_.forget(); }
 
-    // Where rates are known in the step just taken: at its start, at stages before its end, and there; in time.
+    // Rates of the step just taken, in order of time: at its start, at stages before its end, and at its end.
     struct Look {
         double part;
         const VecX* rate;

@@ -6,8 +6,9 @@ namespace pn {
 
 namespace {
 
-// Of the step: where directions of slip relax faster, stability holds the explicit methods short (at 3 to 6); it is
-// believed after some steps in a row, and asked again some steps after it turned out otherwise.
+// Relaxation rate of slip directions, times the step, from which stability limits explicit methods (at 3 to 6).
+// Collocation begins after `stiff_in_a_row` such steps. After collocation ends, the count begins again `patience` steps
+// later.
 constexpr double stiff = 2.5;
 constexpr int stiff_in_a_row = 6, patience = 20;
 

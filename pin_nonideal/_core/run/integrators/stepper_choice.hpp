@@ -1,5 +1,5 @@
-// Which stepper takes the next step where slip turns: collocation as long as directions of slip relax fast beside the
-// step, else the method asked for, until its stability has held the steps short several times in a row.
+// Choice of the stepper while slip turns. Collocation is used as long as slip directions relax fast relative to the
+// step. Otherwise the selected method is used, until its stability has limited several steps in a row.
 #pragma once
 
 #include "run/output/checkpoint.hpp"
@@ -12,9 +12,9 @@ class StepperChoice {
 public:
     StepperChoice(System& system, Stepper& stepper, Progress& progress, const Options& options);
 
-    // At the step just taken, whose end is evaluated: whether stability held it short.
+    // Check if stability limited the step just taken, whose end is evaluated.
     void look();
-    // For the next step.
+    // Select the stepper of the next step.
     void choose();
     void forget() { turns_stiffly_ = false; }
 
@@ -24,7 +24,7 @@ private:
     Stepper& stepper_;
     Progress& now_;
     const Options& options_;
-    bool turns_stiffly_ = false;  // the step just taken
+    bool turns_stiffly_ = false;  // stability limited the step just taken
 };
 
 }  // namespace pn

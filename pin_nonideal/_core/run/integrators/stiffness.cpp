@@ -10,26 +10,27 @@ namespace pn {
 
 namespace {
 
-// A stiff run takes this many steps unless it may take more: some seconds.
+// Maximum number of remaining steps of a stiff run if max_steps is not set (some seconds).
 constexpr double usual_steps = 1e5;
-// Steps near the border of stability until the motion is asked whether it is stiff; these many in a row away from it
-// begin the count anew. [Hairer, Wanner, Solving ODEs II, IV.2, asks after 15]
+// Steps near the limit of stability until stiffness is checked. `quiet_steps` steps in a row away from the limit reset
+// the count. [Hairer, Wanner, Solving ODEs II, IV.2, checks after 15]
 constexpr long suspicious_steps = 1000, quiet_steps = 6;
-// Part of the border beyond which a step counts: the control of the error keeps a stiff run there on an average.
+// Fraction of the stability limit beyond which a step counts. Error control keeps a stiff run there on average.
 constexpr double near_border = 0.5;
-// Time stepping takes what decays by Euler's rule.
+// Stability limit of Euler's rule, which time stepping applies to decaying motions.
 constexpr double euler_border = 2.0;
-// A mode that decays by less than this part of its frequency swings, and must be followed by any method.
+// Minimum decay of a mode that counts as decaying, relative to its rate. Other modes oscillate, and every method must
+// follow them.
 constexpr double least_damping = 0.1;
-// Relative step of differences; passes of the power iteration.
+// Relative step of differences, and passes of the power iteration.
 constexpr double difference_step = 1e-8;
 constexpr int power_passes = 20;
-// Over shorter differences a rate stays what it is to this part; that of a leap, as of a load whose place changes, grows
-// as they shrink, or falls to none where they do not reach it any more.
+// Shorter relative step, and minimum ratio of the rates by both steps. The rate of a jump, as of a load whose contact
+// point changes, grows as the step shrinks. It vanishes if the step does not reach the jump.
 constexpr double shorter_step = 1e-9, same_rate = 0.5;
 
-// A run is looked ahead after so many steps first, and twice as many each time. It takes long where so many seconds are
-// left, and vibrates where so many periods are, by steps longer than this part of one (in radians).
+// Step count at which the remaining time is first estimated, doubled each time. A run is slow if `long_time` seconds of
+// wall time are left. It vibrates if `many_radians` are left and a step covers more than `part_of_period` radians.
 constexpr long first_look_ahead = 500, never = 1L << 62;
 constexpr double long_time = 3.0, many_radians = 2e4, part_of_period = 0.1;
 
@@ -51,7 +52,7 @@ double StiffnessGuard::FastestMode::rate() const { return std::hypot(decay, freq
 
 bool StiffnessGuard::FastestMode::decays() const { return decay > least_damping * rate(); }
 
-// Two evaluations at the step's end, of the last stage and of the result, tell how fast the rate changes with the state.
+// Estimate the change of the rate with the state from two evaluations at the step's end: last stage, and result.
 double StiffnessGuard::stage_rate() const {
     const int n = system_.nq + system_.nv + system_.nz;
     const double apart = (stepper_.y1 - stepper_.last_stage()).head(n).norm();
@@ -59,7 +60,7 @@ double StiffnessGuard::stage_rate() const {
     return apart > 0.0 ? change / apart : 0.0;
 }
 
-// Derivative of the rate along a unit direction, and what the forces on the way change.
+// Return the derivative of the rate along a unit direction. `force` receives that of the forces.
 VecX StiffnessGuard::difference(double relative, const VecX& direction, VecX& force) {
     const double at = stepper_.t0 + stepper_.h;
     const int n = static_cast<int>(direction.size());
@@ -82,7 +83,7 @@ StiffnessGuard::FastestMode StiffnessGuard::fastest_mode(double relative) {
     const int n = system_.nq + system_.nv + system_.nz;
     VecX x = VecX::Ones(n).normalized(), force, other_force;
     for (int pass = 0; pass < power_passes; ++pass) x = difference(relative, x, force).normalized();
-    // The largest eigenvalue in the plane of x and where it goes.
+    // Largest eigenvalue in the plane of x and its image.
     const VecX image = difference(relative, x, force);
     VecX other = image - x.dot(image) * x;
     const double a = x.dot(image), c = other.norm();
@@ -142,7 +143,7 @@ void StiffnessGuard::look_ahead() {
     const double size = stepper_.h, at = stepper_.t0 + size, left = options_.end() - at;
     const double so_far = std::chrono::duration<double>(Clock::now() - begun_).count();
     if (so_far / static_cast<double>(steps_) * (left / size) < long_time) return;
-    const Counters kept = system_.w.counters;  // when this comes depends on the clock
+    const Counters kept = system_.w.counters;  // the instant depends on the clock, so the evaluations are not counted
     const FastestMode mode = mode_here();
     system_.w.counters = kept;
     const double radians = size * mode.rate();
@@ -155,7 +156,7 @@ void StiffnessGuard::look_ahead() {
 }
 
 void StiffnessGuard::require_time_steps(double size) {
-    // Time stepping finds which way slip goes together with its forces: slow slip turns as fast as it likes.
+    // Time stepping solves for slip directions together with the forces, so slow slip may turn arbitrarily fast.
     system_.w.state.seeks_directions = true;
     const FastestMode mode = fastest_mode(difference_step);
     if (!(size * mode.rate() > euler_border && mode.decays())) return;

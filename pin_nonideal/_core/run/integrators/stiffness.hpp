@@ -1,5 +1,5 @@
-// Whether a run crawls because it is stiff: its steps are as long as an explicit method is stable, however smooth the
-// motion, and more of them are left than it may take.
+// Guard against stiff runs. In a stiff run stability of the explicit method limits the steps, although the motion is
+// smooth. More steps are then left than the run may take.
 #pragma once
 
 #include "run/output/checkpoint.hpp"
@@ -10,32 +10,33 @@ namespace pn {
 
 class StiffnessGuard {
 public:
-    // A stiff run may take as many steps as the options allow, or the usual number of them.
+    // A stiff run may take as many steps as the options allow, or a default number.
     StiffnessGuard(System& system, Stepper& stepper, Progress& progress, const Options& options);
 
-    // After a step that the error control accepts, with the workspace evaluated at its end, and left so. Throws a Failure
-    // with the dof that is stiff, and its rate [1/s]. What will take long for a fast motion, but not for ever, is hinted at.
+    // Check stiffness after a step that the error control accepts. The workspace is evaluated at the step's end before
+    // and after. Throw a Failure with the stiff dof and its rate [1/s]. Call the hint of the options if a fast motion
+    // makes the run slow, but not endless.
     void look();
-    // A run begins, at which the count of steps does.
+    // Restart the step count for a new run.
     void forget();
-    // The same at once, unless what decays fastest lets time stepping take steps of this size.
+    // Throw the same Failure at once if the fastest decaying mode is too fast for time steps of this size.
     void require_time_steps(double size);
 
 private:
     struct FastestMode {
         double decay, frequency;  // [1/s]
-        int dof;                  // whose force does most to it
+        int dof;                  // dof whose force contributes most to the mode
         double rate() const;
         bool decays() const;
     };
 
     void look_for_border();
     void look_ahead();
-    // Of the motion at the step's end, which the workspace is at before and after.
+    // Return the fastest mode at the step's end. The workspace is there before and after.
     FastestMode mode_here();
     double stage_rate() const;
     VecX difference(double relative, const VecX& direction, VecX& force);
-    FastestMode fastest_mode(double relative);  // by differences of so small a part of the state
+    FastestMode fastest_mode(double relative);  // `relative`: difference step relative to the state
 
     System& system_;
     Stepper& stepper_;

@@ -14,9 +14,9 @@
 
 namespace pn {
 
-// Below any limit of friction [N or N m]: what carries none at all still has a share.
+// Floor of a friction limit [N or N m], which keeps force / limit finite for elements without load.
 constexpr double least_limit = 1e-300;
-// What a contact holds of its limit is not told beyond this: where its load jumps to none it has opened.
+// Maximum force / limit ratio of a contact. A contact whose load jumps to zero has opened.
 constexpr double most_share = 10.0;
 
 System::System(const Program& program, Workspace& workspace, bool with_energy)
@@ -135,7 +135,7 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_throu
     const auto total = [&] {
         return kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms);
     };
-    // Factors of the new modes: what sticks must not move as the rest is projected.
+    // Factor the rows of the new modes. Sticking elements must not move during the projection.
     bool chosen = begin_rows(p, w, t, q, v);
     const double before = energy && !w.now.rows.blocks.empty() ? total() : 0.0;
     const double longest_single = longest_single_move(p, w);

@@ -1,12 +1,16 @@
-// The right-hand side of y' = f(t, y) on the flat state y = (q, v, z, work, watch): z are the states of laws, work the
-// integrals of the ledger's powers. watch has two numbers for each frictional element, whose rates the stages leave
-// behind: of one that sticks force / limit, so that the step control resolves a load that comes and goes while nothing
-// moves, and the stages tell whether a limit was passed; of one that slips its slip speed and the rate of that, which
-// tell whether it came to rest inside the step. Of each gap one number follows, whose rate is the normal force while it
-// is closed: where redundant contacts share it, +1 while all can press and -1 where they cannot.
+// Right-hand side of y' = f(t, y) on the flat state y = (q, v, z, work, watch). z are the law states, and work the
+// integrals of the ledger's powers.
 //
-// q is integrated in ambient coordinates (a quaternion as four numbers): the right-hand side extends smoothly off the
-// unit sphere, so the order is kept, and lengths are restored at the step's end.
+// watch has two entries per friction element, whose rates the stages store:
+// - Sticking element: the rate is force / limit. Step control then resolves a load that changes while nothing moves.
+// The stages show if a limit was passed.
+// - Slipping element: the rates are the slip speed and the derivative of the slip speed. They show if slip came to rest
+// inside the step.
+// One entry per gap follows. Its rate is the normal force while the gap is closed. If redundant contacts share the
+// force, it is +1 while nonnegative loads exist, else -1.
+//
+// q is integrated in ambient coordinates (a quaternion as four numbers). The right-hand side extends smoothly off the
+// unit sphere, so the order is kept. Unit lengths are restored at the step's end.
 #pragma once
 
 #include "contact/active_set.hpp"
@@ -17,31 +21,31 @@ struct System {
     const Program& p;
     Workspace& w;
     const bool energy;  // integrate the powers of the ledger
-    // Near a singular position the motion off the constraints differs wildly from the motion on them, so stages are
-    // projected first: y' = f(P(y)) has the same solutions and no such cliff.
+    // Project the stages first. Near a singular position the motion off the constraints differs wildly from the motion
+    // on them. The projected equation y' = f(P(y)) has the same solutions without this difference.
     bool on_constraints = false;
-    bool seeks_directions = true;  // the steps can find directions of slip that is too slow to tell them
-    double smallest_pivot = 1.0;  // of the rows' factor, over the evaluations since it was set
-    double moved_energy = 0.0;    // by the last projection of a step's end, where the ledger is kept
+    bool seeks_directions = true;  // steps can solve for slip directions that slow slip does not define
+    double smallest_pivot = 1.0;  // smallest pivot of the rows' factor since the last reset
+    double moved_energy = 0.0;    // energy change by the last projection of a step's end [J], if the ledger is kept
     const int nq, nv, nz, nw, ne, ng, ns, ny;  // sizes of q, v, z, work, elements, gaps, y without watch, y
-    VecX q, v;                         // of the state read last
-    TouchingKnown touching;            // as found last
+    VecX q, v;                         // state read last
+    TouchingKnown touching;            // touching contacts of the last state
 
     System(const Program& program, Workspace& workspace, bool with_energy);
 
-    // Whether anything in the scene may end a smooth stretch of motion by itself.
+    // Check if the scene has elements, gaps or contacts that can cause events.
     bool has_events() const { return ne > 0 || ng > 0 || !p.contacts.empty(); }
-    // Whether elements or gaps are watched in the modes that hold now: some are not open.
+    // Check if an element or gap is active in the current modes, and therefore watched.
     bool watches() const { return !w.now.loaded.empty() || !w.now.touching.empty(); }
-    // So many numbers of a state or rate are read; those behind belong to what is open.
+    // Number of leading entries of a state or rate in use. The entries behind belong to open contacts.
     int active() const {
         if (!w.now.touching.empty()) return ny;
         return w.now.loaded.empty() ? ns : ns + 2 * (w.now.loaded.back() + 1);
     }
-    // Takes q and v from y, or puts them there.
+    // Copy q and v from y, or to y.
     void read(const VecX& y);
     void write(VecX& y) const;
-    // Takes the states of laws from y.
+    // Copy the law states from y.
     void read_law_states(const VecX& y);
     auto velocity(const VecX& y) const { return y.segment(nq, nv); }
     auto work(VecX& y) const { return y.segment(nq + nv + nz, nw); }
@@ -52,19 +56,19 @@ struct System {
     double load(const VecX& dy, int gap) const { return dy[ns + 2 * ne + gap]; }
 
     void derivative(double t, const VecX& y, VecX& dy);
-    // dy from the evaluation that the workspace holds.
+    // Compute dy from the evaluation in the workspace.
     void rate_of_evaluation(double t, const VecX& y, VecX& dy);
-    // Brings a step's end onto the constraints and evaluates there, as the next step begins.
+    // Project a step's end onto the constraints, and evaluate there as the next step begins.
     void project_and_evaluate(double t, VecX& y, VecX& dy);
-    // The same of a step of time stepping, whose modes have just been set; evaluated only where that is asked for.
-    // `goes_through`: where these modes have no motion, what slips rubs on as it did in the step.
+    // Project the end of a step of time stepping, whose modes have just been set. Evaluate only if `evaluates`.
+    // `goes_through`: if these modes have no motion, slipping elements keep the friction of the step.
     void settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_through);
-    // Whether y needs no projection; all that a sample of it tells is evaluated then, and no more.
+    // Check if y needs no projection. The quantities of a sample at y are then evaluated.
     bool is_on_constraints(double t, const VecX& y);
     void normalize(VecX& y) const;
 
 private:
-    // dy at q and v, from the evaluation there.
+    // Write dy at q and v from the evaluation there.
     void write_rate(double t, VecX& dy);
     void watch(double t, VecX& dy);
     void watch_loads(VecX& dy);

@@ -1,5 +1,5 @@
-// Bytes of a state, written and read back by one list of fields: what is read is bit by bit what was written.
-// A buffer keeps the size that it has, so that bytes of another scene, or damaged ones, are refused and not obeyed.
+// Bytes of a state, written and read by one list of fields. The state read is bitwise identical to the state written. A
+// buffer keeps its size, so bytes of another scene and damaged bytes are rejected.
 #pragma once
 
 #include <cstring>
@@ -21,7 +21,7 @@ public:
 
     template <class... T>
     void operator()(T&... items) { (item(items), ...); }
-    // A vector whose length changes over a run.
+    // Write or read a vector whose length changes over a run.
     template <class T>
     void list(std::vector<T>& x) { resized(x); }
     void sized(VecX& x) {

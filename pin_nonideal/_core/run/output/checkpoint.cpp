@@ -1,4 +1,4 @@
-// The bindings below name every member of their type, so that one added there does not compile until it is added here.
+// The structured bindings below name every member of their type. A new member does not compile until it is added here.
 #include "run/output/checkpoint.hpp"
 
 #include <algorithm>
@@ -73,7 +73,7 @@ static void fields(Archive& a, DenseOutput& x) {
 }
 
 static void fields(Archive& a, Recording& x) {
-    // A run that failed or raised has no next step.
+    // `failure` and `error` are omitted, because a failed run has no next step.
     auto& [t, q, v, violation, violation_rate, acceleration, tau, F_ideal, F_nonideal, lam, lam_ideal, energy, power, z,
            law_forces, limits, reactions, contact_forces, modes, closed, events, dense, steps, rejected, limited, rounding,
            failure, error] = x;
@@ -88,8 +88,8 @@ static void fields(Archive& a, Recording& x) {
     a(steps, rejected, limited, rounding);
 }
 
-// One thing of an evaluation outlives it: which rows are independent, decided at the start of a step and kept until that
-// shows to be wrong, and what that is judged by.
+// The choice of independent rows outlives an evaluation, with the data that judges it. It is made at the start of a
+// step and kept until it proves wrong.
 static void archive(Archive& a, Workspace& w, Progress& progress, Recording& out) {
     RowSystem& rows = w.now.rows;
     a(w.state, w.counters, rows.active, rows.longest, rows.longest_chosen, rows.chosen_pivot, progress, out);
@@ -101,8 +101,8 @@ std::string to_bytes(Workspace& w, Progress& progress, Recording& out) {
     return a.bytes;
 }
 
-// The factors and rows that the next step starts from, as the last one left them: all that it reads of an evaluation
-// before it makes its own.
+// Recompute the factors and rows that the last step left. The next step reads no other data of an evaluation before it
+// makes its own.
 static void evaluate_anew(System& system, const Progress& progress) {
     const Program& p = system.p;
     Workspace& w = system.w;

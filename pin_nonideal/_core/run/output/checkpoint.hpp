@@ -1,4 +1,4 @@
-// A run between two steps as bytes, from which it goes on bit by bit as if it had never stopped.
+// Checkpoint of a run between two steps, as bytes. The resumed run is bitwise identical to a run that never stopped.
 #pragma once
 
 #include <cmath>
@@ -9,42 +9,42 @@
 
 namespace pn {
 
-// What of a time loop survives from step to step, beside the RunState of its workspace.
+// State of a time loop from step to step, in addition to the RunState of its workspace.
 struct Progress {
-    double t = 0.0, h = 0.0;  // now, and the step that the error control suggests
-    VecX y, rate;             // the state now, and its rate
-    // Where the workspace was configured last: at the state now, or at a sample inside the last step.
+    double t = 0.0, h = 0.0;  // current time, and step that the error control suggests
+    VecX y, rate;             // current state, and its rate
+    // Time and state of the workspace's last configuration: the current state, or a sample inside the last step.
     double configured_t = 0.0;
     VecX configured_y;
-    double moved_energy = 0.0;  // by projection, so far
-    long samples = 0;           // of the output grid, so far
-    long next_period = 0;       // of sampled control
-    double found_break = HUGE_VAL;  // of a function of time of the user's, inside the next steps
-    std::vector<double> recent_events;  // times, for the count of those that come too thick
+    double moved_energy = 0.0;  // total energy change by projections [J]
+    long samples = 0;           // number of samples on the output grid
+    long next_period = 0;       // index of the next period of sampled control
+    double found_break = HUGE_VAL;  // time of a break that was detected in a user's time function
+    std::vector<double> recent_events;  // times of recent events, for the detection of chatter
     std::vector<double> last_changes;   // times of the last instants at which modes changed
-    std::vector<double> sides;          // of values that tell events by their signs
-    double bridged_time = 0.0, bridged_end = 0.0;  // for which a cluster of them was stepped over last, and until when
-    std::vector<double> slip_at_start;  // of the step, by element
-    std::vector<char> pulls;            // by contact that is kept
-    GapState gaps;                      // at the step's start
-    double left = -HUGE_VAL;           // when modes were left last that went no further
-    double impact_energy = 0.0;         // of all impacts so far
-    bool several = false;               // the laws allow other motions too, which was told
-    long stiff_steps = 0, quiet_steps = 0;  // near the border of stability, and since then away from it
-    VecX rounding;          // of the rates as measured last, raised to what tolerances must allow
-    long next_look = 0;     // at that: number of the step
-    // The largest speed decade by decade: when it was reached, its value, and the number of steps by then.
+    std::vector<double> sides;          // signs of the values of value events
+    double bridged_time = 0.0, bridged_end = 0.0;  // length and end of the last bridged stretch [s]
+    std::vector<double> slip_at_start;  // slip speed at the step's start, by element
+    std::vector<char> pulls;            // true for each bilateral contact in tension
+    GapState gaps;                      // gaps at the step's start
+    double left = -HUGE_VAL;           // time of the last forced mode switch
+    double impact_energy = 0.0;         // total work of impacts [J]
+    bool several = false;               // several motions are possible, which was recorded
+    long stiff_steps = 0, quiet_steps = 0;  // steps near the stability limit, steps away from it since
+    VecX rounding;          // last measured rounding of the rates, scaled to the tolerances that it requires
+    long next_look = 0;     // step number of the next measurement of rounding
+    // Decades of the largest speed: time, value and number of steps when it was reached.
     std::vector<double> growth_times, growth_speeds;
     std::vector<long> growth_steps;
-    int turning_steps = 0;  // in a row that were stiff while slip turned; negative: not to be counted yet
+    int turning_steps = 0;  // consecutive stiff steps with turning slip, negative: not counted yet
 };
 
 std::string to_bytes(Workspace& w, Progress& progress, Recording& out);
-// Into a new workspace: what the next step needs of an evaluation is made from the state. Throws std::invalid_argument
-// when the bytes do not fit the scene.
+// Restore a new workspace. The data of an evaluation that the next step needs is recomputed from the state. Throw
+// std::invalid_argument if the bytes do not fit the scene.
 void from_bytes(const std::string& bytes, System& system, Progress& progress, Recording& out);
 
-// Changes with the members of what the bytes hold.
+// Return a string that changes with the members of the stored types.
 std::string state_layout();
 
 }  // namespace pn

@@ -12,7 +12,7 @@ DenseRecorder::DenseRecorder(System& system, Stepper& stepper, bool holds_torque
 
 double DenseRecorder::part(int point, int points) { return 0.5 * (1.0 - std::cos(M_PI * point / (points - 1))); }
 
-// The state, and the directions of slip that the workspace holds.
+// Store the state, and the slip directions in the workspace.
 void DenseRecorder::state_at_point() {
     out_.states.insert(out_.states.end(), state_.data(), state_.data() + system_.ns);
     if (!turns_) return;
@@ -24,7 +24,7 @@ void DenseRecorder::step(double moved_energy) {
     RunState& state = system_.w.state;
     const std::vector<Vec3> by_end = state.last_direction;
     stepper_.make_interpolant();
-    state.last_direction = by_end;  // further stages of the interpolant have changed them
+    state.last_direction = by_end;  // further stages of the interpolant have changed the directions
     const int n = points(stepper_.method);
     for (int k = 0; k < n; ++k) {
         stepper_.interpolate(part(k, n), state_);

@@ -1,5 +1,5 @@
-// Dense output: the interpolant of every step by its values at Chebyshev's points, through which one polynomial goes, and
-// what else a sample inside the step needs.
+// Dense output: interpolant of every step, and other data that a sample inside the step needs. The interpolant is
+// stored by its values at Chebyshev points, which define one polynomial.
 #pragma once
 
 #include <cstdint>
@@ -12,26 +12,27 @@ namespace pn {
 struct DenseOutput {
     std::vector<double> times;   // start and end of each step
     std::vector<double> states;  // y without watch at each point, step by step
-    std::vector<std::int8_t> modes;  // of the elements over each step
-    // Directions of each element's slip, where any has several: at each point of a step that sought them, else by its end.
+    std::vector<std::int8_t> modes;  // modes of the elements over each step
+    // Slip directions of all elements at each point, if an element has several directions. A step that did not solve
+    // for them stores the directions at its end.
     std::vector<double> directions;
-    std::vector<std::int8_t> sought;  // whether the step sought them
-    std::vector<double> torque;  // held over each step, not a number where none is; or nothing where none ever is
-    std::vector<double> moved;   // energy moved by projection up to the end of each step
+    std::vector<std::int8_t> sought;  // whether the step solved for the directions
+    std::vector<double> torque;  // torque held over each step, NaN if none, empty if the run holds none
+    std::vector<double> moved;   // total energy change by projections at the end of each step [J]
 };
 
 class DenseRecorder {
 public:
-    // Points in each step: as many as the interpolant has coefficients, at least.
+    // Number of points in each step, at least the number of coefficients of the interpolant.
     static int points(const Method& method) { return method.outside() ? 13 : 8; }
-    // Where one of them lies in the step.
+    // Return the position of a point, as a part of the step.
     static double part(int point, int points);
 
     DenseRecorder(System& system, Stepper& stepper, bool holds_torque, DenseOutput& out);
 
-    // The step just taken. Leaves the workspace at other states.
+    // Record the step just taken. Leaves the workspace at other states.
     void step(double moved_energy);
-    // A step of time stepping: straight from the one state to the other.
+    // Record a step of time stepping as a straight line between both states.
     void straight(double t0, const VecX& y0, double t1, const VecX& y1, double moved_energy);
 
 private:
@@ -40,7 +41,7 @@ private:
 
     System& system_;
     Stepper& stepper_;
-    const bool holds_torque_, turns_;  // held torques, and elements of several directions, are in the scene
+    const bool holds_torque_, turns_;  // the run holds torques, the scene has elements with several directions
     DenseOutput& out_;
     VecX state_;
 };

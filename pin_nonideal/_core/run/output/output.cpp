@@ -9,7 +9,7 @@
 
 namespace pn {
 
-// Room for samples is taken at once up to this number; longer runs may stop before they fill it.
+// Maximum number of samples for which memory is reserved. Longer runs may stop before they fill it.
 constexpr double most_reserved = 1e5;
 
 Output::Output(System& system, Stepper& stepper, Progress& progress, const Options& options, Recording& out)
@@ -20,7 +20,7 @@ Output::Output(System& system, Stepper& stepper, Progress& progress, const Optio
 
 void Output::begin() {
     progress_.samples = 1;
-    // The steps of adaptive methods are not known before.
+    // The step count of adaptive methods is unknown in advance.
     const double apart = options_.output_dt > 0.0 ? options_.output_dt : options_.dt;
     if (apart > 0.0) recorder_.reserve(static_cast<size_t>(std::min(options_.duration / apart + 2.0, most_reserved)));
 }
@@ -103,7 +103,7 @@ void Output::emit_between(double at) {
     if (redundant) choose_as_before(at);
 }
 
-// A sample chooses rows that are long at its place; the run goes on with its own.
+// Restore the run's choice of rows. A sample chooses rows that are long at its own state.
 void Output::choose_as_before(double at) {
     const bool same = choice_.active == w.now.rows.active;
     static_cast<RowChoice&>(w.now.rows) = choice_;

@@ -1,4 +1,4 @@
-// Which samples a run leaves: every accepted step or those of an even grid, and both ends and each event.
+// Samples of a run: every accepted step or an even grid, plus both ends and each event.
 #pragma once
 
 #include <optional>
@@ -15,29 +15,30 @@ public:
 
     void begin();
     double next() const { return options_.t0 + progress_.samples * options_.output_dt; }
-    // The state now, whose velocity is about to jump: another sample of the same time follows.
+    // Record the current state, whose velocity is about to jump. Another sample of the same time follows.
     void before_jump();
-    // The state now, at which the workspace is evaluated.
+    // Record the current state, at which the workspace is evaluated.
     void now();
-    // At the end of a step that changed no modes: a sample where one is due, or asked for.
+    // Record a sample at the end of a step without mode changes, if one is due or `asked` is true.
     void end_step(bool asked);
-    // The same of a step of time stepping, whose end is near the grid's.
+    // Record a sample at the end of a step of time stepping if one is due. The end may lie slightly off the grid.
     void end_time_step();
-    // Samples of the grid inside the step just taken, and one at a time between.
+    // Record samples of the grid inside the step just taken, and one at the time `between`.
     void inside_step(std::optional<double> between);
-    // The interpolant of the step just taken, where it is recorded; of a step of time stepping, that began in another
-    // state, a straight line. The workspace is left as it was.
+    // Record the interpolant of the step just taken, if dense output is on. A step of time stepping from another state
+    // is recorded as a straight line. The workspace is restored.
     void keep_step();
     void keep_time_step(double from, const VecX& y_from);
-    // The workspace is configured at the state now.
+    // Store that the workspace is configured at the current state.
     void configured_now();
 
 private:
     void emit(double at, const VecX& state, bool evaluated);
-    // A sample inside the step just taken, from its interpolant. Leaves the workspace there.
+    // Record a sample inside the step just taken, from its interpolant. Leaves the workspace there.
     void emit_between(double at);
     void choose_as_before(double at);
-    // Calls `look`, which may leave the workspace anywhere inside the step just taken, and puts it back to the step's end.
+    // Call `look`, which may leave the workspace anywhere inside the step just taken. Restore the workspace at the
+    // step's end.
     template <class Look>
     void look_inside(const Look& look);
 
@@ -51,9 +52,9 @@ private:
     Recorder recorder_;
     DenseRecorder dense_;
     VecX sample_;
-    RowChoice choice_;  // of the step around a sample
-    RunState kept_;  // of the step's end, while the workspace is elsewhere
-    bool jumps_ = false;  // after the last sample
+    RowChoice choice_;  // choice of rows of the step around a sample
+    RunState kept_;  // run state of the step's end, during samples inside the step
+    bool jumps_ = false;  // the velocity jumps after the last sample
 };
 
 }  // namespace pn

@@ -1,4 +1,4 @@
-// What a run leaves behind: samples, events, counters.
+// Results of a run: samples, events, counters.
 #pragma once
 
 #include <cstdint>
@@ -20,8 +20,8 @@ struct Event {
     };
     double time;
     Kind kind;
-    int element;  // of friction; of a contact or prescribed motion its block; of the user his function; of a drive its dof
-    // An impact has components along the normal and the directions of slip; a prescribed motion has the first alone.
+    int element;  // friction element, block of a contact or prescribed motion, user function, or dof of a drive
+    // Impact: components along the normal and the slip directions. Prescribed motion: first component only.
     Vec3 impulse = Vec3::Zero();
     double energy_change = 0.0;
     VecX v_minus = {}, v_plus = {};
@@ -29,7 +29,7 @@ struct Event {
     static bool of_contact(Kind kind) { return kind == Kind::pull || kind >= Kind::impact; }
 };
 
-// All kinds in order, as Python names them.
+// All kinds in order, with their Python names.
 struct EventKind {
     Event::Kind kind;
     const char *name, *meaning;
@@ -54,18 +54,18 @@ constexpr EventKind event_kinds[] = {
 struct Recording {
     std::vector<double> t, q, v, violation, violation_rate;
     std::vector<double> a, tau, F_ideal, F_nonideal, lam, lam_ideal, energy, power, z;
-    // Of each law on the dofs that it acts on, law by law; of each element; of each joint, then of each block that
-    // reaction_blocks tells, [force; moment] in its own axes and in world axes.
+    // Force of each law on its dofs, and friction limit of each element. Reactions of each joint, then of each block of
+    // `reaction_blocks`: force and moment in its own axes, then in world axes.
     std::vector<double> law_forces, limits, reactions;
-    std::vector<double> contact_forces;  // on the body of each contact's frame, in world axes
+    std::vector<double> contact_forces;  // force on the body of each contact's frame, in world axes [N]
     std::vector<std::int8_t> modes, closed;
     std::vector<Event> events;
     DenseOutput dense;
     long steps = 0, rejected = 0;
-    long limited = 0;       // steps whose error was rounding, beyond the tolerances
-    double rounding = 0.0;  // largest in an acceleration, as part of the largest one, where it was measured
+    long limited = 0;       // steps whose rounding exceeded the tolerances
+    double rounding = 0.0;  // largest measured rounding of an acceleration, relative to the largest acceleration
     std::optional<Failure> failure;
-    std::exception_ptr error;  // what a user function raised
+    std::exception_ptr error;  // exception of a user function
 };
 
 struct RecordOptions {
@@ -80,12 +80,12 @@ public:
         : p(system.p), w(system.w), system(system), options(options), out(out) {
         if (options.laws) supports_ = law_supports(p);
     }
-    // Room for so many samples.
+    // Reserve memory for this number of samples.
     void reserve(size_t samples);
-    // What has changed the energy so far beside the works that are integrated.
+    // Energy changes so far that are not integrated as work [J].
     struct Jumps { double impacts, projection; };
-    // The state at t. The workspace is evaluated there when `evaluated`, and
-    // left so where anything of that is recorded. Gaps that are known to be open are not measured (`sure`).
+    // Record the state at t. `evaluated`: the workspace is evaluated there. Otherwise it is evaluated there if the
+    // options need it. `sure`: gaps that are known to be open, which are not measured.
     void sample(double t, const VecX& y, const Jumps& jumps, bool evaluated, const std::vector<char>* sure = nullptr);
 
 private:
@@ -100,14 +100,14 @@ private:
     Recording& out;
     VecX power_;
     Split split_;
-    std::vector<std::vector<int>> supports_;  // of the laws
+    std::vector<std::vector<int>> supports_;  // dofs of each law
 };
 
-// Whether each contact is closed, in the order of their descriptions.
+// Append 1 for each closed contact and 0 for each open one, in the order of their descriptions.
 void append_closed(const Program& p, const Workspace& w, std::vector<std::int8_t>& to);
-// Contacts between two frames, in the order of their descriptions.
+// Return the contacts between two frames, in the order of their descriptions.
 std::vector<int> framed_contacts(const Program& p);
-// Constraints and contacts that act between two frames, and so carry a wrench.
+// Return the constraints and contacts that act between two frames, and therefore carry a wrench.
 std::vector<int> reaction_blocks(const Program& p);
 
 }  // namespace pn

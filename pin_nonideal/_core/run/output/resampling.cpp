@@ -34,7 +34,7 @@ void StepPolynomials::at(size_t step, double part, double* out) const {
     for (int i = 0; i < size_; ++i) out[i] /= weights;
 }
 
-// The stretch between breaks of the step that begins at t; at the end of the run, that of the last step.
+// Set the stretch between breaks: of the step that begins at t, or of the last step at the end of the run.
 static void enter_stretch(const Program& p, Workspace& w, double t, double end) {
     const auto first = p.breaks.begin(), last = p.breaks.end();
     const auto next = t < end ? std::upper_bound(first, last, t) : std::lower_bound(first, last, t);
@@ -48,7 +48,7 @@ static void hold(const Program& p, Workspace& w, const InsideStates& inside, siz
     if (w.now.has_override) w.now.override_torque = inside.torque[k];
 }
 
-// Sets the directions of slip of a state: from the step's polynomial if the step solved for them, else from the slip.
+// Set the slip directions of a state: from the step's polynomial if the step solved for them, else from the slip.
 static void take_directions(const Program& p, Workspace& w, const System& system, const InsideStates& inside, size_t k) {
     RunState& state = w.state;
     state.seeks_directions = false;

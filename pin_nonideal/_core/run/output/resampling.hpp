@@ -1,4 +1,4 @@
-// Samples inside the steps of a run that has ended, from its dense output.
+// Samples inside the steps of a finished run, from its dense output.
 #pragma once
 
 #include <vector>
@@ -7,13 +7,13 @@
 
 namespace pn {
 
-// The polynomials of steps: `points` states of `size` numbers a step.
+// Polynomials of steps, with `points` states of `size` numbers per step.
 class StepPolynomials {
 public:
     StepPolynomials(const double* states, int points, int size);
 
-    // The state at this part of a step. [Berrut, Trefethen, "Barycentric Lagrange interpolation", SIAM Review 46 (2004),
-    // eq. 4.2, 5.4]
+    // Compute the state at this part of a step. [Berrut, Trefethen, "Barycentric Lagrange interpolation", SIAM Review
+    // 46 (2004), eq. 4.2, 5.4]
     void at(size_t step, double part, double* out) const;
 
 private:
@@ -22,16 +22,16 @@ private:
     std::vector<double> places_, weights_;  // of the points
 };
 
-// States inside steps, each with the modes and torques of its step, and for each element the direction of slip and whether
+// States inside steps, each with the modes and torques of its step. Each element has a slip direction, and a flag if
 // the step solved for it. Without elements of several directions the vectors of directions are empty.
 struct InsideStates {
     std::vector<double> t, moved;
     std::vector<VecX> y, torque, directions;
     std::vector<std::vector<char>> sought;
     std::vector<std::vector<Mode>> modes;
-    double end = HUGE_VAL;  // of the run
+    double end = HUGE_VAL;  // end of the run [s]
 };
-// Puts them on the constraints and samples them.
+// Project the states onto the constraints, and sample them.
 void sample_inside(const Program& p, Workspace& w, const InsideStates& inside, const RecordOptions& options,
                    Recording& out);
 

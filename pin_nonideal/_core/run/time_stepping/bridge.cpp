@@ -11,19 +11,19 @@ namespace pn {
 
 namespace {
 
-// Part of a step that is not worth one of its own.
+// Shortest remainder of a step that becomes a step of its own, relative to the step.
 constexpr double least_part = 1e-9;
-// Of a step at the least, where edges come at each other.
+// Shortest part of a step while edges approach each other, relative to the step.
 constexpr double least_cut = 1e-3;
 
-// Whether another step from the same state may go elsewhere: by time, by the user, or where steps of another method lie
-// between those of time stepping.
+// Check if another step from the same state may have another result. Reasons are time, user functions, or steps of
+// another method in between.
 bool may_differ(const Program& p, const Options& options) {
     return options.method.scheme != Method::Scheme::moreau || p.asks_functions || p.moves_in_time || options.callback ||
            std::holds_alternative<SampledTorque>(p.actuation) || std::holds_alternative<TorqueTable>(p.actuation);
 }
 
-// Whether the accelerations and forces of every step's end tell something.
+// Check if accelerations and forces are needed at the end of every step.
 bool asks_always(const Program& p, const Options& options) {
     return options.method.scheme != Method::Scheme::moreau || options.output_dt == 0.0 || options.record.dense ||
            options.callback || options.save || !options.events.empty() || !p.contacts.empty() || p.asks_functions;
@@ -45,13 +45,13 @@ double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     return stop - end < least_part * size ? stop : end;
 }
 
-// Whether nothing moves, and what sticks leaves no freedom.
+// Check if nothing moves and the sticking elements leave no freedom.
 bool TimeStepping::rests() const {
     return lasts_ && (system_.velocity(now_.y).array() == 0.0).all() && is_immobile(p, w);
 }
 
-// Whether anything asks for the accelerations and forces at the step's end: a sample, what follows the run, or slip
-// whose direction or limit goes on with them.
+// Check if accelerations and forces are needed at the step's end: by a sample, by the end of the run, or by slip. Slip
+// needs them if its direction or limit depends on them.
 bool TimeStepping::asks_for_motion(double end, double t_end) const {
     if (asked_always_ || end >= t_end || end >= options_.end() || output_.next() <= end + same_time(end)) return true;
     return std::any_of(w.now.slipping.begin(), w.now.slipping.end(), [&](int e) {
@@ -59,7 +59,7 @@ bool TimeStepping::asks_for_motion(double end, double t_end) const {
     });
 }
 
-// With contacts that may open: of a step to `end` as much as edges that come at each other allow.
+// Take as much of a step to `end` as approaching edges allow, in a scene with unilateral contacts.
 void TimeStepping::take_part(double end, double t_end, double least) {
     double& t = now_.t;
     const double left = end - t, h = std::max(moreau_contacts_.allowed(t, left, now_.y), least);
@@ -94,7 +94,7 @@ void TimeStepping::take(double end, double t_end) {
         now_.moved_energy += system_.moved_energy;
         return;
     }
-    // Rounding moves nothing that is held at rest; states of laws go on.
+    // Remove the rounding from a motion held at rest. Law states continue.
     y.head(system_.nq + system_.nv) = y_from.head(system_.nq + system_.nv);
     system_.work(y) = system_.work(y_from);
     now_.moved_energy = moved_from;

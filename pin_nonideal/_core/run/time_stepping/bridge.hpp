@@ -1,5 +1,5 @@
-// A step of time stepping as a part of a run: it needs no events, ends where torques jump and samples are due, and is
-// recorded as any other.
+// Step of time stepping as part of a run. It locates no events, ends at torque jumps and due samples, and is recorded
+// like any other step.
 #pragma once
 
 #include "run/time_stepping/moreau.hpp"
@@ -15,9 +15,9 @@ public:
     TimeStepping(System& system, Progress& progress, GapWatch& watch, const Options& options, Torques& torques,
                  Output& output, Notices& notices, ValueEvents& value_events, Recording& out);
 
-    // One step of this size, not beyond `stop` nor the end of the run.
+    // Take one step of this size, not beyond `stop` or the end of the run.
     void step(double size, double stop, double t_end);
-    // Torques may have changed since the last step.
+    // Mark the state as changing, because torques may have changed since the last step.
     void forget() { stands_ = false; }
 
 private:
@@ -39,13 +39,13 @@ private:
     Recording& out_;
     Moreau moreau_;
     MoreauContacts moreau_contacts_;
-    const bool lasts_;     // what a step has left as it was stays so
-    bool stands_ = false;  // the last step has left all as it was
-    const bool asked_always_;  // for the motion of every step's end
+    const bool lasts_;     // a state that a step leaves unchanged stays unchanged
+    bool stands_ = false;  // the last step left the state unchanged
+    const bool asked_always_;  // accelerations are needed at every step's end
     VecX y_from_;
     Modes before_, before_step_;
     std::vector<char> closed_before_;
-    bool open_before_ = false;  // they say that nothing is closed or rubs
+    bool open_before_ = false;  // the stored modes have no closed contact and no active element
 };
 
 }  // namespace pn

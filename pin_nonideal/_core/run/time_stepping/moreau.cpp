@@ -16,11 +16,11 @@ namespace pn {
 
 namespace {
 
-constexpr int load_passes = 60;           // of limits that depend on the load
-constexpr double load_tolerance = 1e-13;  // change of the limits, as a part of the largest, that is rounding
-constexpr double limit_rounding = 1e-12;  // part of its limit within which a force is at it
+constexpr int load_passes = 60;           // maximum passes for load-dependent limits
+constexpr double load_tolerance = 1e-13;  // change of limits that counts as rounding, relative to the largest limit
+constexpr double limit_rounding = 1e-12;  // distance of a force at its limit, relative to the limit
 
-// Of scenes without contacts that may open; others are for MoreauContacts.
+// Return all elements of a scene without unilateral contacts, else none. MoreauContacts treats other scenes.
 std::vector<int> all_elements(const System& system) {
     std::vector<int> list(system.ng > 0 ? 0 : system.ne);
     std::iota(list.begin(), list.end(), 0);
@@ -63,7 +63,7 @@ void meet_at_end(const Program& p, const Evaluation& now, double h, VecX& b) {
     }
 }
 
-// The motion without friction of the elements, constraints met at the end of the step.
+// Solve the motion without friction of the elements, with constraints satisfied at the step's end.
 void Moreau::solve_without_friction(double t) {
     set_modes(p, w, unloaded_);
     begin_step(p, w, t, q_mid_, v0_);
@@ -75,7 +75,7 @@ void Moreau::solve_without_friction(double t) {
     solve_motion(p, w, p.has_laws(), b_, a_free_, lam_free_);
 }
 
-// Slip velocities at the step's end over h take the place of slip accelerations.
+// Set up the friction problem. Slip velocities at the step's end over h replace slip accelerations.
 void Moreau::pose_problem() {
     problem_.respond_in_step(p, w);
     problem_.clean(p, w);
@@ -87,7 +87,7 @@ void Moreau::pose_problem() {
     }
 }
 
-// The motion under the friction forces.
+// Compute the motion under the friction forces.
 void Moreau::apply_forces() {
     problem_.acceleration(p, w, force_, a_friction_);
     w.now.a = a_free_ + a_friction_;
@@ -100,7 +100,7 @@ void Moreau::apply_forces() {
     w.now.renew();
 }
 
-// Limits for the load of the motion in the workspace; returns their largest change.
+// Update the limits to the loads of the motion in the workspace. Return their largest change.
 double Moreau::update_limits(double t) {
     double change = 0.0;
     even_ = true;
@@ -117,14 +117,14 @@ double Moreau::update_limits(double t) {
     return change;
 }
 
-// Friction forces, with limits for the load of this very step.
+// Solve for the friction forces, with limits for the loads of this step.
 void Moreau::solve_friction(double t) {
-    int at = 0;  // from forces of the last step, whose modes mostly last
+    int at = 0;  // warm start from forces of the last step, whose modes usually persist
     for (const Friction& friction : p.frictions)
         for (int k = 0; k < friction.dim; ++k) near_[at++] = w.state.percussion[p.blocks[friction.block].row + k];
     force_.setZero(problem_.rows);
     for (int pass = 0; pass < load_passes; ++pass) {
-        // Limits that no load decides need no motion.
+        // Limits that depend on no load need no motion.
         if (pass == 0 || p.needs_reactions) apply_forces();
         const double change = update_limits(t + 0.5 * h_);
         const double largest = system_.ne > 0 ? std::max(0.0, limit_.size.maxCoeff()) : 0.0;
@@ -138,7 +138,7 @@ void Moreau::solve_friction(double t) {
     }
 }
 
-// Velocity at the step's end, and the modes there: what stays below its limit sticks.
+// Compute the velocity and the modes at the step's end. Elements below their limit stick.
 void Moreau::end_velocity() {
     alpha_ = problem_.alpha0;
     alpha_.noalias() += problem_.W * force_;
@@ -156,13 +156,13 @@ void Moreau::end_velocity() {
     }
 }
 
-// Work over the step, by the mean velocity. Where a slip turns inside the step its mean velocity may go with the
-// friction that meets its end: that is work of the scheme, not of friction.
+// Add the work over the step, by the mean velocity. If a slip reverses inside the step, the friction that opposes its
+// end can do positive work on its mean velocity. This work is due to the scheme, not to friction.
 void Moreau::book_work(VecX& y, double& moved_energy) {
     w.now.lam = lam_free_;
     w.now.lam.noalias() += problem_.multipliers * force_;
     move_ = 0.5 * (v0_ + v1_);
-    powers(p, w, move_, power_.data());  // of all but dry friction, whose modes are still open
+    powers(p, w, move_, power_.data());  // powers of all forces but dry friction, whose modes are not set yet
     problem_.along(p, w, move_, alpha_);
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         double& power = power_[first_law_power + p.frictions[e].law];

@@ -1,6 +1,8 @@
-// Time stepping at velocity level (Moreau's midpoint rule): with u the slip velocities at the step's end and P the
-// percussions, M (v1 - v0) = h (F + C) + A^T P + N^T P_f, A v1 + phi_t = 0, and P_f opposes u within h times its limit.
-// First order, and no creep: what sticks has no velocity at all. All elements are solved together in every step.
+// Time stepping at velocity level (Moreau's midpoint rule). With the slip velocities u at the step's end and the
+// percussions P,
+//     M (v1 - v0) = h (F + C) + A^T P + N^T P_f,   A v1 + phi_t = 0.
+// P_f opposes u within h times its limit. The scheme has order 1 and no creep: sticking elements have zero velocity.
+// All elements are solved together in every step.
 #pragma once
 
 #include <vector>
@@ -12,16 +14,16 @@
 
 namespace pn {
 
-// Right-hand sides b by which constraints are met at the end of a step of length h, in whose middle they are evaluated:
-// half of what their rows change by themselves is still to come.
+// Set the right-hand sides b that satisfy the constraints at the end of a step of length h. The rows are evaluated at
+// the middle of the step, so half of their own change is still to come.
 void meet_at_end(const Program& p, const Evaluation& now, double h, VecX& b);
 
 class Moreau {
 public:
     explicit Moreau(System& system);
 
-    // One step of size h from y at t; what the scheme itself adds to the energy goes into moved_energy. The modes are
-    // those of the step's end, which is left to be projected and evaluated.
+    // Take one step of size h from y at t. The energy added by the scheme itself is added to moved_energy. The modes
+    // are set for the step's end. The caller must project and evaluate the end.
     void step(double t, double h, VecX& y, double& moved_energy);
 
 private:
@@ -36,16 +38,16 @@ private:
     System& system_;
     const Program& p;
     Workspace& w;
-    FrictionProblem problem_;  // of all elements
+    FrictionProblem problem_;  // problem of all elements
     std::vector<Mode> modes_, unloaded_;
     double h_ = 0.0;
     VecX q_mid_, v0_, v1_, move_, b_, a_free_, lam_free_;  // free: without friction of the elements
     VecX a_friction_, alpha_, near_;
     BoxProgram box_;
     bool boxes_ = true;  // every element has one direction
-    VecX force_, power_;                  // of the elements
-    FrictionLimits limit_, force_limit_;  // the second: those that force was found for
-    bool even_ = true;                    // all elements rub alike forward and backward
+    VecX force_, power_;                  // forces and powers of the elements
+    FrictionLimits limit_, force_limit_;  // current limits, and the limits for which the force was found
+    bool even_ = true;                    // all limits are equal forward and backward
     VecX shifted_;
 };
 

@@ -22,16 +22,16 @@ namespace pn {
 
 namespace {
 
-constexpr int load_passes = 60;           // of limits that depend on the load
-constexpr double load_tolerance = 1e-12;  // change of the limits, as a part of the largest, that is rounding
-// Limits that change no less from pass to pass follow what the cones leave open of the forces: where slip is slow, its
-// direction.
+constexpr int load_passes = 60;           // maximum passes for load-dependent limits
+constexpr double load_tolerance = 1e-12;  // change of limits that counts as rounding, relative to the largest limit
+// Maximum ratio of two changes of limits from passes that converge. Slower limits follow force components that the
+// cones leave open, such as the direction of slow slip.
 constexpr double contracting = 0.5;
-constexpr double limit_rounding = 1e-9;   // part of its limit within which a force is at it
-constexpr double width_rounding = 1e-12;   // part of the scene's size by which what stands may find a gap less wide
-constexpr double least_response = 1e-13;  // part of a row's free response that the constraints must leave it
-// Of the velocities in play, by which a step of a body that turns may contradict itself where corners share its load, and
-// of the forces in play, by which a limit may miss its load; the statistics tell.
+constexpr double limit_rounding = 1e-9;   // distance of a force at its limit, relative to the limit
+constexpr double width_rounding = 1e-12;   // uncertainty of a gap at rest, relative to the scene's size
+constexpr double least_response = 1e-13;  // minimum response of a row under the constraints, relative to its free response
+// Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners share
+// its load. Also the accepted error of a limit, relative to the forces. The statistics report both.
 constexpr double most_miss = 1e-7;
 
 }  // namespace
@@ -112,14 +112,14 @@ void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, dou
     y.segment(system_.nq, system_.nv) = v1_;
 }
 
-// Contacts and modes, with the rows that go with them; most of a flight nothing changes. `flies`: nothing is closed or rubs
-// in those asked for.
+// Set contacts and modes, with their rows. During most of a flight nothing changes. `flies`: no contact is closed and
+// no element active in the new modes.
 void MoreauContacts::select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies) {
     if (flies && !system_.watches() && !w.now.rows.redundant && !w.now.rows.orthogonal) w.now.renew();
     else set_contacts(p, w, closed, modes);
 }
 
-// The motion without contacts and dry friction, constraints met at the step's end.
+// Solve the motion without contacts and dry friction, with constraints satisfied at the step's end.
 void MoreauContacts::solve_free(double t) {
     select(open_, unloaded_, true);
     begin_step(p, w, t, q_mid_, v0_);
@@ -135,8 +135,8 @@ void MoreauContacts::solve_free(double t) {
     unit_.setZero();
 }
 
-// By how much each dof has moved since gaps were looked at last, by projections too: where angles go round, not less than
-// by its velocity.
+// Return the travel of each dof since the last sample of the gaps, including projections. It is at least that of the
+// velocity, because angles wrap around.
 const VecX& MoreauContacts::way_since_last() {
     q_looked_ -= q_mid_;
     ambient_to_tangent(p.mechanism, q_mid_.data(), q_looked_.data(), v1_.data());
@@ -145,7 +145,8 @@ const VecX& MoreauContacts::way_since_last() {
     return force_;
 }
 
-// Contacts whose gap is closed at the step's middle, and those that were closed: their loads tell whether they stay so.
+// Find the contacts whose gap is closed at the step's middle, and contacts that were closed before. Their loads decide
+// if they stay closed.
 void MoreauContacts::find_touching(double t) {
     touching_.clear();
     for (int i : watch_.come(way_since_last())) {
@@ -153,7 +154,7 @@ void MoreauContacts::find_touching(double t) {
         const double width = gap_width(p, w, i);
         const bool touches = was_closed_[i] || (width <= 0.0 && tells_way_out(i, width));
         if (touches) touching_.push_back(i);
-        watch_.gaps.width[i] = touches ? 0.0 : width - width_rounding * scene_size(p, w);  // that it is sure to have
+        watch_.gaps.width[i] = touches ? 0.0 : width - width_rounding * scene_size(p, w);  // guaranteed width
     }
     watch_.leave_far();
     for (int i : touching_) {
@@ -163,7 +164,7 @@ void MoreauContacts::find_touching(double t) {
     if (touching_.size() > 1) leave_one_of_each_place(p, w, was_closed_, touching_);
 }
 
-// The coefficient of a contact: the static one where it sticks or comes to rest.
+// Return the coefficient of a contact: the static one if it sticks or comes to rest.
 double MoreauContacts::coefficient(int element) const {
     const Friction& friction = p.frictions[element];
     const double speed = slip_velocity(w.now, friction).norm();
@@ -181,7 +182,7 @@ void MoreauContacts::add_part(Part part, int block, int kept, ConeElement elemen
     cones_.push_back(element);
 }
 
-// Contacts first, then dry friction that is not their sliding.
+// Add the rows of contacts with their sliding, then the rows of other dry friction.
 void MoreauContacts::add_rows() {
     rows_.clear();
     parts_.clear();
@@ -203,7 +204,7 @@ void MoreauContacts::add_rows() {
     }
 }
 
-// What a unit of each force does, and the velocities at the step's end without them, over h.
+// Compute the response to a unit of each force, and the velocities at the step's end without the forces, over h.
 void MoreauContacts::respond() {
     const int n = static_cast<int>(rows_.size());
     if (n == 0) return;
@@ -256,7 +257,7 @@ void MoreauContacts::measure_free() {
     for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) w0_[at] += parts_[e].approach / h_;
 }
 
-// The motion under the forces f.
+// Compute the motion under the forces f.
 void MoreauContacts::apply() {
     const int n = static_cast<int>(rows_.size());
     w.now.a = a_free_;
@@ -280,7 +281,7 @@ void MoreauContacts::apply() {
     }
 }
 
-// Takes the limits of dry friction for the load of the motion at hand; whether they are what they were.
+// Update the limits of dry friction to the loads of the current motion. Return true if they have converged.
 bool MoreauContacts::limits_settle(double t) {
     double change = 0.0, largest = 0.0;
     for (size_t e = 0; e < parts_.size(); ++e) {
@@ -303,7 +304,8 @@ bool MoreauContacts::limits_settle(double t) {
     return settles;
 }
 
-// Boxes of the cone problem lie about no force: forces from the middles of their limits, and back.
+// Shift the forces by the middles of their limits (sign 1) or back (sign -1). Boxes of the cone problem are centered at
+// zero force.
 void MoreauContacts::measure_from_middles(double sign) {
     const int n = static_cast<int>(rows_.size());
     for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
@@ -352,7 +354,7 @@ void MoreauContacts::solve(double t) {
     w.counters.dissipation = std::max(w.counters.dissipation, r.dissipation);
 }
 
-// Computes the velocity at the step's end, the closed contacts and the modes. An element sticks if its force stays below
+// Compute the velocity, the closed contacts and the modes at the step's end. An element sticks if its force stays below
 // its limit, or if its slip is zero.
 void MoreauContacts::end_velocity() {
     const int n = static_cast<int>(rows_.size());
@@ -380,7 +382,7 @@ void MoreauContacts::end_velocity() {
         const Block& block = p.blocks[p.frictions[part.element].block];
         if (held && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
     }
-    const auto rest = [&](int e) {  // what the constraints hold has no mode of its own but rest
+    const auto rest = [&](int e) {  // elements held by the constraints stick
         if (modes_[e] == unloaded && (p.frictions[e].gap < 0 || closed_[p.frictions[e].gap])) modes_[e] = sticking;
     };
     for (int e : own_) rest(e);
@@ -388,8 +390,8 @@ void MoreauContacts::end_velocity() {
         for (int e : p.gaps[i].elements) rest(e);
 }
 
-// Work over the step, by the mean velocity. Where a slip turns inside the step its mean velocity may go with the
-// friction that meets its end: that is work of the scheme, not of friction.
+// Add the work over the step, by the mean velocity. If a slip reverses inside the step, the friction that opposes its
+// end can do positive work on its mean velocity. This work is due to the scheme, not to friction.
 void MoreauContacts::book_work(VecX& y, double& moved_energy, double& impact_energy) {
     const int n = static_cast<int>(rows_.size());
     if (!w.now.rows.blocks.empty()) {

@@ -1,6 +1,6 @@
-// Time stepping with contacts that may open (Moreau's midpoint rule): those whose gap has closed at the step's middle
-// join, u_n + e u_n- >= 0 at its end with a percussion that presses, Coulomb's cone along it, and all other dry friction
-// beside in its limits. One cone problem a step; the others are no rows.
+// Time stepping with unilateral contacts (Moreau's midpoint rule). Contacts with a closed gap at the step's middle take
+// part. They satisfy u_n + e u_n- >= 0 at the step's end with a nonnegative percussion, and Coulomb's cone along it.
+// All other dry friction stays within its limits. Each step solves one cone problem. Open contacts add no rows.
 #pragma once
 
 #include <vector>
@@ -10,30 +10,31 @@
 
 namespace pn {
 
-// Part of what they are rounded by that edges and rims may have entered each other for normals to be found.
+// Maximum penetration of edges and rims with a defined normal, relative to their rounding.
 constexpr double nearly_all = 0.999;
 
 class MoreauContacts {
 public:
     MoreauContacts(System& system, GapWatch& watch);
 
-    // How long a step from y at t may be, up to h: what edges and rims that come at each other are rounded by is entered by
-    // no more than half of it, and by half of what is left where they are inside. Deeper they tell no way out, and may be
-    // behind each other.
+    // Return the longest step from y at t, up to h. Approaching edges and rims may penetrate by half of their rounding.
+    // If they already penetrate, the middle of the step may reach half of the remaining rounding. Deeper edges and rims
+    // have no defined normal, and may pass through each other.
     double allowed(double t, double h, const VecX& y);
-    // One step of size h from y at t; the work of contacts along their normals goes into impact_energy, what the scheme
-    // itself adds into moved_energy. The state is left to be projected and evaluated, with the modes of its end.
+    // Take one step of size h from y at t. The work of contacts along their normals is added to impact_energy. The
+    // energy added by the scheme itself is added to moved_energy. The modes are set for the step's end. The caller must
+    // project and evaluate the end.
     void step(double t, double h, VecX& y, double& moved_energy, double& impact_energy);
 
 private:
     struct Row {
         int block, k;
     };
-    struct Part {              // of the cone problem
-        int gap = -1;          // a contact's,
-        int element = -1;      // and of dry friction: its sliding, or one that is a box
-        double approach = 0.0; // restitution times the rate at which its gap closed, over the step
-        double middle = 0.0;   // of the limits of a box of one direction
+    struct Part {              // part of the cone problem
+        int gap = -1;          // gap of a contact, -1 if none
+        int element = -1;      // friction element: sliding of the contact, or a box
+        double approach = 0.0; // restitution times the closing rate of the gap, at most 0
+        double middle = 0.0;   // middle of the limits of a box with one direction
     };
 
     bool tells_way_out(int gap, double width) const { return width > -nearly_all * rounded_by_[gap]; }
@@ -57,20 +58,20 @@ private:
     System& system_;
     const Program& p;
     Workspace& w;
-    double h_ = 0.0, last_change_ = 0.0;  // the second: of the limits, from pass to pass
+    double h_ = 0.0, last_change_ = 0.0;  // step, and last change of the limits between passes
     GapWatch& watch_;
-    std::vector<int> touching_, own_;  // gaps that take part, and dry friction of no contact that may open
-    std::vector<int> rubbing_;         // dry friction that takes part, but the sliding of contacts
+    std::vector<int> touching_, own_;  // gaps that take part, and friction elements of no unilateral contact
+    std::vector<int> rubbing_;         // friction elements that take part, except the sliding of contacts
     std::vector<char> was_closed_, closed_, open_;
     std::vector<Mode> modes_, unloaded_;
-    std::vector<double> rounded_by_;   // of gaps
-    bool rounded_ = false;             // some are
-    bool marked_ = false;  // in the flags and modes of the last step something was closed or rubbed
+    std::vector<double> rounded_by_;   // rounding of each gap
+    bool rounded_ = false;             // a gap has rounding
+    bool marked_ = false;  // the last step had a closed contact or an active element
     std::vector<Row> rows_;
     std::vector<Part> parts_;
     std::vector<ConeElement> cones_;
     bool scaled_ = true;   // the response is a_s = R^T a
-    bool presses_ = true;  // there may be percussions of the last step
+    bool presses_ = true;  // percussions of the last step may be nonzero
     VecX q_mid_, q_looked_, v0_, v1_, a_free_, lam_free_, w0_, w1_, f_, power_, unit_, zero_, force_, lam_;
     MatX W_, response_, multipliers_;
     ConeComplementarity solver_;
