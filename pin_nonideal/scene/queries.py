@@ -1,4 +1,4 @@
-"""Numbers and tables that users ask a scene for, as thin calls on what the core has."""
+"""Queries of a scene: mass matrix, bias forces, Jacobians, energies and tables."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Tables:
-    """What a Scene can be asked for beside its motion."""
+    """Methods of a Scene that return matrices, energies and tables."""
 
     if TYPE_CHECKING:
         name: str
@@ -32,43 +32,43 @@ class Tables:
         initial_state: Callable[[], tuple[Array, Array]]
 
     def describe(self) -> Description:
-        """Joints with order, limits, friction and damping; rows of constraints and contacts; laws; forces.
+        """Return tables of joints, constraints, contacts, laws, forces and actuation.
 
-        Printed, it is a text of tables; `to_dict()` gives plain values.
+        `str` formats the tables as text; `to_dict()` returns plain values.
         """
         return describe(self._compiled, self.name)
 
     def mass_matrix(self, q: State | None = None) -> Array:
-        """M(q) of the tree, without constraints, (nv, nv).
+        """Return the mass matrix M(q) of the tree, without constraints, (nv, nv).
 
         Args:
-            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
+            q: configuration, (nq,) or by joint name; None for the scene's closed initial configuration.
         """
         at = self._at(q)
         nv = self._compiled.model.nv
         return self._runner.terms(at, np.zeros(nv))[0].reshape(nv, nv)
 
     def bias_forces(self, q: State | None = None, v: State | None = None) -> Array:
-        """Coriolis, centrifugal and gravity forces b of M a + b = tau, (nv,); Pinocchio's nonLinearEffects.
+        """Return Coriolis, centrifugal and gravity forces b of M a + b = tau, (nv,), as nonLinearEffects.
 
         Args:
-            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
+            q: configuration, (nq,) or by joint name; None for the scene's closed initial configuration.
             v: velocity, (nv,) or by joint name; zero when None.
         """
         return self._runner.terms(self._at(q), self._speed(v))[1]
 
     def jacobian(self, name: str, q: State | None = None, t: float = 0.0) -> Array:
-        """Rows A of one constraint or contact, A a = b, in the order and scale of `lam`, (rows, nv).
+        """Return rows A of one constraint or contact, A a = b, in the order and scale of `lam`, (rows, nv).
 
-        Rows that can never act are among them.
+        Rows that can never act are included.
 
         Args:
-            name: of the constraint or contact.
-            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
+            name: name of the constraint or contact.
+            q: configuration, (nq,) or by joint name; None for the scene's closed initial configuration.
             t: time [s].
 
         Raises:
-            UnknownNameError: there is none of that name.
+            UnknownNameError: no constraint or contact has that name.
         """
         slices = self._compiled.slices
         if name not in slices:
@@ -79,12 +79,12 @@ class Tables:
         return rows_at(self._runner, at, np.zeros(self._compiled.model.nv), number("t", t))[0][slices[name]]
 
     def energies(self, q: State | None = None, v: State | None = None) -> dict[str, float]:
-        """Energy by name [J]: "kinetic", "potential" (of gravity, zero at the world's origin), and "total".
+        """Return energies by name [J]: "kinetic", "potential" (gravity, zero at the world's origin), "total".
 
-        That of springs is work of given forces in the ledger of a run, and no part of it.
+        Spring energy is not included: a run's ledger counts it as work of applied forces.
 
         Args:
-            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
+            q: configuration, (nq,) or by joint name; None for the scene's closed initial configuration.
             v: velocity, (nv,) or by joint name; zero when None.
         """
         kinetic, potential = self._runner.energies(self._at(q), self._speed(v))

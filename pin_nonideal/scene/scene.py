@@ -1,4 +1,4 @@
-"""Scene: a model with what holds it, rubs it and drives it, analysed once into the core's program."""
+"""Scene: a model with constraints, contacts, laws, forces and actuation, compiled once for the core."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ from .stepping import Steps
 Rest = ParamSpec("Rest")
 Result = TypeVar("Result")
 
-# What to do where laws and dynamics allow several motions.
+# Behavior if laws and dynamics admit several motions.
 SEVERAL = ("error", "continue")
 TERMS = tuple(provider.name for provider in core.Provider)
 IMPACTS = tuple(law.name for law in core.ImpactLaw)
-# What the core has taken when a scene was made.
+# Fields that cannot change after compilation.
 TAKEN = ("model", "constraints", "laws", "contacts", "forces", "actuation", "terms", "impact", "q0", "v0")
 
 
 class Scene(States, Geometry, Tables, Steps):
     """A Pinocchio model with constraints, laws, contacts, forces and actuation.
 
-    Everything is checked when the scene is made; rows that can never act are found then and left out.
+    The constructor checks all descriptions and removes rows that can never act.
 
     Args:
         model: pinocchio.Model.
@@ -60,41 +60,41 @@ class Scene(States, Geometry, Tables, Steps):
         forces: descriptions of `description.forces`.
         actuation: None, a constant torque (nv,), a function (t, q, v) -> tau, or a description of
             `pin_nonideal.description.actuation`.
-        q0: initial configuration; the neutral one when None.  Frames held to the world are held where they
-            are here.  Here and wherever a configuration is taken it is an array (nq,), a table by joint name,
-            {"crank": 1.0, "base": {"xyz": [0, 0, 1], "rpy": [0, 0, 1.57]}}, which leaves the others as they
-            are (in `solve`, `project` and `simulate` as in the scene's initial state), or the name of a
-            reference configuration.  Where a state is put on the constraints the entries of a table are held
-            and the others follow by the least move.
-        v0: initial velocity, an array (nv,), or a table by joint name whose entries are held while the others
-            follow the constraints; zero when None.
-        visual_model: pinocchio.GeometryModel for the replay, or a function that makes it when asked for.
-        collision_model: pinocchio.GeometryModel, or such a function.
-        name: shown in messages and pages; the model's own when None.
+        q0: initial configuration; the neutral one when None. Anchors without a second frame hold their frame
+            at its placement in q0. Every configuration argument is an array (nq,), a table by joint name such
+            as {"crank": 1.0, "base": {"xyz": [0, 0, 1], "rpy": [0, 0, 1.57]}}, or the name of a reference
+            configuration. Joints missing in a table keep their neutral value, and in `solve`, `project` and
+            `simulate` their value in the scene's initial state. Projection onto the constraints holds the
+            entries of a table, and the other joints follow with the least displacement.
+        v0: initial velocity, an array (nv,), or a table by joint name; zero when None. Entries of a table are
+            held while the others follow the constraints.
+        visual_model: pinocchio.GeometryModel for the replay, or a function that creates it on first access.
+        collision_model: pinocchio.GeometryModel, or a function that creates it on first access.
+        name: name in messages and pages; the model's name when None.
         notes: remarks of the loader, shown by `report`.
-        source: where the robot comes from.
-        licence: its licence.
-        terms: who computes M(q), the bias forces and the kinematics: "core", its own pass over the tree, or
+        source: origin of the robot.
+        licence: licence of the robot.
+        terms: provider of M(q), the bias forces and the kinematics: "core", the core's pass over the tree, or
             "pinocchio", Pinocchio's crba, nonLinearEffects and computeJointJacobians.
-        impact: what restitution e means: "newton", that a gap opens with e times the rate at which it closed,
-            or "poisson", that after the impulse which stops the approach a contact gives e times that impulse
-            again.  Without friction both say the same where all gaps that touch close with one e.
-        assembly_tolerance: to which the frames of loops are given [m or rad]: a gap up to it, in a direction
-            in which no joint moves, is no error.
+        impact: restitution law. "newton": a gap opens with e times the rate at which it closed. "poisson":
+            after the impulse that stops the approach, a contact applies e times that impulse again. Without
+            friction, both laws agree if all closing gaps have the same e.
+        assembly_tolerance: accuracy of the frames of loops [m or rad]. A residual up to it is no error in a
+            direction in which no joint moves.
 
     Raises:
-        InputError, UnknownNameError: something does not fit the model.
-        InconsistentConstraintsError: rows that vanish ask for an acceleration.
+        InputError, UnknownNameError: a description does not fit the model.
+        InconsistentConstraintsError: a vanishing row has a nonzero right-hand side.
 
     Attributes:
         constraint_slices: rows of `lam` of each constraint and contact, by name.
-        anchor_frames: (name, frame id, frame id or None) of what joins two frames.
-        contact_names: names of the contacts, in the order of `closed`; the stops of a JointLimit one by one.
-        element_names: names of the frictional elements, in the order of `modes`.
+        anchor_frames: (name, frame id, frame id or None) of constraints between two frames.
+        contact_names: names of the contacts, in the order of `closed`; each stop of a JointLimit is one.
+        element_names: names of the friction elements, in the order of `modes`.
         law_names: names of the laws, in the order of the ledger's columns.
         dropped: (name, row, reason) of rows that can never act.
-        contact_friction: coefficients of sliding, spinning and rolling that the robot's file gives its
-            collision geometry, by name.
+        contact_friction: sliding, spinning and rolling coefficients of the collision geometry in the robot's
+            file, by name.
     """
 
     def __init__(
@@ -172,8 +172,8 @@ class Scene(States, Geometry, Tables, Steps):
         self._nv = int(model.nv)
         self._closed: tuple[Array, Array, ProjectionReport] | None = None
         self._told: list[str] | None = None
-        self._origin: Table | None = None  # what `load` made the scene from
-        self._shape_sources: tuple[Any, Any] | None = None  # what reads its shapes again
+        self._origin: Table | None = None  # arguments of `load`
+        self._shape_sources: tuple[Any, Any] | None = None  # functions that read the shapes again
         self._assembly_tolerance = tolerance
 
     def __setattr__(self, key: str, value: Any) -> None:
@@ -208,20 +208,20 @@ class Scene(States, Geometry, Tables, Steps):
         modes: Sequence[int] | None = None,
         several: str = "error",
     ) -> Solution:
-        """Eq. (40) at one state: acceleration, both parts of the force of constraint, multipliers, modes.
+        """Solve Eq. (40) at one state: acceleration, both parts of the constraint force, multipliers, modes.
 
         Args:
             q: configuration, (nq,) or by joint name.
             v: velocity, (nv,) or by joint name.
             t: time [s].
             tau: joint torques instead of the scene's actuation, (nv,).
-            modes: mode of each frictional element, +1, -1 or 0, and 2 without friction, as of a contact that
-                is open; by velocity and complementarity when None.
-            several: what to do where the laws allow several motions: "error", or "continue" with the one of
-                least friction.  What may stick or slip at rest sticks either way.
+            modes: mode of each friction element: +1 or -1 slips, 0 sticks, 2 is without friction, as in an
+                open contact. None determines the modes by velocity and complementarity.
+            several: behavior if the laws admit several motions: "error", or "continue" with the motion of
+                least friction. An element at rest that may stick or slip sticks in either case.
 
         Returns:
-            The Solution; `lam` holds all rows in the order of `constraint_slices`, zero for those that
+            The Solution; `lam` holds all rows in the order of `constraint_slices`, and zero for rows that
             never act.
 
         Raises:
@@ -254,14 +254,14 @@ class Scene(States, Geometry, Tables, Steps):
         *,
         several: str = "error",
     ) -> Array:
-        """Just the acceleration, for loops of one's own.
+        """Return the acceleration alone, for user-written integration loops.
 
         Args:
             q: configuration, (nq,) or by joint name.
             v: velocity, (nv,) or by joint name.
             tau: joint torques instead of the scene's actuation, (nv,).
             t: time [s].
-            several: "error" or "continue" where the laws allow several motions, as in `solve`.
+            several: "error" or "continue" if the laws admit several motions, as in `solve`.
 
         Returns:
             a, (nv,).
@@ -275,7 +275,7 @@ class Scene(States, Geometry, Tables, Steps):
             self._checked_at(q, v, t)
         a = np.empty(self._nv)
         self._runner.continues = choice("acceleration: several", several, SEVERAL) == "continue"
-        try:  # arrays of the right shape go straight to the core, which checks sizes, lengths and finiteness
+        try:  # the core checks sizes, unit lengths and finiteness of arrays
             self._runner.acceleration(q, v, t, tau, a)
         except (TypeError, ValueError, core.CoreFailure):
             self._call(self._runner.acceleration, q, v, t, tau, a)
@@ -300,7 +300,7 @@ class Scene(States, Geometry, Tables, Steps):
             raise self._compiled.named(failure) from None
 
     def report(self) -> str:
-        """What the scene is made of: joints, constraints, rows, rank, mobility, and what was left out."""
+        """Return a text with joints, constraints, rows, rank, mobility and removed rows of the scene."""
         q, v = self.initial_state()
         self._runner.solve(q, v, 0.0, modes=[core.Mode.slip_plus] * len(self.element_names))
         notes = [f"note: {n}" for n in (*self.notes, *self._start_notes())]
@@ -310,7 +310,7 @@ class Scene(States, Geometry, Tables, Steps):
 
 
 def program_of(scene: Scene) -> core.Program:
-    """The scene as the core knows it.
+    """Return the core's program of a scene.
 
     Args:
         scene: the scene.
@@ -321,12 +321,12 @@ def program_of(scene: Scene) -> core.Program:
 def loaded(
     scene: Scene, origin: Table | None, friction: dict[str, tuple[float, float, float]] | None = None
 ) -> Scene:
-    """The scene, which remembers what `load` made it from, so that `resume` can load it again.
+    """Store the arguments of `load` in a scene, so that `resume` can load it again, and return the scene.
 
     Args:
-        scene: as loaded.
-        origin: name and parameters, or None when a file cannot hold them.
-        friction: coefficients of the file's collision geometry.
+        scene: the loaded scene.
+        origin: name and parameters of `load`, or None if a file cannot hold them.
+        friction: friction coefficients of the file's collision geometry, by name.
     """
     scene._origin, scene.contact_friction = origin, friction or {}
     return scene

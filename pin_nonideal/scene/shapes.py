@@ -1,4 +1,4 @@
-"""Shapes of a scene, made or read when something first asks for them."""
+"""Geometry models of a scene, created or read on first access."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from pin_nonideal.types import GeometryModel
 
 
 class Geometry:
-    """Shapes for display and for collisions.
+    """Geometry models for display and for collisions.
 
     Attributes:
-        notes: remarks of the loader; grow where shapes that are read at last have some.
+        notes: remarks of the loader; reading of shapes may append more.
     """
 
     notes: list[str]
@@ -23,18 +23,18 @@ class Geometry:
 
     @property
     def visual_model(self) -> GeometryModel | None:
-        """pinocchio.GeometryModel for the replay, or None; meshes of a file are read when first asked for."""
+        """pinocchio.GeometryModel for the replay, or None; meshes of a file are read on first access."""
         self._visual = self._read(self._visual)
         return self._visual
 
     @property
     def collision_model(self) -> GeometryModel | None:
-        """pinocchio.GeometryModel for collisions, or None; meshes are read when first asked for."""
+        """pinocchio.GeometryModel for collisions, or None; meshes are read on first access."""
         self._collision = self._read(self._collision)
         return self._collision
 
     def _read(self, shapes: GeometryModel | Callable[[], GeometryModel] | None) -> GeometryModel | None:
-        """The geometry itself, made now where only the means to make it were given."""
+        """Return the geometry model; a function is called to create it."""
         if not callable(shapes):
             return shapes
         geometry = shapes()

@@ -1,4 +1,4 @@
-"""States of a scene: its initial one, those that users give, and the nearest that meet the constraints."""
+"""States of a scene: initial state, parsing of user states, and projection onto the constraints."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class States:
 
     @property
     def q0(self) -> Array:
-        """Initial configuration, (nq,), read-only: loops are closed and frames are held from it."""
+        """Initial configuration, (nq,), read-only; closure of loops starts from it."""
         return self._q0
 
     @property
@@ -51,10 +51,10 @@ class States:
         return named_configuration(self.model, q, self._q0, what, self._unit_parts)
 
     def _require_unchanged(self) -> None:
-        """The core has taken the model's numbers when the scene was made.
+        """Check that the model is the one that the core copied at compilation.
 
         Raises:
-            InputError: the model is no longer what it was.
+            InputError: the model has changed since.
         """
         if not self._compiled.program.is_of(self.model):
             raise InputError(
@@ -63,7 +63,7 @@ class States:
             )
 
     def _checked_at(self, q: State, v: State, t: float) -> None:
-        """Compares derivatives of the user's functions where none were known before."""
+        """Check the derivatives of user functions at this state if they are still unchecked."""
         if self._compiled.unchecked:
             start = self._configuration(q, "q"), self._velocity(v, "v")
             self._compiled.check_functions(*start, number("t", t))
@@ -72,7 +72,7 @@ class States:
         return named_velocity(self.model, v, self._v0, what)
 
     def initial_state(self) -> tuple[Array, Array]:
-        """The scene's initial state with its loops closed.
+        """Return the scene's initial state with closed loops.
 
         Returns:
             q (nq,), v (nv,).
@@ -107,32 +107,30 @@ class States:
     def project(
         self, q: State | None = None, v: State | None = None, t: float = 0.0, *, report: bool = False
     ) -> tuple[Array, Array] | tuple[Array, Array, ProjectionReport]:
-        """Nearest consistent state: phi(q, t) = 0, A v + phi_t = 0, and no contact inside its plane.
+        """Project a state: phi(q, t) = 0, A v + phi_t = 0, and no penetration of contacts.
 
-        Of all configurations that satisfy the constraints it is that with the least d^T M(q) d, where d is
-        the move from q in tangent coordinates and M(q) the mass matrix there; of all velocities, that with
-        the least d^T M d.  Units, scales of rows and copies of constraints change nothing.  Where the move is
-        long the nearest of the closures found from several starts is taken; the report tells whether it is
-        known to be the nearest.  Closures in gimbal lock (M nearly singular) are taken only where no other is
-        found.
+        The projected configuration minimizes d^T M(q) d, where d is the displacement from q in tangent
+        coordinates and M(q) the mass matrix at q. The projected velocity minimizes d^T M d, where d is its
+        change. Units, row scales and duplicate constraints do not affect the result. If the displacement is
+        long, the nearest closure from several starts is selected. The report states if this closure is proven
+        nearest. Closures in gimbal lock (nearly singular M) are selected only if no other closure is found.
 
         Args:
-            q: configuration, (nq,) or by joint name; the scene's initial one when None.
-            v: velocity, (nv,) or by joint name; the scene's initial one when None.  Entries of q and v that
-                are named are held, and the others follow; where the constraints leave no such configuration
-                but one within a thousandth of a radian or of the mechanism's length, named entries are taken
-                for rounded numbers, and move there.
+            q: configuration, (nq,) or by joint name; the scene's initial configuration when None.
+            v: velocity, (nv,) or by joint name; the scene's initial velocity when None. Named entries of q
+                and v are held, and the others follow. If the constraints do not admit the named entries of q,
+                these are treated as rounded: they may move by 1e-3 rad, or by 1e-3 of the mechanism's length.
             t: time [s].
-            report: also returns how far q and v moved, a `ProjectionReport`.
+            report: whether to return a `ProjectionReport` as well, with the displacements of q and v.
 
         Returns:
             q (nq,), v (nv,), and with `report` the report.
 
         Raises:
-            LoopClosureError: the constraints cannot be met from here; `gaps` names each gap.
-            InputError: wrong shapes or numbers, named entries that the constraints do not allow together,
-                a contact that starts deep inside its plane or has no short way out of it, or a coordinate
-                where floating-point numbers are more than a millimeter or milliradian apart.
+            LoopClosureError: no closure is found from this state; `gaps` names each gap.
+            InputError: wrong shapes or numbers, named entries that the constraints do not admit together,
+                a contact with deep initial penetration or without a short displacement out of it, or a
+                coordinate so large that floating-point numbers are more than 1 mm or 1 mrad apart.
         """
         time, wanted = number("t", t), choice("report", report, (True, False))
         if q is None and v is None and time == 0.0:
@@ -144,7 +142,7 @@ class States:
         return found if wanted else found[:2]
 
     def _named(self, q: State | None, v: State | None, t: float = 0.0) -> Held:
-        """Entries that are named by a state, or by the scene's own, which are those of its own start."""
+        """Return the held entries, which the given state names, or else the scene's initial state."""
         return Held(
             self._held.q if q is None else named_coordinates(self.model, q),
             self._held.v if v is None else named_entries(self.model, v),
@@ -158,7 +156,7 @@ class States:
         return self._compiled.project(q, v, t, held)
 
     def _followed(self, v: State | None, on: Array) -> list[str]:
-        """A note on velocities that follow named ones, or that were changed to meet the constraints."""
+        """Return notes on velocities that follow named entries, or that the projection changed."""
         held = self._named(None, v).v
         asked = self.v0 if v is None else self._velocity(v, "v")
         if held is None or changes(asked, on, held):
@@ -166,14 +164,14 @@ class States:
         return told(self.model, asked, on, held)
 
     def _moved(self, q: State | None, on: Array) -> list[str]:
-        """What to tell of a configuration that was moved onto the constraints, see `Projection.notes`."""
+        """Return notes on a configuration that the projection moved, see `Projection.notes`."""
         if isinstance(q, np.ndarray) and (_same_bytes(q, on) or np.array_equal(q, on)):
             return []
         asked = self.q0 if q is None else self._configuration(q, "q")
         return self._compiled.projection.notes(asked, on, self._named(q, None).q)
 
     def _start_notes(self) -> list[str]:
-        """What to tell of the scene's own initial state, once it is closed."""
+        """Return notes on the projection of the scene's initial state; cached."""
         if self._told is None:
             q, v = self.initial_state()
             self._told = self._moved(None, q) + self._followed(None, v)

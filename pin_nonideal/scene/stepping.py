@@ -1,4 +1,4 @@
-"""Steps of a scene for loops of one's own: one at a time from any state, or period by period in one run."""
+"""Stepping of a scene by user code: single steps from any state, or one run period by period."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from pin_nonideal.validation import array, choice, nonnegative, number, positive
 if TYPE_CHECKING:
     from pin_nonideal.compilation.compiled_scene import CompiledScene
 
-# The core's own methods, and those of them that take steps of a fixed length.
+# Methods of the core, and its methods with a fixed step.
 STEPPING = tuple(method.name for method in core.methods() if not method.outside)
 FIXED = tuple(method.name for method in core.methods() if not method.outside and not method.adaptive)
 RTOL, ATOL = 1e-8, 1e-10
-# Steps fit into a period if their number is whole but for so much.
+# Relative tolerance for a whole number of steps in a period.
 WHOLE = 1e-9
 
 
 class Stepper:
-    """A run that a controller takes period by period: it goes on where the last period ended.
+    """A run that a controller advances period by period, each from the end of the last.
 
-    Made by `Scene.stepper`.  Between two periods torques may change; steps, modes of dry friction and factors
-    are kept, so that a period costs its own steps and nothing beside them.
+    `Scene.stepper` creates it. Torques may change between two periods. Step sizes, modes of dry friction and
+    factorizations are kept between periods, so a period costs only its steps.
 
     Args:
-        run: of the core.
-        compiled: what the core knows of the scene.
+        run: stepped run of the core.
+        compiled: the compiled scene.
     """
 
     def __init__(self, run: core.SteppedRun, compiled: CompiledScene) -> None:
@@ -44,57 +44,57 @@ class Stepper:
 
     @property
     def t(self) -> float:
-        """Time now [s]."""
+        """Current time [s]."""
         self._require_begun()
         return self._run.t
 
     @property
     def q(self) -> Array:
-        """Configuration now, (nq,), a copy."""
+        """Current configuration, (nq,), a copy."""
         self._require_begun()
         return self._run.state()[0]
 
     @property
     def v(self) -> Array:
-        """Velocity now, (nv,), a copy."""
+        """Current velocity, (nv,), a copy."""
         self._require_begun()
         return self._run.state()[1]
 
     @property
     def modes(self) -> Array:
-        """Mode of each frictional element now: +1 or -1 slips, 0 sticks, 2 where its contact is open."""
+        """Current mode of each friction element: +1 or -1 slips, 0 sticks, 2 if its contact is open."""
         return np.array([int(mode) for mode in self._run.modes], dtype=np.int8)
 
     def step(self, tau: ArrayLike | None = None) -> tuple[Array, Array]:
-        """Goes on for a period.
+        """Advance the run by one period.
 
         Args:
-            tau: joint torques in place of the scene's actuation from here on, (nv,) [N m or N]; None leaves
-                them as they are.
+            tau: joint torques that replace the scene's actuation from now on, (nv,) [N m or N]; None keeps
+                the current torques.
 
         Returns:
-            q (nq,) and v (nv,) at its end.
+            q (nq,) and v (nv,) at the end of the period.
 
         Raises:
             InputError: tau does not fit, or the run has stopped.
-            RunError: the run stops here; `reset` begins anew.
+            RunError: the run stopped within the period; `reset` starts a new run.
         """
         self._require_begun()
         self._guarded(self._run.advance, tau)
         return self._run.state()
 
     def reset(self, q: Array, v: Array, t: float = 0.0, tau: ArrayLike | None = None) -> None:
-        """Begins anew; nothing is left of what was before.
+        """Restart the run at a state and discard all previous data.
 
         Args:
-            q: configuration on the constraints, (nq,), as `Scene.project` gives it.
-            v: velocity on them, (nv,).
+            q: configuration on the constraints, (nq,), as from `Scene.project`.
+            v: velocity on the constraints, (nv,).
             t: time [s].
-            tau: joint torques in place of the scene's actuation, (nv,), or None.
+            tau: joint torques that replace the scene's actuation, (nv,), or None.
 
         Raises:
             InputError: an argument does not fit.
-            RunError: there is no motion from there.
+            RunError: no motion exists from this state.
         """
         model = self._compiled.model
         at, speed = array("Stepper: q", q, (model.nq,)), array("Stepper: v", v, (model.nv,))
@@ -122,7 +122,7 @@ class Stepper:
 
 
 class Steps:
-    """What a Scene does for loops of one's own."""
+    """Methods of a Scene for stepping by user code."""
 
     if TYPE_CHECKING:
         _compiled: CompiledScene
@@ -142,21 +142,21 @@ class Steps:
         t: float = 0.0,
         method: str = "semi_implicit_euler",
     ) -> tuple[Array, Array]:
-        """One step of a method from any state, for controllers and learning loops.
+        """Take one step from any state, for controllers and learning loops.
 
-        It is what `simulate(scene, dt, q, v, method=method, dt=dt)` ends with, events of friction and
-        contacts inside the step included.
+        The result is the final state of `simulate(scene, dt, q, v, method=method, dt=dt)`, including friction
+        and contact events inside the step.
 
         Args:
             q: configuration on the constraints, (nq,) or by joint name.
-            v: velocity on them, (nv,) or by joint name.
+            v: velocity on the constraints, (nv,) or by joint name.
             tau: joint torques, (nv,) [N m or N]; those of the scene's actuation when None.
             dt: length of the step [s].
-            t: time at its start [s].
-            method: one of the core's with a fixed step: "semi_implicit_euler", "rk4" or "moreau".
+            t: time at the start of the step [s].
+            method: method of the core with a fixed step: "semi_implicit_euler", "rk4" or "moreau".
 
         Returns:
-            q (nq,) and v (nv,) at its end.
+            q (nq,) and v (nv,) at the end of the step.
 
         Raises:
             InputError: an argument does not fit.
@@ -171,7 +171,7 @@ class Steps:
             run = self._steps[method, length] = self._new_run(method, length, length, RTOL, ATOL)
         if self._compiled.unchecked:
             self._checked_at(q, v, t)
-        try:  # arrays of the right shape go straight to the core, which checks sizes, lengths and finiteness
+        try:  # the core checks sizes, unit lengths and finiteness of arrays
             return run.step(q, v, t, tau)
         except (TypeError, ValueError, core.CoreFailure):
             return self._call(run.step, q, v, t, tau)  # type: ignore[no-any-return]
@@ -189,17 +189,17 @@ class Steps:
         rtol: float | None = None,
         atol: float | None = None,
     ) -> Stepper:
-        """A run that is taken period by period, with torques of one's own, and keeps its state between them.
+        """Return a run that advances period by period with user torques and keeps its state between calls.
 
         Args:
-            period: length of time of each call of `Stepper.step` [s].
-            q: initial configuration, (nq,) or by joint name, put onto the constraints; the scene's when None.
+            period: duration of each call of `Stepper.step` [s].
+            q: initial configuration, (nq,) or by joint name, projected onto the constraints; the scene's when
+                None.
             v: initial velocity, (nv,) or by joint name; the scene's when None.
             t0: initial time [s].
-            tau: joint torques in place of the scene's actuation from the start on, (nv,), or None.
-            method: one of the core's: adaptive, or with a fixed step.
-            dt: step of methods with a fixed step [s], a whole number of them in the period; the period when
-                None.
+            tau: joint torques that replace the scene's actuation from the start, (nv,), or None.
+            method: method of the core, adaptive or with a fixed step.
+            dt: step of fixed-step methods [s]; the period must be a multiple of it. None for the period.
             rtol: relative tolerance of adaptive methods, 1e-8 when None.
             atol: absolute tolerance, 1e-10 when None.
 
@@ -208,7 +208,7 @@ class Steps:
 
         Raises:
             InputError: an argument does not fit.
-            RunError: there is no motion from there.
+            RunError: no motion exists from the initial state.
         """
         choice("stepper: method", method, STEPPING)
         length = positive("stepper: period", period)
