@@ -63,7 +63,7 @@ def finish(
     def shaped() -> Trajectory:
         return Trajectory(**fields(), stats=stats)
 
-    # A time step may penetrate a contact, which the next step detects. A loop that opens stops the run itself.
+    # A time step may penetrate a contact, which the next step detects. An opening loop stops the run itself.
     enters = options.method == "moreau" and bool(scene._compiled.opening_names)
     if (
         not enters
