@@ -348,7 +348,7 @@ class Projection:
             return Closure(q, np.inf, 0.0, False, 0), False
 
     def _unit_at(self, runner: core.Runner, q: Array, t: float) -> Array:
-        """Return the units of a search; sliding units cover the least displacements that close single rows."""
+        """Return the units of a search; slide units cover the least displacements that close single rows."""
         A, _, phi, _ = rows_at(runner, q, np.zeros(self.model.nv), t)
         phi = np.where(self._gaps, np.minimum(phi, 0.0), phi)
         weighted = A * self.unit

@@ -168,7 +168,7 @@ class _Torques:
         self.modes, self.slipping = self._modes()
 
     def _modes(self) -> tuple[list[Any], Array]:
-        """Return modes from slip or from its acceleration at rest, and a velocity at which all elements slip."""
+        """Return modes from slip, or its acceleration at rest, and a velocity at which all elements slip."""
         runner, t, v, model = self.rest.runner, self.rest.t, self.v, self.rest.scene.model
         rows = [
             runner.slip_rows(pin.integrate(model, self.q, s * DIFFERENCE * v), v, t).reshape(-1, len(v))
