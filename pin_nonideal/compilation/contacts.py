@@ -33,7 +33,7 @@ def lower_contacts(
 ) -> Iterator[tuple[str, Any]]:
     """Add the normal rows of all contacts; `lower_contact_friction` adds their friction after all rows.
 
-    Bilateral contacts are added before unilateral ones. The order of their rows is that of the descriptions.
+    Bilateral contacts are added before unilateral contacts. Their rows are in the order of the descriptions.
 
     Args:
         contacts: unique names and descriptions.

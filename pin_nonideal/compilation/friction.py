@@ -31,7 +31,7 @@ from .resolver import Frame, Resolution, turned, words
 BALLS = ("PointAnchorConstraintModel", "RigidConstraintModel")
 # Scales of random displacements from q0 [rad or m] at which a function is called for the shape of its result.
 AROUND = (0.0, 0.1, 1.0)
-# Parameters of JointFriction for bearings, and those for teeth and threads.
+# Parameters of JointFriction for bearings, and parameters for teeth and threads.
 BEARING = ("radius", "axial_radius", "span")
 TEETH = ("lead_angle", "efficiency")
 

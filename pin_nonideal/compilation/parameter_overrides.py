@@ -18,7 +18,7 @@ from .compiled_scene import CompiledScene
 from .lowering import Written, lowered
 from .resolver import Resolution
 
-NUMBERS = (float, list, np.ndarray)  # types of named arguments that may differ between runs
+NUMBERS = (float, list, np.ndarray)  # types of keyword arguments that may differ between runs
 WRITES = ("add_", "set_", "let_")  # prefixes of builder methods that modify the program
 # Negative principal moments down to this value times the largest are accepted: rounding of a thin rod.
 ROUNDING = 1e-9

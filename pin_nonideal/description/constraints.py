@@ -104,7 +104,7 @@ class PointAnchor:
 class FrameAnchor:
     """Holds one frame on another, in position and orientation: a weld.
 
-    Residual: phi = [R2^T (p1 - p2); log(R2^T R1)], [m; rad].  With frame2=None:
+    Residual: phi = [R2^T (p1 - p2); log(R2^T R1)], [m; rad]. With frame2=None:
     [p1 - p2; log(R1 R1(start)^T)] in world axes.
     Rows: 6, three of position and three of orientation.
     lam: [force; moment] on frame1's body, [N; N m], in the axes of frame2, the moment about the origin of

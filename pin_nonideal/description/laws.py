@@ -36,8 +36,8 @@ __all__ = [
 class JointFriction:
     """Friction in a joint, an anchor or a coupling, with constant or load-dependent limits.
 
-    Let v_j be the joint's velocity, f its reaction force with parts along (axial, normal) and across (radial)
-    the joint's axis, and m_b its bending moment. The dry friction limit is
+    Let v_j be the joint's velocity, f its reaction force, and m_b its bending moment. The force has parts
+    along (axial, normal) and across (radial) the joint's axis. The dry friction limit is
 
         revolute, helical, universal:  limit = constant + mu (radius (|f_radial| + |m_b| / span)
                                                              + axial_radius |f_axial|)       [N m]
@@ -57,7 +57,7 @@ class JointFriction:
     `PointAnchor` of all three axes) C opposes the angular velocity, with |C| = limit. Planar joints and free
     flyers have the same friction for sliding in two or three directions. Turning has a limit of radius times
     the sliding limit [N m], and a viscous coefficient of radius^2 times `viscous`, as for a contact area of
-    that mean radius. Without `radius` turning is free. Friction against sliding and friction against turning are independent.
+    that mean radius. Without `radius` turning is free. Sliding friction and turning friction are independent.
 
     Couplings. lam is the multiplier of a `JointCoupling`, the tooth force on joint1 [N m or N]; limit and v_j
     belong to joint2. One of two inputs defines the losses: the efficiencies, or the thread of a screw or worm

@@ -109,11 +109,12 @@ class States:
     ) -> tuple[Array, Array] | tuple[Array, Array, ProjectionReport]:
         """Project a state: phi(q, t) = 0, A v + phi_t = 0, and no penetration of contacts.
 
-        The projected configuration minimizes d^T M(q) d, where d is the displacement from q in tangent
-        coordinates and M(q) the mass matrix at q. The projected velocity minimizes d^T M d, where d is its
-        change. Units, row scales and duplicate constraints do not affect the result. If the displacement is
-        long, the nearest closure from several starts is selected. The report states if this closure is proven
-        nearest. Closures in gimbal lock (nearly singular M) are selected only if no other closure is found.
+        The projected configuration minimizes d^T M(q) d for the displacement d from q in tangent coordinates.
+        M(q) is the mass matrix at q. The projected velocity minimizes d^T M d for its change d. Units, row
+        scales and duplicate constraints do not affect the result. If the displacement is long, the nearest
+        closure from several starts is selected. `ProjectionReport.nearest` states if the search confirms it
+        as nearest. Closures in gimbal lock (nearly singular M) are selected only if no other closure is
+        found.
 
         Args:
             q: configuration, (nq,) or by joint name; the scene's initial configuration when None.
@@ -128,9 +129,9 @@ class States:
 
         Raises:
             LoopClosureError: no closure is found from this state; `gaps` names each gap.
-            InputError: wrong shapes or numbers, named entries that the constraints do not admit together,
-                a contact with deep initial penetration or without a short displacement out of it, or a
-                coordinate so large that floating-point numbers are more than 1 mm or 1 mrad apart.
+            InputError: wrong shapes or numbers, or named entries that the constraints do not admit together.
+                Further causes are a contact with deep initial penetration or without a short displacement out
+                of it, and a coordinate at which floating-point numbers are more than 1 mm or 1 mrad apart.
         """
         time, wanted = number("t", t), choice("report", report, (True, False))
         if q is None and v is None and time == 0.0:

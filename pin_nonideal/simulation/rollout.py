@@ -76,7 +76,7 @@ def rollout(
         record: as in `simulate`; "dense" is not supported with parameters.
         several: "error" or "continue", as in `simulate`.
         threads: number of native threads.
-        failures: "raise" raises the error of the first failed run after all runs have ended; "keep" returns
+        failures: "raise" raises the error of the first failed run after all runs have ended. "keep" returns
             errors in place of the trajectories of failed runs.
         as_arrays: whether to return a `RunArrays` with states by run and sample, without an object per run.
             This is faster for many short runs. No other quantities are recorded.
@@ -115,7 +115,7 @@ def rollout(
 
 
 def _starts(scene: Scene, q: Any, v: Any, parameters: Any) -> tuple[Array, Array]:
-    """Return the initial states of all runs; missing ones are the scene's initial state."""
+    """Return the initial states of all runs; a missing state is the scene's initial state."""
     if parameters is not None and not isinstance(parameters, Mapping):
         raise InputError(f"rollout: parameters must be values by name; got {parameters!r}")
     starts_q = None if q is None else array("rollout: q", q, (None, scene.model.nq), copy=False)

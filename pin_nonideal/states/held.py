@@ -119,7 +119,7 @@ def settled(
 
 
 def with_entries(model: Model, q: Array, given: Array, held: NDArray[np.bool_]) -> Array:
-    """Return a configuration with the held coordinates bitwise equal to the given ones.
+    """Return a configuration with the held coordinates bitwise equal to the given values.
 
     Args:
         model: pinocchio.Model.

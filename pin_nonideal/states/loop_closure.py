@@ -1,6 +1,6 @@
 """Global search for the nearest configuration that satisfies the holonomic constraints.
 
-The problem is min d^T M(q0) d / 2 over phi(q) = 0, where d(q) is the displacement from q0 to q in tangent
+The problem is min d^T M(q0) d / 2 over phi(q) = 0. The displacement d(q) from q0 to q is in tangent
 coordinates. Damped steps close the loops. Newton's method for the Lagrangian then descends along the
 constraints until M(q0) d + A^T lam = 0. Loops may have several closures. If the displacement is long, the
 search uses further starts and returns the nearest closure.

@@ -63,11 +63,11 @@ def named_configuration(
 ) -> Array:
     """Return a configuration from numbers, a table by joint name, or a name, (nq,).
 
-    A table maps a joint name to a number, to the joint's values, or to a table of its pieces:
-    {"xyz": .., "rpy": ..} or {"xyz": .., "quaternion": [x, y, z, w]} for a floating base (joint name, body
-    name or "base"), "rpy" or "quaternion" for a ball joint, "xy" and "angle" for a planar joint, "xyz" for a
-    translation joint. An angle [rad] replaces (cos, sin). Missing entries stay as in `base`. A string is the
-    name of a reference configuration of the model.
+    A table maps a joint name to a number, to the joint's values, or to a table of pieces. A floating base has
+    the pieces "xyz" and either "rpy" or "quaternion" [x, y, z, w]. Its name is that of the joint or the body,
+    or "base". A ball joint has "rpy" or "quaternion", a planar joint "xy" and "angle", and a translation
+    joint "xyz". An angle [rad] replaces (cos, sin). Missing entries stay as in `base`. A string is the name
+    of a reference configuration of the model.
 
     Args:
         model: pinocchio.Model.
@@ -99,9 +99,9 @@ def named_configuration(
 def named_velocity(model: Model, given: State, base: Array, what: str) -> Array:
     """Return a velocity from numbers or from a table by joint name, (nv,).
 
-    A table maps a joint name to a number, to the joint's values, or to a table of its pieces: "linear" and
-    "angular" for a floating base (in body axes, as in Pinocchio) or a planar joint, "angular" for a ball
-    joint, "linear" for a translation joint. Missing entries stay as in `base`.
+    A table maps a joint name to a number, to the joint's values, or to a table of pieces. A planar joint and
+    a floating base (in body axes, as in Pinocchio) have the pieces "linear" and "angular". A ball joint has
+    "angular", and a translation joint "linear". Missing entries stay as in `base`.
 
     Args:
         model: pinocchio.Model.
