@@ -69,7 +69,7 @@ if TYPE_CHECKING:
     from .visualization.rendering import render
     from .visualization.replay import replay
 
-# What not every program asks for is imported when it is asked for.
+# Modules of these names are imported on first use.
 _LATER = {
     "rollout": "simulation.rollout",
     "RunArrays": "simulation.rollout_arrays",
@@ -96,7 +96,7 @@ _LATER = {
 
 
 def __getattr__(name: str) -> Any:
-    """A public name whose module has not been imported yet."""
+    """Import the module of a public name on first use."""
     if name not in _LATER:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value = getattr(import_module(f".{_LATER[name]}", __name__), name)
@@ -104,7 +104,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """All public names, those that have not been imported yet among them."""
+    """Return all public names, including names that are not imported yet."""
     return sorted([*__all__, "__version__"])
 
 

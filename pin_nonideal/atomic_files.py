@@ -1,4 +1,4 @@
-"""Output files: names checked, contents whole or absent."""
+"""Output files: checked names, and atomic writing."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ PART = ".part"  # end of the name of a file that is still being written
 
 
 def file_path(what: str, value: object) -> Path:
-    """The name of a file as a Path.
+    """Return the name of a file as a Path.
 
     Args:
-        what: words that name the argument in the message.
-        value: what was passed.
+        what: name of the argument in messages.
+        value: the argument.
 
     Raises:
-        InputError: it is no path, or an empty one.
+        InputError: the argument is no path, or is empty.
     """
     if not isinstance(value, (str, os.PathLike)) or not isinstance(os.fspath(value), str):
         raise InputError(f"{what} must be the name of a file; got {value!r}")
@@ -36,14 +36,14 @@ def file_path(what: str, value: object) -> Path:
 
 @contextmanager
 def whole_file(path: Path, what: str) -> Iterator[IO[bytes]]:
-    """A stream into a temporary file beside `path`, renamed at the end, so that no half of it is ever seen.
+    """Open a stream to a temporary file beside `path` that is renamed at the end, so the write is atomic.
 
-    A symbolic link stays and its target is written; a file that is there keeps its permissions; what a killed
-    process left half written of the same file is taken away.
+    A symbolic link is kept and its target is written. An existing file keeps its permissions. Partial files
+    of the same name are removed if the process that wrote them was killed.
 
     Args:
-        path: the file; an older one stays until the new one is complete.
-        what: words for the message.
+        path: the file; an existing file stays until the new one is complete.
+        what: words for messages.
 
     Raises:
         OutputError: the folder does not exist or cannot be written, or `path` is a folder, device or pipe.
@@ -65,7 +65,7 @@ def whole_file(path: Path, what: str) -> Iterator[IO[bytes]]:
         with os.fdopen(handle, "wb") as stream:
             yield stream
             stream.flush()
-            os.fsync(stream.fileno())  # on the disk before it bears its name
+            os.fsync(stream.fileno())  # flush to disk before the rename
         _keep_owner(target, temporary)
         os.chmod(temporary, mode)
         os.replace(temporary, target)
@@ -77,14 +77,14 @@ def whole_file(path: Path, what: str) -> Iterator[IO[bytes]]:
 
 
 def mode_of(path: Path, what: str) -> int:
-    """Permissions of the file that is there, or of a new one.
+    """Return the permissions of an existing file, or of a new file.
 
     Args:
         path: the file, or a symbolic link to it.
-        what: words for the message.
+        what: words for messages.
 
     Raises:
-        OutputError: a device, a pipe or a socket is there, or links that lead in a circle.
+        OutputError: the path is a device, a pipe or a socket, or its links form a cycle.
     """
     target = Path(os.path.realpath(path))
     if target.is_symlink():
@@ -100,7 +100,7 @@ def mode_of(path: Path, what: str) -> int:
 
 
 def _keep_owner(target: Path, temporary: str) -> None:
-    """The file that is there keeps its owner and group, as far as this process may give files away."""
+    """Copy owner and group of the existing file, as far as this process is allowed to."""
     if hasattr(os, "chown"):
         with suppress(OSError):
             there = target.stat()
@@ -108,13 +108,13 @@ def _keep_owner(target: Path, temporary: str) -> None:
 
 
 def _part(target: Path, process: int) -> str:
-    """Beginning of the name of a file that a process of this machine is still writing."""
+    """Return the prefix of the name of a temporary file of a process of this machine."""
     whose = zlib.crc32(f"{platform.node()}/{target.name}".encode())
     return f".{target.name[:40]}.{whose:08x}.{process}."
 
 
 def _remove_left_over(target: Path) -> None:
-    """Takes away half-written files of processes of this machine that are gone."""
+    """Remove partial files of processes of this machine that have ended."""
     beginning = _part(target, 0).removesuffix("0.")
     pattern = re.compile(re.escape(beginning) + r"(\d+)\..*" + re.escape(PART))
     for entry in list(os.scandir(target.parent)):
@@ -139,7 +139,7 @@ def _cannot_write(path: Path, what: str, error: OSError) -> str:
 
 
 def _umask() -> int:
-    """Permissions that new files of this process do not get."""
+    """Return the file mode mask of this process."""
     mask = os.umask(0)
     os.umask(mask)
     return mask

@@ -1,4 +1,4 @@
-"""Contact and friction forces of several contacts at one instant, on plain arrays."""
+"""Contact and friction forces of several coupled contacts at one instant, on plain arrays."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ __all__ = ["ConeResiduals", "ConeSolution", "cone_complementarity"]
 
 Array = NDArray[np.floating[Any]]
 
-# Velocities below this part of those in play are none, for the names of the modes alone.
+# Velocities below this part of the velocity scale count as zero in the names of the modes only.
 AT_REST = 1e-9
-LARGEST = 3  # rows of a contact: its normal and two slip directions
+LARGEST = 3  # maximum number of rows of a contact: normal and two slip directions
 
 
 @dataclass(frozen=True)
 class ConeResiduals:
-    """By how much a solution misses the laws of contact.
+    """Relative residuals of a solution in the laws of contact.
 
-    Parts of what is in play: of a velocity, the largest |w0| or, where it is more, |W| |f| of the row; of a
-    force, the largest |f|; of a power, their product.
+    The scale of a velocity is the larger of max |w0| and |W| |f| of its row. The scale of a force is the
+    largest |f|. The scale of a power is the product of both.
 
     Attributes:
-        signorini: of w_n >= 0, f_n >= 0 and f_n w_n = 0.
-        coulomb: of |f_t| <= mu f_n and |f| <= limit.
-        dissipation: of maximum dissipation, f_t . w_t = -mu f_n |w_t| and f . w = -limit |w|.
+        signorini: residual of w_n >= 0, f_n >= 0 and f_n w_n = 0.
+        coulomb: residual of |f_t| <= mu f_n and |f| <= limit.
+        dissipation: residual of maximum dissipation, f_t . w_t = -mu f_n |w_t| and f . w = -limit |w|.
     """
 
     signorini: float
@@ -41,22 +41,21 @@ class ConeResiduals:
 
 @dataclass(frozen=True, eq=False)
 class ConeSolution:
-    """What `cone_complementarity` found.
+    """Result of `cone_complementarity`.
 
     Attributes:
-        f: forces (or impulses), (n,); the shortest with this w where contacts share a load that W does not
-            split.
+        f: forces (or impulses), (n,); the minimum-norm forces for this w if contacts are hyperstatic.
         w: W f + w0, (n,).
         modes: "open", "stick" or "slip" of each element.
-        residuals: what f and w miss, with any status.
-        status: "solved".  "infeasible": no forces whatever keep the contacts from being entered.  "jammed":
-            the motion drives contacts into each other, so that none need exist, and none was found.
-            "failed": none was found, which proves nothing.
-        certificate: proof of "infeasible" or "jammed" that anyone can check, (n,); empty otherwise.
-            Infeasible: y >= 0 on the normals and zero elsewhere, with y . w0 < 0 and u = -W^T y of u_n >= mu
-            |u_t| for every contact (with boxes: y . w0 plus limit |u| of each is still negative), so that y
-            . w < 0 whatever f.
-            Jammed: forces y in the cones that balance by themselves, W^T y = 0, with y . w0 < 0.
+        residuals: residuals of f and w, for any status.
+        status: "solved". "infeasible": no forces prevent penetration. "jammed": the motion drives contacts
+            into each other, so a solution may not exist, and none was found. "failed": no solution was found,
+            but one may exist.
+        certificate: verifiable proof of "infeasible" or "jammed", (n,); empty otherwise.
+            Infeasible: y >= 0 on the normals and zero elsewhere, with y . w0 < 0 and u = -W^T y with u_n >=
+            mu |u_t| for each contact (with boxes: y . w0 plus the sum of limit |u| is still negative). Then
+            y . w < 0 for any f.
+            Jammed: self-balanced forces y in the cones, W^T y = 0, with y . w0 < 0.
     """
 
     f: Array
@@ -76,33 +75,34 @@ def cone_complementarity(
     limits: ArrayLike = (),
     start: ArrayLike | None = None,
 ) -> ConeSolution:
-    """Forces of unilateral contacts with Coulomb friction, normals and tangents together.
+    """Solve for the forces of unilateral contacts with Coulomb friction, normals and tangents coupled.
 
-    With f = (f_n, f_t) and w = W f + w0 = (w_n, w_t) of each contact:
+    Each contact has f = (f_n, f_t) and w = W f + w0 = (w_n, w_t), and satisfies
 
         w_n >= 0,  f_n >= 0,  f_n w_n = 0                                     (Signorini)
         |f_t| <= mu f_n,  f_t = -mu f_n w_t / |w_t| where w_t is not 0        (Coulomb)
 
-    The cone is the exact circular one.  Both lines are f in K = {|f_t| <= mu f_n}, u = w + (mu |w_t|, 0) in
-    the dual cone of K, and f . u = 0.  W is the Delassus matrix A M^-1 A^T of the contacts' rows, of any
-    rank; it may be any square matrix (one that is not symmetric comes of contacts whose slip direction is
-    known).  w are velocities and f impulses, or w accelerations and f forces.
+    The friction cone is circular and exact. The conditions are equivalent to f in K = {|f_t| <= mu f_n},
+    u = w + (mu |w_t|, 0) in the dual cone of K, and f . u = 0. W is the Delassus matrix A M^-1 A^T of the
+    contacts' rows, of any rank. It may be any square matrix: contacts with known slip direction give
+    nonsymmetric ones. w are velocities and f impulses, or w accelerations and f forces.
 
     Args:
         W: response of w to f, (n, n) [1/kg for contacts of points].
         w0: w without forces, (n,) [m/s or m/s^2].
         mu: coefficient of friction of each contact, (k,), or one number for all; at least 0.
-        dims: rows of each contact, (k,), or one number: 3 (normal and two slip directions), 2 (planar
-            friction) or 1 (none).  None: the same for all, n / k; 3 where mu is one number.
-        limits: limits of dry friction of one row each that follow the contacts' rows, |f| <= limit and
-            f = -limit w / |w| where it slips, (m,) [N or N s].
-        start: forces near the solution, (n,), such as those of the step before; None for a cold start.
+        dims: number of rows of each contact, (k,), or one number: 3 (normal and two slip directions), 2
+            (planar friction) or 1 (no friction). None: n / k for all contacts, or 3 if mu is one number.
+        limits: limits of dry friction elements of one row each, after the contacts' rows, (m,) [N or N s]:
+            |f| <= limit, and f = -limit w / |w| during slip.
+        start: forces near the solution for a warm start, (n,), such as those of the last step; None for a
+            cold start.
 
     Returns:
-        The `ConeSolution`.  Newton's method on the modes after Alart and Curnier; where it does not come to
-        rest, an interior-point method on second-order cones first, with de Saxce's correction mu |w_t|
-        inside Newton's equations or held in turn.  Contacts are scaled by their own response; one below
-        1e-14 of the largest counts as none.
+        The `ConeSolution`. The solver is Newton's method on the modes after Alart and Curnier. If it does not
+        converge, an interior-point method on second-order cones provides a start, with de Saxce's correction
+        mu |w_t| inside Newton's equations or fixed alternately. Contacts are scaled by their response; a
+        response below 1e-14 of the largest counts as zero.
 
     Raises:
         InputError: a shape does not fit, a value is not finite, or a coefficient or limit is negative.
@@ -127,7 +127,7 @@ def cone_complementarity(
 
 
 def _depth(value: object) -> int:
-    """0 of one number, 1 of a list."""
+    """Return 0 for a number, 1 for a list."""
     return min(np.asarray(value, dtype=object).ndim, 1)
 
 
@@ -138,7 +138,7 @@ def _bounds(name: str, values: Array) -> Array:
 
 
 def _contacts(rows: int, mu: Array, dims: ArrayLike | None) -> tuple[list[int], Array]:
-    """Rows and coefficient of each contact, whose rows are `rows` together."""
+    """Return the number of rows and the coefficient of each contact; `rows` is the total number of rows."""
     given = None if dims is None else array("dims", dims, (None,) * _depth(dims))
     if given is not None and given.ndim == 1:
         count = len(given)

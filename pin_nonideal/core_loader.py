@@ -1,7 +1,7 @@
-"""The door to the compiled core: loaded after Pinocchio, and refused with a reason when the two do not fit.
+"""Loader of the compiled core, with a check of its Pinocchio version.
 
-The core is linked to the libraries of one minor version of the `pin` wheel.  Beside another one it would read
-models and data laid out differently in memory, so that is an error at import and not a matter of luck.
+The core is linked to the libraries of one minor version of the `pin` wheel. With another version, the memory
+layout of models and data may differ, so the import raises ImportError.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _AGAIN = "pip install '{}' brings the Pinocchio that it needs"
 
 
 def load_core() -> ModuleType:
-    """The compiled module `pin_nonideal._core`, checked against the Pinocchio of this environment.
+    """Load the compiled module `pin_nonideal._core` and check it against the installed Pinocchio.
 
     Returns:
         The module.
@@ -27,7 +27,7 @@ def load_core() -> ModuleType:
     Raises:
         ImportError: the core is missing, does not load, or was built for another minor version of `pin`.
     """
-    # Pinocchio is imported first: it registers the conversion of its Python models that the core relies on.
+    # Pinocchio is imported first, since it registers the conversion of Python models that the core needs.
     found = str(pinocchio.__version__)
     try:
         core = importlib.import_module("pin_nonideal._core")
@@ -54,7 +54,7 @@ def _again() -> str:
 
     try:
         needed = [each for each in metadata.requires("pin-nonideal") or [] if each.startswith("pin=")]
-    except metadata.PackageNotFoundError:  # found on a path, not installed
+    except metadata.PackageNotFoundError:  # imported from a path, not installed
         needed = []
     return _AGAIN.format(*needed, "pin")
 

@@ -1,15 +1,15 @@
 """The explicit equation of motion, Eq. (40), on plain arrays.
 
-A system with mass matrix M and given force F obeys constraints A a = b, with redundant rows allowed, and on
-every virtual displacement w (A w = 0) the force of constraint F_c does the prescribed work w^T F_c = w^T C,
-Eq. (9).  Then
+A system has mass matrix M, given force F and constraints A a = b, whose rows may be redundant. On every
+virtual displacement w (A w = 0), the force of constraint F_c does the prescribed work w^T F_c = w^T C,
+Eq. (9). Then
 
     M a = F + F_ideal + F_nonideal                                             Eq. (40)
     F_ideal    = R B^+ (b - A M^-1 F)                                          Eq. (39)
     F_nonideal = R (I - B^+ B) R^-1 C                                          Eq. (39)
 
-with M = R R^T, B = A R^-T and B^+ = J B^T = (B^T B + V V^T)^-1 B^T, Eqs. (33) and (41)-(46).  The paper takes
-the symmetric root R = M^(1/2); any factor gives the same forces, so R is the Cholesky factor here.
+with M = R R^T, B = A R^-T and B^+ = J B^T = (B^T B + V V^T)^-1 B^T, Eqs. (33) and (41)-(46). The paper uses
+the symmetric root R = M^(1/2). Any factor gives the same forces, so R is the Cholesky factor here.
 
 Source: F. E. Udwadia, R. E. Kalaba, P. Phohomsiri, "Mechanical systems with nonideal constraints: explicit
 equations without the use of generalized inverses", J. Appl. Mech. 71 (2004).
@@ -28,16 +28,16 @@ from .validation import floats
 
 Array = NDArray[np.floating[Any]]
 
-# A row is redundant when, at unit length, no more than this is left of it outside the span of the others.
-# Rows made from kinematics carry rounding of about 1e-13, which a smaller tolerance would take for rows;
-# a row with more left than this still determines its acceleration to about 1e-6.
+# A unit row is redundant if its remainder outside the span of the other rows is at most this value. Rows from
+# kinematics have rounding of about 1e-13, which a smaller tolerance would count as independent. A row with a
+# larger remainder still determines its acceleration to about 1e-6.
 RANK_TOLERANCE = 1e-10
-# A row this small beside the longest one is the rounding of a row that vanishes (a planar loop closed in 3D).
+# A row below this part of the longest row is the rounding of a vanishing row (a planar loop closed in 3D).
 ZERO_ROW = 1e-14
-# Redundant rows contradict when they miss b by more than this part of the accelerations in play: a hundred
-# times the remainder that a redundant row may have, so that rounding alone never raises.
+# Redundant rows are inconsistent if their residual exceeds this part of the acceleration scale. It is a
+# hundred times the largest remainder of a redundant row, so rounding alone never raises.
 RESIDUAL_TOLERANCE = 1e-8
-# A refinement gains as many digits as one response has right, few at worst when M has condition 1e12.
+# Number of refinements. Each gains the correct digits of one response, which are few if M has condition 1e12.
 REFINEMENTS = 2
 # M[i, j] and M[j, i] may differ by this part of sqrt(M[i, i] M[j, j]); sums in another order differ by 1e-15.
 SYMMETRY_TOLERANCE = 1e-10
@@ -48,8 +48,8 @@ class Solution:
     """Acceleration and forces of constraint at one instant.
 
     The multipliers belong to the total motion, M a = F + C + A^T lam, so that
-    A^T lam = F_ideal + F_nonideal - C.  When rows are redundant they are not unique: `lam` is the shortest
-    vector, in the row order and the row scale of the given A.  The forces are unique.
+    A^T lam = F_ideal + F_nonideal - C. For redundant rows the multipliers are not unique: `lam` has minimum
+    norm, in the row order and the row scale of the given A. The forces are unique.
 
     Attributes:
         a: acceleration, (n,).
@@ -57,13 +57,13 @@ class Solution:
         F_nonideal: nonideal part of the force of constraint, (n,), Eq. (39).
         lam: multipliers of the rows of A, (m,).
         rank: number of independent rows of A, the paper's k.
-        modes: mode of each frictional element of a scene, +1 or -1 for slip, 0 for stick, 2 where the
-            contact is open; empty without any.
+        modes: mode of each friction element of a scene, +1 or -1 for slip, 0 for stick, 2 for an open
+            contact; empty without friction elements.
         closed: whether each contact of a scene is closed, in the order of its `contact_names`; empty without
-            any.
-        unique: whether this is the only motion that constraints and laws allow: True where it is shown, False
-            where another one is known, None where neither is (functions of the user's read the reactions,
-            or many elements load each other strongly).
+            contacts.
+        unique: whether this is the only motion that constraints and laws admit. True: uniqueness is proven.
+            False: another motion is known. None: unknown, for example if user functions read the reactions
+            or many elements load each other strongly.
     """
 
     a: Array
@@ -83,7 +83,7 @@ def solve(
     b: ArrayLike | None = None,
     C: ArrayLike | None = None,
 ) -> Solution:
-    """Acceleration and forces of constraint by Eq. (40).
+    """Compute the acceleration and the forces of constraint by Eq. (40).
 
     Units follow from the coordinates: for a joint angle, F in N m and M in kg m^2; for a length, N and kg.
 
@@ -96,7 +96,7 @@ def solve(
             None for ideal constraints.
 
     Returns:
-        The `Solution`; with it M a = F + C + A^T lam and A^T lam = F_ideal + F_nonideal - C.
+        The `Solution`, which satisfies M a = F + C + A^T lam and A^T lam = F_ideal + F_nonideal - C.
 
     Raises:
         InputError: a shape does not fit, a value is not finite, or M is not symmetric.
@@ -107,29 +107,29 @@ def solve(
     Source: Eqs. (3)-(7), (39), (40).
     """
     M, R, F, A, b, C = checked_problem(M, F, A, b, C)
-    mass_scale = np.sqrt(np.diag(M))  # makes the coordinates' units alike: metres, radians
+    mass_scale = np.sqrt(np.diag(M))  # scales coordinates in meters and radians alike
     with np.errstate(over="ignore", invalid="ignore"):
         row_scale, chosen, E = independent_rows(A / mass_scale)
-        A_k, b_k, rank = A[chosen], b[chosen], len(chosen)  # A = E A_k: redundant rows left out
+        A_k, b_k, rank = A[chosen], b[chosen], len(chosen)  # A = E A_k: without redundant rows
         R_inverse = _solve_lower(R, np.eye(len(R)))
         B = A_k @ R_inverse.T  # Eq. (7)
         Q, T = np.linalg.qr(B.T)  # B^T = Q T: the Gram-Schmidt of Eqs. (12)-(14), so B^+ = Q T^-T
         T_inverse = np.linalg.solve(T, np.eye(rank))
 
         def respond(f: Array, r: Array) -> tuple[Array, Array]:
-            """The a and lam of M a = f + A_k^T lam, A_k a = r, for several columns f and r at once."""
+            """Solve M a = f + A_k^T lam, A_k a = r for a and lam, for several columns f and r at once."""
             a_s = R_inverse @ f  # Eq. (5)
             c = T_inverse.T @ (r - B @ a_s)
             a = R_inverse.T @ (a_s + Q @ c)  # Eq. (40), scaled: a_s + B^+ (r - B a_s)
             return a, T_inverse @ c
 
-        # Eq. (40) is linear in (F, b) and C: the first column is the ideal motion, the second what C adds.
+        # Eq. (40) is linear in (F, b) and C: the first column is the ideal motion, the second the part of C.
         f, r = np.column_stack([F, C]), np.column_stack([b_k, np.zeros(rank)])
         a, lam_k = respond(f, r)
-        # Light links make M^-1 f huge where a constraint then holds it back.  What is still out of balance is
-        # small, so its response brings back the digits lost in that difference.
+        # Light links give a large M^-1 f, which constraints then cancel. The response to the remaining
+        # residual restores the digits lost by cancellation.
         for _ in range(REFINEMENTS):
-            more_a, more_lam = respond(f - M @ a + A_k.T @ lam_k, r - A_k @ a)  # what Eqs. (3), (4) miss
+            more_a, more_lam = respond(f - M @ a + A_k.T @ lam_k, r - A_k @ a)  # residuals of Eqs. (3), (4)
             a, lam_k = a + more_a, lam_k + more_lam
 
         F_ideal = A_k.T @ lam_k[:, 0]  # Eq. (39)
@@ -147,19 +147,19 @@ def solve(
 
 
 def independent_rows(A: Array) -> tuple[Array, list[int], Array]:
-    """Rows of A that span all of its rows, by Gram-Schmidt with pivoting on rows of unit length.
+    """Select rows of A that span all of its rows, by Gram-Schmidt with pivoting on rows of unit length.
 
-    Deciding on A instead of B = A R^-T keeps the condition of M out of the decision: both have the same rank.
+    A and B = A R^-T have the same rank. The use of A makes the decision independent of the condition of M.
 
     Args:
-        A: rows in coordinates of like units, (m, n).
+        A: rows in coordinates of equal units, (m, n).
 
     Returns:
         Length of each row (for vanishing rows the largest entry of A), (m,); the k chosen rows; and E,
         (m, k), with A = E A[chosen].
     """
     m, n = A.shape
-    largest = float(np.abs(A).max(initial=0.0)) or 1.0  # taken out first: squares of 1e200 overflow
+    largest = float(np.abs(A).max(initial=0.0)) or 1.0  # divided out first, since squares of 1e200 overflow
     length = np.linalg.norm(A / largest, axis=1)
     vanishing = length <= ZERO_ROW * length.max(initial=0.0)
     length[vanishing] = 1.0
@@ -179,7 +179,7 @@ def independent_rows(A: Array) -> tuple[Array, list[int], Array]:
         remainder[pivot] = 0.0  # exactly, so that L[chosen] is lower triangular
         chosen.append(pivot)
     L = L[:, : len(chosen)]
-    if len(chosen) == m:  # none is redundant
+    if len(chosen) == m:  # no row is redundant
         E = np.zeros((m, m))
         E[chosen, range(m)] = 1.0
         return length, chosen, E
@@ -188,23 +188,23 @@ def independent_rows(A: Array) -> tuple[Array, list[int], Array]:
 
 
 def _spread(E: Array, chosen: list[int], lam_k: Array) -> Array:
-    """The shortest lam with E^T lam = lam_k, so that A^T lam = A_k^T lam_k: redundant rows share the load."""
+    """Compute the minimum-norm lam with E^T lam = lam_k, so that A^T lam = A_k^T lam_k."""
     if len(chosen) == len(E):
         lam = np.zeros(len(E))
         lam[chosen] = lam_k
         return lam
     Q, T = np.linalg.qr(E)
     lam = Q @ _solve_lower(T.T, lam_k)
-    lam += Q @ _solve_lower(T.T, lam_k - E.T @ lam)  # rows of very different scale lose digits in the first
-    lam[~E.any(axis=1)] = 0.0  # rows that vanish carry nothing
+    lam += Q @ _solve_lower(T.T, lam_k - E.T @ lam)  # refinement for rows of very different scale
+    lam[~E.any(axis=1)] = 0.0  # vanishing rows have zero multipliers
     return lam
 
 
 def _solve_lower(L: Array, X: Array) -> Array:
-    """L^-1 X by forward substitution.
+    """Compute L^-1 X by forward substitution.
 
-    Turned upside down L is upper triangular, and in an upper triangular matrix `numpy.linalg.solve` finds
-    nothing to exchange or eliminate: it substitutes, which keeps light and heavy coordinates apart.
+    With rows and columns reversed, L is upper triangular. `numpy.linalg.solve` then neither pivots nor
+    eliminates, so rounding of heavy coordinates does not enter light ones.
     """
     return np.linalg.solve(L[::-1, ::-1], X[::-1])[::-1]
 
@@ -213,7 +213,7 @@ def _solve_lower(L: Array, X: Array) -> Array:
 def _check_consistent(
     A: Array, b: Array, a: Array, E: Array, chosen: list[int], row_scale: Array, in_play: float
 ) -> None:
-    """Raise when a row that was left out as redundant is not satisfied by the others."""
+    """Raise InconsistentConstraintsError if the motion violates a redundant row."""
     residual = A @ a - b  # Eq. (3)
     dropped = np.ones(len(A), dtype=bool)
     dropped[chosen] = False
@@ -238,7 +238,7 @@ def _check_consistent(
 def checked_problem(
     M: ArrayLike, F: ArrayLike, A: ArrayLike | None, b: ArrayLike | None, C: ArrayLike | None
 ) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """The arguments of `solve` as arrays of fitting shapes, absent ones filled in, with the factor R of M."""
+    """Return the arguments of `solve` as checked arrays with defaults, and the factor R of M."""
     M = _numbers("M", M)
     if M.ndim != 2 or M.shape[0] != M.shape[1] or M.shape[0] == 0:
         raise InputError(f"M must have shape (n, n) with n >= 1, got {M.shape}; pass the mass matrix")
@@ -264,7 +264,7 @@ def checked_problem(
 
 
 def _numbers(name: str, value: ArrayLike) -> Array:
-    """`value` as an array of finite floats."""
+    """Return `value` as an array of finite floats."""
     array, where = floats(value)
     if array is None:
         raise InputError(f"{name} must hold real numbers, got {type(value).__name__}; pass floats")
@@ -275,7 +275,7 @@ def _numbers(name: str, value: ArrayLike) -> Array:
 
 
 def _check_symmetry(M: Array) -> None:
-    """Raise unless M is symmetric beyond rounding."""
+    """Raise InputError unless M is symmetric up to rounding."""
     diagonal = np.sqrt(np.abs(np.diag(M)))
     gap = np.abs(M - M.T) - SYMMETRY_TOLERANCE * np.outer(diagonal, diagonal)
     if (gap <= 0.0).all():
@@ -289,10 +289,10 @@ def _check_symmetry(M: Array) -> None:
 
 
 def _factor(M: Array) -> Array:
-    """R of M = R R^T; raises unless M is positive definite beyond rounding."""
+    """Return R of M = R R^T; raise SingularMassError unless M is positive definite beyond rounding."""
     try:
         R: Array = np.linalg.cholesky(M)
-        left = np.diag(R) ** 2 / np.diag(M)  # of each diagonal entry, after elimination
+        left = np.diag(R) ** 2 / np.diag(M)  # remaining part of each diagonal entry after elimination
         definite = bool((left > len(M) * np.finfo(float).eps).all())
     except np.linalg.LinAlgError:
         definite = False

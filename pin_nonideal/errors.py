@@ -1,8 +1,8 @@
 """The exceptions of pin_nonideal.
 
 Every error derives from `PinNonidealError` and from the built-in exception that a caller expects
-(`ValueError`, `KeyError`, `RuntimeError`, `OSError`).  A message says what must hold, what came, and what to
-do.
+(`ValueError`, `KeyError`, `RuntimeError`, `OSError`). A message has three parts: the requirement, the given
+value, and a remedy.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ class PinNonidealError(Exception):
     """Root of all errors raised by this package."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Not by its constructor, which takes other arguments than the message.
+        # The constructor cannot be used, since its arguments differ from `args`.
         return _made_again, (type(self), self.args, dict(self.__dict__))
 
     def __str__(self) -> str:
-        # KeyError would print the repr of its message; every class here prints the message itself.
+        # KeyError prints the repr of its message; all classes here print the message itself.
         return str(self.args[0]) if self.args else ""
 
 
 def _made_again(
     kind: type[PinNonidealError], args: tuple[Any, ...], state: dict[str, Any]
 ) -> PinNonidealError:
-    """An error from another process."""
+    """Rebuild an error from another process."""
     error = kind.__new__(kind, *args)
     error.args = args
     error.__dict__.update(state)
@@ -50,17 +50,17 @@ class OutputError(PinNonidealError, OSError):
 
 
 class JointOrderWarning(UserWarning):
-    """A list of joints' values was taken in the order of the model, and the robot's file has another one."""
+    """A list of joint values was read in the order of the model, which differs from the robot's file."""
 
 
 class RunError(PinNonidealError, RuntimeError):
     """A run stopped early.
 
     Attributes:
-        trajectory: what was computed up to the failure (`pin_nonideal.Trajectory`), or None outside of a run.
+        trajectory: samples before the failure (`pin_nonideal.Trajectory`), or None outside of a run.
         time: time of the failure [s], or None.
-        index: which state of a rollout it was, or None.
-        results: of all runs of the rollout, a Trajectory or the error of each; None outside of one.
+        index: index of the run in a rollout, or None.
+        results: Trajectory or error of each run of a rollout; None outside of a rollout.
     """
 
     def __init__(self, message: str, *, time: float | None = None) -> None:
@@ -100,11 +100,11 @@ class FrictionParadoxError(RunError):
 
     Attributes:
         time: time of the paradox [s].
-        element: name of the frictional element, or names joined by commas.
-        determinant: det(I - d lam' / d lam) of the implicit reaction equation, the least of its solutions.
-        solutions: accelerations (nv,) of two motions that satisfy all laws; empty where there is none, or
-            where it is not told.
-        limits: friction limits of the elements in each of them [N m or N].
+        element: name of the friction element, or names joined by commas.
+        determinant: det(I - d lam' / d lam) of the implicit reaction equation, smallest over its solutions.
+        solutions: accelerations (nv,) of two motions that satisfy all laws; empty without a solution or if
+            they are unknown.
+        limits: friction limits of the elements in each motion [N m or N].
     """
 
     def __init__(
@@ -125,11 +125,11 @@ class FrictionParadoxError(RunError):
 
 
 class FrictionConvergenceError(RunError):
-    """Modes of friction at rest were not found, and none of it proves that there are none.
+    """The solver found no consistent stick-slip modes; a solution may still exist.
 
     Attributes:
-        time: when it happened [s].
-        element: name of the frictional element at rest, or names joined by commas.
+        time: time of the failure [s].
+        element: name of the friction element at rest, or names joined by commas.
     """
 
     def __init__(self, message: str, *, element: str, time: float | None = None) -> None:
@@ -152,23 +152,23 @@ class ImpactEnergyError(RunError):
 
 
 class StepSizeError(RunError):
-    """Steps as short as the asked tolerance needs lead nowhere, or the run may take no more of them."""
+    """The tolerance requires too short steps, or the run has reached its maximum number of steps."""
 
 
 class EquilibriumError(RunError):
-    """No state of rest was found."""
+    """No equilibrium was found."""
 
 
 class WallTimeError(RunError):
-    """The run may take no more wall time."""
+    """The run has reached its maximum wall time."""
 
 
 class StiffnessError(StepSizeError):
-    """An explicit method crawls: its stability, not the accuracy, keeps the steps short.
+    """Stability, not accuracy, limits the steps of an explicit method.
 
     Attributes:
-        joint: name of the joint whose force relaxes so fast.
-        rate: at which it does [1/s].
+        joint: name of the joint with the stiff force.
+        rate: relaxation rate [1/s].
     """
 
     def __init__(self, message: str, *, joint: str, rate: float, time: float | None = None) -> None:
@@ -182,8 +182,8 @@ class DivergenceError(RunError):
 
     Attributes:
         joint: name of the fastest joint.
-        source: the actuation, forces or laws that do most work on the motion, in words.
-        rate: of the growth over the last decades [1/s].
+        source: names of the actuation, forces or laws that do most work on the motion.
+        rate: growth rate over the last decades [1/s].
     """
 
     def __init__(
@@ -196,22 +196,22 @@ class DivergenceError(RunError):
 
 
 class UserFunctionError(RunError):
-    """A function passed by the user raised, or returned a value of wrong shape or not finite."""
+    """A user function raised, or returned a value of wrong shape or not finite."""
 
 
 class RunInterrupted(RunError, KeyboardInterrupt):
-    """Ctrl-C stopped the run; `trajectory` holds what was computed."""
+    """Ctrl-C stopped the run; `trajectory` holds the samples before the stop."""
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """Suffix that points at the closest known name, for messages about unknown names.
+    """Return a message suffix with the closest known name, for unknown names.
 
     Args:
-        name: what was asked for.
-        names: what exists.
+        name: the unknown name.
+        names: known names.
 
     Returns:
-        `; nearest: "..."` or, when nothing is close, `; known: ...` with up to eight names.
+        `; nearest: "..."` or, if no name is close, `; known: ...` with up to eight names.
     """
     import difflib
 

@@ -1,4 +1,4 @@
-"""Objects whose fields are made when the first of them is asked for, which short runs may never be."""
+"""Objects whose fields are computed on first access."""
 
 from __future__ import annotations
 
@@ -10,36 +10,36 @@ from .types import Table
 
 Made = TypeVar("Made", bound="MadeLater")
 MAKER = "_make"
-_one_at_a_time = RLock()  # of threads that ask; making the fields of one object may ask for another's
+_one_at_a_time = RLock()  # reentrant, since the fields of one object may need those of another
 
 
 class _Plain:
-    """What gives objects a table of fields."""
+    """Base class that provides the instance dictionary."""
 
 
 _own: Callable[[Any], Table] = vars(_Plain)["__dict__"].__get__
 
 
 class MadeLater(_Plain):
-    """Fields that come from a function, which is called once one of them is read.
+    """Base class of objects whose fields are computed by a function on first access.
 
-    A field must not be an attribute of the class as well, which would be found first.
+    A field must not be a class attribute as well, since Python finds class attributes first.
     """
 
     @classmethod
     def later(cls: type[Made], make: Callable[[], Table], **known: Any) -> Made:
-        """An object whose fields `make` gives.
+        """Return an object whose fields are computed by `make`.
 
         Args:
             make: a function without arguments, called once.
-            known: fields that are there at once.
+            known: fields that are available at once.
         """
         made = cls.__new__(cls)
         _own(made).update(known, **{MAKER: make})
         return made
 
     def __getattr__(self, name: str) -> Any:
-        # Only what is not there comes here.
+        # Python calls this method for missing attributes only.
         fields = self._fields()
         if name in fields:
             return fields[name]
@@ -54,5 +54,5 @@ class MadeLater(_Plain):
                     del own[MAKER]
         return own
 
-    # What looks into an object, such as `vars`, finds all of its fields.
+    # `vars` and similar functions return all fields.
     __dict__ = property(_fields)

@@ -1,4 +1,4 @@
-"""Types that signatures name: arrays of floats, and Pinocchio's objects, which have no types of their own."""
+"""Type aliases of signatures: arrays of floats, and Pinocchio's objects, which have no static types."""
 
 from __future__ import annotations
 

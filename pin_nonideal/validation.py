@@ -1,7 +1,7 @@
-"""Checks at the door: every number, name and function a user passes is looked at once, here.
+"""Validation of user input: numbers, names, arrays and functions are checked once, when they are passed.
 
-The inner loop trusts what has passed.  Each helper takes `what`, the words that name the argument in its
-message.
+Inner loops do not repeat the checks. The parameter `what` of each helper is the name of the argument in
+messages.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .errors import InputError, nearest
 
-FEW = 100  # numbers that Python adds up faster than NumPy looks at them; their sum is finite as they are
+FEW = 100  # up to this size a Python sum is faster than NumPy; a finite sum implies finite numbers
 
 Vector3 = tuple[float, float, float]
 
@@ -24,7 +24,7 @@ AXES: dict[str, Vector3] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.
 
 
 def label(description: Any) -> str:
-    """Words that name a description in a message: its class and, when it has one, its name.
+    """Return the label of a description in messages: its class and, if it has one, its name.
 
     Args:
         description: any object, with or without an attribute `name`.
@@ -47,7 +47,7 @@ def by_name(value: Any) -> dict[Any, Any] | None:
 
 
 def number(what: str, value: object) -> float:
-    """A finite real number as a float.
+    """Return a finite real number as a float.
 
     Raises:
         InputError: `value` is no real number, or NaN, or infinite.
@@ -65,10 +65,10 @@ def number(what: str, value: object) -> float:
 
 
 def nonnegative(what: str, value: object) -> float:
-    """A finite number >= 0.
+    """Return a finite number >= 0.
 
     Raises:
-        InputError: it is negative or no finite number.
+        InputError: `value` is negative or no finite number.
     """
     result = number(what, value)
     if result < 0.0:
@@ -77,10 +77,10 @@ def nonnegative(what: str, value: object) -> float:
 
 
 def positive(what: str, value: object) -> float:
-    """A finite number > 0.
+    """Return a finite number > 0.
 
     Raises:
-        InputError: it is zero, negative or no finite number.
+        InputError: `value` is zero, negative or no finite number.
     """
     result = number(what, value)
     if result <= 0.0:
@@ -89,10 +89,10 @@ def positive(what: str, value: object) -> float:
 
 
 def fraction(what: str, value: object) -> float:
-    """A number from 0 to 1.
+    """Return a number from 0 to 1.
 
     Raises:
-        InputError: it is none.
+        InputError: `value` is no number from 0 to 1.
     """
     result = nonnegative(what, value)
     if result > 1.0:
@@ -101,10 +101,10 @@ def fraction(what: str, value: object) -> float:
 
 
 def flag(what: str, value: object) -> bool:
-    """True or False.
+    """Return True or False.
 
     Raises:
-        InputError: it is neither.
+        InputError: `value` is no bool.
     """
     if not isinstance(value, (bool, np.bool_)):
         raise InputError(f"{what} must be True or False; got {value!r}")
@@ -112,10 +112,10 @@ def flag(what: str, value: object) -> bool:
 
 
 def count(what: str, value: object, *, least: int = 0, most: int = 1_000_000_000) -> int:
-    """An integer from `least` to `most`.
+    """Return an integer from `least` to `most`.
 
     Raises:
-        InputError: it is no integer, too small or too large.
+        InputError: `value` is no integer, too small or too large.
     """
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
         raise InputError(f"{what} must be an integer; got {value!r}")
@@ -127,10 +127,10 @@ def count(what: str, value: object, *, least: int = 0, most: int = 1_000_000_000
 
 
 def text(what: str, value: object) -> str:
-    """A name: a string that is not empty.
+    """Return a name, which is a nonempty string.
 
     Raises:
-        InputError: it is no string, or empty.
+        InputError: `value` is no string, or empty.
     """
     if not isinstance(value, str):
         raise InputError(f"{what} must be a name (a string); got {value!r}")
@@ -140,19 +140,19 @@ def text(what: str, value: object) -> str:
 
 
 def optional_text(what: str, value: object) -> str | None:
-    """A name or None.
+    """Return a name or None.
 
     Raises:
-        InputError: it is neither None nor a string that is not empty.
+        InputError: `value` is neither None nor a nonempty string.
     """
     return None if value is None else text(what, value)
 
 
 def choice(what: str, value: object, allowed: Sequence[Any]) -> Any:
-    """One of `allowed`.
+    """Return `value` if it is one of `allowed`.
 
     Raises:
-        InputError: it is another value; the message lists the allowed ones.
+        InputError: `value` is not allowed; the message lists the allowed values.
     """
     for a in allowed:
         if value is a:
@@ -160,17 +160,17 @@ def choice(what: str, value: object, allowed: Sequence[Any]) -> Any:
     if not any(isinstance(value, type(a)) and value == a for a in allowed):
         names = [a for a in allowed if isinstance(a, str)]
         hint = nearest(value, names) if isinstance(value, str) else ""
-        if not hint.startswith("; nearest"):  # the message lists them already
+        if not hint.startswith("; nearest"):  # the message lists the known names already
             hint = ""
         raise InputError(f"{what} must be one of {', '.join(map(repr, allowed))}; got {value!r}{hint}")
     return value
 
 
 def sequence(what: str, value: object) -> tuple[Any, ...]:
-    """A list or tuple, as a tuple.
+    """Return a list or tuple as a tuple.
 
     Raises:
-        InputError: it is something else, such as one description that was not put into a list.
+        InputError: `value` is no list or tuple, for example a single description.
     """
     if not isinstance(value, (list, tuple)):
         raise InputError(f"{what} must be a list; got {value!r}")
@@ -180,10 +180,10 @@ def sequence(what: str, value: object) -> tuple[Any, ...]:
 def floats(
     value: object, kinds: str = "fiu", copy: bool = True
 ) -> tuple[NDArray[np.float64] | None, tuple[int, ...] | None]:
-    """A copy as floats, and the place of its first entry that is not finite, None where all are.
+    """Return a copy as floats, and the index of its first entry that is not finite, or None.
 
-    There is no copy (None) unless the type of `value` is one of `kinds`, NumPy's letters of real numbers.
-    Without `copy` it is a view where `value` is an array of floats.
+    The copy is None unless the dtype kind of `value` is in `kinds`, by default the real numbers. Without
+    `copy`, an array of floats is not copied.
     """
     try:
         given = np.asarray(value)
@@ -198,13 +198,13 @@ def floats(
 
 
 def array(what: str, value: object, shape: Sequence[int | None], copy: bool = True) -> NDArray[np.float64]:
-    """A finite array of the given shape, copied and read-only.
+    """Return a finite array of the given shape, copied and read-only.
 
     Args:
         what: words for messages.
-        value: anything NumPy can turn into an array of floats.
-        shape: expected shape; None leaves a length free.
-        copy: False for many numbers that are read while the call lasts and no longer: not copied.
+        value: any value that NumPy converts to an array of floats.
+        shape: expected shape; None accepts any length.
+        copy: whether to copy the array; False for large arrays that are read during the call only.
 
     Raises:
         InputError: wrong shape, not numbers, or not finite.
@@ -228,15 +228,15 @@ def array(what: str, value: object, shape: Sequence[int | None], copy: bool = Tr
 
 
 def function(what: str, value: object, signature: str) -> Callable[..., Any]:
-    """Something that can be called.
+    """Return `value` if it is callable.
 
     Args:
         what: words for messages.
-        value: the candidate.
-        signature: how it will be called, shown in the message.
+        value: the argument.
+        signature: expected signature, shown in the message.
 
     Raises:
-        InputError: it cannot be called.
+        InputError: `value` is not callable.
     """
     if not callable(value):
         raise InputError(f"{what} must be a function {signature}; got {value!r}")
@@ -245,14 +245,14 @@ def function(what: str, value: object, signature: str) -> Callable[..., Any]:
 
 
 def unit_axis(what: str, value: object) -> Vector3:
-    """An axis as a unit vector.
+    """Return an axis as a unit vector.
 
     Args:
         what: words for messages.
         value: "x", "y", "z", or three numbers of any nonzero length.
 
     Raises:
-        InputError: another string, a wrong shape, or a vector of no length.
+        InputError: another string, a wrong shape, or a zero vector.
     """
     if isinstance(value, str):
         if value not in AXES:
@@ -268,10 +268,10 @@ def unit_axis(what: str, value: object) -> Vector3:
 
 
 def axis_triad(axis: Vector3) -> tuple[Vector3, Vector3, Vector3]:
-    """Right-handed unit vectors (t1, t2, axis) that every row across an axis is written in.
+    """Return right-handed unit vectors (t1, t2, axis), the basis of all rows across an axis.
 
-    t1 starts from the coordinate axis that follows, cyclically, the largest component of `axis`; so "z" gives
-    (x, y, z), "x" gives (y, z, x) and "y" gives (z, x, y).
+    t1 is the projection of the coordinate axis that follows, cyclically, the largest component of `axis`.
+    Thus "z" gives (x, y, z), "x" gives (y, z, x) and "y" gives (z, x, y).
 
     Args:
         axis: unit vector.

@@ -1,1 +1,1 @@
-"""From descriptions to the core's program: names become indices, user functions checked ones."""
+"""Compilation of descriptions into the core's program: resolved names, checked user functions."""

@@ -1,6 +1,6 @@
-"""Checks before the first step: bad numbers in the model, idle rows, wrong derivatives.
+"""Checks before the first step: invalid numbers in the model, zero or duplicate rows, wrong derivatives.
 
-Functions of the user are called near states of a run only: rows that they make are never idle.
+User functions are called near states of a run only. Rows that they define are never removed.
 """
 
 from __future__ import annotations
@@ -29,30 +29,32 @@ from .lowering import Descriptions
 
 Rows = NDArray[np.bool_]
 
-# Functions of time that call none of the user's.
+# Functions of time without user code.
 KNOWN = (Constant, Polynomial, Sinusoid, Spline)
-# Rows below this part of their greatest length at random states vanish structurally: rounding of the
-# kinematics.
+# A row vanishes structurally if its length stays below this part of its greatest possible length at random
+# states. The value covers rounding of the kinematics.
 STRUCTURAL = 1e-11
-# What such a row asks for beside the largest: rounding of long sums.
+# Right-hand side of a vanishing row, relative to the largest right-hand side: rounding of long sums.
 SUM_ROUNDING = 1e-9
-# The derivatives of a user's constraint are compared with differences, which carry about this relative error.
+# Tolerance between derivatives of user functions and central differences: relative error of the differences.
 DERIVATIVE_TOLERANCE = 1e-4
-# Step of these [s], the cube root of unit roundoff, and how long after a start they are taken: at an instant
-# that no function singles out.
+# Step of the central differences [s], the cube root of unit roundoff, and their time after the start [s].
+# User functions are unlikely to have a corner at this time.
 DIFFERENCE, AFTER_START = 1e-5, 0.21
-# Parts of random moves [rad or m] around a start: a function that has no value there is tried closer to it.
+# Scales of random displacements [rad or m] around a start. If a function raises, the next smaller is tried.
 AROUND = (0.1, 1e-2, 1e-3, 1e-4)
 
 
 def check_model(model: Model) -> None:
-    """Every number of a model is finite, no mass or armature is negative, and gravity has no angular part.
+    """Check that all numbers of a model are finite and valid.
+
+    Masses and armatures must not be negative. Gravity must have no angular part.
 
     Args:
         model: pinocchio.Model.
 
     Raises:
-        InputError: one is not.
+        InputError: a number is invalid.
     """
     for i in range(1, model.njoints):
         Y, name = model.inertias[i], model.names[i]
@@ -79,7 +81,7 @@ def check_model(model: Model) -> None:
 
 
 def without_functions(said: Descriptions, nv: int) -> Descriptions | None:
-    """A scene with the same rows, in which nothing stands for functions of the user; None where it has none.
+    """Return a scene with the same rows but without user functions, or None if no description has one.
 
     Args:
         said: descriptions of the scene.
@@ -97,7 +99,7 @@ def without_functions(said: Descriptions, nv: int) -> Descriptions | None:
 
 
 def _without_function(c: Any, nv: int) -> Any:
-    """A description with zeros for rows, gaps and directions of the user, and a number for a drive."""
+    """Return a copy with zeros for user rows, gaps and directions, and constants for functions of time."""
     if isinstance(c, UserConstraint):
         rows, zeros = (np.zeros((c.size, nv)), np.zeros(c.size)), np.zeros(c.size)
         return replace(
@@ -131,27 +133,27 @@ def idle_rows(
     sampled: core.Program,
     tolerance: float = CLOSURE_TOLERANCE,
 ) -> tuple[list[tuple[str, int, str]], list[tuple[int, int, float]]]:
-    """Rows that can never act: they vanish at every state, or are copies of others.
+    """Return the rows that can never act: zero at every state, or duplicates of other rows.
 
     Args:
         model: pinocchio.Model.
         q0: configuration around which the rows are sampled, (nq,).
         program: the scene with all its rows.
-        sampled: the same without functions of the user, see `without_functions`.
-        tolerance: gap that a row that vanishes may have [m or rad].
+        sampled: the same scene without user functions, see `without_functions`.
+        tolerance: residual that a vanishing row may have [m or rad].
 
     Returns:
-        (name, row, reason) of each, and (row, the row it is a copy of, its multiple of it) of each copy,
-        numbered as in `lam`.
+        (name, row, reason) of each removed row, and (row, original row, factor) of each duplicate, where
+        row = factor * original row. Duplicates are numbered as in `lam`.
 
     Raises:
-        InconsistentConstraintsError: a row that vanishes asks for an acceleration.
-        LoopClosureError: a row that vanishes has a gap.
+        InconsistentConstraintsError: a vanishing row has a nonzero right-hand side.
+        LoopClosureError: a vanishing row has a residual above the tolerance.
     """
     blocks = sorted(program.constraints, key=lambda c: c.first)
     opening = {c.name for c in program.constraints[program.first_gap :]}
     owners = [(c.name, row) for c in blocks for row in range(c.count)]
-    # Rows that may look special at a few states and times only; gaps of contacts are no copies of each other.
+    # Rows that move in time may vanish at a few states only, so they stay. Gaps are never duplicates.
     fixed = np.array([c.moves_in_time for c in blocks for _ in range(c.count)], dtype=bool)
     opens = np.array([c.name in opening for c in blocks for _ in range(c.count)], dtype=bool)
     if fixed.all():
@@ -181,7 +183,7 @@ def idle_rows(
 def _check_vanishing(
     name: str, local: int, asked: float, largest: float, gap: float, tolerance: float
 ) -> None:
-    """A row that moves nothing must ask for nothing: no acceleration, and no gap to be closed."""
+    """Check that a vanishing row has zero right-hand side and a residual within the tolerance."""
     if asked > SUM_ROUNDING * max(1.0, largest):
         raise InconsistentConstraintsError(
             f'row {local} of constraint "{name}" moves nothing and asks for the acceleration {asked:.1e}; '
@@ -196,7 +198,7 @@ def _check_vanishing(
 
 
 def has_rates(c: object) -> bool:
-    """Whether a description holds functions of the user that are derivatives of each other.
+    """Check if a description holds user functions that are derivatives of each other.
 
     Args:
         c: constraint or contact.
@@ -209,20 +211,20 @@ def has_rates(c: object) -> bool:
 def check_user_functions(
     model: Model, q0: Array, v0: Array, t0: float, described: Mapping[str, object], program: core.Program
 ) -> None:
-    """Compares once, by central differences: d residual/dt = rate and d rate/dt = A a - b.
+    """Check by central differences that d residual/dt = rate and d rate/dt = A a - b.
 
-    The residual of a contact is its gap.  Functions that have no value around the start are left to the run.
+    The residual of a contact is its gap. Functions that raise around the start are not checked.
 
     Args:
         model: pinocchio.Model.
-        q0: configuration near which they are compared, that of a start, (nq,).
+        q0: start configuration, near which the functions are compared, (nq,).
         v0: velocity, (nv,).
         t0: time of the start [s].
         described: constraints and contacts by their names.
-        program: the scene as the core knows it.
+        program: the core's program.
 
     Raises:
-        InputError: they differ.
+        InputError: a function differs from the difference quotient.
     """
     slices = row_slices(program)
     runner, generator = program.runner(), np.random.default_rng(3)
@@ -248,7 +250,7 @@ def _check_derivatives(
     name: str,
     c: Any,
 ) -> None:
-    """The comparison at one state, along a motion with an acceleration."""
+    """Check the derivatives at one state, along a motion with constant acceleration."""
     h, who = DIFFERENCE, f'{type(c).__name__} "{name}"'
     A, b, _, rate = (x[rows] for x in rows_at(runner, q, v, t))
     ends = []

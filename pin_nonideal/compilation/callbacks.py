@@ -1,4 +1,4 @@
-"""Python functions of the user as the core calls them: results checked, errors that name the function."""
+"""Wrappers of user functions for the core: checked results, and errors that name the function."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from pin_nonideal.errors import InputError, RunError, UnknownNameError, UserFunc
 from pin_nonideal.types import Array
 from pin_nonideal.validation import array, floats
 
-# Where a user's function of time is compared with its differences [s]: at no round time, since it may have
-# corners there, and at several, since one may fall on a corner all the same.
+# Times at which a user's function of time is compared with its central differences [s]. Round times are
+# avoided, since functions often have corners there. Several times are used, since one may fall on a corner.
 PROBES = (0.01371, 0.21317, 0.71753)
 PROBE_STEP = 1e-6
 FLOATS = np.dtype(float)
-COARSE = 0.1  # what is interpolated in tables of its own for each derivative stays below
-ROUNDING = 1e-7  # of a difference over two steps, and more
+COARSE = 0.1  # relative tolerance: separately interpolated tables of value and derivatives stay below it
+ROUNDING = 1e-7  # absolute tolerance: above the rounding of a difference quotient over two steps
 
 
 def checked(function: Callable[..., Any], who: str, *shapes: tuple[int, ...]) -> Callable[..., Any]:
-    """The user's function with its result made contiguous, and errors that name it.
+    """Wrap a user function: contiguous finite results of the given shapes, and errors that name it.
 
     Args:
-        function: what the user passed.
+        function: the user's function.
         who: words for messages.
-        shapes: shape of its result, or of each part of a tuple of results.
+        shapes: shape of the result, or of each part of a tuple of results.
     """
     ask = named(function, who)
 
@@ -54,10 +54,10 @@ def checked(function: Callable[..., Any], who: str, *shapes: tuple[int, ...]) ->
 
 
 def named(function: Callable[..., Any], who: str) -> Callable[..., Any]:
-    """The user's function with errors that name it.
+    """Wrap a user function so that errors name it.
 
     Args:
-        function: what the user passed.
+        function: the user's function.
         who: words for messages.
     """
 
@@ -73,23 +73,23 @@ def named(function: Callable[..., Any], who: str) -> Callable[..., Any]:
 
 
 def _failed(message: str, arguments: Sequence[Any]) -> UserFunctionError:
-    """The error of a function whose first argument is the time, which it tells."""
+    """Return the error of a user function; it includes the time if the first argument is a float."""
     time = float(arguments[0]) if arguments and isinstance(arguments[0], float) else None
     return UserFunctionError(message if time is None else f"{message} (at t = {time:.6g} s)")
 
 
 def numbers_of(part: Any, shape: tuple[int, ...], who: str) -> Array:
-    """What a user's function has returned, as finite numbers of a shape.
+    """Convert a result of a user function to a contiguous array of finite numbers.
 
     Args:
-        part: what came.
-        shape: which it must have.
+        part: the result.
+        shape: required shape.
         who: words for messages.
 
     Raises:
-        UserFunctionError: it is something else.
+        UserFunctionError: the result is no finite array of this size.
     """
-    result, where = floats(part, "fiubOUS")  # whatever float() takes
+    result, where = floats(part, "fiubOUS")  # any kind that float() accepts
     if result is None:
         raise UserFunctionError(f"{who} must return numbers of shape {shape}; got {part!r}")
     if result.shape != shape and result.size != math.prod(shape):
@@ -100,10 +100,10 @@ def numbers_of(part: Any, shape: tuple[int, ...], who: str) -> Array:
 
 
 def checked_limits(function: Callable[..., Any], who: str) -> Callable[..., tuple[float, float]]:
-    """The user's limit of friction as two numbers, against slip forward and backward.
+    """Wrap a user's friction limit so that it returns two numbers: against forward and backward slip.
 
     Args:
-        function: the user's; it returns one number for both, or two.
+        function: the user's function; it returns one number for both directions, or two.
         who: words for messages.
     """
     ask = named(function, who)
@@ -125,10 +125,10 @@ def checked_limits(function: Callable[..., Any], who: str) -> Callable[..., tupl
 
 
 def time_function(function: Any, who: str) -> Any:
-    """A function of time as numbers for the core, or checked when it is the user's.
+    """Return a function of time as numbers for the core, or as a checked callable if it is the user's.
 
     Args:
-        function: of `description.time_functions`, or the user's t -> (value, rate, acceleration).
+        function: one of `description.time_functions`, or the user's t -> (value, rate, acceleration).
         who: words for messages.
 
     Raises:
@@ -148,14 +148,14 @@ def time_function(function: Any, who: str) -> Any:
 
 
 def breaks(function: Any, who: str) -> list[float]:
-    """Times at which the pieces of a user's function of time meet, as its attribute `breaks` tells them.
+    """Return the times [s] at which pieces of a user's function of time meet, from its attribute `breaks`.
 
     Args:
-        function: the user's.
+        function: the user's function.
         who: words for messages.
 
     Raises:
-        InputError: the attribute holds something else than ascending times.
+        InputError: the attribute is no ascending sequence of times.
     """
     given = getattr(function, "breaks", None)
     if given is None or isinstance(function, Spline):
@@ -167,18 +167,18 @@ def breaks(function: Any, who: str) -> list[float]:
 
 
 def _check_derivatives(jet: Callable[..., Any], who: str) -> None:
-    """Compares the rate and the acceleration of a user's function of time with central differences.
+    """Compare the rate and the acceleration of a user's function of time with central differences.
 
     Args:
-        jet: t -> (value, rate, acceleration), checked.
+        jet: checked function t -> (value, rate, acceleration).
         who: words for messages.
 
     Raises:
-        InputError: one of them is wrong at every probe.
+        InputError: the rate or the acceleration is wrong at every probe.
     """
     ends = []
     for t in PROBES:
-        with contextlib.suppress(UserFunctionError):  # it may be defined for a part of the time only
+        with contextlib.suppress(UserFunctionError):  # the function may be undefined at this time
             ends.append((t, jet(t - PROBE_STEP), jet(t), jet(t + PROBE_STEP)))
     for k, (quantity, derivative) in enumerate((("value", "rate"), ("rate", "acceleration"))):
         rows = [
@@ -201,11 +201,11 @@ def _check_derivatives(jet: Callable[..., Any], who: str) -> None:
 
 @dataclass
 class ReactionNames:
-    """Names that a law may ask reactions for.
+    """Names by which a user law may access reactions.
 
     Attributes:
         slices: rows of each constraint and contact.
-        blocks: the core's block of each.
+        blocks: index of each constraint and contact in the core's list of blocks.
         joints: index of each joint.
     """
 
@@ -215,7 +215,7 @@ class ReactionNames:
 
 
 class Reactions:
-    """What the constraints exert at the instant of a law's call; valid during the call only.
+    """Constraint reactions at the instant of a call of a user law; valid during the call only.
 
     Attributes:
         lam: multipliers of all rows, in the order and scale of the descriptions, (m,).
@@ -246,11 +246,11 @@ class Reactions:
     def wrench(self, name: str) -> Array:
         """[force; moment] that a joint or an anchor exerts, (6,) [N; N m].
 
-        A joint's is what it exerts on the body that it moves, in the joint frame's axes, about its origin; an
-        anchor's is what it exerts on the body of frame1, in the axes of frame2.
+        A joint acts on the body that it moves: axes and moment point are those of the joint frame. An anchor
+        acts on the body of frame1: the axes are those of frame2.
 
         Args:
-            name: of a joint of the model, or of a constraint.
+            name: a joint of the model, or a constraint.
 
         Raises:
             UnknownNameError: there is no such joint or constraint.

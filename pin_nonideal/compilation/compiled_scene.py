@@ -1,4 +1,4 @@
-"""A scene as the core knows it: the finished program, and what its numbers are called."""
+"""A scene compiled into the core's program, with the names of rows, contacts and joints."""
 
 from __future__ import annotations
 
@@ -31,30 +31,30 @@ class CompiledScene:
     Args:
         model: pinocchio.Model.
         q0: configuration at which `frame2=None` and lengths left out are read, (nq,).
-        said: what the scene is made of.
-        tolerance: gap that a row along which nothing moves may have [m or rad].
-        is_start: whether q0 was given as a start, so that functions of the user may be called there.
+        said: descriptions of the scene.
+        tolerance: residual that a vanishing row may have [m or rad].
+        is_start: whether q0 was given as a start, so that user functions may be called there.
 
     Raises:
-        InputError, UnknownNameError: something does not fit the model.
-        InconsistentConstraintsError: rows that vanish ask for an acceleration.
+        InputError, UnknownNameError: a description does not fit the model.
+        InconsistentConstraintsError: a vanishing row has a nonzero right-hand side.
 
     Attributes:
         model: pinocchio.Model.
         q0: see above.
         said: see above.
-        program: the core's, without the rows that can never act.
+        program: the core's program, without the rows that can never act.
         slices: rows of `lam` of each constraint and contact, by name.
-        rows: the same as (first, end, whether it is a contact).
-        described: what each of them is made of, by the same name; both stops of a joint are one description.
-        joints: where the values of each joint stand.
-        contact_names: names of the contacts in the order of their descriptions, stops of joints one by one.
-        opening_names: names of those that may open.
-        anchors: (name, frame id, frame id or None for the world) of what joins two frames.
+        rows: (first row, end, whether it is a contact) of each constraint and contact, by name.
+        described: description of each constraint and contact, by name; both stops of a joint share one.
+        joints: layout of the values of each joint in q and v.
+        contact_names: names of the contacts in the order of their descriptions; each stop is one contact.
+        opening_names: names of the unilateral contacts.
+        anchors: (name, frame id, frame id or None for the world) of constraints between two frames.
         dropped: (name, row, reason) of rows that can never act.
-        projection: onto the constraints.
+        projection: projection onto the constraints.
         unprojected: names of user constraints without residual and rate.
-        unchecked: whether derivatives of functions of the user are still to be compared.
+        unchecked: whether derivatives of user functions are still unchecked.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class CompiledScene:
         self.projection = Projection(model, self.program, q0, idle_names, is_start or plain is None)
 
     def check_functions(self, q: Array, v: Array, t: float) -> None:
-        """Compares derivatives of the user's functions, at the first start that is known.
+        """Check the derivatives of user functions once, at the first known start.
 
         Args:
             q: configuration, (nq,).
@@ -113,7 +113,7 @@ class CompiledScene:
             t: time [s].
 
         Raises:
-            InputError: they differ.
+            InputError: a derivative differs from the difference quotient.
         """
         if not self.unchecked:
             return
@@ -123,19 +123,19 @@ class CompiledScene:
     def project(
         self, q: Array, v: Array, t: float, held: Held = NOTHING_HELD
     ) -> tuple[Array, Array, ProjectionReport]:
-        """Nearest state on the constraints, see `Projection.nearest`."""
+        """Return the nearest state on the constraints, see `Projection.nearest`."""
         try:
             return self.projection.nearest(q, v, t, held)
         except core.CoreFailure as failure:
             raise self.named(failure) from None
 
     def named(self, failure: core.CoreFailure) -> RunError:
-        """The core's failure as the exception that names what is to blame."""
+        """Convert a failure of the core to an exception that names the elements involved."""
         return named_failure(failure, self.model, self.program, self._circumstances())
 
     @property
     def explicit_only(self) -> str:
-        """Words on a part of the scene that no implicit method here takes, or empty."""
+        """Message on a part of the scene that no implicit method supports, or empty."""
         if self.opening_names:
             return f'no implicit method here opens and closes contacts such as "{self.opening_names[0]}" yet'
         if isinstance(asked_by(self.said.actuation), SampledControl):
@@ -143,14 +143,14 @@ class CompiledScene:
         return ""
 
     def _circumstances(self) -> Circumstances:
-        """Parts of the scene to be named in errors of its runs."""
+        """Return the parts of the scene that errors of its runs name."""
         said = self.said
         sources = ("the actuation", _quoted("force", said.forces), _quoted("law", said.laws))
         return Circumstances(self.explicit_only, sources)
 
 
 def _quoted(kind: str, descriptions: Sequence[Any]) -> str:
-    """The names of all descriptions of a kind, of many the first few."""
+    """Return the names of descriptions of a kind, at most the first few."""
     names = unique_names(descriptions, set())
     shown = ", ".join(f'"{name}"' for name in names[:MOST_QUOTED])
     shown += ", ..." if len(names) > MOST_QUOTED else ""

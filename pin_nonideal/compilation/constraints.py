@@ -32,17 +32,17 @@ from pin_nonideal.validation import axis_triad, unit_axis
 from .callbacks import breaks, checked, time_function
 from .resolver import Frame, Resolution, placed_on, words
 
-# A rational gear ratio with a larger denominator than this leaves the angle of endless joints undetermined.
+# Largest denominator of a rational gear ratio for which the coupled angle of endless joints is constrained.
 LARGEST_GEAR = 64
-# A ratio that misses a fraction by less is that fraction as a float.
+# A ratio within this distance of a fraction is treated as that fraction.
 GEAR_ROUNDING = 1e-12
-# Central differences in time take this part of it [s]: between rounding and curvature.
+# Step of central differences in time, relative to max(1 s, |t|): a compromise of rounding and curvature.
 TIME_DIFFERENCE = 1e-6
 
 
 @singledispatch
 def lower_constraint(c: Any, name: str, out: core.Builder, where: Resolution) -> None:
-    """Adds one constraint to the program; a constraint model of Pinocchio when it is no description of ours.
+    """Add one constraint to the program: a description of this package, or a constraint model of Pinocchio.
 
     Args:
         c: the description.
@@ -51,7 +51,7 @@ def lower_constraint(c: Any, name: str, out: core.Builder, where: Resolution) ->
         where: frames and joints by name.
 
     Raises:
-        InputError, UnknownNameError: what it refers to does not exist or does not fit.
+        InputError, UnknownNameError: a frame or joint does not exist or does not fit.
     """
     kind = type(c).__name__
     known = ("RigidConstraintModel", "PointAnchorConstraintModel", "FrameAnchorConstraintModel")
@@ -69,7 +69,7 @@ def lower_constraint(c: Any, name: str, out: core.Builder, where: Resolution) ->
 
 
 def frames_of(c: Any, where: Resolution, who: str) -> tuple[Frame, Frame]:
-    """Both frames of an anchor, or of a constraint model of Pinocchio.
+    """Return both frames of an anchor, or of a constraint model of Pinocchio.
 
     Args:
         c: the description.
@@ -186,17 +186,17 @@ def _(c: UserConstraint, name: str, out: core.Builder, where: Resolution) -> Non
 
 
 def user_rows(c: Any, size: int, who: str, where: Resolution) -> Callable[..., Any]:
-    """The user's rows as a function of (t, q, v), with Pinocchio's data made for it.
+    """Wrap the user's rows as a function of (t, q, v) that computes Pinocchio's data for them.
 
     Args:
         c: the description.
         size: number of rows.
         who: words for messages.
-        where: the model.
+        where: resolver of the model.
     """
     model = where.model
     function = checked(c.function, f"{who}: function", (size, model.nv), (size,))
-    if getattr(c.function, "needs_data", True) is False:  # of this package's own, which follow from q and v
+    if getattr(c.function, "needs_data", True) is False:  # functions of this package that need q and v only
         return lambda t, q, v: function(t, q, v, None)
     local = threading.local()
 
@@ -215,14 +215,14 @@ def user_rows(c: Any, size: int, who: str, where: Resolution) -> Callable[..., A
 def user_rate(
     c: Any, size: int, who: str, rows: Callable[..., Any], residual: Callable[..., Array] | None
 ) -> Callable[..., Array] | None:
-    """The user's rate; from a residual without one, A v and a difference in time.
+    """Return the user's rate, or A v plus a time difference of the residual, or None without a residual.
 
     Args:
         c: the description.
         size: number of rows.
         who: words for messages.
-        rows: of `user_rows`.
-        residual: of (t, q), checked.
+        rows: result of `user_rows`.
+        residual: checked function of (t, q).
     """
     if c.rate is not None:
         return checked(c.rate, f"{who}: rate", (size,))
@@ -241,7 +241,7 @@ def user_rate(
 def anchor_frames(
     constraints: Sequence[tuple[str, object]], where: Resolution
 ) -> list[tuple[str, int, int | None]]:
-    """Name, frame id and frame id (None for the world) of what joins two frames that both have an index.
+    """Return (name, frame id, frame id or None for the world) of constraints between two indexed frames.
 
     Args:
         constraints: names and descriptions.
@@ -250,7 +250,7 @@ def anchor_frames(
     found: list[tuple[str, int, int | None]] = []
     for name, c in constraints:
         if isinstance(c, (PointAnchor, FrameAnchor, HingeAnchor, Distance)):
-            with suppress(UnknownNameError):  # a joint without a frame of its own
+            with suppress(UnknownNameError):  # a joint without a frame
                 second = None if c.frame2 is None else where.frame_id(c.frame2, "")
                 found.append((name, where.frame_id(c.frame1, ""), second))
     return found

@@ -24,16 +24,16 @@ from .callbacks import checked
 from .constraints import user_rate, user_rows
 from .resolver import Resolution, turned, words
 
-# What Pinocchio gives joints without limits [rad or m].
+# Value of Pinocchio for joints without limits [rad or m].
 NO_LIMIT = np.finfo(float).max
 
 
 def lower_contacts(
     contacts: Sequence[tuple[str, Any]], out: core.Builder, where: Resolution
 ) -> Iterator[tuple[str, Any]]:
-    """Adds the normal rows of all contacts; their friction follows all rows (`lower_contact_friction`).
+    """Add the normal rows of all contacts; `lower_contact_friction` adds their friction after all rows.
 
-    Those that may open come after those that are kept, and their rows in the order of the descriptions.
+    Bilateral contacts are added before unilateral contacts. Their rows are in the order of the descriptions.
 
     Args:
         contacts: unique names and descriptions.
@@ -41,10 +41,10 @@ def lower_contacts(
         where: frames and joints by name.
 
     Yields:
-        Each that is in, with its name.
+        Name and description of each added contact.
 
     Raises:
-        InputError, UnknownNameError: what one refers to does not exist or does not fit.
+        InputError, UnknownNameError: a frame or joint does not exist or does not fit.
     """
     for name, c in contacts:
         if not isinstance(c, get_args(Contact)):
@@ -62,7 +62,7 @@ def lower_contacts(
 
 
 def lower_gaps(c: Any, name: str, out: core.Builder, where: Resolution) -> list[int]:
-    """Adds the normal rows of one contact; its blocks.
+    """Add the normal rows of one contact and return the indices of its blocks.
 
     Args:
         c: the description.
@@ -102,7 +102,7 @@ def lower_gaps(c: Any, name: str, out: core.Builder, where: Resolution) -> list[
 
 
 def _round_gap(c: Any, name: str, out: core.Builder, where: Resolution) -> int:
-    """Adds the row of what has a radius on both sides."""
+    """Add the row of a contact between two solids with rounding radii."""
     who, radius = words(c, name), c.radius1 + c.radius2
     if isinstance(c, HullContact):
         f1, f2, hull = where.hull(c, who)
@@ -126,7 +126,7 @@ def _on_plane(c: PointContact, name: str, out: core.Builder, where: Resolution) 
 
 
 def _stops(c: JointLimit, name: str, out: core.Builder, where: Resolution) -> list[int]:
-    """The finite stops of a joint, "NAME lower" and "NAME upper"."""
+    """Add the finite stops of a joint, "NAME lower" and "NAME upper"."""
     blocks = []
     for which, sign, bound in zip(("lower", "upper"), (1.0, -1.0), stops_of(c, name, where), strict=True):
         if math.isfinite(bound):
@@ -138,7 +138,7 @@ def _stops(c: JointLimit, name: str, out: core.Builder, where: Resolution) -> li
 
 
 def stops_of(c: JointLimit, name: str, where: Resolution) -> tuple[float, float]:
-    """Positions of the lower and upper stop, infinite where there is none.
+    """Return the positions of the lower and upper stop [rad or m]; a missing stop is infinite.
 
     Args:
         c: the description.
@@ -153,17 +153,17 @@ def stops_of(c: JointLimit, name: str, where: Resolution) -> tuple[float, float]
 
 
 def has_stops(model: Model, at: int) -> bool:
-    """Whether the model bounds a position, on one side at least.
+    """Check if the model bounds a position on at least one side.
 
     Args:
         model: pinocchio.Model.
-        at: place of the position in q.
+        at: index of the position in q.
     """
     return bool(model.lowerPositionLimit[at] > -NO_LIMIT or model.upperPositionLimit[at] < NO_LIMIT)
 
 
 def _check_limit(c: JointLimit, who: str, where: Resolution) -> None:
-    """Raises where a joint has no position that stops could bound, or where none is given.
+    """Check that a joint has one position coordinate and ordered stops, at least one of them finite.
 
     Raises:
         InputError, UnknownNameError: see above.

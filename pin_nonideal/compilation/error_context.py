@@ -1,4 +1,4 @@
-"""The core's failures as exceptions that name what is to blame."""
+"""Conversion of failures of the core to exceptions that name joints, constraints and elements."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from pin_nonideal.types import Model
 
 
 def opened(name: str, gaps: dict[str, float], t: float, after: str = "") -> LoopClosureError:
-    """The exception of a run that has left its constraints.
+    """Return the exception of a run that has left its constraints.
 
     Args:
-        name: of the constraint with the largest gap.
-        gaps: of each constraint [m or rad].
+        name: constraint with the largest gap.
+        gaps: gap of each constraint [m or rad].
         t: time [s].
-        after: more words.
+        after: text to append to the message.
     """
     return LoopClosureError(
         f'loop "{name}" has opened by t = {t:.4g} s: gap {gaps[name]:.2g} (m or rad); no position near there '
@@ -47,8 +47,8 @@ class Circumstances(NamedTuple):
     """Parts of a scene that errors of its runs refer to.
 
     Attributes:
-        explicit_only: words on a part of the scene that no implicit method here takes, or empty.
-        sources: words for the actuation, the given forces and the laws.
+        explicit_only: message on a part of the scene that no implicit method supports, or empty.
+        sources: names of the actuation, the applied forces and the laws.
     """
 
     explicit_only: str
@@ -58,13 +58,13 @@ class Circumstances(NamedTuple):
 def named_failure(
     failure: core.CoreFailure, model: Model, program: core.Program, around: Circumstances
 ) -> RunError:
-    """The exception that says in names what the core says in numbers.
+    """Return the exception of a failure, with names in place of the core's indices.
 
     Args:
         failure: the core's CoreFailure.
         model: pinocchio.Model.
-        program: the scene as the core knows it.
-        around: parts of the scene to be named.
+        program: the core's program.
+        around: parts of the scene that the message may name.
     """
     kinds, kind, t, value = core.FailureKind, failure.kind, failure.time, failure.value
     if kind is kinds.singular_mass:
@@ -148,14 +148,14 @@ def _stiff(model: Model, dof: int, rate: float, t: float, explicit_only: str) ->
 
 
 def stiff_hint(model: Model, dof: int, rate: float, decays: bool, explicit_only: str) -> str:
-    """What to know of a run that takes long because its steps follow a fast motion.
+    """Return a hint for a run that is slow because its steps resolve a fast motion.
 
     Args:
         model: pinocchio.Model.
-        dof: the one whose force does most to the fastest motion.
-        rate: of that motion [1/s].
-        decays: whether it decays; else it swings.
-        explicit_only: words on a part of the scene that no implicit method here takes, or empty.
+        dof: degree of freedom whose force contributes most to the fastest motion.
+        rate: rate of the fastest motion [1/s].
+        decays: whether the motion decays; otherwise it oscillates.
+        explicit_only: message on a part of the scene that no implicit method supports, or empty.
     """
     joint = str(model.names[joint_of(model, dof)])
     if decays:
@@ -176,7 +176,7 @@ def stiff_hint(model: Model, dof: int, rate: float, decays: bool, explicit_only:
 
 
 def joint_of(model: Model, dof: int) -> int:
-    """The joint that a degree of freedom belongs to."""
+    """Return the index of the joint that owns a degree of freedom."""
     return next(i for i, j in enumerate(model.joints) if i and j.idx_v <= dof < j.idx_v + j.nv)
 
 
@@ -225,7 +225,7 @@ def _stuck(steps: float, t: float, explicit_only: str) -> RunError:
 
 def _inconsistent(names: Sequence[str], items: list[int], residual: float, t: float) -> RunError:
     quoted = " and ".join(f'"{names[i]}"' for i in items)
-    if residual == 0.0:  # of an impact, which leaves none
+    if residual == 0.0:  # the failure of an impact has no residual
         return InconsistentConstraintsError(
             f"no impulses part the bodies at {quoted} as their restitution asks at t = {t:.2f} s: with what"
             ' else holds them they cannot move apart; lower restitution, or use Scene(..., impact="poisson")',

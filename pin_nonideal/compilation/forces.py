@@ -1,4 +1,4 @@
-"""Given forces and actuation in the core's program."""
+"""Applied forces and actuation in the core's program."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .resolver import Resolution, words
 
 @singledispatch
 def lower_force(f: object, out: core.Builder, where: Resolution) -> None:
-    """Adds one given force to the program.
+    """Add one applied force to the program.
 
     Args:
         f: the description.
@@ -30,7 +30,7 @@ def lower_force(f: object, out: core.Builder, where: Resolution) -> None:
         where: frames and joints by name.
 
     Raises:
-        InputError, UnknownNameError: what it refers to does not exist or does not fit.
+        InputError, UnknownNameError: a frame or joint does not exist or does not fit.
     """
     raise InputError(f"a force must be SpringDamper, JointSpring, Wrench or UserForce; got {f!r}")
 
@@ -61,12 +61,12 @@ def _(f: UserForce, out: core.Builder, where: Resolution) -> None:
     out.add_user_force(checked(f.function, f"{words(f)}: function", (where.model.nv,)))
 
 
-# Pinocchio's word for no limit is the largest number.
+# Efforts from here on are unlimited: Pinocchio stores the largest float for no limit.
 UNBOUNDED = 1e300
 
 
 def lower_actuation(u: Any, out: core.Builder, where: Resolution) -> None:
-    """Sets the torques that drive the scene.
+    """Set the actuation of the scene.
 
     Args:
         u: None, an array (nv,), a function, or a description.
@@ -111,7 +111,7 @@ def _torques_of(function: Callable[..., Any], model: Model, who: str) -> Callabl
 
 
 def _efforts(u: EffortLimits, model: Model) -> tuple[Array, Array]:
-    """Least and most effort of every degree of freedom, infinite where it has no limit."""
+    """Return the lower and upper effort limit of each degree of freedom; no limit is infinite."""
     if u.effort is not None:
         if isinstance(u.effort, float):
             most = np.full(model.nv, u.effort)
@@ -126,7 +126,7 @@ def _efforts(u: EffortLimits, model: Model) -> tuple[Array, Array]:
 
 
 def _gains(u: HoldPosition, key: str, model: Model) -> Array:
-    """A gain for every degree of freedom; a number acts on joints of one degree of freedom."""
+    """Return a gain for each degree of freedom; a scalar acts on joints with one degree of freedom."""
     gain, who = getattr(u, key), f"{words(u)}: {key}"
     if isinstance(gain, float):
         single = np.zeros(model.nv)

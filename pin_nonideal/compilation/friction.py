@@ -1,4 +1,4 @@
-"""Friction in the core's program: where it acts, along which directions, and what loads it there."""
+"""Friction elements in the core's program: their sites, slip directions and loads."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ from .callbacks import ReactionNames, checked, named
 from .constraints import frames_of
 from .resolver import Frame, Resolution, turned, words
 
-# Constraint models of Pinocchio that hold a point on a point.
+# Constraint models of Pinocchio that can hold a point on a point.
 BALLS = ("PointAnchorConstraintModel", "RigidConstraintModel")
-# Random moves from q0 [rad or m] at which a function is asked for the shape of its result.
+# Scales of random displacements from q0 [rad or m] at which a function is called for the shape of its result.
 AROUND = (0.0, 0.1, 1.0)
-# Parameters of JointFriction that say something of a bearing, and those that say something of teeth.
+# Parameters of JointFriction for bearings, and parameters for teeth and threads.
 BEARING = ("radius", "axial_radius", "span")
 TEETH = ("lead_angle", "efficiency")
 
 
 class Surroundings(NamedTuple):
-    """What a law may refer to.
+    """Names of a scene that laws may use.
 
     Attributes:
         where: frames and joints by name.
         constraints: descriptions of the constraints by name.
-        reactions: names that the user's laws may ask reactions for.
+        reactions: names by which user laws may access reactions.
     """
 
     where: Resolution
@@ -51,21 +51,21 @@ class Surroundings(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Directions along which a law rubs together, and what loads them.
+    """Slip directions of one friction element of a law, and its load.
 
     Attributes:
-        load: what kind of load the limit follows.
-        part: which part of its law this is, in words; empty when it is all.
-        dof: first of the dofs that are the directions, or -1.
-        dofs: number of these.
-        block: of the directions where they are no dofs.
-        joint: that carries the load, or -1.
-        anchor: block that carries it, or -1.
-        row: of the anchor, whose multiplier is the load.
-        axis: of the bearing, in the joint's frame or in frame 1 of the anchor.
-        axis_dof: dof whose axis it is, where no frame carries it; or -1.
-        mu: limit over load; that of the law when None.
-        lever: of what turns [m]: torque over the force that resists sliding, and that speed over the rate.
+        load: kind of load that the friction limit follows.
+        part: name of this part of the law; empty if the law has one part.
+        dof: first degree of freedom of the slip directions, or -1.
+        dofs: number of these degrees of freedom.
+        block: core block of the slip directions if they are no degrees of freedom, else -1.
+        joint: joint that carries the load, or -1.
+        anchor: core block of the constraint that carries the load, or -1.
+        row: row of the anchor whose multiplier is the load.
+        axis: bearing axis, in the joint's frame or in frame 1 of the anchor.
+        axis_dof: degree of freedom whose axis is the bearing axis, if no frame carries it; else -1.
+        mu: limit over load; None for the coefficient of the law.
+        lever: lever arm of a turning element [m]: torque over friction force, and sliding speed over rate.
     """
 
     load: core.Load
@@ -83,13 +83,13 @@ class Place(NamedTuple):
 
 
 def rubbing_joint(name: str, who: str, around: Surroundings, *, freedoms: tuple[int, ...] = (1,)) -> int:
-    """Index of a joint that a friction law may act on: one that moves, and is no mimic joint.
+    """Return the index of a movable joint that is no mimic joint, for a friction law.
 
     Args:
-        name: of the joint.
+        name: name of the joint.
         who: words for messages.
-        around: what the law may refer to.
-        freedoms: numbers of degrees of freedom that the law can do with.
+        around: names that the law may use.
+        freedoms: numbers of degrees of freedom that the law supports.
 
     Raises:
         InputError, UnknownNameError: there is no such joint.
@@ -105,16 +105,16 @@ def rubbing_joint(name: str, who: str, around: Surroundings, *, freedoms: tuple[
 
 
 def lower_joint_friction(law: JointFriction, name: str, out: core.Builder, around: Surroundings) -> None:
-    """Adds friction of a joint of the tree, of an anchor or of a coupling.
+    """Add friction of a joint of the tree, of an anchor or of a coupling.
 
     Args:
         law: the description.
         name: its unique name.
         out: the program under construction.
-        around: what it may refer to.
+        around: names that the law may use.
 
     Raises:
-        InputError, UnknownNameError: what it refers to does not exist, or a parameter has no meaning there.
+        InputError, UnknownNameError: the joint does not exist, or a parameter does not apply to it.
     """
     who, model = words(law, name), around.where.model
     if model.existJointName(law.joint) or law.joint not in around.constraints:
@@ -129,7 +129,7 @@ def lower_joint_friction(law: JointFriction, name: str, out: core.Builder, aroun
 
 
 def _in_joint(law: JointFriction, who: str, around: Surroundings) -> list[Place]:
-    """Where friction in a joint of the tree acts."""
+    """Return the friction sites of a joint of the tree."""
     where = around.where
     model = where.model
     if not model.existJointName(law.joint) and around.constraints:
@@ -159,7 +159,7 @@ def _in_joint(law: JointFriction, who: str, around: Surroundings) -> list[Place]
 def _sliding_and_turning(
     law: JointFriction, who: str, joint: int, kind: str, dof: int, count: int
 ) -> list[Place]:
-    """Joints that slide in several directions: planar, translation, free flyer."""
+    """Return the friction sites of a planar, translation or free-flyer joint."""
     planar = kind == "JointModelPlanar"
     load, carrier = (core.Load.planar, joint) if planar else (core.Load.none, -1)
     if law.mu and not planar:
@@ -174,7 +174,7 @@ def _sliding_and_turning(
 
 
 def _in_constraint(law: JointFriction, name: str, out: core.Builder, around: Surroundings) -> list[Place]:
-    """Where friction in an anchor or a coupling acts."""
+    """Return the friction sites of an anchor or a coupling."""
     c: Any = around.constraints[law.joint]
     who, anchor, where = words(law, name), around.reactions.blocks[law.joint], around.where
     if isinstance(c, JointCoupling):
@@ -208,7 +208,10 @@ def _in_coupling(
     out: core.Builder,
     where: Resolution,
 ) -> Place:
-    """Where the teeth or threads of a coupling rub: parts a and b of their force go to its joints."""
+    """Return the friction site of the teeth or threads of a coupling.
+
+    Fractions a and b of the tooth force act as friction on the two joints.
+    """
     _refuse(law, who, BEARING, f'of a bearing, and "{law.joint}" is a JointCoupling')
     if law.mu and law.lead_angle is None:
         raise InputError(
@@ -223,14 +226,14 @@ def _in_coupling(
 
 
 def _refuse(law: JointFriction, who: str, keys: tuple[str, ...], reason: str) -> None:
-    """Parameters that would say nothing are no part of the law."""
+    """Raise InputError if a parameter is set that does not apply to the joint."""
     for key in keys:
         if getattr(law, key):
             raise InputError(f"{who}: {key} is {reason}; leave it out")
 
 
 def _check_radius(law: JointFriction, who: str, load: core.Load) -> None:
-    """A coefficient without a radius would be no friction at all."""
+    """Raise InputError if `mu` has no radius: the friction torque would be zero."""
     radii = {core.Load.revolute: ("radius", "axial_radius"), core.Load.spherical: ("radius",)}.get(load, ())
     if law.mu and radii and not any(getattr(law, key) for key in radii):
         needed = " or ".join(radii)
@@ -240,7 +243,7 @@ def _check_radius(law: JointFriction, who: str, load: core.Load) -> None:
 
 
 def _viscous(law: JointFriction, out: core.Builder, index: int, place: Place) -> None:
-    """The part of a law that grows with the velocity."""
+    """Add the viscous part of a law."""
     if not law.viscous:
         return
     coefficient = law.viscous * place.lever**2
@@ -251,7 +254,7 @@ def _viscous(law: JointFriction, out: core.Builder, index: int, place: Place) ->
 
 
 def _dry(law: JointFriction, name: str, out: core.Builder, index: int, place: Place) -> None:
-    """The part of a law that sticks and slips."""
+    """Add the dry friction element of a law."""
     element = f"{name} {place.part}" if place.part else name
     block = place.block
     if block < 0:
@@ -284,13 +287,13 @@ def lower_contact_friction(
     out: core.Builder,
     around: Surroundings,
 ) -> None:
-    """Adds what rubs where a contact presses: sliding, spinning about the normal, and rolling.
+    """Add the friction elements of a contact: sliding, spinning about the normal, and rolling resistance.
 
     Args:
-        c: the description, of a contact or of a body that rolls.
+        c: description of a contact or of a rolling constraint.
         name: its unique name.
         out: the program under construction.
-        around: what it may refer to.
+        around: names of the scene.
     """
     if not any(getattr(c, key, 0.0) for key in ("mu", "torsional", "rolling")):
         return
@@ -312,7 +315,7 @@ def lower_contact_friction(
 
 
 def _round_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[tuple[str, int, float]]:
-    """Name, directions and coefficient of what rubs between spheres, capsules, boxes and other solids."""
+    """Add the slip directions of a contact of two solids; return (name, block, coefficient)."""
     who = words(c, name)
     if isinstance(c, HullContact):
         f1, f2, hull = where.hull(c, who)
@@ -339,7 +342,7 @@ def _round_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list
 
 
 def _user_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[tuple[str, int, float]]:
-    """The same in directions of the user's."""
+    """Add slip directions that the user defines; return (name, block, coefficient)."""
     who, nv = f"{words(c, name)}: directions", where.model.nv
     shape = _shape_of_directions(named(c.directions, who), where)
     if shape not in ((1, nv), (2, nv)):
@@ -350,7 +353,7 @@ def _user_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[
 
 
 def _shape_of_directions(directions: Callable[..., Any], where: Resolution) -> tuple[int, ...]:
-    """The shape of its value at q0, or near q0 if it has none there."""
+    """Return the shape of the directions at q0, or near q0 if the function raises there."""
     generator = np.random.default_rng(5)
     for part in AROUND:
         with suppress(UserFunctionError):
@@ -360,7 +363,7 @@ def _shape_of_directions(directions: Callable[..., Any], where: Resolution) -> t
 
 
 def _flat_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[tuple[str, int, float]]:
-    """The same on a plane."""
+    """Add the slip directions of a contact with a plane; return (name, block, coefficient) per element."""
     f1, f2, (t1, t2, n) = where.contact(c, words(c, name))
     if isinstance(c, EllipsoidContact):
         body, along = turned(f1, c.rpy), {"tangent1": t1, "tangent2": t2, "normal": n}
@@ -378,6 +381,6 @@ def _flat_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[
 
 
 def _turned(frame: Frame, axes: Any) -> Frame:
-    """A frame with other axes, the columns of `axes` in its own."""
+    """Return the frame with new axes, which are the columns of `axes` in the old axes."""
     joint, R, p = frame
     return joint, (np.reshape(R, (3, 3)) @ axes).ravel().tolist(), p

@@ -1,4 +1,4 @@
-"""Nonideal laws in the core's program."""
+"""Nonideal force laws in the core's program."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from .resolver import words
 
 @singledispatch
 def lower_law(law: object, name: str, out: core.Builder, around: Surroundings) -> None:
-    """Adds one law to the program.
+    """Add one law to the program.
 
     Args:
         law: the description.
         name: its unique name.
         out: the program under construction.
-        around: what it may refer to.
+        around: names that the law may use.
 
     Raises:
-        InputError, UnknownNameError: what it refers to does not exist or does not fit.
+        InputError, UnknownNameError: a frame or joint does not exist or does not fit.
     """
     raise InputError(
         f"a law must be JointFriction, SigmoidFriction, LuGre, Drag, UserLaw or UserFriction; got {law!r}"

@@ -1,4 +1,4 @@
-"""From descriptions to the core's builder: rows first, then the laws that read them, then given forces."""
+"""Lowering of descriptions into the core's builder: rows, then laws that read them, then applied forces."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .resolver import Resolution, unique_names
 
 
 class Descriptions(NamedTuple):
-    """What the user said of a scene beside its model.
+    """Descriptions of a scene, without its model.
 
     Attributes:
         constraints: descriptions, or constraint models of Pinocchio.
@@ -29,7 +29,7 @@ class Descriptions(NamedTuple):
         laws: descriptions.
         forces: descriptions.
         actuation: None, an array (nv,), a function, or a description.
-        terms: who computes M and the bias forces, "core" or "pinocchio".
+        terms: provider of M and the bias forces, "core" or "pinocchio".
         impact: the law of restitution, "newton" or "poisson".
     """
 
@@ -43,13 +43,13 @@ class Descriptions(NamedTuple):
 
 
 class Written(NamedTuple):
-    """A description that is in the builder now.
+    """A description that has been added to the builder.
 
     Attributes:
         kind: "constraint", "contact", "law", "force" or "actuation".
         name: unique among its kind.
-        description: itself.
-        again: (description, builder) writes another one in its place.
+        description: the description.
+        again: function of (description, builder) that adds a replacement of the description.
     """
 
     kind: str
@@ -59,29 +59,31 @@ class Written(NamedTuple):
 
 
 def lower(said: Descriptions, builder: core.Builder, where: Resolution) -> dict[str, Any]:
-    """Writes one scene into the core's builder.
+    """Add one scene to the core's builder.
 
     Args:
-        said: what it is made of.
-        builder: the core's program under construction, empty so far.
+        said: descriptions of the scene.
+        builder: the core's program under construction, still empty.
         where: frames and joints by name.
 
     Returns:
         Constraints and contacts by their unique names.
 
     Raises:
-        InputError, UnknownNameError: what a description refers to does not exist or does not fit.
+        InputError, UnknownNameError: a frame, joint or constraint does not exist or does not fit.
     """
     written = lowered(said, builder, where)
     return {each.name: each.description for each in written if each.kind in ("constraint", "contact")}
 
 
 def lowered(said: Descriptions, builder: core.Builder, where: Resolution) -> Iterator[Written]:
-    """The same, telling of each description when it is in; a contact has two parts.
+    """Add one scene to the core's builder and yield each description after it is added.
+
+    A contact is yielded twice: after its normal rows and after its friction.
 
     Args:
-        said: what the scene is made of.
-        builder: the core's program under construction, empty so far.
+        said: descriptions of the scene.
+        builder: the core's program under construction, still empty.
         where: frames and joints by name.
     """
     taken: set[str] = set()
@@ -114,7 +116,7 @@ def lowered(said: Descriptions, builder: core.Builder, where: Resolution) -> Ite
         yield Written("force", name, f, lambda f, out: lower_force(f, out, where))
     lower_actuation(said.actuation, builder, where)
     yield Written("actuation", "actuation", said.actuation, lambda u, out: lower_actuation(u, out, where))
-    builder.set_impact(core.ImpactLaw[said.impact])  # no description's: after the last of them
+    builder.set_impact(core.ImpactLaw[said.impact])  # last, since it belongs to no description
 
 
 def _again(write: Callable[..., object], name: str, around: Any, description: Any, out: Any) -> None:

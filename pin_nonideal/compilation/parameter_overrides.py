@@ -1,4 +1,4 @@
-"""Numbers of a scene that each run of a batch may have for itself, without a scene of its own."""
+"""Parameter overrides: numbers of a scene that may differ between runs of a batch."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from .compiled_scene import CompiledScene
 from .lowering import Written, lowered
 from .resolver import Resolution
 
-NUMBERS = (float, list, np.ndarray)  # what arguments with a name come as, where a run may have its own
-WRITES = ("add_", "set_", "let_")  # what a builder's calls that write begin with
-# Least over largest principal moment of inertia that may be negative: rounding of a thin rod's.
+NUMBERS = (float, list, np.ndarray)  # types of keyword arguments that may differ between runs
+WRITES = ("add_", "set_", "let_")  # prefixes of builder methods that modify the program
+# Negative principal moments down to this value times the largest are accepted: rounding of a thin rod.
 ROUNDING = 1e-9
 
 
@@ -28,11 +28,11 @@ class Call(NamedTuple):
     """A call of the core's builder.
 
     Attributes:
-        name: of the method.
-        number: how many of that name came before.
-        positional: arguments without a name: what it belongs to, where it acts.
-        named: the others, numbers among them.
-        result: what it gave.
+        name: name of the method.
+        number: number of earlier calls of the same method.
+        positional: positional arguments, such as names, joints and frames.
+        named: keyword arguments, including numbers.
+        result: returned value.
     """
 
     name: str
@@ -43,11 +43,11 @@ class Call(NamedTuple):
 
 
 class RunNumbers(NamedTuple):
-    """What the core takes for a batch.
+    """Parameter values of a batch in the form of the core.
 
     Attributes:
-        names: (call, index, argument) of each number or group of them.
-        values: of all runs, (n, their number together).
+        names: (call, index, argument) of each number or group of numbers.
+        values: values of all runs, (n, total number of values).
     """
 
     names: list[tuple[str, int, str]]
@@ -55,17 +55,17 @@ class RunNumbers(NamedTuple):
 
 
 def run_numbers(compiled: CompiledScene, parameters: Mapping[str, Any], n: int) -> RunNumbers:
-    """Numbers of the core's program from parameters of the runs.
+    """Convert parameters of the runs to numbers of the core's program.
 
     Args:
         compiled: the scene.
-        parameters: by name of a law, contact or force, or "actuation": values of its fields, one a run; by
-            name of a joint: "mass" or "inertia" of its body; "gravity".
+        parameters: values by name, one per run. A law, contact, force or "actuation" maps to its fields, a
+            joint to "mass" or "inertia" of its body. "gravity" is an array (n, 3).
         n: number of runs.
 
     Raises:
-        InputError: a value does not fit, or is more than a number in the scene.
-        UnknownNameError: there is nothing of that name.
+        InputError: a value does not fit, or changes the structure of the scene.
+        UnknownNameError: no part of the scene has that name.
     """
     columns: dict[tuple[str, int, str], Array] = {}
     parts = _parts(compiled) if parameters else {}
@@ -89,10 +89,10 @@ def run_numbers(compiled: CompiledScene, parameters: Mapping[str, Any], n: int) 
 
 
 def _check_known(program: core.Program, first: RunNumbers) -> None:
-    """Raises unless the core knows all of them as numbers.
+    """Check that the core accepts all overrides as numbers.
 
     Raises:
-        InputError: one of them shapes the scene.
+        InputError: an override changes the structure of the scene.
     """
     try:
         core.with_numbers(program, *first)
@@ -108,7 +108,7 @@ def _is_body(compiled: CompiledScene, name: str) -> bool:
 
 
 def _parts(compiled: CompiledScene) -> dict[str, list[tuple[Written, _Again]]]:
-    """What the program is made of, by name, each with what it told the builder; a contact in two parts."""
+    """Return the parts of the program by name, with their builder calls; a contact has two parts."""
     said = compiled.said
     builder: Any = _Recorder(core.Builder(compiled.model, core.Provider[said.terms]))
     parts: dict[str, list[tuple[Written, _Again]]] = {}
@@ -123,7 +123,7 @@ def _parts(compiled: CompiledScene) -> dict[str, list[tuple[Written, _Again]]]:
 
 
 def _body(compiled: CompiledScene, name: str, given: Mapping[str, Any], n: int) -> dict[Any, Array]:
-    """Mass, center and inertia of the body that hangs on a joint."""
+    """Return mass, center of mass and inertia of a joint's body for all runs."""
     who = f'rollout: parameters: "{name}"'
     if compiled.said.terms != "core":
         raise InputError(f'{who}: masses can differ between runs with terms="core" only')
@@ -138,7 +138,7 @@ def _body(compiled: CompiledScene, name: str, given: Mapping[str, Any], n: int) 
         mass = dynamic[:, 0]
     if own.mass == 0.0 and "mass" in given:
         raise InputError(f'{who}: the body has no mass, whose inertia would go with it; give "inertia"')
-    heavy = mass > 0.0  # of others Pinocchio makes no inertia
+    heavy = mass > 0.0  # Pinocchio creates no inertia without a positive mass
     if not heavy.all():
         bodies = []
     elif "mass" in given:
@@ -162,7 +162,7 @@ def _body(compiled: CompiledScene, name: str, given: Mapping[str, Any], n: int) 
 
 
 def _columns(name: str, given: Any, n: int, parts: list[tuple[Written, _Again]]) -> dict[Any, Array]:
-    """What of the program the fields of a description decide, for all runs."""
+    """Return the numbers of the program that depend on the given fields of a description, for all runs."""
     described = parts[0][0].description
     others = list(_descriptions(name, described, given, n))
     columns: dict[Any, Array] = {}
@@ -176,7 +176,7 @@ def _columns(name: str, given: Any, n: int, parts: list[tuple[Written, _Again]])
 
 
 def _descriptions(name: str, described: Any, given: Any, n: int) -> Iterator[Any]:
-    """The description of each run, checked as all are."""
+    """Yield the description of each run, with the checks of its constructor."""
     who = f'rollout: parameters: "{name}"'
     if isinstance(described, np.ndarray):
         yield from array(who, given, (n, len(described)))
@@ -201,7 +201,7 @@ def _descriptions(name: str, described: Any, given: Any, n: int) -> Iterator[Any
 
 
 class _Recorder:
-    """The core's builder, with what it is told."""
+    """A proxy of the core's builder that records its calls."""
 
     def __init__(self, builder: core.Builder) -> None:
         self._builder = builder
@@ -224,11 +224,13 @@ class _Recorder:
 
 
 class _Again:
-    """What takes the calls of one description again, from others in its place, with the same answers.
+    """A stand-in builder that compares the calls of a replaced description with the recorded calls.
+
+    It returns the recorded results.
 
     Args:
-        builder: that was told first.
-        calls: what it was told.
+        builder: recorder of the first lowering.
+        calls: recorded calls of the description.
     """
 
     def __init__(self, builder: Any, calls: list[Call]) -> None:
@@ -237,10 +239,10 @@ class _Again:
         self._differs = False
 
     def told(self, written: Written, other: Any, name: str) -> list[dict[str, Any]]:
-        """Named arguments of the calls of another description.
+        """Return the keyword arguments of the calls of another description.
 
         Raises:
-            InputError: it tells something else than other numbers.
+            InputError: the calls differ in more than numbers.
         """
         self._told, self._differs = [], False
         written.again(other, self)
@@ -272,7 +274,7 @@ class _Again:
 
 
 def _same(a: Any, b: Any) -> bool:
-    """Whether arguments without a name are equal; functions count as functions."""
+    """Check if two arguments are equal; any two functions count as equal."""
     if isinstance(a, (tuple, list)):
         return isinstance(b, (tuple, list)) and len(a) == len(b) and all(map(_same, a, b))
     if isinstance(a, np.ndarray):

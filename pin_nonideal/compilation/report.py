@@ -1,4 +1,4 @@
-"""What a scene is made of, in words: `Scene.report`."""
+"""Text summary of a scene: `Scene.report`."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from pin_nonideal.types import Model
 
 from .compiled_scene import CompiledScene
 
-UNLIMITED = 1e3  # positions that no joint reaches [rad or m]
+UNLIMITED = 1e3  # position limits from here on are never reached [rad or m]
 
 
 def report(scene: CompiledScene, name: str, rank: int, notes: Sequence[str]) -> str:
-    """Joints, constraints, rows, rank, mobility, and what was left out.
+    """Return a text with joints, constraints, rows, rank, mobility and removed rows.
 
     Args:
         scene: the compiled scene.
-        name: shown above all.
-        rank: of its rows in the initial state.
-        notes: remarks that follow.
+        name: title.
+        rank: rank of the rows in the initial state.
+        notes: lines to append.
     """
     model, opening = scene.model, set(scene.opening_names)
     rows = scene.program.rows - len(opening)
@@ -52,7 +52,7 @@ def report(scene: CompiledScene, name: str, rank: int, notes: Sequence[str]) -> 
 
 
 def _label(said: object) -> str:
-    """What a force or an actuation is called: its name and kind, or what it acts on."""
+    """Return a label of a force or an actuation: its name, joint or frame, and its kind."""
     kind = type(said).__name__
     name = getattr(said, "name", None) or getattr(said, "joint", None) or getattr(said, "frame", None)
     if kind in ("ndarray", "list", "tuple"):
@@ -61,7 +61,7 @@ def _label(said: object) -> str:
 
 
 def _skipped(scene: CompiledScene) -> list[str]:
-    """Parts of an evaluation that this scene does without."""
+    """Return the parts of an evaluation that this scene skips."""
     skipped = []
     if not scene.slices:
         skipped.append("rows and their factorization (no constraint)")
@@ -80,14 +80,14 @@ def _skipped(scene: CompiledScene) -> list[str]:
 
 
 def _passed(scene: CompiledScene) -> list[int]:
-    """Joints with limits of position that are no stops of the scene."""
+    """Return the joints with position limits that are no stops of the scene."""
     stops = {c.joint for c in scene.said.contacts if isinstance(c, JointLimit)}
     model = scene.model
     return [i for i in range(1, model.njoints) if _limited(model, i) and str(model.names[i]) not in stops]
 
 
 def _limited(model: Model, joint: int) -> bool:
-    """Whether a joint of one degree of freedom has a limit of position that it could reach."""
+    """Check if a joint with one position coordinate has a reachable position limit."""
     i = model.idx_qs[joint]
     bounds = (model.lowerPositionLimit[i], model.upperPositionLimit[i])
     return model.nqs[joint] == 1 and any(abs(bound) < UNLIMITED for bound in bounds)

@@ -1,4 +1,4 @@
-"""From names to numbers: which frame, joint and axis a description means, and what it is called itself."""
+"""Resolution of names: frames, joints and axes of descriptions, and unique names of descriptions."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from pin_nonideal.states.kinematics import frame_index, frame_on_joint, joint_pl
 from pin_nonideal.types import Array, Model, Placement
 from pin_nonideal.validation import Vector3, axis_triad, unit_axis
 
-# A frame as the core takes it: joint, orientation by rows, place.
+# A frame in the form of the core: joint index, rotation matrix by rows, translation [m].
 Frame = tuple[int, list[float], list[float]]
 
 WORLD: Frame = (0, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0])
 
 
 def placed_on(joint: int, placement: Placement) -> Frame:
-    """A placement on a joint's body as the core takes it.
+    """Return a placement on a joint's body in the form of the core.
 
     Args:
         joint: index of the joint.
@@ -42,7 +42,7 @@ def placed_on(joint: int, placement: Placement) -> Frame:
 
 
 class Resolution:
-    """Frames and joints of a model by their names.
+    """Lookup of frames and joints of a model by name.
 
     Args:
         model: pinocchio.Model.
@@ -54,29 +54,29 @@ class Resolution:
         self._placements = joint_placements(model, q0)
 
     def frame_id(self, name: str, who: str) -> int:
-        """Index of a frame, or of the frame of a joint."""
+        """Return the index of a frame; a joint's name selects the frame of the joint."""
         if self.model.existFrame(name):
             return frame_index(self.model, name)
         names = [f.name for f in self.model.frames]
         raise UnknownNameError(f'{who}: no frame "{name}" in model "{self.model.name}"{nearest(name, names)}')
 
     def frame(self, name: str, who: str) -> Frame:
-        """A frame, or a joint's own one, as the core takes it."""
+        """Return a frame, or the frame of a joint, in the form of the core."""
         if not self.model.existJointName(name):
-            self.frame_id(name, who)  # raises where there is neither
+            self.frame_id(name, who)  # raises if there is no such frame
         return placed_on(*frame_on_joint(self.model, name))
 
     def plane(self, name: str | None, who: str) -> Frame:
-        """The frame that a plane belongs to: the world's when there is no name."""
+        """Return the frame of a plane: the world frame if the name is None."""
         return WORLD if name is None else self.frame(name, who)
 
     def in_world(self, frame: Frame) -> Placement:
-        """Where a frame is in the world at q0, pinocchio.SE3."""
+        """Return the placement of a frame in the world at q0, pinocchio.SE3."""
         joint, R, p = frame
         return self._placements[joint] * pin.SE3(np.reshape(R, (3, 3)), np.array(p))
 
     def joint(self, name: str, who: str, *, freedoms: tuple[int, ...] = (1,)) -> int:
-        """Index of a joint with an allowed number of degrees of freedom."""
+        """Return the index of a joint with an allowed number of degrees of freedom."""
         model = self.model
         if not model.existJointName(name) or name == "universe":
             if model.existFrame(name, pin.FrameType.FIXED_JOINT):
@@ -95,17 +95,20 @@ class Resolution:
         return index
 
     def pair(self, description: Any, who: str) -> tuple[Frame, Frame]:
-        """Both frames of an anchor.  The world stands in for a missing second frame, in world axes."""
+        """Return both frames of an anchor.
+
+        Without a second frame, both frames have world axes at q0, and the second is fixed to the world.
+        """
         first = self.frame(description.frame1, who)
         if description.frame2 is not None:
             return first, self.frame(description.frame2, who)
         here = self.in_world(first)
         joint, R, p = first
-        level = np.reshape(R, (3, 3)) @ here.rotation.T  # equals the world's axes at q0
+        level = np.reshape(R, (3, 3)) @ here.rotation.T  # world axes at q0
         return (joint, level.ravel().tolist(), p), (0, WORLD[1], here.translation.tolist())
 
     def hinge_axis(self, hinge: HingeAnchor, who: str) -> Vector3:
-        """The hinge's axis in the axes of frame2 (of the world without one)."""
+        """Return the hinge axis in the axes of frame2, or in world axes without frame2."""
         axis = unit_axis(who, hinge.axis)
         if hinge.frame2 is not None:
             return axis
@@ -115,7 +118,7 @@ class Resolution:
     def contact(
         self, c: PointContact | EllipsoidContact | Rolling, who: str
     ) -> tuple[Frame, Frame, tuple[Vector3, Vector3, Vector3]]:
-        """Frame, plane, and right-handed directions (along, along, normal) in the axes of the plane."""
+        """Return frame, plane, and right-handed (tangent, tangent, normal) in the axes of the plane."""
         plane, axes = self.plane(c.plane, who), axis_triad(unit_axis(who, c.normal))
         level = np.array(axes[2]) * getattr(c, "height", 0.0)
         frame = self.frame(c.frame, who)
@@ -124,14 +127,14 @@ class Resolution:
         return moved(frame, getattr(c, "offset", (0.0, 0.0, 0.0))), moved(plane, level), axes
 
     def capsules(self, c: SphereContact | CapsuleContact, who: str) -> tuple[Frame, Frame, float, float]:
-        """Both frames in the middle of their segments, along z, and half the lengths of these [m]."""
+        """Return frames at the segment centers, z along the segments, and the half lengths [m]."""
         (first, half1), (second, half2) = (
             along(frame, ends, who) for frame, ends in zip(self._two_bodies(c, who), segments(c), strict=True)
         )
         return first, second, half1, half2
 
     def box(self, c: BoxContact, who: str) -> tuple[Frame, Frame, list[float]]:
-        """Frames in the middle of the sphere and of the box, and half the box without its rounding [m]."""
+        """Return frames at the centers of sphere and box, and half edges minus the rounding radius [m]."""
         first, second = self._two_bodies(c, who)
         half = [0.5 * edge - c.radius2 for edge in c.size]
         return moved(first, c.offset), turned(moved(second, c.xyz), c.rpy), half
@@ -139,16 +142,17 @@ class Resolution:
     def hull(
         self, c: HullContact, who: str
     ) -> tuple[Frame, Frame, tuple[list[float], list[float], list[int]]]:
-        """Frames in the middle of the sphere and of the hull, and its corners, planes and edges."""
+        """Return the frame at the sphere's center, the frame of the hull, and the hull in the core's form."""
         first, second = self._two_bodies(c, who)
         return moved(first, c.offset), second, core_hull(c)
 
     def cylinder(
         self, c: CylinderContact, who: str
     ) -> tuple[Frame, Frame, tuple[float, float, float], float]:
-        """Frames in the middle of the sphere or capsule and of the axis, the solid, and half the capsule [m].
+        """Return the frames of capsule and solid of revolution, the solid, and the half capsule length [m].
 
-        Of the solid half the length and the radii of both faces; the capsule's frame has z along it.
+        Both frames are at the centers, with z along the axes. The solid is (half length, lower radius, upper
+        radius) [m]. A sphere is a capsule with zero half length.
         """
         first, second = self._two_bodies(c, who)
         above = c.below if c.above is None else c.above
@@ -156,12 +160,12 @@ class Resolution:
         return first, turned(moved(second, c.xyz), c.rpy), (0.5 * c.length, c.below, above), half1
 
     def rim(self, c: RimContact, who: str) -> tuple[Frame, Frame, tuple[list[float], list[float], list[int]]]:
-        """Frames in the middle of the disk, its axis along z, and of the hull, and the hull."""
+        """Return the frame at the disk's center, z along its axis, the frame of the hull, and the hull."""
         first, second = self._two_bodies(c, who)
         return turned(moved(first, c.offset), c.rpy), second, core_hull(c)
 
     def rims(self, c: RevolvedContact, who: str) -> tuple[Frame, Frame, Vector3, Vector3]:
-        """Frames in the middle of both, along z, and half the length and both radii of each [m]."""
+        """Return frames at both centers, z along the axes, and (half length, radius, radius) of both [m]."""
         first, second = self._two_bodies(c, who)
         (length1, *radii1), (length2, *radii2) = c.solid1, c.solid2
         one, other = (0.5 * length1, radii1[0], radii1[1]), (0.5 * length2, radii2[0], radii2[1])
@@ -174,13 +178,13 @@ class Resolution:
         return ends
 
     def bearing(self, joint: int) -> tuple[core.Load, list[float]]:
-        """What loads a joint that rubs, and its axis in the joint's frame, (3,).
+        """Return the kind of bearing load of a joint, and the bearing axis in the joint's frame, (3,).
 
         Args:
             joint: index.
 
         Returns:
-            revolute (helical joints too), prismatic, spherical, or none for all others.
+            revolute (helical joints too), prismatic, spherical, or none for all others, and the axis.
         """
         item = self.model.joints[joint]
         data = item.createData()
@@ -198,22 +202,22 @@ class Resolution:
 
 
 def moved(frame: Frame, by: Any) -> Frame:
-    """A frame at another place of its body.
+    """Return the frame translated on its body.
 
     Args:
         frame: the frame.
-        by: the way there in its axes [m], (3,).
+        by: translation in the axes of the frame [m], (3,).
     """
     joint, R, p = frame
     return (joint, R, (np.array(p) + np.reshape(R, (3, 3)) @ np.array(by)).tolist()) if np.any(by) else frame
 
 
 def along(frame: Frame, ends: Array, who: str) -> tuple[Frame, float]:
-    """A frame in the middle of a segment, along z, and half its length [m].
+    """Return a frame at the center of a segment, with z along it, and its half length [m].
 
     Args:
-        frame: on the same body.
-        ends: of the segment in its axes [m], (2, 3).
+        frame: a frame on the same body.
+        ends: ends of the segment in the axes of the frame [m], (2, 3).
         who: words for messages.
     """
     first, last = ends
@@ -226,25 +230,25 @@ def along(frame: Frame, ends: Array, who: str) -> tuple[Frame, float]:
 
 
 def turned(frame: Frame, rpy: Any) -> Frame:
-    """A frame with other axes at the same place.
+    """Return the frame rotated about its origin.
 
     Args:
         frame: the frame.
-        rpy: roll, pitch and yaw of the axes against its own [rad], (3,).
+        rpy: roll, pitch and yaw of the new axes relative to the old axes [rad], (3,).
     """
     joint, R, p = frame
     return joint, (np.reshape(R, (3, 3)) @ pin.rpy.rpyToMatrix(*rpy)).ravel().tolist(), p
 
 
 def unique_names(descriptions: Sequence[object], taken: set[str]) -> list[str]:
-    """A name for each description: its own, or its kind and what it acts on.
+    """Return a unique name for each description: the user's name, or the kind with its frames or joints.
 
     Args:
         descriptions: constraints, laws or contacts.
-        taken: names in use; grows.
+        taken: names in use; extended by this function.
 
     Raises:
-        InputError: two descriptions were given the same name.
+        InputError: two descriptions have the same name.
     """
     names = []
     for d in descriptions:
@@ -267,11 +271,11 @@ def unique_names(descriptions: Sequence[object], taken: set[str]) -> list[str]:
 
 
 def words(description: object, name: str | None = None) -> str:
-    """Words that name a description in a message: its class, and the name it has or was given.
+    """Return the label of a description in messages: its class and its name.
 
     Args:
-        description: of anything in a scene.
-        name: the unique name that the scene gave it.
+        description: any description in a scene.
+        name: unique name in the scene, used if the description has no name.
     """
     own = getattr(description, "name", None) or name
     kind = type(description).__name__

@@ -1,4 +1,4 @@
-"""What a scene is made of, as tables: `Scene.describe`."""
+"""Tables of a scene's parts: `Scene.describe`."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from pin_nonideal.types import Model, Table
 from .compiled_scene import CompiledScene
 from .resolver import unique_names
 
-NO_LIMIT = 1e30  # models hold infinity, or the largest number, for none
+NO_LIMIT = 1e30  # models store infinity or the largest float for no limit
 
 
 @dataclass(frozen=True)
 class Description:
-    """What a scene is made of: one table a row, as plain values; printed, a text.
+    """Parts of a scene as tables of plain values; `str` formats them as text.
 
     Attributes:
-        name: of the scene.
-        joints: in the order of the model: name, kind, parent, where their values stand in q and v (`q_first`,
-            `nq`, `v_first`, `nv`), `file_index` (their place in the robot's file, where it has another order,
-            else None), `lower` and `upper` limits of position, `velocity` and `effort` limits (the file's,
-            which the motion may pass; None for none), `friction` and `damping` of the file, `armature`.
-        constraints: name, kind, `first` row and `rows` in `lam`, `dropped` rows, and what it was made with.
-        contacts: the same.
-        laws: name, kind, and what they were made with.
-        forces: kind, and what they were made with.
-        actuation: the same, or None.
+        name: name of the scene.
+        joints: joints in the order of the model: name, kind, parent, indices in q and v (`q_first`, `nq`,
+            `v_first`, `nv`), `file_index` (index in the robot's file if its order differs, else None),
+            `lower` and `upper` position limits, `velocity` and `effort` limits (of the file, which the motion
+            may pass; None for no limit), `friction` and `damping` of the file, `armature`.
+        constraints: name, kind, `first` row and `rows` in `lam`, `dropped` rows, and arguments (`made_with`).
+        contacts: the same columns as `constraints`.
+        laws: name, kind and arguments.
+        forces: kind and arguments.
+        actuation: kind and arguments, or None.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Description:
     actuation: Table | None
 
     def to_dict(self) -> Table:
-        """All tables as plain values that JSON holds."""
+        """Return all tables as plain values for JSON."""
         return dataclasses.asdict(self)
 
     def __str__(self) -> str:
@@ -76,7 +76,7 @@ class Description:
 
 
 def _table(title: str, rows: Sequence[Table], keys: Sequence[str]) -> list[str]:
-    """A table in columns as wide as they must be."""
+    """Return the lines of a table, with columns as wide as their longest cells."""
     if not rows:
         return []
     cells = [[_cell(row, key) for key in keys] for row in rows]
@@ -102,11 +102,11 @@ def _words(value: Any) -> str:
 
 
 def describe(scene: CompiledScene, name: str) -> Description:
-    """The tables of a scene.
+    """Return the tables of a scene.
 
     Args:
         scene: the compiled scene.
-        name: of the scene.
+        name: name of the scene.
     """
     said = scene.said
     rows = [
@@ -134,7 +134,7 @@ def describe(scene: CompiledScene, name: str) -> Description:
 
 
 def _joints(model: Model, scene: CompiledScene) -> list[Table]:
-    """A row for each joint; limits that are none are None."""
+    """Return a row for each joint; missing limits are None."""
     order, rows = file_order(model), []
     for j, place in enumerate(scene.joints, start=1):
         dofs = slice(place.v_first, place.v_first + place.nv)
@@ -167,12 +167,12 @@ def _joints(model: Model, scene: CompiledScene) -> list[Table]:
 
 
 def _limit(x: float) -> float | None:
-    """A limit that is one, or None."""
+    """Return a finite limit, or None."""
     return float(x) if np.isfinite(x) and abs(x) < NO_LIMIT else None
 
 
 def _made(said: Any) -> Table:
-    """Kind of a description, and what it was made with as plain values; functions by their names."""
+    """Return the kind of a description and its arguments as plain values; functions appear by name."""
     fields = (
         {f.name: getattr(said, f.name) for f in dataclasses.fields(said)}
         if dataclasses.is_dataclass(said)

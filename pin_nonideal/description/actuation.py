@@ -1,7 +1,7 @@
 """Torques tau that drive a scene, in generalized coordinates (shape nv).
 
-A scene takes one of: nothing, constant torques, a function (t, q, v) -> tau evaluated at every evaluation, or
-one of the descriptions below.  Torques are arrays (nv,) or tables by joint name, those of functions too.
+A scene accepts None, constant torques, a function (t, q, v) -> tau that is called at every evaluation, or one
+of the descriptions below. Torques are arrays (nv,) or tables by joint name, also those of functions.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ class SampledControl:
     """A controller in discrete time: its torque is held between samples, and steps end at every sample.
 
     Args:
-        function: (t, q, v) -> tau, shape (nv,), called once a period.
-        period: [s].
+        function: (t, q, v) -> tau, shape (nv,), called once per period.
+        period: sample period [s].
         name: used in messages and results.
     """
 
@@ -52,16 +52,15 @@ class SampledControl:
 class HoldPosition:
     """Proportional-derivative control around a configuration: tau = kp (q0 - q) - kd v.
 
-    The difference q0 - q is taken in the tangent space (pinocchio.difference).  The degrees of freedom of a
-    floating base have no motor: give them gain zero in an array, or leave the gain a number, which acts on
-    joints of one degree of freedom only.
+    The difference q0 - q is computed in the tangent space (pinocchio.difference). A floating base has no
+    motor: its gains in an array must be zero. A scalar gain acts on joints with one degree of freedom only.
 
     Args:
         kp: stiffness [N m/rad or N/m], not negative: a number, an array of shape (nv,), or by joint name,
-            zero for the others.
+            zero for missing joints.
         kd: damping [N m s/rad or N s/m], not negative, as kp.
-        q: configuration to hold, shape (nq,) or by joint name, the others as in the scene's initial one; None
-            for the scene's initial one.
+        q: configuration to hold, shape (nq,) or by joint name, with missing joints at the scene's initial
+            configuration; None for the scene's initial configuration.
         name: used in messages and results.
     """
 
@@ -81,12 +80,12 @@ class HoldPosition:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Torques given at times, linear in between, and held before the first and after the last.
+    """Torques at given times, interpolated linearly, and held before the first and after the last time.
 
     Args:
-        times: increasing [s], shape (nt,) with nt >= 1.
+        times: increasing times [s], shape (nt,) with nt >= 1.
         values: torques [N m or N], shape (nt, nv), or by joint name, shape (nt,) or (nt, n) for a joint of n
-            degrees of freedom: a dict or a pandas DataFrame. Joints that are left out have no torque.
+            degrees of freedom: a dict or a pandas DataFrame. Missing joints have no torque.
         name: used in messages and results.
     """
 
@@ -123,18 +122,18 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class EffortLimits:
-    """A drive that gives no more than its motors have: tau = min(max(u, -effort), effort), dof by dof.
+    """A drive with effort limits: tau = min(max(u, -effort), effort) for each degree of freedom.
 
-    What is asked of it (torques in place of the scene's actuation too) is cut; an event of kind "saturate"
-    tells of each joint when its drive reaches the limit, one of kind "desaturate" when it gives again what is
-    asked of it.
+    Requested torques are clipped, including torques that replace the scene's actuation. An event of kind
+    "saturate" occurs when the drive of a joint reaches its limit. An event of kind "desaturate" occurs when
+    the drive follows the requested torque again.
 
     Args:
-        actuation: what asks for torques u: any other actuation.
-        effort: largest torque [N m or N], not negative: a number, an array of shape (nv,), or by joint name,
-            without limit for the others; None for the model's own limits (`lowerEffortLimit`,
-            `upperEffortLimit`: those of the file), of which infinite ones and the zeros of joints that state
-            none are none.
+        actuation: source of the requested torques u: any other actuation.
+        effort: largest effort of each dof [N m or N], not negative: a number, an array of shape (nv,), or by
+            joint name, without limit for missing joints. None selects the model's limits
+            (`lowerEffortLimit`, `upperEffortLimit` of the file). Infinite limits, and zero limits of joints
+            without stated limits, are no limits.
         name: used in messages and results.
     """
 
@@ -176,5 +175,5 @@ def _nonnegative(what: str, value: Any) -> float | Array | dict[str, Array]:
 
 
 def asked_by(actuation: Actuation | None) -> Actuation | None:
-    """What asks for torques, without the limits that a drive may have."""
+    """Return the actuation that requests torques, without effort limits."""
     return actuation.actuation if isinstance(actuation, EffortLimits) else actuation

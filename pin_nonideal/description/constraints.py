@@ -1,12 +1,12 @@
-"""What each constraint is: frozen descriptions by name.
+"""Frozen descriptions of constraints.
 
-The scene resolves the names and the core writes the rows A a = b.
+The scene resolves the names, and the core computes the rows A a = b.
 
-Shared words.  p1, R1 are the place and orientation of `frame1` in the world, p2, R2 those of `frame2`.  With
-`frame2=None` the second side is the world: a point p2 = p1 and an orientation R1 taken once, at the scene's
-initial state, while components are in world axes.  `lam` belongs to M a = F + C + A^T lam: for anchors it is
-the force that the constraint exerts on the body of frame1, in the axes of frame2 (world axes when None);
-frame2's body feels the opposite.
+Notation: p1, R1 are position and orientation of `frame1` in the world, and p2, R2 those of `frame2`. With
+`frame2=None` the second side is the world: point p2 = p1 and orientation R1 are fixed at the scene's initial
+state, and components are in world axes. `lam` belongs to M a = F + C + A^T lam. For anchors, `lam` is the
+force of the constraint on the body of frame1, in the axes of frame2 (world axes when None). The opposite
+force acts on the body of frame2.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ __all__ = [
 
 Axis = str | Sequence[float]
 TIME_FUNCTION = "t -> (value, rate, acceleration)"
-MOST_ROWS = 10_000  # of a user's constraint: a gigabyte of A at 10,000 degrees of freedom
+MOST_ROWS = 10_000  # rows of a user constraint: A takes a gigabyte at 10,000 degrees of freedom
 
 
 def _frames(description: Any) -> None:
@@ -74,8 +74,8 @@ class PointAnchor:
 
     Args:
         frame1: name of a frame of the model.
-        frame2: name of a frame, or None for the world at the place where frame1 starts.
-        axes: which components are held, letters out of "xyz".
+        frame2: name of a frame, or None for the world, at the initial position of frame1.
+        axes: held components, letters out of "xyz".
         name: used in messages and results.
     """
 
@@ -102,17 +102,17 @@ class PointAnchor:
 
 @dataclass(frozen=True)
 class FrameAnchor:
-    """Holds one frame on another, in place and orientation: a weld.
+    """Holds one frame on another, in position and orientation: a weld.
 
-    Residual: phi = [R2^T (p1 - p2); log(R2^T R1)], [m; rad].  With frame2=None:
+    Residual: phi = [R2^T (p1 - p2); log(R2^T R1)], [m; rad]. With frame2=None:
     [p1 - p2; log(R1 R1(start)^T)] in world axes.
-    Rows: 6, three of place and three of orientation.
+    Rows: 6, three of position and three of orientation.
     lam: [force; moment] on frame1's body, [N; N m], in the axes of frame2, the moment about the origin of
     frame2.
 
     Args:
         frame1: name of a frame of the model.
-        frame2: name of a frame, or None for the world at the place where frame1 starts.
+        frame2: name of a frame, or None for the world, at the initial position of frame1.
         name: used in messages and results.
     """
 
@@ -129,16 +129,16 @@ class FrameAnchor:
 class HingeAnchor:
     """Holds the origins of two frames together and lets them turn about one common axis u: a hinge.
 
-    Residual: phi = [R2^T (p1 - p2); t1 . (u x u'); t2 . (u x u')], [m; rad], where u' = R2^T R1 u is the axis
-    as frame1 carries it and t1, t2 are `checks.axis_triad(u)`; the last two are scaled by angle/sine, so that
-    they tell the angle between the axes, which must point the same way.  With frame2=None, u is replaced by
-    R1(start) u and all components are in world axes.
-    Rows: 5, three of place and two of orientation.
+    Residual: phi = [R2^T (p1 - p2); t1 . (u x u'); t2 . (u x u')], [m; rad]. u' = R2^T R1 u is the axis fixed
+    in frame1, and t1, t2 are those of `validation.axis_triad(u)`. The last two components are scaled by
+    angle/sine, so they measure the angle between the axes. The axes must point in the same direction. With
+    frame2=None, u is replaced by R1(start) u and all components are in world axes.
+    Rows: 5, three of position and two of orientation.
     lam: force on frame1's body [N] in the axes of frame2, and the moments about t1 and t2 [N m].
 
     Args:
         frame1: name of a frame of the model.
-        frame2: name of a frame, or None for the world at the place where frame1 starts.
+        frame2: name of a frame, or None for the world, at the initial position of frame1.
         axis: the common axis, with the same components in both frames: "x", "y", "z" or three numbers.
         name: used in messages and results.
     """
@@ -165,10 +165,10 @@ class Distance:
 
     Args:
         frame1: name of a frame of the model.
-        frame2: name of a frame, or None for the world at the place where frame1 starts (then `length` must be
-            given).
-        length: positive length [m]; a function t -> (value, rate, acceleration), whose breaks are those of
-            `PrescribedMotion`; None for the distance at the start.
+        frame2: name of a frame, or None for the world, at the initial position of frame1 (then `length` must
+            be given).
+        length: positive length [m]; a function t -> (value, rate, acceleration), with breaks as in
+            `PrescribedMotion`; None for the initial distance.
         name: used in messages and results.
     """
 
@@ -196,7 +196,7 @@ class JointCoupling:
 
     Residual: phi = q1 - ratio q2 - offset [m or rad].
     Rows: 1.
-    lam: generalized force on joint1 [N or N m]; joint2 feels -ratio lam.
+    lam: generalized force on joint1 [N or N m]; -ratio lam acts on joint2.
 
     Args:
         joint1: name of the driven joint.
@@ -234,17 +234,17 @@ class PrescribedMotion:
 
     Residual: phi = q_joint - function(t) [m or rad].
     Rows: 1.
-    lam: the generalized force that the drive exerts on the joint [N or N m]; its power is v lam.
-    Breaks: where pieces of the function meet, a step of the integrator ends and the next one begins.  A rate
-    that jumps there is an impulse I on the rows, M (v+ - v-) = A^T I with A v+ + phi_t+ = 0; an event of kind
-    "jump" tells it, and its work is the motion's.  Contacts that it drives into each other strike; dry
-    friction, whose forces are finite, gives no impulse.
+    lam: generalized force of the drive on the joint [N or N m]; its power is v lam.
+    Breaks: steps of the integrator end at the times at which pieces of the function meet. A jump of the rate
+    causes an impulse I on the rows, M (v+ - v-) = A^T I with A v+ + phi_t+ = 0. The jump is an event of kind
+    "jump", and its work belongs to the motion. Contacts that the jump drives into each other have an impact.
+    Dry friction has finite forces and thus no impulse.
 
     Args:
         joint: name of the joint.
-        function: t -> (value, rate, acceleration), for example `sinusoid(...)`.  A function of the user's may
-            tell its breaks [s] by an attribute `breaks`; otherwise they are searched for in sixteen intervals
-            of each adaptive step and over each fixed one: a shorter pulse is seen with the attribute only.
+        function: t -> (value, rate, acceleration), for example `sinusoid(...)`. A user function may list its
+            breaks [s] in an attribute `breaks`. Otherwise breaks are searched in sixteen intervals of each
+            adaptive step, and over each fixed step. Shorter pulses are detected only with the attribute.
         name: used in messages and results.
     """
 
@@ -262,13 +262,13 @@ class PrescribedMotion:
 class KnifeEdge:
     """Forbids the velocity of a frame's origin along one of the frame's axes: a skate, a blade.
 
-    Rate (nonholonomic, no residual): u . R1^T v_p1 = 0 [m/s], with u the axis in frame's own components.
+    Rate (nonholonomic, no residual): u . R1^T v_p1 = 0 [m/s], with the axis u in the axes of the frame.
     Rows: 1.
     lam: force on the body along the axis [N].
 
     Args:
         frame: name of a frame of the model.
-        axis: direction of no velocity, in the frame: "x", "y", "z" or three numbers.
+        axis: direction without velocity, in the axes of the frame: "x", "y", "z" or three numbers.
         name: used in messages and results.
     """
 
@@ -286,27 +286,26 @@ class KnifeEdge:
 class Rolling:
     """Rolls a sphere or a thin disk on a plane without slip and without lifting.
 
-    With n the plane's normal and e the disk's axis, the contact point is c = p - radius n for a sphere and
-    c = p - radius (n - (n.e) e)/|n - (n.e) e| for a disk.  The material point of the body at c has the
-    velocity of the plane's body there.
+    With the plane's normal n and the disk's axis e, the contact point is c = p - radius n for a sphere and
+    c = p - radius (n - (n.e) e)/|n - (n.e) e| for a disk. The material points of both bodies at c have the
+    same velocity.
     Residual: height of c above the plane [m] (holonomic, the third row); the first two rows are nonholonomic
     [m/s].
-    Rows: 3, along t1, t2 and n of `checks.axis_triad(normal)`, axes fixed in the plane.
+    Rows: 3, along t1, t2 and n of `validation.axis_triad(normal)`, axes fixed in the plane.
     lam: force on the rolling body at c [N] along t1, t2 and n; the third is the normal force, positive when
     pressed.
-    Resistance: with w the angular velocity of the body against that of the plane, the torque
-    torsional |lam_n| opposes its part along the normal (spinning), and the torque rolling |lam_n| its part
-    along the plane (rolling); each sticks and slips on its own.
+    Resistance: the angular velocity of the body relative to the plane has a part along the normal (spinning)
+    and a part in the plane (rolling). The torque torsional |lam_n| opposes spinning, and the torque
+    rolling |lam_n| opposes rolling. Each sticks and slips independently.
 
     Args:
         frame: name of the frame at the center of the sphere or disk.
-        radius: [m].
+        radius: radius of the sphere or disk [m].
         axis: axis of the disk in the frame; None for a sphere.
-        plane: name of the frame whose origin the plane goes through (its body may move); None for the world's
-            origin.
+        plane: name of a frame with origin in the plane (its body may move); None for the world's origin.
         normal: normal of the plane, in the axes of the plane's frame.
         torsional: torque against spinning over normal force [m].
-        rolling: torque against rolling over normal force [m], the lever of rolling resistance.
+        rolling: torque against rolling over normal force [m], the lever arm of rolling resistance.
         name: used in messages and results.
     """
 
@@ -338,13 +337,13 @@ class Rolling:
 class UserConstraint:
     """Any constraint A(q, v, t) a = b(q, v, t) as a Python function: Eq. (3).
 
-    Holonomic: residual is phi(q, t) and rate is A v + phi_t.  Nonholonomic: no residual, and rate is the
-    velocity constraint itself.  d residual/dt = rate and d rate/dt = A a - b are checked once by differences.
-    Without residual and rate the rows hold at acceleration level only and cannot be projected.  With a
-    residual and no rate, the rate is A v plus a difference in t.
-    A row shorter than about 1e-14 times the longest row of the same function is rounding and holds nothing.
+    Holonomic: residual is phi(q, t) and rate is A v + phi_t. Nonholonomic: no residual, and rate is the
+    velocity constraint itself. d residual/dt = rate and d rate/dt = A a - b are checked once by differences.
+    Without residual and rate the rows hold at acceleration level only and cannot be projected. With a
+    residual and without a rate, the rate is A v plus a difference in t.
+    A row shorter than about 1e-14 times the longest row of the same function is rounding and has no effect.
     Rows: `size`, in the order of the function.
-    lam: multipliers in M a = F + C + A^T lam, scaled as the rows are.
+    lam: multipliers in M a = F + C + A^T lam, in the scale of the rows.
 
     Args:
         function: (t, q, v, data) -> (A, b), shapes (size, nv) and (size,).  `data` is a read-only

@@ -1,4 +1,4 @@
-"""Given forces that are no constraints: they belong to F in M a = F + F^c, Eq. (4)."""
+"""Applied forces: they belong to F in M a = F + F^c, Eq. (4)."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ class SpringDamper:
     """A spring and a damper in parallel between the origins of two frames.
 
     With L = |p1 - p2| and e = (p1 - p2)/L, the force on frame1's body is -(stiffness (L - rest_length) +
-    damping dL/dt) e [N], and frame2's body feels the opposite.  At L = 0 the direction e does not exist: with
-    a rest length of zero the force is taken as -stiffness (p1 - p2) - damping (v1 - v2)'s component along e,
-    which vanishes there.
+    damping dL/dt) e [N]. The opposite force acts on frame2's body. The direction e does not exist at L = 0.
+    With a rest length of zero, the force is -stiffness (p1 - p2) minus damping times the component of v1 - v2
+    along e, which vanishes at L = 0.
 
     Args:
         frame1: name of a frame of the model.
-        frame2: name of a frame, or None for the world at the place where frame1 starts.
-        stiffness: [N/m], not negative.
-        damping: [N s/m], not negative.
+        frame2: name of a frame, or None for the world, at the initial position of frame1.
+        stiffness: spring stiffness [N/m], not negative.
+        damping: damping coefficient [N s/m], not negative.
         rest_length: length without spring force [m], not negative.
         name: used in messages and results.
     """
@@ -62,9 +62,9 @@ class JointSpring:
 
     Args:
         joint: name of the joint.
-        stiffness: [N m/rad or N/m], not negative.
+        stiffness: spring stiffness [N m/rad or N/m], not negative.
         rest: position without spring force [rad or m].
-        damping: [N m s/rad or N s/m], not negative.
+        damping: damping coefficient [N m s/rad or N s/m], not negative.
         name: used in messages and results.
     """
 
@@ -112,7 +112,7 @@ class Wrench:
 
 @dataclass(frozen=True)
 class UserForce:
-    """Any given generalized force as a Python function.
+    """Any applied generalized force as a Python function.
 
     Args:
         function: (t, q, v) -> generalized force, shape (nv,) [N or N m].

@@ -1,6 +1,6 @@
-"""What each nonideal law is: frozen descriptions of C(q, v, t, reactions) in Eq. (9), w^T F^c = w^T C.
+"""Frozen descriptions of nonideal laws C(q, v, t, reactions) in Eq. (9), w^T F^c = w^T C.
 
-C never feeds energy when the law is a friction: its power v^T C is zero or negative.
+Friction laws never supply energy: their power v^T C is zero or negative.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ __all__ = [
 
 @dataclass(frozen=True)
 class JointFriction:
-    """Friction in a joint, an anchor or a coupling, that may depend on the load it really carries.
+    """Friction in a joint, an anchor or a coupling, with constant or load-dependent limits.
 
-    With v_j the joint's velocity, f its reaction force split along (axial, normal) and across (radial) the
-    joint's axis and m_b its bending moment, the dry limit is
+    Let v_j be the joint's velocity, f its reaction force, and m_b its bending moment. The force has parts
+    along (axial, normal) and across (radial) the joint's axis. The dry friction limit is
 
         revolute, helical, universal:  limit = constant + mu (radius (|f_radial| + |m_b| / span)
                                                              + axial_radius |f_axial|)       [N m]
@@ -48,51 +48,51 @@ class JointFriction:
         translation, free flyer:       limit = constant                                      [N]
         coupling:           limit = constant + k |ratio lam|                                 [N m or N]
 
-    where constant = coulomb + preload and m is the reaction moment about the joint's origin, m_b its part
-    across the axis (of a planar joint the normal of its plane); without `span` moments are left out.
+    Here constant = coulomb + preload, m is the reaction moment about the joint's origin, and m_b is its part
+    across the axis (for a planar joint, the normal of its plane). Without `span`, moments are ignored.
     Sliding gives C_j = -limit s(v_j) sgn(v_j) - viscous v_j, with Stribeck's factor
     s = 1 + (static_ratio - 1) exp(-(v_j / stribeck_velocity)^2), and s = 1 without stribeck_velocity.
-    Sticking holds while the force it needs is below static_ratio times the limit.
+    A sticking joint stays at rest while the required force is below static_ratio times the limit.
 
-    Directions.  A universal joint has two axes that rub each on its own.  In a ball joint (spherical, or a
-    `PointAnchor` of all three axes) C points against the angular velocity, |C| = limit.  Planar joints and
-    free flyers slide in two or three directions like that, and turn besides: against their turning rubs
-    radius times the limit [N m] and radius^2 times `viscous`, as of an area of that mean radius; without
-    `radius` turning is free.  Sliding and turning do not weaken each other.
+    Directions. The two axes of a universal joint have independent friction. In a ball joint (spherical, or a
+    `PointAnchor` of all three axes) C opposes the angular velocity, with |C| = limit. Planar joints and free
+    flyers have the same friction for sliding in two or three directions. Turning has a limit of radius times
+    the sliding limit [N m], and a viscous coefficient of radius^2 times `viscous`, as for a contact area of
+    that mean radius. Without `radius` turning is free. Sliding friction and turning friction are independent.
 
-    Couplings.  lam is the multiplier of a `JointCoupling`, the force between its teeth as it acts on joint1
-    [N m or N]; limit and v_j are those of joint2.  Either the thread of a screw or worm on joint2 is given,
-    of lead angle l (the thread rises ratio = tan(l) times the thread's mean radius) and with
-    tan(p) = mu / cos(pressure_angle), or the efficiencies are:
+    Couplings. lam is the multiplier of a `JointCoupling`, the tooth force on joint1 [N m or N]; limit and v_j
+    belong to joint2. One of two inputs defines the losses: the efficiencies, or the thread of a screw or worm
+    on joint2. The thread has lead angle l (ratio = tan(l) times the thread's mean radius) and
+    tan(p) = mu / cos(pressure_angle):
 
         joint2 drives:  efficiency      = tan(l) / tan(l + p)
         joint1 drives:  efficiency_back = tan(l - p) / tan(l)
 
-    Both follow from one rubbing pair of surfaces, which carries lam and takes part a of it from joint1 and
-    part b from joint2: a = tan(p) tan(l) and b = tan(p) / tan(l), or with the efficiencies e and e'
-    a = (1 - 2 e + e e') / (1 - e e') and b = (1 - 2 e' + e e') / (1 - e e'); k = a + b.  Where b >= 1, that
-    is efficiency_back <= 0, joint1 cannot drive joint2: the coupling locks itself.
+    Both follow from one sliding pair of surfaces that carries lam. Its friction removes part a of lam
+    from joint1 and part b from joint2: a = tan(p) tan(l) and b = tan(p) / tan(l). With the efficiencies e and
+    e', a = (1 - 2 e + e e') / (1 - e e') and b = (1 - 2 e' + e e') / (1 - e e'). The limit has k = a + b. If
+    b >= 1, that is efficiency_back <= 0, joint1 cannot drive joint2: the coupling is self-locking.
 
     Args:
         joint: name of a revolute, prismatic, helical, spherical, universal, planar, translation or
             free-flyer joint, of a `HingeAnchor`, of a `PointAnchor` of three axes, or of a `JointCoupling`.
         coulomb: constant dry friction [N m or N].
-        mu: coefficient of friction of the surfaces that bear.
-        radius: radius at which the radial load rubs [m]; of planar joints and free flyers the mean radius of
-            the area that turns.
-        axial_radius: mean radius at which the axial load rubs [m].
-        span: lever at which the moment loads the bearing [m]: half the distance of two bearings.
+        mu: coefficient of friction of the bearing surfaces.
+        radius: friction radius of the radial load [m]; for planar joints and free flyers, the mean radius of
+            the contact area.
+        axial_radius: mean friction radius of the axial load [m].
+        span: lever arm at which the moment loads the bearing [m]: half the distance between two bearings.
         preload: dry friction of a preloaded bearing, present without load [N m or N].
         static_ratio: static over kinetic friction, at least 1.
-        stribeck_velocity: velocity scale of the fall from static to kinetic [rad/s or m/s].
-        viscous: coefficient of the velocity [N m s/rad or N s/m].
-        reaction: "total" solves the implicit equation on the real reaction, friction included; "ideal"
-            evaluates the law on the ideal reaction, as the paper's Example (c) does.
-        lead_angle: of the thread of a coupling [rad], between 0 and pi/2; with `mu`.
-        pressure_angle: of its flanks, in the normal section [rad]: 0 for a square thread.
+        stribeck_velocity: velocity scale of the decrease from static to kinetic friction [rad/s or m/s].
+        viscous: viscous coefficient [N m s/rad or N s/m].
+        reaction: "total" solves the implicit equation for the reaction with friction; "ideal" evaluates the
+            law on the ideal reaction, as in the paper's Example (c).
+        lead_angle: lead angle of the thread of a coupling [rad], between 0 and pi/2; with `mu`.
+        pressure_angle: flank angle of the thread in its normal section [rad]: 0 for a square thread.
         efficiency: power at joint1 over power at joint2 while joint2 drives, between 0 and 1.
         efficiency_back: power at joint2 over power at joint1 while joint1 drives, below 1; zero or negative
-            where joint1 cannot drive.  None: equal to `efficiency`, as of a gear mesh.
+            if joint1 cannot drive. None: equal to `efficiency`, as for a gear mesh.
         name: used in messages and results.
     """
 
@@ -173,7 +173,7 @@ class JointFriction:
 
     @property
     def tooth_losses(self) -> tuple[float, float]:
-        """Parts a and b of a coupling's tooth force that friction takes from joint1 and from joint2."""
+        """Parts a and b of a coupling's tooth force that friction removes from joint1 and from joint2."""
         if self.efficiency is not None:
             e, back = self.efficiency, self.efficiency_back
             back = e if back is None else back
@@ -187,14 +187,14 @@ class JointFriction:
 
 
 def _acute(what: str, angle: float) -> float:
-    """An angle of a thread [rad], checked to be below a right one."""
+    """Return an angle of a thread [rad], checked to be below pi/2."""
     if not angle < 0.5 * math.pi:
         raise InputError(f"{what} must be below pi/2 rad; got {angle:g}")
     return angle
 
 
 def _thread(law: JointFriction, who: str) -> None:
-    """The thread of a coupling: two angles, and the coefficient that they need."""
+    """Check the thread of a coupling: two angles, and the coefficient that they need."""
     what = f"{who}: pressure_angle"
     object.__setattr__(law, "pressure_angle", _acute(what, nonnegative(what, law.pressure_angle)))
     if law.lead_angle is None:
@@ -208,7 +208,7 @@ def _thread(law: JointFriction, who: str) -> None:
 
 
 def _efficiencies(law: JointFriction, who: str) -> None:
-    """What a coupling leaves of power, there and back."""
+    """Check the two efficiencies of a coupling."""
     if law.efficiency is None:
         if law.efficiency_back is not None:
             raise InputError(f"{who}: efficiency_back needs an efficiency too, of the way there")
@@ -230,16 +230,16 @@ def _efficiencies(law: JointFriction, who: str) -> None:
 
 @dataclass(frozen=True)
 class SigmoidFriction:
-    """Friction of a robot joint as identification gives it: smooth, and independent of the load.
+    """Smooth friction of a robot joint from identification, independent of the load.
 
         C_j = -(phi1 / (1 + exp(-phi2 (v_j + phi3))) - phi1 / (1 + exp(-phi2 phi3)))          [N m]
 
-    It vanishes at rest, so it creeps under a load; use `JointFriction` where a joint must hold.
+    It vanishes at rest, so a loaded joint creeps; use `JointFriction` for joints that must stick.
     Source: Gaz, Cognetti, Oliva, Robuffo Giordano, De Luca, IEEE RA-L 4 (2019), Franka Emika Panda.
 
     Args:
         joint: name of a joint of one degree of freedom.
-        phi1: swing of the friction from one direction to the other [N m], not negative.
+        phi1: difference of the friction between both directions [N m], not negative.
         phi2: steepness [s/rad], positive.
         phi3: velocity offset [rad/s].
         name: used in messages and results.
@@ -268,18 +268,18 @@ class LuGre:
         g(v) = coulomb + (stiction - coulomb) exp(-(v / stribeck_velocity)^2)
         C_j = -(stiffness z + damping dz/dt + viscous v)                                       [N m or N]
 
-    z is one column of `Trajectory.z`.  Bristles give way a little under any load, and the body
-    drifts under a load that varies; use `JointFriction` where a joint must hold.
+    z is one column of `Trajectory.z`. Bristles deflect under any load, and the body drifts under a varying
+    load; use `JointFriction` for joints that must stick.
     Source: Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Trans. Automatic Control 40 (1995).
 
     Args:
         joint: name of a joint of one degree of freedom.
-        stiffness: of the bristles [N m/rad or N/m], positive.
-        damping: of the bristles [N m s/rad or N s/m], not negative.
-        viscous: coefficient of the velocity, not negative.
+        stiffness: bristle stiffness [N m/rad or N/m], positive.
+        damping: bristle damping [N m s/rad or N s/m], not negative.
+        viscous: viscous coefficient [N m s/rad or N s/m], not negative.
         coulomb: level at high velocity [N m or N], positive.
         stiction: level near rest, at least `coulomb`; equal to it when None.
-        stribeck_velocity: velocity scale between both [rad/s or m/s], positive.
+        stribeck_velocity: velocity scale of the decrease from stiction to coulomb [rad/s or m/s], positive.
         name: used in messages and results.
     """
 
@@ -313,12 +313,12 @@ class LuGre:
 class Drag:
     """Resistance of a fluid against the motion of a frame's origin.
 
-    Force on the body at the origin of the frame, in world axes: f = -coefficient |u|^(exponent - 1) u, with u
-    its velocity, and C = J^T f.  The paper's Example (a), Eq. (58), is exponent = 2 beta.
+    Force on the body at the origin of the frame, in world axes: f = -coefficient |u|^(exponent - 1) u, with
+    its velocity u, and C = J^T f. The paper's Example (a), Eq. (58), has exponent = 2 beta.
 
     Args:
         frame: name of a frame of the model.
-        coefficient: [N (s/m)^exponent], not negative.
+        coefficient: drag coefficient [N (s/m)^exponent], not negative.
         exponent: positive; 1 is linear drag, 2 is quadratic drag.
         name: used in messages and results.
     """
@@ -338,17 +338,17 @@ class Drag:
 
 @dataclass(frozen=True)
 class UserLaw:
-    """Any law C(q, v, t, reactions) as a Python function, with states of its own when it needs them.
+    """Any law C(q, v, t, reactions) as a Python function, optionally with states.
 
-    `reactions.lam` holds all multipliers, `reactions[name]` one constraint's slice, `reactions.wrench(name)`
-    the wrench of a joint or an anchor.  The function must be pure, and finite for any reactions: it is called
-    with provisional ones.
+    `reactions.lam` holds all multipliers, `reactions[name]` those of one constraint, and
+    `reactions.wrench(name)` the wrench of a joint or an anchor. The function must be pure. It must be finite
+    for any reactions, since iterations call it with provisional reactions.
 
     Args:
         function: (t, q, v, reactions) -> C, shape (nv,); with states: (t, q, v, reactions, z) -> (C, dz/dt).
-        reaction: "total" solves the implicit equation, "ideal" evaluates once on the ideal reactions, None
-            passes None and costs nothing.
-        states: number of the law's own states z.
+        reaction: "total" solves the implicit equation, "ideal" evaluates the law once on the ideal reactions,
+            None passes None for the reactions, at no cost.
+        states: number of states z of the law.
         name: used in messages and results.
     """
 
@@ -368,19 +368,19 @@ class UserLaw:
 
 @dataclass(frozen=True)
 class UserFriction:
-    """Dry friction along a generalized direction given by the user; the package owns its modes.
+    """Dry friction along a user-defined generalized direction; the package determines its modes.
 
-    With d = direction(t, q) and slip velocity s = d . v, sliding gives C = -limit sgn(s) d, and sticking is
-    an ideal row that holds s at zero while the force it needs is below static_ratio times the limit.
+    With d = direction(t, q) and slip velocity s = d . v, sliding gives C = -limit sgn(s) d. Sticking is an
+    ideal row that holds s at zero while the required force is below static_ratio times the limit.
 
-    If friction differs between both ways of slip, as in a one-way clutch or a ratchet, `limit` returns
-    (forward, backward): C = -forward d for s > 0, C = backward d for s < 0, and sticking holds with C = f d
-    while -static_ratio forward <= f <= static_ratio backward.
+    If friction differs between both slip directions, as in a one-way clutch or a ratchet, `limit` returns
+    (forward, backward): C = -forward d for s > 0, and C = backward d for s < 0. Sticking has C = f d and
+    holds while -static_ratio forward <= f <= static_ratio backward.
 
     Args:
         direction: (t, q) -> row, shape (nv,).
-        limit: (t, q, v, reactions) -> friction force while it slides, not negative: one number, or two, those
-            against slip forward (along `direction`) and backward.
+        limit: (t, q, v, reactions) -> kinetic friction force, not negative: one number, or two numbers
+            against forward slip (along `direction`) and backward slip.
         static_ratio: static over kinetic friction, at least 1.
         name: used in messages and results.
     """
@@ -399,10 +399,10 @@ class UserFriction:
 
 
 def static_ratio(who: str, value: object) -> float:
-    """Static over kinetic friction, checked to be at least 1.
+    """Return the ratio of static to kinetic friction, checked to be at least 1.
 
     Raises:
-        InputError: it is below 1 or no finite number.
+        InputError: the ratio is below 1 or no finite number.
     """
     ratio = number(f"{who}: static_ratio", value)
     if ratio < 1.0:

@@ -1,7 +1,7 @@
-"""Functions of time with their first two derivatives: what moves prescribed joints and changes lengths.
+"""Functions of time with two derivatives, for prescribed joints and lengths.
 
-Any Python function t -> (value, rate, acceleration) serves.  The ready ones below expose their numbers as
-fields, so that the compiled core evaluates them without calling back into Python.
+Any Python function t -> (value, rate, acceleration) is accepted. The classes below store their numbers as
+fields, so that the compiled core evaluates them without calls into Python.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Constant:
     """f(t) = value.
 
     Args:
-        value: the value, in the unit of what it drives.
+        value: constant value, in the unit of the driven quantity.
     """
 
     value: float
@@ -44,9 +44,9 @@ class Sinusoid:
     """f(t) = offset + amplitude sin(frequency t + phase).
 
     Args:
-        amplitude: in the unit of what it drives.
+        amplitude: amplitude, in the unit of the driven quantity.
         frequency: angular frequency [rad/s].
-        phase: [rad].
+        phase: phase angle [rad].
         offset: mean value.
     """
 
@@ -60,7 +60,7 @@ class Sinusoid:
             object.__setattr__(self, key, number(f"Sinusoid: {key}", getattr(self, key)))
 
     def __call__(self, t: float) -> Sample:
-        """(value, rate, acceleration) at time t [s]; no numbers where the angle leaves their range."""
+        """(value, rate, acceleration) at time t [s]; NaN if the angle overflows."""
         w = self.frequency
         angle = w * t + self.phase
         if not math.isfinite(angle):
@@ -74,7 +74,7 @@ class Polynomial:
     """f(t) = c0 + c1 t + c2 t^2 + ...
 
     Args:
-        coefficients: from low power to high, at least one.
+        coefficients: coefficients in ascending powers, at least one.
     """
 
     coefficients: tuple[float, ...]
@@ -95,9 +95,8 @@ class Spline:
     """Cubic spline through samples, with continuous value, rate and acceleration between them.
 
     On piece i, with s = t - breaks[i]:  f = c[i, 0] + c[i, 1] s + c[i, 2] s^2 + c[i, 3] s^3.
-    Before the first and after the last time the end value is held with rate zero.  The default ends have rate
-    zero, so that nothing jumps there; natural ends (acceleration zero) jump in rate when the run goes past
-    them.
+    Before the first and after the last time, the end value is held with rate zero. Clamped ends (the default)
+    have rate zero, so the rate is continuous. At natural ends (acceleration zero) the rate jumps.
 
     Args:
         times: sample times [s], increasing, shape (n,) with n >= 2.
@@ -152,7 +151,7 @@ def constant(value: float) -> Constant:
     """f(t) = value; see `Constant`.
 
     Args:
-        value: the value, in the unit of what it drives.
+        value: constant value, in the unit of the driven quantity.
 
     Returns:
         The function t -> (value, rate, acceleration).
@@ -167,16 +166,16 @@ def sinusoid(amplitude: float, frequency: float, phase: float = 0.0, offset: flo
     """f(t) = offset + amplitude sin(frequency t + phase); see `Sinusoid`.
 
     Args:
-        amplitude: in the unit of what it drives.
+        amplitude: amplitude, in the unit of the driven quantity.
         frequency: angular frequency [rad/s].
-        phase: [rad].
+        phase: phase angle [rad].
         offset: mean value.
 
     Returns:
         The function t -> (value, rate, acceleration).
 
     Raises:
-        InputError: one of them is no finite number.
+        InputError: an argument is no finite number.
     """
     return Sinusoid(amplitude, frequency, phase, offset)
 
@@ -185,13 +184,13 @@ def polynomial(coefficients: Sequence[float]) -> Polynomial:
     """f(t) = c0 + c1 t + c2 t^2 + ...; see `Polynomial`.
 
     Args:
-        coefficients: from low power to high, at least one.
+        coefficients: coefficients in ascending powers, at least one.
 
     Returns:
         The function t -> (value, rate, acceleration).
 
     Raises:
-        InputError: there is none, or one is no finite number.
+        InputError: there is no coefficient, or a coefficient is no finite number.
     """
     return Polynomial(coefficients)  # type: ignore[arg-type]
 
@@ -214,7 +213,7 @@ def spline(times: ArrayLike, values: ArrayLike, ends: str = "clamped") -> Spline
 
 
 def _horner(coefficients: Any, s: float) -> Sample:
-    """Value and two derivatives of a polynomial given from low power to high."""
+    """Return value and two derivatives of a polynomial with coefficients in ascending powers."""
     value = rate = half = 0.0
     for c in reversed(coefficients):
         half = half * s + rate
@@ -226,11 +225,11 @@ def _horner(coefficients: Any, s: float) -> Sample:
 def _spline_coefficients(
     t: NDArray[np.float64], y: NDArray[np.float64], *, clamped: bool
 ) -> NDArray[np.float64]:
-    """Coefficients (n - 1, 4) of the C2 cubic spline, from its second derivatives m at the samples.
+    """Compute the coefficients (n - 1, 4) of the C2 cubic spline, from second derivatives m at the samples.
 
-    Continuity of the rate gives, inside, h[i-1] m[i-1] + 2 (h[i-1] + h[i]) m[i] + h[i] m[i+1] = 6 (d[i] -
-    d[i-1]) with steps h and slopes d; the tridiagonal set is diagonally dominant and is solved by Thomas'
-    algorithm.
+    At inner samples, continuity of the rate gives h[i-1] m[i-1] + 2 (h[i-1] + h[i]) m[i] + h[i] m[i+1] =
+    6 (d[i] - d[i-1]) with steps h and slopes d. The tridiagonal system is diagonally dominant and is solved
+    by Thomas' algorithm.
     """
     n = t.size
     h = np.diff(t)

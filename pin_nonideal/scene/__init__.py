@@ -1,1 +1,1 @@
-"""Scene: a model with all its descriptions, compiled."""
+"""Scene: a model and its descriptions, compiled into the core's program."""

@@ -1,4 +1,4 @@
-"""Scenes that travel: to other processes by pickle, and as copies; made again from what they were made of."""
+"""Pickling and copying of scenes: a scene is rebuilt from its constructor arguments."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ LISTS = ("constraints", "laws", "contacts", "forces")
 
 
 class Packed:
-    """Something that pickle does not take and cloudpickle does, such as a function without a module.
+    """An object serialized by cloudpickle because pickle does not support it, such as a local function.
 
     Args:
-        content: what cloudpickle made of it.
+        content: bytes of cloudpickle.
     """
 
     def __init__(self, content: bytes) -> None:
@@ -27,7 +27,7 @@ class Packed:
 
 
 def parts_of(scene: Any, source: Any, shapes: tuple[Any, Any], held: Held) -> Table:
-    """Parts of which a scene was made, as they are now.
+    """Return the constructor arguments and the later state of a scene.
 
     Args:
         scene: the Scene.
@@ -52,11 +52,11 @@ def parts_of(scene: Any, source: Any, shapes: tuple[Any, Any], held: Held) -> Ta
 
 
 def rebuilt(kind: type, parts: Table) -> Any:
-    """The scene made of such parts; equal to the first one bit by bit.
+    """Return a scene rebuilt from its parts, bitwise equal to the original.
 
     Args:
         kind: Scene, or a class derived from it.
-        parts: of `parts_of`, packed or not.
+        parts: result of `parts_of`, packed or not.
     """
     made = {key: _unpacked(value) for key, value in parts["made"].items()}
     if parts["order"] is not None:
@@ -68,28 +68,28 @@ def rebuilt(kind: type, parts: Table) -> Any:
 
 
 def copied(scene: Any, parts: Table, memo: dict[int, Any]) -> Any:
-    """A scene of its own, with a model of its own; functions are the same.
+    """Return a deep copy of a scene with a copy of its model; user functions are shared.
 
     Args:
         scene: the Scene.
-        parts: of `parts_of`.
-        memo: of `copy.deepcopy`.
+        parts: return value of `parts_of`.
+        memo: memo of `copy.deepcopy`.
     """
     shapes = {key: parts["made"].pop(key) for key in ("visual_model", "collision_model")}
-    parts["made"] = copy.deepcopy(parts["made"], memo) | shapes  # meshes are shared, and nobody changes them
+    parts["made"] = copy.deepcopy(parts["made"], memo) | shapes  # meshes are shared, since they never change
     parts |= {key: copy.deepcopy(parts[key], memo) for key in ("notes", "later")}
     return rebuilt(type(scene), parts | {"model": scene.model.copy()})
 
 
 def packed(parts: Table, name: str) -> Table:
-    """The parts with what pickle refuses packed by cloudpickle.
+    """Return the parts, with cloudpickle applied to objects that pickle does not support.
 
     Args:
-        parts: of `parts_of`.
-        name: of the scene.
+        parts: result of `parts_of`.
+        name: name of the scene.
 
     Raises:
-        InputError: something cannot be pickled; names it.
+        InputError: a part cannot be pickled; the message names it.
     """
     made = dict(parts["made"])
     for key in (*LISTS, "actuation", "visual_model", "collision_model"):
@@ -107,7 +107,7 @@ def _packed(value: Any, what: str, scene: str) -> Any:
     try:
         pickle.dumps(value)
         return value
-    except Exception as error:  # pickle raises whatever the object's own methods raise
+    except Exception as error:  # pickle passes on any exception of the object's methods
         reason = f"{type(error).__name__}: {error}"
     advice = "define its functions in a module"
     try:

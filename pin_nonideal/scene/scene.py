@@ -1,4 +1,4 @@
-"""Scene: a model with what holds it, rubs it and drives it, analysed once into the core's program."""
+"""Scene: a model with constraints, contacts, laws, forces and actuation, compiled once for the core."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from .stepping import SceneStepper, Stepper
 
 TERMS = tuple(provider.name for provider in core.Provider)
 IMPACTS = tuple(law.name for law in core.ImpactLaw)
-# What the core has taken when a scene was made.
+# Fields that cannot change after compilation.
 TAKEN = ("model", "constraints", "laws", "contacts", "forces", "actuation", "terms", "impact", "q0", "v0")
 
 
@@ -60,7 +60,7 @@ class Origin:
 class Scene:
     """A Pinocchio model with constraints, laws, contacts, forces and actuation.
 
-    Everything is checked when the scene is made; rows that can never act are found then and left out.
+    The constructor checks all descriptions and removes rows that can never act.
 
     Args:
         model: pinocchio.Model.
@@ -71,43 +71,43 @@ class Scene:
         forces: descriptions of `description.forces`.
         actuation: None, constant torques, (nv,) or by joint name, a function (t, q, v) -> tau, or a
             description of `pin_nonideal.description.actuation`.
-        q0: initial configuration; the neutral one when None.  Frames held to the world are held where they
-            are here.  Here and wherever a configuration is taken it is an array (nq,), a table by joint name,
-            {"crank": 1.0, "base": {"xyz": [0, 0, 1], "rpy": [0, 0, 1.57]}}, which leaves the others as they
-            are (in `solve`, `project` and `simulate` as in the scene's initial state), or the name of a
-            reference configuration.  Where a state is put on the constraints the entries of a table are held
-            and the others follow by the least move.
-        v0: initial velocity, an array (nv,), or a table by joint name whose entries are held while the others
-            follow the constraints; zero when None.
-        visual_model: pinocchio.GeometryModel for the replay, or a function that makes it when asked for.
-        collision_model: pinocchio.GeometryModel, or such a function.
-        name: shown in messages and pages; the model's own when None.
+        q0: initial configuration; the neutral one when None. Anchors without a second frame hold their frame
+            at its placement in q0. Every configuration argument is an array (nq,), a table by joint name such
+            as {"crank": 1.0, "base": {"xyz": [0, 0, 1], "rpy": [0, 0, 1.57]}}, or the name of a reference
+            configuration. Joints missing in a table keep their neutral value, and in `solve`, `project` and
+            `simulate` their value in the scene's initial state. Projection onto the constraints holds the
+            entries of a table, and the other joints follow with the least displacement.
+        v0: initial velocity, an array (nv,), or a table by joint name; zero when None. Entries of a table are
+            held while the others follow the constraints.
+        visual_model: pinocchio.GeometryModel for the replay, or a function that creates it on first access.
+        collision_model: pinocchio.GeometryModel, or a function that creates it on first access.
+        name: name in messages and pages; the model's name when None.
         notes: remarks of the loader, shown by `report`.
-        source: where the robot comes from.
-        licence: its licence.
-        terms: who computes M(q), the bias forces and the kinematics: "core", its own pass over the tree, or
+        source: origin of the robot.
+        licence: licence of the robot.
+        terms: provider of M(q), the bias forces and the kinematics: "core", the core's pass over the tree, or
             "pinocchio", Pinocchio's crba, nonLinearEffects and computeJointJacobians.
-        impact: what restitution e means: "newton", that a gap opens with e times the rate at which it closed,
-            or "poisson", that after the impulse which stops the approach a contact gives e times that impulse
-            again.  Without friction both say the same where all gaps that touch close with one e.
-        assembly_tolerance: to which the frames of loops are given [m or rad]: a gap up to it, in a direction
-            in which no joint moves, is no error.
+        impact: restitution law. "newton": a gap opens with e times the rate at which it closed. "poisson":
+            after the impulse that stops the approach, a contact applies e times that impulse again. Without
+            friction, both laws agree if all closing gaps have the same e.
+        assembly_tolerance: accuracy of the frames of loops [m or rad]. A residual up to it is no error in a
+            direction in which no joint moves.
 
     Raises:
-        InputError, UnknownNameError: something does not fit the model.
-        InconsistentConstraintsError: rows that vanish ask for an acceleration.
+        InputError, UnknownNameError: a description does not fit the model.
+        InconsistentConstraintsError: a vanishing row has a nonzero right-hand side.
 
     Attributes:
         q0: initial configuration, (nq,), read-only: loops are closed and frames are held from it.
         v0: initial velocity, (nv,), read-only.
         constraint_slices: rows of `lam` of each constraint and contact, by name.
-        anchor_frames: (name, frame id, frame id or None) of what joins two frames.
-        contact_names: names of the contacts, in the order of `closed`; the stops of a JointLimit one by one.
-        element_names: names of the frictional elements, in the order of `modes`.
+        anchor_frames: (name, frame id, frame id or None) of constraints between two frames.
+        contact_names: names of the contacts, in the order of `closed`; each stop of a JointLimit is one.
+        element_names: names of the friction elements, in the order of `modes`.
         law_names: names of the laws, in the order of the ledger's columns.
         dropped: (name, row, reason) of rows that can never act.
-        contact_friction: coefficients of sliding, spinning and rolling that the robot's file gives its
-            collision geometry, by name.
+        contact_friction: sliding, spinning and rolling coefficients of the collision geometry in the robot's
+            file, by name.
     """
 
     def __init__(
@@ -204,7 +204,7 @@ class Scene:
     # --- states ---------------------------------------------------------------------------------------------
 
     def initial_state(self) -> tuple[Array, Array]:
-        """The scene's initial state with its loops closed.
+        """Return the scene's initial state with closed loops.
 
         Returns:
             q (nq,), v (nv,).
@@ -232,32 +232,31 @@ class Scene:
     def project(
         self, q: State | None = None, v: State | None = None, t: float = 0.0, *, report: bool = False
     ) -> tuple[Array, Array] | tuple[Array, Array, ProjectionReport]:
-        """Nearest consistent state: phi(q, t) = 0, A v + phi_t = 0, and no contact inside its plane.
+        """Project a state: phi(q, t) = 0, A v + phi_t = 0, and no penetration of contacts.
 
-        Of all configurations that satisfy the constraints it is that with the least d^T M(q) d, where d is
-        the move from q in tangent coordinates and M(q) the mass matrix there; of all velocities, that with
-        the least d^T M d.  Units, scales of rows and copies of constraints change nothing.  Where the move is
-        long the nearest of the closures found from several starts is taken; the report tells whether it is
-        known to be the nearest.  Closures in gimbal lock (M nearly singular) are taken only where no other is
+        The projected configuration minimizes d^T M(q) d for the displacement d from q in tangent coordinates.
+        M(q) is the mass matrix at q. The projected velocity minimizes d^T M d for its change d. Units, row
+        scales and duplicate constraints do not affect the result. If the displacement is long, the nearest
+        closure from several starts is selected. `ProjectionReport.nearest` states if the search confirms it
+        as nearest. Closures in gimbal lock (nearly singular M) are selected only if no other closure is
         found.
 
         Args:
-            q: configuration, (nq,) or by joint name; the scene's initial one when None.
-            v: velocity, (nv,) or by joint name; the scene's initial one when None.  Entries of q and v that
-                are named are held, and the others follow; where the constraints leave no such configuration
-                but one within a thousandth of a radian or of the mechanism's length, named entries are taken
-                for rounded numbers, and move there.
+            q: configuration, (nq,) or by joint name; the scene's initial configuration when None.
+            v: velocity, (nv,) or by joint name; the scene's initial velocity when None. Named entries of q
+                and v are held, and the others follow. If the constraints do not admit the named entries of q,
+                these are treated as rounded: they may move by 1e-3 rad, or by 1e-3 of the mechanism's length.
             t: time [s].
-            report: also returns how far q and v moved, a `ProjectionReport`.
+            report: whether to return a `ProjectionReport` as well, with the displacements of q and v.
 
         Returns:
             q (nq,), v (nv,), and with `report` the report.
 
         Raises:
-            LoopClosureError: the constraints cannot be met from here; `gaps` names each gap.
-            InputError: wrong shapes or numbers, named entries that the constraints do not allow together,
-                a contact that starts deep inside its plane or has no short way out of it, or a coordinate
-                where floating-point numbers are more than a millimeter or milliradian apart.
+            LoopClosureError: no closure is found from this state; `gaps` names each gap.
+            InputError: wrong shapes or numbers, or named entries that the constraints do not admit together.
+                Further causes are a contact with deep initial penetration or without a short displacement out
+                of it, and a coordinate at which floating-point numbers are more than 1 mm or 1 mrad apart.
         """
         wanted = choice("report", report, (True, False))
         found = self._states.project(q, v, number("t", t))
@@ -275,20 +274,20 @@ class Scene:
         modes: Sequence[int] | None = None,
         several: str = "error",
     ) -> Solution:
-        """Eq. (40) at one state: acceleration, both parts of the force of constraint, multipliers, modes.
+        """Solve Eq. (40) at one state: acceleration, both parts of the constraint force, multipliers, modes.
 
         Args:
             q: configuration, (nq,) or by joint name.
             v: velocity, (nv,) or by joint name.
             t: time [s].
             tau: joint torques instead of the scene's actuation, (nv,) or by joint name.
-            modes: mode of each frictional element, +1, -1 or 0, and 2 without friction, as of a contact that
-                is open; by velocity and complementarity when None.
-            several: what to do where the laws allow several motions: "error", or "continue" with the one of
-                least friction.  What may stick or slip at rest sticks either way.
+            modes: mode of each friction element: +1 or -1 slips, 0 sticks, 2 is without friction, as in an
+                open contact. None determines the modes by velocity and complementarity.
+            several: behavior if the laws admit several motions: "error", or "continue" with the motion of
+                least friction. An element at rest that may stick or slip sticks in either case.
 
         Returns:
-            The Solution; `lam` holds all rows in the order of `constraint_slices`, zero for those that
+            The Solution; `lam` holds all rows in the order of `constraint_slices`, and zero for rows that
             never act.
 
         Raises:
@@ -307,14 +306,14 @@ class Scene:
         *,
         several: str = "error",
     ) -> Array:
-        """Just the acceleration, for loops of one's own.
+        """Return the acceleration alone, for user-written integration loops.
 
         Args:
             q: configuration, (nq,) or by joint name.
             v: velocity, (nv,) or by joint name.
             tau: joint torques instead of the scene's actuation, (nv,) or by joint name.
             t: time [s].
-            several: "error" or "continue" where the laws allow several motions, as in `solve`.
+            several: "error" or "continue" if the laws admit several motions, as in `solve`.
 
         Returns:
             a, (nv,).
@@ -328,51 +327,51 @@ class Scene:
     # --- terms ----------------------------------------------------------------------------------------------
 
     def describe(self) -> Description:
-        """Joints with order, limits, friction and damping; rows of constraints and contacts; laws; forces.
+        """Return tables of joints, constraints, contacts, laws, forces and actuation.
 
-        Printed, it is a text of tables; `to_dict()` gives plain values.
+        `str` formats the tables as text; `to_dict()` returns plain values.
         """
         return describe(self._compiled, self.name)
 
     def mass_matrix(self, q: State | None = None) -> Array:
-        """M(q) of the tree, without constraints, (nv, nv).
+        """Return the mass matrix M(q) of the tree, without constraints, (nv, nv).
 
         Args:
-            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
+            q: configuration, (nq,) or by joint name; None for the scene's closed initial configuration.
         """
         return self._queries.mass_matrix(q)
 
     def bias_forces(self, q: State | None = None, v: State | None = None) -> Array:
-        """Coriolis, centrifugal and gravity forces b of M a + b = tau, (nv,); Pinocchio's nonLinearEffects.
+        """Return Coriolis, centrifugal and gravity forces b of M a + b = tau, (nv,), as nonLinearEffects.
 
         Args:
-            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
+            q: configuration, (nq,) or by joint name; None for the scene's closed initial configuration.
             v: velocity, (nv,) or by joint name; zero when None.
         """
         return self._queries.bias_forces(q, v)
 
     def jacobian(self, name: str, q: State | None = None, t: float = 0.0) -> Array:
-        """Rows A of one constraint or contact, A a = b, in the order and scale of `lam`, (rows, nv).
+        """Return rows A of one constraint or contact, A a = b, in the order and scale of `lam`, (rows, nv).
 
-        Rows that can never act are among them.
+        Rows that can never act are included.
 
         Args:
-            name: of the constraint or contact.
-            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
+            name: name of the constraint or contact.
+            q: configuration, (nq,) or by joint name; None for the scene's closed initial configuration.
             t: time [s].
 
         Raises:
-            UnknownNameError: there is none of that name.
+            UnknownNameError: no constraint or contact has that name.
         """
         return self._queries.jacobian(name, q, t)
 
     def energies(self, q: State | None = None, v: State | None = None) -> dict[str, float]:
-        """Energy by name [J]: "kinetic", "potential" (of gravity, zero at the world's origin), and "total".
+        """Return energies by name [J]: "kinetic", "potential" (gravity, zero at the world's origin), "total".
 
-        That of springs is work of given forces in the ledger of a run, and no part of it.
+        Spring energy is not included: a run's ledger counts it as work of applied forces.
 
         Args:
-            q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
+            q: configuration, (nq,) or by joint name; None for the scene's closed initial configuration.
             v: velocity, (nv,) or by joint name; zero when None.
         """
         return self._queries.energies(q, v)
@@ -389,21 +388,21 @@ class Scene:
         t: float = 0.0,
         method: str = "semi_implicit_euler",
     ) -> tuple[Array, Array]:
-        """One step of a method from any state, for controllers and learning loops.
+        """Take one step from any state, for controllers and learning loops.
 
-        It is what `simulate(scene, dt, q, v, method=method, dt=dt)` ends with, events of friction and
-        contacts inside the step included.
+        The result is the final state of `simulate(scene, dt, q, v, method=method, dt=dt)`, including friction
+        and contact events inside the step.
 
         Args:
             q: configuration on the constraints, (nq,) or by joint name.
-            v: velocity on them, (nv,) or by joint name.
+            v: velocity on the constraints, (nv,) or by joint name.
             tau: joint torques, (nv,) or by joint name [N m or N]; those of the scene's actuation when None.
             dt: length of the step [s].
-            t: time at its start [s].
-            method: one of the core's with a fixed step: "semi_implicit_euler", "rk4" or "moreau".
+            t: time at the start of the step [s].
+            method: method of the core with a fixed step: "semi_implicit_euler", "rk4" or "moreau".
 
         Returns:
-            q (nq,) and v (nv,) at its end.
+            q (nq,) and v (nv,) at the end of the step.
 
         Raises:
             InputError: an argument does not fit.
@@ -424,18 +423,17 @@ class Scene:
         rtol: float | None = None,
         atol: float | None = None,
     ) -> Stepper:
-        """A run that is taken period by period, with torques of one's own, and keeps its state between them.
+        """Return a run that advances period by period with user torques and keeps its state between calls.
 
         Args:
-            period: length of time of each call of `Stepper.step` [s].
-            q: initial configuration, (nq,) or by joint name, put onto the constraints; the scene's when None.
+            period: duration of each call of `Stepper.step` [s].
+            q: initial configuration, (nq,) or by joint name, projected onto the constraints; the scene's when
+                None.
             v: initial velocity, (nv,) or by joint name; the scene's when None.
             t0: initial time [s].
-            tau: joint torques in place of the scene's actuation from the start on, (nv,) or by joint name, or
-                None.
-            method: one of the core's: adaptive, or with a fixed step.
-            dt: step of methods with a fixed step [s], a whole number of them in the period; the period when
-                None.
+            tau: joint torques that replace the scene's actuation from the start, (nv,), or None.
+            method: method of the core, adaptive or with a fixed step.
+            dt: step of fixed-step methods [s]; the period must be a multiple of it. None for the period.
             rtol: relative tolerance of adaptive methods, 1e-8 when None.
             atol: absolute tolerance, 1e-10 when None.
 
@@ -444,7 +442,7 @@ class Scene:
 
         Raises:
             InputError: an argument does not fit.
-            RunError: there is no motion from there.
+            RunError: no motion exists from the initial state.
         """
         return self._stepper.stepper(period, q, v, t0, tau, method, dt, rtol, atol)
 
@@ -452,12 +450,12 @@ class Scene:
 
     @property
     def visual_model(self) -> GeometryModel | None:
-        """pinocchio.GeometryModel for the replay, or None; meshes of a file are read when first asked for."""
+        """pinocchio.GeometryModel for the replay, or None; meshes of a file are read on first access."""
         return self._shapes.visual
 
     @property
     def collision_model(self) -> GeometryModel | None:
-        """pinocchio.GeometryModel for collisions, or None; meshes are read when first asked for."""
+        """pinocchio.GeometryModel for collisions, or None; meshes are read on first access."""
         return self._shapes.collision
 
     # --- new scenes -----------------------------------------------------------------------------------------
@@ -547,7 +545,7 @@ class Scene:
     # --- text -----------------------------------------------------------------------------------------------
 
     def report(self) -> str:
-        """What the scene is made of: joints, constraints, rows, rank, mobility, and what was left out."""
+        """Return a text with joints, constraints, rows, rank, mobility and removed rows of the scene."""
         q, v = self.initial_state()
         rank = self._evaluator.rank(q, v)
         notes = [f"note: {n}" for n in (*self.notes, *self._states.start_notes())]
@@ -557,7 +555,7 @@ class Scene:
 
 
 def compiled_scene(scene: Scene) -> CompiledScene:
-    """The scene as the core knows it.
+    """Return the compiled scene.
 
     Args:
         scene: the scene.
@@ -566,7 +564,7 @@ def compiled_scene(scene: Scene) -> CompiledScene:
 
 
 def scene_states(scene: Scene) -> SceneStates:
-    """States of a scene.
+    """Return the states of a scene.
 
     Args:
         scene: the scene.

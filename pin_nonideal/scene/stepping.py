@@ -27,14 +27,14 @@ WHOLE = 1e-9
 
 
 class Stepper:
-    """A run that a controller takes period by period: it goes on where the last period ended.
+    """A run that a controller advances period by period, each from the end of the last.
 
-    Made by `Scene.stepper`.  Between two periods torques may change; steps, modes of dry friction and factors
-    are kept, so that a period costs its own steps and nothing beside them.
+    `Scene.stepper` creates it. Torques may change between two periods. Step sizes, modes of dry friction and
+    factorizations are kept between periods, so a period costs only its steps.
 
     Args:
-        run: of the core.
-        compiled: what the core knows of the scene.
+        run: stepped run of the core.
+        compiled: the compiled scene.
     """
 
     def __init__(self, run: core.SteppedRun, compiled: CompiledScene) -> None:
@@ -46,57 +46,57 @@ class Stepper:
 
     @property
     def t(self) -> float:
-        """Time now [s]."""
+        """Current time [s]."""
         self._require_begun()
         return self._run.t
 
     @property
     def q(self) -> Array:
-        """Configuration now, (nq,), a copy."""
+        """Current configuration, (nq,), a copy."""
         self._require_begun()
         return self._run.state()[0]
 
     @property
     def v(self) -> Array:
-        """Velocity now, (nv,), a copy."""
+        """Current velocity, (nv,), a copy."""
         self._require_begun()
         return self._run.state()[1]
 
     @property
     def modes(self) -> Array:
-        """Mode of each frictional element now: +1 or -1 slips, 0 sticks, 2 where its contact is open."""
+        """Current mode of each friction element: +1 or -1 slips, 0 sticks, 2 if its contact is open."""
         return np.array([int(mode) for mode in self._run.modes], dtype=np.int8)
 
     def step(self, tau: ArrayLike | None = None) -> tuple[Array, Array]:
-        """Goes on for a period.
+        """Advance the run by one period.
 
         Args:
-            tau: joint torques in place of the scene's actuation from here on, (nv,) [N m or N]; None leaves
-                them as they are.
+            tau: joint torques that replace the scene's actuation from now on, (nv,) [N m or N]; None keeps
+                the current torques.
 
         Returns:
-            q (nq,) and v (nv,) at its end.
+            q (nq,) and v (nv,) at the end of the period.
 
         Raises:
             InputError: tau does not fit, or the run has stopped.
-            RunError: the run stops here; `reset` begins anew.
+            RunError: the run stopped within the period; `reset` starts a new run.
         """
         self._require_begun()
         self._guarded(self._run.advance, tau)
         return self._run.state()
 
     def reset(self, q: Array, v: Array, t: float = 0.0, tau: ArrayLike | None = None) -> None:
-        """Begins anew; nothing is left of what was before.
+        """Restart the run at a state and discard all previous data.
 
         Args:
-            q: configuration on the constraints, (nq,), as `Scene.project` gives it.
-            v: velocity on them, (nv,).
+            q: configuration on the constraints, (nq,), as from `Scene.project`.
+            v: velocity on the constraints, (nv,).
             t: time [s].
-            tau: joint torques in place of the scene's actuation, (nv,), or None.
+            tau: joint torques that replace the scene's actuation, (nv,), or None.
 
         Raises:
             InputError: an argument does not fit.
-            RunError: there is no motion from there.
+            RunError: no motion exists from this state.
         """
         model = self._compiled.model
         at, speed = array("Stepper: q", q, (model.nq,)), array("Stepper: v", v, (model.nv,))

@@ -1,7 +1,7 @@
-"""Checkpoint: a run between two steps in one file, from which it goes on bit by bit.
+"""Checkpoint: one file with the state of a run between two steps, for bitwise continuation.
 
 The file is a NumPy archive without pickles: a header in JSON, and the core's state as bytes with their
-digest.  Reading it executes nothing.
+digest. Reading it executes no code.
 """
 
 from __future__ import annotations
@@ -33,23 +33,23 @@ from pin_nonideal.version import __version__
 from .options import RunOptions
 
 FORMAT = 2
-# Longer than any run [s].
+# Largest interval, longer than any run [s].
 FOREVER = 1e8
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A run between two steps.
+    """State and options of a run between two steps.
 
     Attributes:
         scene: name of the scene.
-        origin: name and parameters that `load` makes the scene from, or None.
-        fingerprint: of the scene, see `fingerprint`.
-        options: of the run, as `simulate` checked them.
+        origin: name and parameters for `load`, or None.
+        fingerprint: digest of the scene, see `fingerprint`.
+        options: checked options of the run.
         interval: wall time between checkpoints [s].
         wall_s: wall time so far [s].
-        notes: on the start of the run.
-        state: of the core.
+        notes: notes on the start of the run.
+        state: state of the core.
     """
 
     scene: str
@@ -63,18 +63,18 @@ class Checkpoint:
 
 
 class Saver:
-    """Writes the checkpoints of one run.
+    """Writer of the checkpoints of one run.
 
     Args:
         path: the file.
-        scene: what runs.
-        options: of the run.
+        scene: the scene of the run.
+        options: options of the run.
         interval: wall time between checkpoints [s].
         wall_s: wall time that earlier parts of the run took [s].
         notes: notes on the start of the run.
 
     Attributes:
-        interval: see above, bounded.
+        interval: wall time between checkpoints, bounded [s].
     """
 
     def __init__(
@@ -102,10 +102,10 @@ class Saver:
         }
 
     def __call__(self, state: bytes) -> None:
-        """Replaces the file; a run that has a checkpoint goes on when a later one cannot be written.
+        """Replace the file; if a later checkpoint cannot be written, warn and keep the last one.
 
         Raises:
-            OutputError: the first one cannot be written.
+            OutputError: the first checkpoint cannot be written.
         """
         wall = self._wall + time.perf_counter()
         header = {**self._header, "wall_s": wall, "digest": hashlib.sha256(state).hexdigest()}
@@ -126,13 +126,13 @@ class Saver:
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
-    """Reads a file that a run with `checkpoint` wrote.
+    """Read a checkpoint file.
 
     Args:
         path: the file.
 
     Raises:
-        LoadingError: it is missing, damaged, no checkpoint, or of another version of this package.
+        LoadingError: the file is missing, damaged, no checkpoint, or of another version of this package.
     """
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -165,14 +165,14 @@ def read_checkpoint(path: Path) -> Checkpoint:
 
 
 def _version() -> list[str]:
-    """Of the package and of what its core keeps of a run: another one steps differently in the last bits."""
+    """Return package version and state layout of the core; other versions may differ in the last bits."""
     return [__version__, core.state_layout]
 
 
 def fingerprint(scene: Scene) -> str:
-    """Digest of all that the core knows of a scene: the model, and every row, law and force in numbers.
+    """Return a digest of a compiled scene: model, rows, laws, forces and actuation as numbers.
 
-    Functions of the user count as functions, whatever they compute.
+    All user functions count as equal.
 
     Args:
         scene: the scene.
@@ -184,7 +184,7 @@ def fingerprint(scene: Scene) -> str:
 
 
 class _Transcript:
-    """The core's builder, with a digest of what it is told."""
+    """A proxy of the core's builder that computes a digest of its calls."""
 
     def __init__(self, builder: core.Builder, digest: Any) -> None:
         self._builder, self._digest = builder, digest
@@ -203,7 +203,7 @@ class _Transcript:
 
 
 def _plain(x: Any) -> Any:
-    """Numbers, names and functions as JSON knows them."""
+    """Convert arguments to JSON values; functions become a placeholder."""
     if isinstance(x, (list, tuple, np.ndarray)):
         return [_plain(each) for each in x]
     if isinstance(x, np.generic):
@@ -214,10 +214,10 @@ def _plain(x: Any) -> Any:
 
 
 def refuse_other_scene(held: Checkpoint, scene: Scene, path: Path) -> None:
-    """Raises unless the scene is the one that the run was of.
+    """Check that a scene is the scene of the checkpoint.
 
     Raises:
-        InputError: its model, rows, laws or forces differ.
+        InputError: model, rows, laws or forces differ.
     """
     if fingerprint(scene) != held.fingerprint:
         raise InputError(

@@ -1,6 +1,6 @@
-"""Mechanisms of one scene that share nothing, neither joint, row nor load.
+"""Decoupled components of a scene: mechanisms without a common joint, row or load.
 
-They are found once a scene; each is a scene of its own, whose run is that of it alone.
+Each component is a separate scene. The components of a scene are computed once and cached.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from pin_nonideal.states.parsing import named_configuration
 from pin_nonideal.types import Model
 
 Indices = NDArray[np.intp]
-# What acts on the bodies that it names and on no other.
+# Descriptions that act only on the bodies that they name.
 LOCAL = (
     *(PointAnchor, FrameAnchor, HingeAnchor, Distance, JointCoupling, PrescribedMotion, KnifeEdge),
     *(JointFriction, SigmoidFriction, Drag, SpringDamper, JointSpring, Wrench),
@@ -40,14 +40,14 @@ PLACES = ("frame", "frame1", "frame2", "joint", "joint1", "joint2")
 
 @dataclass(frozen=True, eq=False)
 class Component:
-    """A mechanism of a scene that shares nothing with the others.
+    """A mechanism of a scene that is decoupled from the others.
 
     Attributes:
-        scene: it alone.
-        q: where its configuration stands in that of the whole, (nq,).
-        v: its velocity, (nv,).
-        elements: its frictional elements, (ne,).
-        works: its columns of work.
+        scene: the mechanism as a separate scene.
+        q: indices of its coordinates in the configuration of the whole scene, (nq,).
+        v: indices of its coordinates in the velocity of the whole scene, (nv,).
+        elements: indices of its friction elements in the whole scene, (ne,).
+        works: indices of its work columns in the whole scene.
     """
 
     scene: Scene
@@ -58,10 +58,12 @@ class Component:
 
 
 def components(scene: Scene) -> list[Component]:
-    """The mechanisms of a scene, where there are several and dry friction makes events; none otherwise.
+    """Return the decoupled mechanisms of a scene with dry friction; empty if there is only one.
+
+    Scenes with contacts, states of laws or global descriptions count as one mechanism.
 
     Args:
-        scene: the whole.
+        scene: the whole scene.
     """
     found: list[Component] | None = scene.__dict__.get("_components")
     if found is None:
@@ -101,7 +103,7 @@ def _components(scene: Scene) -> list[Component]:
 
 
 def _trees(model: Model) -> list[int]:
-    """The joint at the root of each joint's tree."""
+    """Return the root joint of each joint's tree."""
     tree = [0]
     for joint, parent in enumerate(list(model.parents)[1:], 1):
         tree.append(tree[parent] if parent else joint)
@@ -109,7 +111,7 @@ def _trees(model: Model) -> list[int]:
 
 
 def _touched(one: Any, model: Model, tree: Sequence[int], anchors: dict[str, Any]) -> set[int]:
-    """Roots of the trees that a description acts on."""
+    """Return the root joints of the trees that a description acts on."""
     roots: set[int] = set()
     for place in (f.name for f in fields(one) if f.name in PLACES):
         name = getattr(one, place)
@@ -152,7 +154,7 @@ def _component(
 
 
 def _alone(model: Model, joints: Sequence[int]) -> tuple[Model, Indices, Indices]:
-    """Some trees of a model as a model, and where its coordinates stand in the whole."""
+    """Return some trees of a model as a separate model, and the indices of its q and v in the whole model."""
     alone, number = pin.Model(), {0: 0}
     alone.name, alone.gravity = model.name, model.gravity
     q: list[int] = []

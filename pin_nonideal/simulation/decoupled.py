@@ -1,7 +1,7 @@
-"""Runs in which each component of a scene takes its own steps.
+"""Runs in which each decoupled component of a scene takes its own steps.
 
-An event of dry friction ends a step.  Where mechanisms that share nothing stepped together, each of them
-would stop at the events of all, and the cost of a run would grow with the square of their number.
+An event of dry friction ends a step. If all components took common steps, each would stop at the events of
+all others. The cost of a run would then grow with the square of their number.
 """
 
 from __future__ import annotations
@@ -22,30 +22,30 @@ from .options import METHODS, SCIPY, RunOptions
 
 
 def stepped_apart(scene: Scene, options: RunOptions) -> list[Component]:
-    """The components that take their own steps in a run; none where all step together.
+    """Return the components that take their own steps in a run; empty if all take common steps.
 
     Args:
-        scene: what runs.
-        options: of the run.
+        scene: the scene of the run.
+        options: options of the run.
     """
     apart = METHODS[options.method] and options.method not in SCIPY and not options.event_names
     return components(scene) if apart and options.max_steps == 0 and options.max_wall == 0.0 else []
 
 
 def run_together(scene: Scene, q0: Array, v0: Array, options: RunOptions, **more: Any) -> core.Outcome:
-    """A run of all mechanisms in common steps, in a workspace that an earlier run of the scene has left.
+    """Run all mechanisms in common steps, in a workspace reused from an earlier run of the scene.
 
     Args:
-        scene: what runs.
+        scene: the scene of the run.
         q0: initial configuration, (nq,).
         v0: initial velocity, (nv,).
-        options: of the run.
-        **more: what the core takes beside.
+        options: options of the run.
+        **more: further arguments of the core's `simulate`.
     """
     idle: list[core.Runner] = scene.__dict__.setdefault("_idle_runners", [])
     try:
         runner = idle.pop()
-    except IndexError:  # the first run, or others are under way
+    except IndexError:  # first run, or all workspaces are in use
         runner = compiled_scene(scene).program.runner()
     outcome = runner.simulate(q0, v0, options, **more)
     idle.append(runner)
@@ -60,15 +60,15 @@ def run_apart(
     options: RunOptions,
     tick: Callable[[float], None] | None,
 ) -> core.Outcome | None:
-    """Runs each component alone and puts their motions together; None where one of them fails.
+    """Run each component separately and merge the results; None if a component fails.
 
     Args:
-        scene: the whole.
-        parts: its components.
+        scene: the whole scene.
+        parts: components of the scene.
         q0: initial configuration, (nq,).
         v0: initial velocity, (nv,).
-        options: of the run.
-        tick: is told the time, or None.
+        options: options of the run.
+        tick: progress function of the time, or None.
     """
     outcomes = []
     for k, part in enumerate(parts):
@@ -87,15 +87,15 @@ def run_apart(
 def roll_apart(
     scene: Scene, parts: Sequence[Component], q0: Array, v0: Array, options: RunOptions, threads: int
 ) -> list[core.Outcome | None]:
-    """What `run_apart` gives for each of many states, on several threads.
+    """Return the result of `run_apart` for each of many states, on several threads.
 
     Args:
-        scene: the whole.
-        parts: its components.
+        scene: the whole scene.
+        parts: components of the scene.
         q0: initial configurations, (n, nq).
         v0: initial velocities, (n, nv).
-        options: of the runs.
-        threads: how many.
+        options: options of the runs.
+        threads: number of threads.
     """
     of_parts = []
     for part in parts:
@@ -107,7 +107,7 @@ def roll_apart(
     for k, outcomes in enumerate(zip(*of_parts, strict=True)):
         if all(one is not None and one.stopped is None for one in outcomes):
             results.append(joined_outcome(scene, parts, cast(list[core.Outcome], outcomes), options))
-        else:  # together, which tells what stops them
+        else:  # a run in common steps reports the failure of the whole scene
             program = compiled_scene(scene).program
             results += core.rollout(program, q0[k : k + 1], v0[k : k + 1], options, 1, [], np.zeros((1, 0)))
     return results
@@ -122,7 +122,7 @@ def _options_of(part: Component, options: RunOptions, nv: int) -> RunOptions:
 def _after(
     tick: Callable[[float], None] | None, k: int, n: int, options: RunOptions
 ) -> Callable[[float], None] | None:
-    """The time told by the k-th of n runs, as a part of all of them."""
+    """Return a progress function for the k-th of n runs that maps its time to the progress of all runs."""
     if tick is None:
         return None
     t0, duration = options.t0, options.duration

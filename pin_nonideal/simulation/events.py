@@ -1,4 +1,4 @@
-"""What a user asks of a run while it goes: events by functions, and a callback between steps."""
+"""User hooks of a run: event functions, and a callback between steps."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from pin_nonideal.validation import count
 
 from .options import RunOptions
 
-Watched = tuple[Callable[..., float], int, int]  # function, direction, how many end the run
+Watched = tuple[Callable[..., float], int, int]  # function, direction, number of events that ends the run
 SEPARATE = "separate"
-SAME_TIME = 1e-12  # part of a time, or number of seconds, below which two are one
+SAME_TIME = 1e-12  # times closer than this are equal: relative, or absolute [s] below 1 s
 
 
 class Asked(NamedTuple):
-    """Events that a user asks for.
+    """Event functions of a run.
 
     Attributes:
-        watched: as the core takes them.
-        names: of the functions.
+        watched: functions with direction and terminal count, in the form of the core.
+        names: unique names of the functions.
         separate: whether events are no samples of the trajectory.
     """
 
@@ -38,13 +38,13 @@ NOTHING = Asked([], (), False)
 
 
 def asked_events(events: object) -> Asked:
-    """Functions whose zeros are events, and whether events stay out of the samples.
+    """Parse the `events` argument of `simulate`.
 
     Args:
         events: None, "separate", a function (t, q, v) -> number, or a list of these.
 
     Raises:
-        InputError: something else is there, or `terminal` or `direction` of a function is none.
+        InputError: an entry is of another type, or `terminal` or `direction` of a function is invalid.
     """
     if events is None:
         return NOTHING
@@ -74,7 +74,7 @@ def _valued(f: Callable[..., Any], who: str) -> Callable[..., float]:
 
 
 def _direction(f: Callable[..., Any], who: str) -> int:
-    """Sign of the attribute `direction`, as solve_ivp has it."""
+    """Return the sign of the attribute `direction`, as in solve_ivp."""
     given = getattr(f, "direction", 0)
     if isinstance(given, bool) or not isinstance(given, (int, float, np.number)) or not np.isfinite(given):
         raise InputError(f"{who}: direction must be a number, of which the sign counts; got {given!r}")
@@ -82,7 +82,7 @@ def _direction(f: Callable[..., Any], who: str) -> int:
 
 
 def _terminal(f: Callable[..., Any], who: str) -> int:
-    """The attribute `terminal`, as solve_ivp has it: whether it ends the run, or how many of them do."""
+    """Return the number of events that ends the run, 0 for none, from the attribute `terminal`."""
     given = getattr(f, "terminal", False)
     if given is None or isinstance(given, (bool, np.bool_)):
         return int(bool(given))
@@ -90,14 +90,14 @@ def _terminal(f: Callable[..., Any], who: str) -> int:
 
 
 def asked_callback(callback: object, nv: int) -> Callable[[float, Array, Array], Any] | None:
-    """The callback between steps, with its result checked.
+    """Wrap the callback between steps, with its result checked.
 
     Args:
         callback: None, or a function (t, q, v) -> None, True to stop, or torques (nv,).
         nv: number of velocities.
 
     Raises:
-        InputError: it cannot be called.
+        InputError: the callback is not callable.
     """
     if callback is None:
         return None
@@ -115,11 +115,11 @@ def asked_callback(callback: object, nv: int) -> Callable[[float, Array, Array],
 
 
 def grid_of(t: Array, options: RunOptions) -> NDArray[np.bool_]:
-    """Which samples lie on the asked grid, both ends among it; of several at one time the last.
+    """Return the mask of samples on the output grid, both ends included; of equal times only the last.
 
     Args:
         t: times [s], (nt,).
-        options: of the run.
+        options: options of the run.
 
     Returns:
         Mask, (nt,).
@@ -132,11 +132,11 @@ def grid_of(t: Array, options: RunOptions) -> NDArray[np.bool_]:
 
 
 def exact_grid(t: Array, options: RunOptions) -> Array:
-    """The times of the asked grid nearest to those of samples, (nt,).
+    """Return the time of the output grid nearest to each sample [s], (nt,).
 
     Args:
         t: times [s], (nt,).
-        options: of the run.
+        options: options of the run.
     """
     nearest = options.t0 + options.output_dt * np.round((t - options.t0) / options.output_dt)
     end = options.t0 + options.duration

@@ -1,4 +1,4 @@
-"""The outcome of a scene put together from those of its components, each of which took its own steps."""
+"""Merging of the outcomes of components that took their own steps."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Motion = tuple[Array, Array, Array, Array, Array]  # states, modes, directions, 
 
 
 class JoinedEvent(NamedTuple):
-    """An event of one component, by the numbers of the whole."""
+    """An event of one component, with the element index of the whole scene."""
 
     time: float
     kind: core.EventKind
@@ -36,16 +36,16 @@ def joined_outcome(
     options: RunOptions,
     stopped: BaseException | None = None,
 ) -> core.Outcome:
-    """The outcome of the whole, with samples on the asked grid and at all events.
+    """Merge the outcomes of all components, with samples on the output grid and at all events.
 
-    Without a grid they are at the steps of the component that takes most.
+    Without a grid, samples lie at the steps of the component with the most steps.
 
     Args:
-        scene: the whole.
-        parts: its components.
-        outcomes: of each, with interpolants.
-        options: of the run.
-        stopped: what stopped it, or None.
+        scene: the whole scene.
+        parts: components of the scene.
+        outcomes: outcome of each component, with interpolants.
+        options: options of the run.
+        stopped: exception that stopped the run, or None.
     """
     dense = [
         dense_output(one, options, part.v.size, part.elements.size)
@@ -79,14 +79,14 @@ def joined_outcome(
 
 
 def _motion(scene: Scene, parts: Sequence[Component], dense: Sequence[DenseOutput], t: Array) -> Motion:
-    """States of the whole at some times, with the modes, directions of slip and moved energy there.
+    """Return states of the whole scene at given times, with modes, slip directions and energy moved.
 
     Directions have no columns if every element slips along one direction.
     """
     nq, nv, ne = scene.model.nq, scene.model.nv, len(scene.element_names)
     work = dense[0].states.shape[2] - parts[0].q.size - parts[0].v.size if dense else 0
     columns = len(compiled_scene(scene).program.power_names) if work else 0
-    # A row for each coordinate, in which times stand one after the other, as each component fills them.
+    # One row per coordinate, so that each component fills contiguous times.
     states, moved = np.zeros((nq + nv + columns, t.size)), np.zeros(t.size)
     modes, sought = np.zeros((2, ne, t.size), dtype=np.int8)
     turns = any(one.directions.shape[2] for one in dense)
@@ -121,7 +121,7 @@ def _samples(
     sought: Array,
     moved: Array,
 ) -> dict[str, Any]:
-    """The samples as the core has them: evaluated where more than the state of a tree is asked for."""
+    """Return the samples as fields of a core outcome; states of a tree alone need no evaluation."""
     program, (nq, nv) = compiled_scene(scene).program, (scene.model.nq, scene.model.nv)
     asked = (
         options.a,
@@ -154,12 +154,12 @@ def _samples(
 def _join_dense(
     scene: Scene, parts: Sequence[Component], dense: Sequence[DenseOutput], joined: SimpleNamespace
 ) -> None:
-    """Interpolants between all steps of all components: the polynomials of each, on shorter stretches."""
+    """Join the interpolants of all components: their polynomials, on the intervals between all steps."""
     ends = np.unique(np.concatenate([one.times.ravel() for one in dense]))
     points = dense[0].states.shape[1]
     part = 0.5 * (1.0 - np.cos(np.pi * np.arange(points) / (points - 1)))
     stretches = np.stack([ends[:-1], ends[1:]], axis=1)
-    # Inside, so that the ends of a stretch belong to it.
+    # Points stay inside an interval, so that they are evaluated by its own polynomial.
     inside = np.clip(part, 1e-9, 1.0 - 1e-9)
     t = (stretches[:, :1] + inside * np.diff(stretches, axis=1)).ravel()
     states, modes, directions, sought, _ = _motion(scene, parts, dense, t)

@@ -1,4 +1,4 @@
-"""What a run was asked for: method, tolerances, lengths of time and records, checked before it starts."""
+"""Options of a run: method, tolerances, durations and records, checked before the start."""
 
 from __future__ import annotations
 
@@ -17,49 +17,48 @@ from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array
 from pin_nonideal.validation import array, choice, count, flag, label, nonnegative, number, positive, sequence
 
-# Whether each chooses its own steps.
+# Integration methods by name, with a flag for adaptive steps.
 METHODS = {method.name: method.adaptive for method in core.methods()}
-# Those of SciPy, and of them those that go on from a state that was put in place.
+# Methods of SciPy, and its one-step methods, which can continue from a projected state.
 SCIPY = tuple(method.name for method in core.methods() if method.outside)
 ONE_STEP = tuple(method.name for method in core.methods() if method.outside and method.one_step)
 RECORDS = ("a", "forces", "energy", "power", "laws", "reactions", "tau", "dense")
 FIELDS = {"F_ideal": "forces", "F_nonideal": "forces", "lam": "forces", "lam_ideal": "forces"}
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-8, 1e-10
-# Times are floating-point numbers: a step of fewer of their spacings is off by more than a percent, and one
-# shorter than a spacing leads nowhere.
+# Minimum length of a step in spacings of floating-point times. A shorter step has an error above one percent.
 LEAST_SPACINGS = 100.0
-NO_LIMIT = 2**62  # of steps
-MOST_KEPT = 32  # options that a scene keeps
+NO_LIMIT = 2**62  # steps of a run without limit
+MOST_KEPT = 32  # maximum number of cached options of a scene
 MOST_SAMPLES = 1e8  # some gigabytes for a small robot
-# No step meets a tolerance below rounding; the square of what misses it must not overflow.
+# Smallest tolerances: no step meets rtol below rounding, and the square of error / atol must not overflow.
 LEAST_RTOL, LEAST_ATOL = 1e-14, 1e-100
 
 
 @dataclass(frozen=True, eq=False)
 class RunOptions:
-    """What a run was asked for, as the core reads it and a checkpoint holds it.
+    """Options of a run, in the form that the core and checkpoints read.
 
     Attributes:
-        method: of integration.
-        duration: length of time [s].
+        method: integration method.
+        duration: duration [s].
         t0: initial time [s].
         rtol: relative tolerance.
         atol: absolute tolerances of positions, velocities and states of laws, (2 nv + nz,).
         dt: step of the fixed-step methods [s], or 0.
         output_dt: time between samples [s], or 0 for every accepted step.
-        max_steps: most accepted steps, or 0 for as many as it takes, and fewer of a stiff scene.
+        max_steps: maximum number of accepted steps, or 0 for no limit except in a stiff scene.
         a: whether accelerations are recorded.
-        forces: whether forces and multipliers are.
-        energy: whether the ledger is.
-        power: whether powers are.
-        laws: whether the forces of each law are, and limits of friction.
-        reactions: whether the wrenches that joints and anchors carry are.
-        tau: whether torques of the actuation are.
-        dense: whether interpolants of the steps are.
-        max_wall: wall time that the run may take [s], or 0 for as much as it takes.
-        event_names: of the user's functions whose zeros are events.
-        separate: whether samples lie on the asked grid only.
-        several: "error" or "continue" where the laws allow several motions.
+        forces: whether forces and multipliers are recorded.
+        energy: whether the energy ledger is recorded.
+        power: whether powers are recorded.
+        laws: whether the forces of each law and the friction limits are recorded.
+        reactions: whether the reaction wrenches of joints and anchors are recorded.
+        tau: whether torques of the actuation are recorded.
+        dense: whether interpolants of the steps are recorded.
+        max_wall: maximum wall time [s], or 0 for no limit.
+        event_names: names of the user's event functions.
+        separate: whether samples lie on the output grid only.
+        several: "error" or "continue" if the laws admit several motions.
         strict: whether an impact that gains energy is an error.
     """
 
@@ -103,27 +102,27 @@ def run_options(
     separate: bool = False,
     strict: bool = False,
 ) -> RunOptions:
-    """Options of a run, checked.
+    """Return the checked options of a run.
 
     Args:
-        scene: what to simulate.
-        duration: length of time [s].
+        scene: scene to simulate.
+        duration: duration [s].
         t0: initial time [s].
-        method: of integration.
+        method: integration method.
         rtol: relative tolerance, or None.
         atol: absolute tolerance, a number or an array (2 nv,), or None.
         dt: step of the fixed-step methods [s], or None.
         output_dt: time between samples [s], or None.
-        max_steps: most accepted steps, infinite too, or None.
-        record: names of what to record.
+        max_steps: maximum number of accepted steps, possibly infinite, or None.
+        record: names of quantities to record.
         several: "error" or "continue".
-        max_wall: most wall time [s], infinite too, or None.
-        event_names: of the user's functions whose zeros are events.
-        separate: whether samples lie on the asked grid only.
+        max_wall: maximum wall time [s], possibly infinite, or None.
+        event_names: names of the user's event functions.
+        separate: whether samples lie on the output grid only.
         strict: whether an impact that gains energy is an error.
 
     Raises:
-        InputError: one is wrong, or they do not go together.
+        InputError: an option is invalid, or two options exclude each other.
     """
     choice("simulate: method", method, tuple(METHODS))
     if not METHODS[method]:
@@ -192,18 +191,18 @@ def run_options(
 
 
 def kept_options(scene: Scene, *asked: Any) -> RunOptions:
-    """The same as `run_options`, checked once: controllers ask for the same run again and again.
+    """Return cached options of `run_options`; controllers often repeat the same run.
 
     Args:
-        scene: what to simulate, which keeps them.
+        scene: scene to simulate, which holds the cache.
         *asked: the other arguments of `run_options`, in order.
     """
     kept: dict[Any, RunOptions] = scene.__dict__.setdefault("_kept_options", {})
-    key = (asked, tuple(map(type, asked)))  # True is no 1.0
+    key = (asked, tuple(map(type, asked)))  # types separate True from 1.0
     try:
         if key in kept:
             return kept[key]
-    except TypeError:  # lists and arrays, which may change
+    except TypeError:  # lists and arrays are mutable, so their options are not cached
         return run_options(scene, *asked)
     if len(kept) >= MOST_KEPT:
         kept.clear()
@@ -212,10 +211,10 @@ def kept_options(scene: Scene, *asked: Any) -> RunOptions:
 
 
 def _check_opening(method: str, record: str | Sequence[str], name: str) -> None:
-    """Refuses methods and records that know no contacts that open.
+    """Check that method and records support unilateral contacts.
 
     Raises:
-        InputError: it is one.
+        InputError: the method or a record does not support them.
     """
     if "dense" in ((record,) if isinstance(record, str) else record):
         raise InputError(
@@ -232,13 +231,13 @@ def _check_opening(method: str, record: str | Sequence[str], name: str) -> None:
 
 
 def _most_steps(max_steps: float | None) -> int:
-    """A number of steps as the core reads it; infinity is one that no run reaches.
+    """Return the maximum number of steps in the form of the core: 0 for None, a huge number for infinity.
 
     Args:
         max_steps: a whole number of at least 1, infinity, or None.
 
     Raises:
-        InputError: it is something else.
+        InputError: max_steps has another value.
     """
     if max_steps is None:
         return 0
@@ -249,16 +248,16 @@ def _most_steps(max_steps: float | None) -> int:
 
 
 def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, float]) -> None:
-    """Refuses lengths of time that floating-point times near the end of the run cannot tell apart.
+    """Check that durations and steps are much longer than the spacing of floating-point times.
 
     Args:
-        scene: what to simulate.
+        scene: scene to simulate.
         t0: initial time [s].
-        duration: length of time [s].
-        lengths: dt and output_dt, as far as given [s].
+        duration: duration [s].
+        lengths: dt and output_dt [s], if given.
 
     Raises:
-        InputError: a length is too short, or leaves more samples than a run can hold.
+        InputError: a length is too short, or the run would have too many samples.
     """
     end = max(abs(t0), abs(t0 + duration))
     spacing = float(np.spacing(end))
@@ -267,7 +266,7 @@ def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, fl
     if isinstance(control, SampledControl):
         named[f"{label(control)}: period"] = control.period
     for what, value in named.items():
-        if not value >= LEAST_SPACINGS * spacing:  # also when the end is beyond all numbers
+        if not value >= LEAST_SPACINGS * spacing:  # true for an infinite end as well
             raise InputError(
                 f"{what} must be at least {LEAST_SPACINGS:g} times the spacing of floating-point times, "
                 f"which is {spacing:.2g} s at t = {end:g} s; got {value:g} s"

@@ -1,4 +1,4 @@
-"""The bar that shows how far a run has come."""
+"""Progress bar of a run."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ Tick = Callable[[float], None]
 
 
 def progress_bar(progress: bool | None, options: RunOptions) -> AbstractContextManager[Tick | None]:
-    """While a run lasts, a function that shows the time it has come to; None where no bar is wanted.
+    """Return a context manager of a function that shows the current time, or of None without a bar.
 
     Args:
         progress: True, False, or None for a terminal only.
-        options: of the run.
+        options: options of the run.
     """
     wanted = sys.stderr.isatty() if progress is None else progress
     return _bar(options) if wanted else nullcontext()

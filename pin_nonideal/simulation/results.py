@@ -1,4 +1,4 @@
-"""What the core hands over as a Trajectory; what stopped the run as an exception that holds it."""
+"""Conversion of core results to a Trajectory, and of failures to exceptions with the trajectory attached."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from pin_nonideal.types import Table
 from .events import exact_grid, grid_of
 from .options import RunOptions
 
-# A sample with a larger gap than this [m or rad] has left the constraints: after every step projection comes
-# down to rounding, and in singular positions to the square root of it.
+# Largest residual of a sample on the constraints [m or rad]. Projection after each step reduces residuals to
+# rounding, or to the square root of rounding in singular positions.
 LEFT = 1e-6
 KEPT = "the trajectory up to there is in error.trajectory"
 
@@ -43,19 +43,19 @@ def finish(
     wall: float,
     notes: Sequence[str] = (),
 ) -> Trajectory:
-    """The trajectory of a run; raises what stopped it, with the trajectory attached.
+    """Return the trajectory of a run, or raise the error that stopped it with the trajectory attached.
 
     Args:
-        scene: the scene that ran.
-        outcome: of the core.
-        stopped: a failure of the core, what a function of the user raised, an interrupt, or None.
-        options: what was asked for.
+        scene: the scene of the run.
+        outcome: outcome of the core.
+        stopped: a failure of the core, an exception of a user function, an interrupt, or None.
+        options: options of the run.
         wall: wall time [s].
-        notes: what to know of it.
+        notes: notes on the run.
 
     Raises:
         RunError: the run stopped early.
-        OutputError: its first checkpoint could not be written.
+        OutputError: the first checkpoint of the run could not be written.
     """
     fields = partial(_fields, scene, outcome, options, list(notes))
     stats = outcome_stats(outcome, wall)
@@ -63,7 +63,7 @@ def finish(
     def shaped() -> Trajectory:
         return Trajectory(**fields(), stats=stats)
 
-    # A time step may enter a contact, which the next one finds; a loop that opens ends the steps by itself.
+    # A time step may penetrate a contact, which the next step detects. An opening loop stops the run itself.
     enters = options.method == "moreau" and bool(compiled_scene(scene).opening_names)
     if (
         not enters
@@ -94,7 +94,7 @@ def finish(
 
 
 def _fields(scene: Scene, outcome: core.Outcome, options: RunOptions, notes: list[str]) -> Table:
-    """All fields of the trajectory but its counters; without its events, where they are to be kept apart."""
+    """Return all fields of the trajectory except its counters; with `separate`, samples on the grid only."""
     fields = outcome_fields(scene, outcome, options)
     t, q, v = fields["t"], fields["q"], fields["v"]
     grid = grid_of(t, options)
@@ -113,7 +113,7 @@ def _fields(scene: Scene, outcome: core.Outcome, options: RunOptions, notes: lis
 
 
 def _opened(scene: Scene, trajectory: Trajectory) -> LoopClosureError:
-    """A run has left its constraints, as it must when a drive pulls a loop apart; with the samples before."""
+    """Return the error of a run that has left its constraints, with the samples before that time."""
     k = int((trajectory.violation > LEFT).argmax())
     t = float(trajectory.t[k])
     runner = compiled_scene(scene).program.runner()
@@ -126,7 +126,7 @@ def _opened(scene: Scene, trajectory: Trajectory) -> LoopClosureError:
 
 
 def _fixed_step_hint(error: RunError, options: RunOptions) -> str:
-    """Words on a run by fixed steps that has overflowed; none for other failures."""
+    """Return a hint for a fixed-step run that has overflowed; empty for other failures."""
     if not (isinstance(error, NonFiniteError) and options.dt > 0.0):
         return ""
     return (
@@ -136,5 +136,5 @@ def _fixed_step_hint(error: RunError, options: RunOptions) -> str:
 
 
 def _stopped(trajectory: Trajectory, error: RunError) -> Trajectory:
-    """A trajectory that tells what stopped it."""
+    """Return the trajectory with the message of the error that stopped the run."""
     return replace(trajectory, failure=str(error).removesuffix(f"; {KEPT}"))

@@ -1,4 +1,4 @@
-"""resume: a run that was stopped goes on from its checkpoint."""
+"""resume: continuation of a stopped run from its checkpoint."""
 
 from __future__ import annotations
 
@@ -24,32 +24,30 @@ def resume(
     checkpoint_interval: float | None = None,
     progress: bool | None = None,
 ) -> Trajectory:
-    """Goes on with a run from the file that `simulate(..., checkpoint=path)` wrote.
+    """Resume a run from the file that `simulate(..., checkpoint=path)` wrote.
 
-    The trajectory is bitwise the one of the run left alone, from its very start: samples, recorded
-    quantities, events and counters; `stats.wall_s` adds up the parts.  The file is kept up to date as
-    before, so that a run may be stopped any number of times; of a run that had ended, it gives the
-    trajectory at once.
+    The trajectory is bitwise equal to an uninterrupted run from its start: samples, recorded quantities,
+    events and counters. `stats.wall_s` is the sum over all parts. The file is updated as before, so a run may
+    be stopped any number of times. For a finished run, the trajectory is returned at once.
 
-    What functions of the user remember between calls is not in the file: let them depend on their
-    arguments only, and keep what must be remembered in the states of a `UserLaw`.
+    The file does not hold memory of user functions. They must depend on their arguments only, and keep memory
+    in the states of a `UserLaw`.
 
     Args:
         path: the file.
-        scene: the scene of the run, made as it was then; None loads it again by the name and parameters that
-            `load` was given.
-        checkpoint_interval: wall time between checkpoints [s]; as before when None.
+        scene: the scene of the run, built as before; None loads it again with the arguments of `load`.
+        checkpoint_interval: wall time between checkpoints [s]; None keeps the previous interval.
         progress: progress bar on standard error; None shows it on a terminal only.
 
     Returns:
         The Trajectory of the whole run.
 
     Raises:
-        LoadingError: the file is missing, damaged, or of another version; or its robot does not load.
-        InputError: the scene is missing, or not the one of the run.
+        LoadingError: the file is missing, damaged, or of another version, or its robot does not load.
+        InputError: the scene is missing, or is not the scene of the run.
         OutputError: the file cannot be written.
-        RunError: the run stopped early; its `trajectory` holds the samples up to there.
-        RunInterrupted: Ctrl-C; the same.
+        RunError: the run stopped early; its `trajectory` holds the samples before the stop.
+        RunInterrupted: Ctrl-C was pressed; its `trajectory` holds the samples before the stop.
     """
     source = file_path("resume: path", path)
     held = read_checkpoint(source)

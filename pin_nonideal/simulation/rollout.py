@@ -43,28 +43,28 @@ def rollout(
     failures: str = "raise",
     as_arrays: bool = False,
 ) -> Any:
-    """Runs many initial states in native threads; each result is bitwise that of its own `simulate`.
+    """Simulate many initial states in native threads; each result is bitwise that of its own `simulate`.
 
-    With `parameters` every run has numbers of its own, and is bitwise that of a scene with these:
+    With `parameters`, numbers differ between runs. Each run is bitwise that of a scene with its numbers:
 
         pn.rollout(scene, None, None, 1.0, parameters={
             "elbow": {"mu": [0.1, 0.2, 0.3]},              # fields of the law, contact or force of that name
-            "forearm_joint": {"mass": [1.0, 1.5, 2.0]},    # the body that hangs on a joint
+            "forearm_joint": {"mass": [1.0, 1.5, 2.0]},    # the body of a joint
             "actuation": {"kp": [50.0, 80.0, 90.0]},       # fields of HoldPosition, or torques (n, nv)
         })
 
-    They are the numbers of laws (coefficients, radii, ratios), of contacts (mu, restitution, resistances), of
-    forces (stiffness, damping, lengths) and of the actuation (kp, kd, q); "mass" [kg] of a body, whose
-    inertia goes with it, or all its "inertia", (n, 10), as `pinocchio.Inertia.FromDynamicParameters` has it;
-    and "gravity", (n, 3) [m/s^2].  What shapes the scene (frames, lengths and ratios of constraints, radii of
-    contacts, functions, a friction that begins or ceases to be) takes a scene for each: `sweep`.
-    `run.scene` is the one given.
+    Parameters are numbers of laws (coefficients, radii, ratios), of contacts (mu, restitution, resistances),
+    of forces (stiffness, damping, lengths) and of the actuation (kp, kd, q). A body has "mass" [kg], which
+    scales its inertia, or "inertia", (n, 10), as in `pinocchio.Inertia.FromDynamicParameters`. "gravity" is
+    (n, 3) [m/s^2]. Other quantities need a scene per run, see `sweep`: frames, lengths and ratios of
+    constraints, radii of contacts, functions, and friction that is zero in some runs only. `run.scene` is the
+    given scene.
 
     Args:
-        scene: what to simulate.
-        q: initial configurations, (n, nq); the scene's own for every run when None.
-        v: initial velocities, (n, nv); the scene's own when None.
-        duration: length of time [s].
+        scene: scene to simulate.
+        q: initial configurations, (n, nq); None for the scene's initial configuration in every run.
+        v: initial velocities, (n, nv); None for the scene's initial velocity in every run.
+        duration: duration [s].
         parameters: numbers of each run, by name and field, (n,) or (n, ...); see above.
         t0: initial time [s].
         method: one of the core's methods (not SciPy's).
@@ -73,22 +73,22 @@ def rollout(
         dt: step of the fixed-step methods [s].
         output_dt: time between samples [s]; every accepted step when None.
         max_steps: as in `simulate`.
-        record: as in `simulate`; "dense" goes without parameters only.
+        record: as in `simulate`; "dense" is not supported with parameters.
         several: "error" or "continue", as in `simulate`.
         threads: number of native threads.
-        failures: "raise" raises what stopped the first run that failed, when all are through; "keep" returns
-            the errors in the places of their runs.
-        as_arrays: returns states as arrays by run and sample, a `RunArrays`, with no object for each run:
-            for many short runs.  Nothing else is recorded.
+        failures: "raise" raises the error of the first failed run after all runs have ended. "keep" returns
+            errors in place of the trajectories of failed runs.
+        as_arrays: whether to return a `RunArrays` with states by run and sample, without an object per run.
+            This is faster for many short runs. No other quantities are recorded.
 
     Returns:
-        One Trajectory a state, or with failures="keep" the error that stopped it; or the RunArrays.
+        A list with one Trajectory per run, or with failures="keep" the error of a failed run; or a RunArrays.
 
     Raises:
         InputError, UnknownNameError: an argument does not fit.
-        RunError: a run stopped early: the first one that did; `index` tells which, `trajectory` has its
-            samples, and `results` holds the trajectories and errors of all runs.
-        RunInterrupted: Ctrl-C, which ends all runs; the same.
+        RunError: a run stopped early. The error is that of the first failed run: `index` is its index,
+            `trajectory` has its samples, and `results` holds the trajectories and errors of all runs.
+        RunInterrupted: Ctrl-C ended all runs; the attributes are those of RunError.
     """
     if not isinstance(scene, Scene):
         raise InputError(f"rollout: scene must be a Scene; got {type(scene).__name__}")
@@ -115,7 +115,7 @@ def rollout(
 
 
 def _starts(scene: Scene, q: Any, v: Any, parameters: Any) -> tuple[Array, Array]:
-    """States of all runs: as given, or the scene's own as often as there are runs."""
+    """Return the initial states of all runs; a missing state is the scene's initial state."""
     if parameters is not None and not isinstance(parameters, Mapping):
         raise InputError(f"rollout: parameters must be values by name; got {parameters!r}")
     starts_q = None if q is None else array("rollout: q", q, (None, scene.model.nq), copy=False)
@@ -145,7 +145,7 @@ def _arrays(
     keep: bool,
     record: str | Sequence[str],
 ) -> RunArrays:
-    """The runs as arrays."""
+    """Run all states and return a RunArrays."""
     if len(record):
         raise InputError("rollout: as_arrays records states alone; leave record out, or as_arrays")
     q = scene_states(scene).with_unit_parts(q)
@@ -173,7 +173,7 @@ def _arrays(
 def _run(
     scene: Scene, q: Array, v: Array, numbers: RunNumbers, options: RunOptions, threads: int
 ) -> list[Any]:
-    """A Trajectory of each run, or what stopped it."""
+    """Return the Trajectory or the error of each run."""
     begin = time.perf_counter()
     compiled, states = compiled_scene(scene), scene_states(scene)
     q = states.with_unit_parts(q)
@@ -194,7 +194,7 @@ def _run(
         outcomes = core.rollout(compiled.program, *started, options, threads, numbers.names, values)
     wall = time.perf_counter() - begin
     for i, outcome in zip(going, outcomes, strict=True):
-        if outcome is None:  # not begun when an interrupt ended all
+        if outcome is None:  # an interrupt ended all runs before this one started
             continue
         try:
             moved = states.configuration_notes(q[i], on[i]) + states.velocity_notes(v[i], v_on[i])

@@ -1,4 +1,4 @@
-"""Samples of many runs as arrays, without an object for each."""
+"""Samples of many runs as arrays, without an object per run."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from .results import LEFT
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunArrays:
-    """Samples of many runs, by run and sample; what `rollout(..., as_arrays=True)` returns.
+    """Samples of many runs by run and sample, as returned by `rollout(..., as_arrays=True)`.
 
     Attributes:
-        t: times [s], (n, nt); not a number beyond the last sample of a run that has fewer than others.
-        q: configurations, (n, nt, nq), likewise.
-        v: velocities, (n, nt, nv), likewise.
-        samples: how many samples each run has, (n,).
+        t: times [s], (n, nt); NaN after the last sample of a run.
+        q: configurations, (n, nt, nq); NaN after the last sample.
+        v: velocities, (n, nt, nv); NaN after the last sample.
+        samples: number of samples of each run, (n,).
         violation: largest |residual| of each run [m or rad], (n,).
         steps: accepted steps of each run, (n,).
-        failures: what stopped runs before their end, by index.
-        scene: the scene that ran.
+        failures: errors of failed runs, by index.
+        scene: the scene of the runs.
     """
 
     t: Array
@@ -52,7 +52,7 @@ class RunArrays:
 
     @property
     def last(self) -> tuple[Array, Array]:
-        """Configurations (n, nq) and velocities (n, nv) of each run's last sample, if it has one."""
+        """Configurations (n, nq) and velocities (n, nv) of each run's last sample; NaN without samples."""
         runs, at = np.arange(len(self)), np.maximum(self.samples - 1, 0)
         none = self.samples == 0
         q, v = self.q[runs, at], self.v[runs, at]
@@ -63,14 +63,14 @@ class RunArrays:
 def run_arrays(
     scene: Scene, q0: Array, v0: Array, numbers: RunNumbers, options: RunOptions, threads: int
 ) -> RunArrays:
-    """Runs from states that lie on the constraints.
+    """Simulate initial states that satisfy the constraints, and return their samples.
 
     Args:
-        scene: what to simulate.
+        scene: scene to simulate.
         q0: initial configurations, (n, nq).
         v0: initial velocities, (n, nv).
-        numbers: of the runs that differ.
-        options: of all runs.
+        numbers: numbers that differ between runs.
+        options: options of all runs.
         threads: number of native threads.
     """
     n, compiled = len(q0), compiled_scene(scene)
@@ -97,7 +97,7 @@ def run_arrays(
 
 
 def _of_outcomes(scene: Scene, outcomes: Sequence[core.Outcome]) -> RunArrays:
-    """The same of runs whose mechanisms took their own steps."""
+    """Return the samples of runs whose components took their own steps."""
     n, (nq, nv) = len(outcomes), (scene.model.nq, scene.model.nv)
     samples = np.array([len(one.t) for one in outcomes], dtype=np.int64)
     most = int(samples.max(initial=0))
@@ -115,7 +115,7 @@ def _of_outcomes(scene: Scene, outcomes: Sequence[core.Outcome]) -> RunArrays:
 def _failures(
     scene: Scene, stopped: dict[int, BaseException], violation: Array
 ) -> dict[int, PinNonidealError]:
-    """Errors by name of what stopped runs, and of runs that have left their constraints."""
+    """Return the errors of stopped runs and of runs that have left their constraints, by index."""
     failures: dict[int, PinNonidealError] = {}
     for i, cause in stopped.items():
         if isinstance(cause, core.CoreFailure):

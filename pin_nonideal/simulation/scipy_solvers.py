@@ -1,11 +1,10 @@
 """SciPy's implicit methods on the core's right-hand side, for stiff scenes.
 
-The state is y = (q, v, states of laws, work of the ledger's columns), with q in ambient coordinates:
-quaternions and (cos, sin) pairs are plain numbers, and the right-hand side is smooth off unit length as well.
-The core follows the steps: modes of dry friction are held over each, events inside it are located by the
-method's own interpolant, and the integrator starts again behind them.  Radau, a one-step method, goes on from
-the projected state after every step; BDF and LSODA remember earlier steps, so that only their samples are
-projected.
+The state is y = (q, v, states of laws, work of the ledger's columns), with q in ambient coordinates.
+Quaternions and (cos, sin) pairs are plain numbers. The right-hand side is smooth off unit length as well.
+The core monitors the steps: modes of dry friction are fixed within a step, events are located by the method's
+interpolant, and the integrator restarts after each event. Radau is a one-step method and continues from the
+projected state after each step. BDF and LSODA use earlier steps, so only their samples are projected.
 """
 
 from __future__ import annotations
@@ -25,16 +24,16 @@ from pin_nonideal.types import Array
 from .events import Watched
 from .options import ONE_STEP, RunOptions
 
-Tick = Callable[[float], None]  # with the time
+Tick = Callable[[float], None]  # function of the time [s]
 
-# SciPy refuses, or cannot reach, tolerances below this.
+# Smallest relative tolerance that SciPy's methods accept and reach.
 LEAST_RTOL = 1e-13
-# Work is integrated along and takes no part in the choice of steps.
+# Absolute tolerance of work: excludes work from step size control.
 FREE = 1e100
 
 
 class _Run:
-    """One run: what SciPy asks of it, step by step."""
+    """One run with a SciPy solver: right-hand side, Jacobian, tolerances and steps."""
 
     def __init__(
         self, scene: Scene, options: RunOptions, tick: Tick | None, events: Sequence[Watched]
@@ -44,21 +43,21 @@ class _Run:
         self.failure: core.CoreFailure | None = None
 
     def rate(self, t: float, y: Array) -> Array:
-        """dy/dt; not a number where a trial state has none, so that a shorter step is tried."""
+        """Return dy/dt, or NaN if a trial state cannot be evaluated, so that SciPy tries a shorter step."""
         try:
             return self.core.derivative(t, np.ascontiguousarray(y))
         except core.CoreFailure as failure:
-            if self.options.method == "LSODA":  # which does not look
+            if self.options.method == "LSODA":  # LSODA does not check for NaN
                 raise
             self.failure = failure
             return np.full(y.shape, np.nan)
 
     def jacobian(self, t: float, y: Array) -> Array:
-        """d(dy/dt)/dy; SciPy's own differences grow with a coordinate that has turned many times."""
+        """Return d(dy/dt)/dy; difference steps of SciPy grow with the angle of a joint after many turns."""
         return self.core.jacobian(t, np.ascontiguousarray(y))
 
     def tolerance(self, size: int) -> Array:
-        """Absolute tolerance in ambient coordinates: a quaternion takes the smallest of its joint's."""
+        """Return absolute tolerances in ambient coordinates; a quaternion has the smallest of its joint."""
         given, model = self.options.atol, self.model
         positions = np.empty(model.nq)
         for joint in list(model.joints)[1:]:
@@ -69,7 +68,7 @@ class _Run:
         return np.concatenate([known, np.full(size - known.size, FREE)])
 
     def smooth_stretch(self, method: Any, t_end: float) -> None:
-        """To the next event or break of a function of time, or to the end."""
+        """Integrate to the next event, to the next break of a function of time, or to the end."""
         self._require_regular_start()
         y = self.core.y
         tolerance = {"rtol": max(self.options.rtol, LEAST_RTOL), "atol": self.tolerance(y.size)}
@@ -78,7 +77,7 @@ class _Run:
         while solver.status == "running":
             self.failure = None
             self._step(solver)
-            if self.core.stop_before(solver.t) < solver.t:  # inside the step, which is taken again
+            if self.core.stop_before(solver.t) < solver.t:  # a break lies inside the step, which is repeated
                 return
             if self.core.follow(solver.t, solver.dense_output()):
                 return
@@ -86,10 +85,10 @@ class _Run:
                 solver.y, solver.f = self.core.y, self.core.rate
 
     def _require_regular_start(self) -> None:
-        """Refuses an onset of slip whose direction relaxes faster than any of these methods' steps.
+        """Check for a singular slip onset, whose direction relaxes faster than any step of these methods.
 
         Raises:
-            StepSizeError: slip in several directions begins so.
+            StepSizeError: slip in several directions has a singular onset.
         """
         element = self.core.singular_onset
         if element is None:
@@ -117,10 +116,10 @@ class _Run:
 
 
 def _one_blas_thread() -> AbstractContextManager[Any]:
-    """Factors of small matrices cost many times more on several threads, which wait for each other."""
+    """Return a context with one BLAS thread: small factorizations are much slower on several threads."""
     try:
         from threadpoolctl import threadpool_limits
-    except ImportError:  # the same results, later
+    except ImportError:  # slower, with the same results
         return nullcontext()
     limits: AbstractContextManager[Any] = threadpool_limits(limits=1, user_api="blas")
     return limits
@@ -134,21 +133,21 @@ def simulate_stiff(
     tick: Tick | None,
     events: Sequence[Watched] = (),
 ) -> tuple[core.Outcome, BaseException | None]:
-    """Runs one of SciPy's implicit methods.
+    """Simulate with one of SciPy's implicit methods.
 
     Args:
-        scene: what to simulate.
+        scene: scene to simulate.
         q0: initial configuration on the constraints, (nq,).
         v0: initial velocity on the constraints, (nv,).
-        options: as checked by `simulate`.
-        tick: called with the time now and then.
-        events: functions of the user whose zeros are events.
+        options: checked options of the run.
+        tick: progress function of the time, or None.
+        events: event functions of the user.
 
     Returns:
-        What the core recorded of it, and what stopped the run.
+        Outcome recorded by the core, and the exception that stopped the run, or None.
 
     Raises:
-        InputError: the scene's torque is held between samples, which these methods would step over.
+        InputError: the actuation is a SampledControl, whose samples these methods would step over.
     """
     from scipy import integrate
 

@@ -1,4 +1,4 @@
-"""simulate: a scene and a length of time in, a Trajectory out."""
+"""simulate: time integration of a scene to a Trajectory."""
 
 from __future__ import annotations
 
@@ -47,52 +47,53 @@ def simulate(
     checkpoint: str | os.PathLike[str] | None = None,
     checkpoint_interval: float = 60.0,
 ) -> Trajectory:
-    """Integrates a scene in time, on its constraints.
+    """Simulate a scene in time, on its constraints.
 
-    Adaptive methods keep the local error of every coordinate below atol + rtol |y| (that of a velocity not
-    below the rounding of the largest one); the state is put back on the constraints after every step, so that
-    violations stay at rounding.  Dry friction sticks and slips at located events.
+    Adaptive methods keep the local error of each coordinate below atol + rtol |y|. The tolerance of a
+    velocity is at least the rounding of the largest velocity. After each step, the state is projected onto
+    the constraints, so that violations stay at rounding. Transitions of dry friction are located events.
 
     Args:
-        scene: what to simulate.
-        duration: length of time [s].
-        q: initial configuration, (nq,) or by joint name (see `Scene`); the scene's when None.  It is
-            projected onto the constraints first (`Scene.project`): an array by the least move, while entries
-            that are named are held and the others follow.  `Trajectory.notes` lists moves of more than a
-            little, and those of an array that was given here are a RuntimeWarning.
-        v: initial velocity, (nv,) or by joint name; the scene's when None.  The same holds for it.
+        scene: scene to simulate.
+        duration: duration [s].
+        q: initial configuration, (nq,) or by joint name (see `Scene`); the scene's when None. It is projected
+            onto the constraints (`Scene.project`): an array by the least displacement, a table with its named
+            entries held. `Trajectory.notes` lists notable displacements; for an array, they are also a
+            RuntimeWarning.
+        v: initial velocity, (nv,) or by joint name; the scene's when None. It is projected like q.
         t0: initial time [s].
         method: "dop853" (order 8) or "dopri5" (order 5), adaptive; "rk4", "semi_implicit_euler" or "moreau"
             (time stepping at velocity level), fixed dt; "Radau", "BDF" or "LSODA" by SciPy, for stiff scenes.
         rtol: relative tolerance of adaptive methods, 1e-8 when None.
         atol: absolute tolerance, a number or an array (2 nv,) for positions and velocities, 1e-10 when None;
-            states of laws take the number, or the smallest of the array.
+            for states of laws, the number or the smallest entry of the array.
         dt: step of the fixed-step methods [s].
-        output_dt: time between samples [s]; every accepted step when None.  Events are samples as well;
-            `run.grid` tells which samples lie on the grid t0 + k output_dt, both ends among them.
-        max_steps: most steps that the run may take; when None as many as it takes, but a stiff scene stops as
-            soon as an explicit method would take 100,000 more.
-        max_wall: most wall time that the run may take [s]; as much as it takes when None.
+        output_dt: time between samples [s]; every accepted step when None. Events are samples as well;
+            `run.grid` is the mask of samples on the grid t0 + k output_dt, both ends included.
+        max_steps: maximum number of steps. None sets no limit, except that a stiff scene stops as soon as an
+            explicit method would need 100,000 more steps.
+        max_wall: maximum wall time [s]; no limit when None.
         record: any of "a", "tau", "forces" (which include "laws" and "tau"), "laws", "reactions", "energy",
             "power", "dense" (interpolants of the steps, for `run.at`), or names of fields that they fill.
-        events: functions (t, q, v) -> number whose zeros are events, as in SciPy's solve_ivp: `terminal`
-            (True, or how many of them end the run) and `direction` (its sign: only where the value rises, or
-            falls) are attributes of the function.  A step ends at each, found as accurately as the step; a
-            value that is zero at the start is no event there.  `run.user_events` holds them.  "separate",
-            alone or in the list, keeps all events out of the samples, which then lie on the grid exactly.
-        callback: called as callback(t, q, v) before every step; True ends the run there, torques (nv,) are
-            those of the actuation from there on, None changes nothing.  Of the core's methods only.
-        several: what to do where the laws allow several motions: "error" stops with a FrictionParadoxError
-            that shows two; "continue" goes on with the one nearest to the motion before (at the start, that
-            of least friction), and an event of kind "several" says from when on.  What rests and might slip
-            as well goes on resting either way, with such an event.
-        strict: whether an impact that gains energy, as Newton's law of restitution with friction may, is an
-            ImpactEnergyError; an event of kind "impact" with a positive energy_change tells it otherwise.
+        events: functions (t, q, v) -> number whose zeros are events, as in SciPy's solve_ivp. A function may
+            have the attributes `terminal` (True, or the number of events that ends the run) and `direction`
+            (positive for rising zeros only, negative for falling ones). A step ends at each event, with the
+            accuracy of the step. A zero at the start is no event. `run.user_events` holds the events.
+            "separate", alone or in the list, keeps all events out of the samples, which then lie exactly on
+            the grid.
+        callback: function called as callback(t, q, v) before every step. True ends the run, torques (nv,)
+            replace the actuation from this time on, and None changes nothing. Methods of the core only.
+        several: behavior if the laws admit several motions. "error" raises a FrictionParadoxError that holds
+            two of them. "continue" selects the motion nearest to the previous motion (at the start, the
+            motion of least friction) and records an event of kind "several". An element at rest that may
+            also slip stays at rest in both cases, with such an event.
+        strict: whether an impact that gains energy raises an ImpactEnergyError; Newton's law of restitution
+            with friction may gain energy. Otherwise an event of kind "impact" has a positive energy_change.
         progress: progress bar on standard error; None shows it on a terminal only.
-        checkpoint: file that the run is kept in, so that `resume` goes on with it should it be killed; None
-            for none.  It is replaced whole, at the start, at the end, on Ctrl-C between two steps, and every
-            `checkpoint_interval`.  Of the core's methods only.
-        checkpoint_interval: wall time between checkpoints [s]; 0 for one after every step.
+        checkpoint: file from which `resume` can continue the run if it is killed; None for no file. It is
+            replaced atomically at the start, at the end, on Ctrl-C between two steps, and every
+            `checkpoint_interval`. Methods of the core only.
+        checkpoint_interval: wall time between checkpoints [s]; 0 for a checkpoint after every step.
 
     Returns:
         The Trajectory.
@@ -100,14 +101,15 @@ def simulate(
     Raises:
         InputError: an argument does not fit.
         OutputError: the checkpoint cannot be written.
-        LoopClosureError: the initial state cannot be put on the constraints, or the run was pulled off them.
-        StiffnessError: the scene is stiff, and the method explicit; `joint` and `rate` say where and how.
-        DivergenceError: speeds grow without bound over many decades, and max_steps was not given; `joint`,
-            `source` and `rate` say where, by what and how.
-        WallTimeError: `max_wall` is over.
-        RunError: the run stopped early; its `trajectory` holds the samples up to there.
-        ImpactEnergyError: an impact gained energy, and `strict` was asked for.
-        RunInterrupted: Ctrl-C; the same.
+        LoopClosureError: the initial state cannot be projected onto the constraints, or the run left them.
+        StiffnessError: the scene is stiff and the method explicit; `joint` and `rate` hold the stiff joint
+            and its relaxation rate.
+        DivergenceError: speeds grow without bound over many decades, and max_steps is None; `joint`, `source`
+            and `rate` hold the joint, the force with the most work on it, and the growth rate.
+        WallTimeError: `max_wall` is exceeded.
+        RunError: the run stopped early; its `trajectory` holds the samples before the stop.
+        ImpactEnergyError: an impact gained energy, and `strict` is True.
+        RunInterrupted: Ctrl-C was pressed; its `trajectory` holds the samples before the stop.
     """
     if not isinstance(scene, Scene):
         raise InputError(f"simulate: scene must be a Scene; got {type(scene).__name__}")
@@ -150,7 +152,7 @@ def simulate(
         else:
             parts = [] if saver or between else stepped_apart(scene, options)
             apart = run_apart(scene, parts, q0, v0, options, tick) if parts else None
-            # Where all step together, what fails is told.
+            # If a component fails, a run in common steps reports the failure.
             outcome = apart or run_together(
                 scene,
                 q0,
@@ -168,7 +170,7 @@ def simulate(
 
 
 def _check_together(method: str, asked: Asked, callback: object, checkpoint: object) -> None:
-    """Refuses what does not go together.
+    """Check that method, events, callback and checkpoint can be combined.
 
     Raises:
         InputError: see above.

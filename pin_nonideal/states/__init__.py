@@ -1,1 +1,1 @@
-"""States of a scene: configurations, their placements, and the way onto the constraints."""
+"""States of a scene: configurations, placements, and projection onto the constraints."""

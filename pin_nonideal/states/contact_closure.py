@@ -1,8 +1,8 @@
-"""The closure nearest to a configuration among those in which no contact is inside its plane.
+"""Search for the nearest configuration that satisfies the constraints without penetration.
 
-min d^T M(q0) d / 2 over phi(q) = 0 and gap(q) >= 0: steps of sequential quadratic programming tell which
-gaps are touched; with these held like rows Newton's method of `closure` finds the nearest place, which the
-signs of their multipliers and the other gaps confirm.
+The problem is min d^T M(q0) d / 2 over phi(q) = 0 and gap(q) >= 0. Steps of sequential quadratic programming
+determine the active gaps. With active gaps held as rows, Newton's method of `loop_closure` finds the nearest
+closure. The signs of the gap multipliers and the other gaps confirm it.
 
 [Nocedal, Wright: Numerical Optimization, 2006, ch. 18.]
 """
@@ -19,20 +19,20 @@ from .least_distance import LeastMove, Numbers, least_move
 from .loop_closure import HALVINGS, ROUNDING, Closure, Place, Rows, Search
 
 STEPS, SETTLINGS, OPENINGS = 60, 8, 15
-# Steps are over where the next is shorter than this part of the move: Newton's method squares it.
+# Steps end if the next step is shorter than this part of the displacement, since Newton's method squares it.
 SHORT = 1e-7
-# A gap that is negative by more than this part of its reach is inside.
+# Largest penetration, scaled like its row, that counts as rounding.
 INSIDE = 10.0 * ROUNDING
-# Of what the linear model promises, the part that a step must keep.
+# Minimum decrease of the merit function, relative to the decrease of its linear model.
 KEPT = 1e-4
 
 
 class SearchOutside(Search):
-    """Closures around a configuration with all gaps open or touching.
+    """Search for closures around a configuration without penetration.
 
     Args:
-        gaps: q -> (G, gap) of the contacts that may open over their reach, (k, nv) and (k,).
-        given: what `Search` takes.
+        gaps: q -> (G, gap) of the unilateral contacts over their row scales, (k, nv) and (k,).
+        given: arguments of `Search`.
     """
 
     def __init__(self, gaps: Rows, *given: Any) -> None:
@@ -40,7 +40,7 @@ class SearchOutside(Search):
         self.loops, self.gaps = self.rows, gaps
 
     def _hold(self, touching: Numbers) -> None:
-        """Takes the rows of some gaps among those that are held."""
+        """Add the rows of active gaps to the rows of the loops."""
 
         def rows(q: Array) -> tuple[Array, Array]:
             (A, phi), (G, gap) = self.loops(q), self.gaps(q)
@@ -49,16 +49,16 @@ class SearchOutside(Search):
         self.rows = rows if len(touching) else self.loops
 
     def _close(self, q: Array) -> Place:
-        """A closure outside of all planes; some contact is inside where none is found."""
+        """Close the loops and remove penetration; the result may still penetrate if the search fails."""
         self._hold(np.zeros(0, dtype=int))
         return self._step_out(super()._close(q))
 
     def _is_closed(self, place: Place) -> bool:
-        """Whether all rows are met there, and no contact is inside."""
+        """Check if all rows are satisfied and no contact penetrates."""
         return super()._is_closed(place) and self._depth(place) <= INSIDE
 
     def _settle(self, place: Place) -> Closure:
-        """The nearest closure downhill, by the gaps that are touched there."""
+        """Descend to a local minimum of the distance, with an update of the active gaps."""
         known = place
         for _ in range(SETTLINGS):
             self._hold(np.zeros(0, dtype=int))
@@ -83,7 +83,7 @@ class SearchOutside(Search):
         return Closure(known.q, known.gap, self._distance(known), False, self.iterations)
 
     def _gaps(self, place: Place) -> tuple[Array, Array]:
-        """Rows and values of the gaps, in coordinates in which |x| is a distance."""
+        """Return rows and values of the gaps, in coordinates x in which |x| is the distance."""
         G, gap = self.gaps(place.q)
         return np.linalg.solve(place.half.T, G.T).T, gap
 
@@ -91,7 +91,7 @@ class SearchOutside(Search):
         return least_move(place.B, place.phi, *self._gaps(place), move)
 
     def _step_out(self, place: Place) -> Place:
-        """Steps to the nearest place outside, each as long as the sum of distance and gaps falls."""
+        """Take steps to the nearest configuration without penetration, with a line search on the merit."""
         weight = 0.0
         for _ in range(STEPS):
             step = self._least(place, place.move)
@@ -113,7 +113,7 @@ class SearchOutside(Search):
         return self._open(place)
 
     def _open(self, place: Place) -> Place:
-        """Out of what is left inside, and onto what is left open, by least moves."""
+        """Remove remaining residuals and penetration by least displacements."""
         for _ in range(OPENINGS):
             lacking = self._lacking(place)
             step = self._least(place, np.zeros_like(place.move)) if lacking > 0.0 else None
@@ -126,15 +126,15 @@ class SearchOutside(Search):
         return place
 
     def _depth(self, place: Place) -> float:
-        """The largest by which a contact is inside."""
+        """Return the largest penetration."""
         return -float(self._gaps(place)[1].min(initial=0.0))
 
     def _lacking(self, place: Place) -> float:
-        """The largest residual, or depth."""
+        """Return the largest residual or penetration."""
         return max(place.gap, self._depth(place))
 
     def _missed(self, place: Place) -> float:
-        """The sum of all residuals and depths."""
+        """Return the sum of all residuals and penetrations."""
         gap = self._gaps(place)[1]
         return float(np.abs(place.phi).sum() - np.minimum(gap, 0.0).sum())
 
@@ -142,5 +142,5 @@ class SearchOutside(Search):
         return 0.5 * float(place.move @ place.move) + weight * self._missed(place)
 
     def _slope_of_merit(self, place: Place, x: Array, weight: float) -> float:
-        """By which the merit falls along x, which meets all rows."""
+        """Return the derivative of the merit along x, which satisfies all linearized rows."""
         return float(place.move @ x) - weight * self._missed(place)

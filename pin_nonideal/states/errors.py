@@ -1,4 +1,4 @@
-"""What is said of a state that cannot be put on the constraints."""
+"""Errors of states that cannot be projected onto the constraints."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .rows import row_slices
 
 
 def deepest_contact(phi: Array, program: core.Program) -> tuple[str, float]:
-    """The contact that is deepest inside its plane, and its depth; none where there is no contact.
+    """Return the name and depth of the deepest penetrating contact, or ("", 0.0) without contacts.
 
     Args:
         phi: residuals of all rows, (m,).
-        program: the scene as the core knows it.
+        program: the core's program.
     """
     slices = row_slices(program)
     depths = {c.name: -float(phi[slices[c.name]].min()) for c in program.constraints[program.first_gap :]}
@@ -26,11 +26,11 @@ def deepest_contact(phi: Array, program: core.Program) -> tuple[str, float]:
 
 
 def largest_loop_gap(phi: Array, program: core.Program) -> float:
-    """The largest residual of what always holds and is a matter of positions.
+    """Return the largest residual of the holonomic bilateral constraints.
 
     Args:
         phi: residuals of all rows, (m,).
-        program: the scene as the core knows it.
+        program: the core's program.
     """
     slices = row_slices(program)
     loops = [phi[slices[c.name]] for c in program.constraints[: program.first_gap] if all(c.holonomic)]
@@ -38,16 +38,16 @@ def largest_loop_gap(phi: Array, program: core.Program) -> float:
 
 
 def refuse_deep_starts(phi: Array, program: core.Program, allowed: float, t: float) -> None:
-    """Raises where a contact that may open starts far inside, if the loops tell that its place is meant.
+    """Check that no unilateral contact starts with deep penetration, unless loops are open as well.
 
     Args:
         phi: residuals of all rows, (m,).
-        program: the scene as the core knows it.
-        allowed: depth that is moved out.
+        program: the core's program.
+        allowed: penetration that the projection may remove [m or rad].
         t: time [s].
 
     Raises:
-        InputError: one does.
+        InputError: a contact penetrates deeper.
     """
     if largest_loop_gap(phi, program) > allowed:
         return
@@ -60,11 +60,11 @@ def refuse_deep_starts(phi: Array, program: core.Program, allowed: float, t: flo
 
 
 def no_way_out(phi: Array, program: core.Program, t: float) -> InputError:
-    """Of a contact that starts inside and is found no way out of its plane, or none but a long one.
+    """Return the error of a contact with initial penetration that no short displacement removes.
 
     Args:
         phi: residuals of all rows at the start, (m,).
-        program: the scene as the core knows it.
+        program: the core's program.
         t: time [s].
     """
     name, depth = deepest_contact(phi, program)
@@ -75,11 +75,11 @@ def no_way_out(phi: Array, program: core.Program, t: float) -> InputError:
 
 
 def open_loops(phi: Array, program: core.Program, t: float) -> LoopClosureError:
-    """Of loops that do not close.
+    """Return the error of loops that do not close.
 
     Args:
         phi: residuals of all rows, (m,).
-        program: the scene as the core knows it.
+        program: the core's program.
         t: time [s].
     """
     slices = row_slices(program)
@@ -97,11 +97,11 @@ def open_loops(phi: Array, program: core.Program, t: float) -> LoopClosureError:
 
 
 def lost_velocity(rate: Array, program: core.Program, t: float) -> InconsistentConstraintsError:
-    """Of rates that no velocity has.
+    """Return the error of constraint rates that no velocity satisfies.
 
     Args:
-        rate: of all rows, (m,).
-        program: the scene as the core knows it.
+        rate: rates of all rows, (m,).
+        program: the core's program.
         t: time [s].
     """
     slices = row_slices(program)

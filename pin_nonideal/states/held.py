@@ -1,4 +1,4 @@
-"""Projection onto the constraints with some entries of a configuration or a velocity held."""
+"""Projection onto the constraints with held entries of a configuration or a velocity."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from .joint_layout import JointPlace, joint_places
 from .rows import DEPENDENT, row_lengths, rows_at, shortest
 from .scales import coordinate
 
-# Part of the velocities in play by which rows over their greatest lengths may miss their rates.
+# Tolerance of row rates over their greatest lengths, relative to the scale of the velocities.
 MISSED = 1e-9
-# Part of the largest velocity by which a projection changes velocities that meet the constraints already.
+# Rounding of a projection, relative to the largest velocity or to the unit of a coordinate.
 ROUNDING = 1e-12
-# Part of the largest velocity above which the change of a free entry is reported.
+# Changes of free entries are reported above this part of the largest velocity or of a unit.
 LITTLE = 1e-3
-# Newton steps from a closure that a search has found, which is near enough for each to square its gap.
+# Maximum number of Newton steps after a search, which squares the residual in each step.
 SETTLINGS = 8
 
 
 class Held(NamedTuple):
-    """Entries of a state that were named and stay.
+    """Named entries of a state that a projection holds.
 
     Attributes:
-        q: tangent coordinates of the configuration, (nv,), or None.
-        v: entries of the velocity, (nv,), or None.
-        firm_q: whether it is an error that they cannot stay; else all are projected then, as entries that
-            were named for another time.
-        firm_v: the same of the velocity.
+        q: mask of held tangent coordinates of the configuration, (nv,), or None.
+        v: mask of held entries of the velocity, (nv,), or None.
+        firm_q: whether an error is raised if coordinates cannot be held. Otherwise all are projected, as for
+            entries named for another time.
+        firm_v: whether an error is raised if velocities cannot be held.
     """
 
     q: NDArray[np.bool_] | None = None
@@ -47,39 +47,39 @@ NOTHING_HELD = Held()
 
 
 def changes(asked: Array, found: Array, held: NDArray[np.bool_]) -> bool:
-    """Whether a projection has changed held entries by more than rounding.
+    """Check if a projection has changed held entries by more than rounding.
 
     Args:
         asked: velocity before, (nv,).
         found: velocity after, (nv,).
-        held: entries to be held, (nv,).
+        held: mask of held entries, (nv,).
     """
     change = np.abs(found - asked)[held].max(initial=0.0)
     return bool(change > ROUNDING * np.abs(asked).max(initial=0.0))
 
 
 def moving(model: Model, q: Array, on: Array, unit: Array) -> NDArray[np.bool_]:
-    """Which coordinates a projection has moved by more than rounding, (nv,).
+    """Return the mask of coordinates that a projection has moved by more than rounding, (nv,).
 
     Args:
         model: pinocchio.Model.
         q: configuration before, (nq,).
         on: configuration after, (nq,).
-        unit: a long move of each coordinate, (nv,).
+        unit: unit displacement of each coordinate, (nv,).
     """
     away: NDArray[np.bool_] = np.abs(pin.difference(model, q, on)) > ROUNDING * unit
     return away
 
 
 def moves(model: Model, q: Array, on: Array, held: NDArray[np.bool_], unit: Array) -> bool:
-    """Whether it has moved held ones.
+    """Check if a projection has moved held coordinates by more than rounding.
 
     Args:
         model: pinocchio.Model.
         q: configuration before, (nq,).
         on: configuration after, (nq,).
-        held: coordinates to be held, (nv,).
-        unit: a long move of each coordinate, (nv,).
+        held: mask of held coordinates, (nv,).
+        unit: unit displacement of each coordinate, (nv,).
     """
     return bool((moving(model, q, on, unit) & held).any())
 
@@ -92,14 +92,14 @@ def settled(
     rows: NDArray[np.bool_],
     t: float,
 ) -> Array:
-    """Free coordinates near the constraints brought onto them to rounding, by Newton's method.
+    """Bring free coordinates near the constraints onto them, to rounding, by Newton's method.
 
     Args:
         model: pinocchio.Model.
         runner: a workspace of the core.
         q: configuration, (nq,).
-        free: coordinates that move, (nv,).
-        rows: rows that must hold, (m,).
+        free: mask of coordinates that move, (nv,).
+        rows: mask of rows that must hold, (m,).
         t: time [s].
 
     Returns:
@@ -119,13 +119,13 @@ def settled(
 
 
 def with_entries(model: Model, q: Array, given: Array, held: NDArray[np.bool_]) -> Array:
-    """A configuration with the held coordinates as they were given, to the last digit.
+    """Return a configuration with the held coordinates bitwise equal to the given values.
 
     Args:
         model: pinocchio.Model.
         q: configuration whose held coordinates differ by rounding, (nq,).
-        given: the configuration that was given, (nq,).
-        held: coordinates, (nv,).
+        given: the given configuration, (nq,).
+        held: mask of held coordinates, (nv,).
 
     Returns:
         The configuration, (nq,).
@@ -143,7 +143,7 @@ def with_entries(model: Model, q: Array, given: Array, held: NDArray[np.bool_]) 
 
 
 def _plain(place: JointPlace) -> int:
-    """How many values of a joint are coordinates themselves, before those of an orientation."""
+    """Return the number of leading values of a joint that are coordinates and no part of an orientation."""
     if place.nq == place.nv:
         return place.nq
     kinds = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2}
@@ -153,18 +153,18 @@ def _plain(place: JointPlace) -> int:
 def require_rounding(
     model: Model, q: Array, on: Array, held: NDArray[np.bool_], little: Array, t: float
 ) -> None:
-    """Refuses a configuration that has moved held entries by more than written numbers are rounded.
+    """Check that a projection has moved held coordinates at most by the rounding of written numbers.
 
     Args:
         model: pinocchio.Model.
-        q: configuration as it was given, (nq,).
-        on: the nearest one on the constraints, (nq,).
-        held: coordinates to be held, (nv,).
-        little: rounding of each coordinate, (nv,).
+        q: configuration before, (nq,).
+        on: nearest configuration on the constraints, (nq,).
+        held: mask of held coordinates, (nv,).
+        little: largest displacement of each held coordinate, (nv,).
         t: time [s].
 
     Raises:
-        InputError: one is.
+        InputError: a held coordinate has moved farther.
     """
     move = pin.difference(model, q, on)
     if not (held & (np.abs(move) > little)).any():
@@ -179,14 +179,14 @@ def require_rounding(
 def told_coordinates(
     model: Model, asked: Array, found: Array, held: NDArray[np.bool_], unit: Array
 ) -> list[str]:
-    """A note that names the coordinates that follow held ones, and another on held ones that moved; or none.
+    """Return notes on coordinates that follow held coordinates, and on held coordinates that moved.
 
     Args:
         model: pinocchio.Model.
-        asked: configuration as asked for, (nq,).
+        asked: requested configuration, (nq,).
         found: configuration at the start of the run, (nq,).
-        held: coordinates that were named, (nv,).
-        unit: a long move of each coordinate, (nv,).
+        held: mask of named coordinates, (nv,).
+        unit: unit displacement of each coordinate, (nv,).
     """
     move = np.abs(pin.difference(model, asked, found))
     follows, gave_way = ~held & (move > LITTLE * unit), held & (move > ROUNDING * unit)
@@ -205,7 +205,7 @@ def told_coordinates(
 
 
 def _coordinates(model: Model, q: Array) -> Array:
-    """A configuration as numbers for a message, (nv,): positions, angles, rotation vectors."""
+    """Return a configuration as numbers for a message, (nv,): positions, angles, rotation vectors."""
     out: Array = pin.difference(model, pin.neutral(model), q)
     for place in joint_places(model):
         count = _plain(place)
@@ -224,24 +224,24 @@ def holding(
     unit: Array,
     t: float,
 ) -> Array:
-    """The velocity v' with A v' + phi_t = 0, v' = v in held entries and the least d^T M d, d = v' - v.
+    """Compute v' with A v' + phi_t = 0, v' = v in held entries, and least d^T M d, where d = v' - v.
 
     Args:
         model: pinocchio.Model.
-        program: the scene as the core knows it.
+        program: the core's program.
         q: configuration on the constraints, (nq,).
-        v: velocity as asked for, (nv,).
-        held: entries that stay, (nv,).
-        rows: rows that must hold, (m,).
+        v: requested velocity, (nv,).
+        held: mask of held entries, (nv,).
+        rows: mask of rows that must hold, (m,).
         metric: M, positive definite, (nv, nv).
-        unit: a long move of each coordinate, (nv,).
+        unit: unit displacement of each coordinate, (nv,).
         t: time [s].
 
     Returns:
         v', (nv,).
 
     Raises:
-        InputError: the constraints do not allow the held entries together.
+        InputError: the constraints do not admit the held entries together.
     """
     runner, free = program.runner(), ~held
     A, _, _, rate = rows_at(runner, q, v, t)
@@ -267,11 +267,11 @@ def holding(
 
 
 def changed(model: Model, asked: Array, found: Array) -> list[str]:
-    """A note on a velocity that did not meet the constraints and was changed more than a little; or none.
+    """Return a note on a velocity that the projection changed notably, or no note.
 
     Args:
         model: pinocchio.Model.
-        asked: velocity as asked for, (nv,).
+        asked: requested velocity, (nv,).
         found: velocity at the start of the run, (nv,).
     """
     change = np.abs(found - asked)
@@ -285,13 +285,13 @@ def changed(model: Model, asked: Array, found: Array) -> list[str]:
 
 
 def told(model: Model, asked: Array, found: Array, held: NDArray[np.bool_]) -> list[str]:
-    """A note that names the entries that follow held ones; none where no entry had to.
+    """Return a note on velocities that follow held entries, or no note.
 
     Args:
         model: pinocchio.Model.
-        asked: velocity as asked for, (nv,).
+        asked: requested velocity, (nv,).
         found: velocity at the start of the run, (nv,).
-        held: entries that stay, (nv,).
+        held: mask of held entries, (nv,).
     """
     change = np.abs(found - asked)
     follows = ~held & (change > LITTLE * max(np.abs(asked).max(initial=0.0), np.abs(found).max(initial=0.0)))

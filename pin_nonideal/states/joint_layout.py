@@ -1,4 +1,4 @@
-"""Configurations at the door: unit lengths restored, and coordinates too large to move refused."""
+"""Layout of joint values, and checks of configurations: unit lengths and size of coordinates."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from pin_nonideal.errors import InputError
 from pin_nonideal.types import JointModel, Model
 from pin_nonideal.validation import array
 
-# Lengths off by less than this are rounding of a file or a printout and are restored; more is an error.
+# Deviations of a unit length below this value are rounding of a file and are normalized; others are errors.
 UNIT_TOLERANCE = 1e-6
 
-# Coarsest spacing of floating-point numbers about a coordinate of an initial state [m or rad]: a joint that
-# its own steps cannot move stands still whatever drives it.
+# Largest spacing of floating-point numbers at a coordinate of an initial state [m or rad]. A joint cannot
+# move if its steps are shorter than the spacing.
 COARSEST_SPACING = 1e-3
 
-# Joints whose configuration ends in the cosine and sine of an angle, by the beginnings of their names.
+# Prefixes of joint kinds whose configuration ends in the cosine and sine of an angle.
 CIRCLES = ("JointModelRUB", "JointModelRevoluteUnbounded", "JointModelPlanar")
 
 
 class JointPlace(NamedTuple):
-    """Where the values of a joint stand.
+    """Indices of a joint's values in q and v.
 
     Attributes:
-        name: of the joint.
-        kind: Pinocchio's name of its kind.
-        q_first: where they begin in a configuration.
-        nq: how many they are there.
-        v_first: where they begin in a velocity.
-        nv: how many they are there.
+        name: name of the joint.
+        kind: Pinocchio's name of the joint kind.
+        q_first: index of the first value in a configuration.
+        nq: number of values in a configuration.
+        v_first: index of the first value in a velocity.
+        nv: number of values in a velocity.
     """
 
     name: str
@@ -46,7 +46,7 @@ class JointPlace(NamedTuple):
 
 
 def joint_places(model: Model) -> list[JointPlace]:
-    """Where the values of each joint stand, in the order of the model.
+    """Return the indices of all joints' values, in the order of the model.
 
     Args:
         model: pinocchio.Model.
@@ -59,7 +59,7 @@ def joint_places(model: Model) -> list[JointPlace]:
 
 
 def unit_parts(model: Model) -> Iterator[tuple[str, slice]]:
-    """Stretches of a configuration that must have length 1, with the joint's name.
+    """Yield (joint name, slice) of each part of a configuration that must have length 1.
 
     Args:
         model: pinocchio.Model.
@@ -74,7 +74,7 @@ def _parts(joint: JointModel) -> Iterator[slice]:
     if kind == "JointModelComposite":
         for part in joint.extract().joints:
             yield from _parts(part)
-    elif joint.nq != joint.nv:  # a quaternion or (cos, sin) ends the joint's stretch
+    elif joint.nq != joint.nv:  # the joint's values end with a quaternion or (cos, sin)
         end = joint.idx_q + joint.nq
         yield slice(end - (2 if kind.startswith(CIRCLES) else 4), end)
 
@@ -82,13 +82,13 @@ def _parts(joint: JointModel) -> Iterator[slice]:
 def configuration(
     model: Model, q: ArrayLike, what: str, parts: Sequence[tuple[str, slice]] | None = None
 ) -> NDArray[np.float64]:
-    """A configuration with unit quaternions and (cos, sin) pairs, (nq,).
+    """Return a configuration with normalized quaternions and (cos, sin) pairs, (nq,).
 
     Args:
         model: pinocchio.Model.
         q: configuration, (nq,).
         what: words for messages.
-        parts: those of `unit_parts`, when known.
+        parts: result of `unit_parts`, if known.
 
     Raises:
         InputError: wrong shape, not finite, or a part far from unit length.
@@ -108,14 +108,14 @@ def configuration(
 
 
 def require_resolved(model: Model, q: NDArray[np.float64]) -> None:
-    """Refuses initial states in which a joint cannot move by less than `COARSEST_SPACING`.
+    """Check that floating-point spacing at each coordinate is at most `COARSEST_SPACING`.
 
     Args:
         model: pinocchio.Model.
-        q: configuration, or several, (..., nq).
+        q: one or several configurations, (..., nq).
 
     Raises:
-        InputError: a coordinate is too large; names its joint.
+        InputError: a coordinate is too large; the message names its joint.
     """
     if q.ndim == 1:
         farthest = max(map(abs, q.tolist()), default=0.0)

@@ -1,7 +1,7 @@
-"""The order of a robot's joints in its file, beside the one of its model.
+"""Order of a robot's joints in its file, as opposed to the order in the model.
 
-Pinocchio sorts the joints that leave a link by name, so that a list in the order of a URDF would go to
-other joints.  Who passes a list is told; arrays are taken as Pinocchio's, without a word.
+Pinocchio sorts the child joints of a link by name. A list in the order of a URDF would therefore assign
+values to other joints. Lists cause a warning; arrays are taken in Pinocchio's order without a warning.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from typing import Literal
 from pin_nonideal.errors import JointOrderWarning
 from pin_nonideal.types import Model
 
-# Names in the order of the file, by the model's identity: a model has no place of its own for them.
+# Joint names in the order of the file, by `id(model)`, since a pinocchio.Model has no attribute for them.
 _file_order: dict[int, tuple[str, ...]] = {}
 
 
 def remember_order(model: Model, names: Sequence[str]) -> None:
-    """Keeps the order of the joints in the file as long as the model lives, where the model has another one.
+    """Store the joint order of the file for the lifetime of the model, if it differs from the model's order.
 
     Args:
         model: pinocchio.Model.
-        names: of joints, in the order of the file; those that the model does not have are passed over.
+        names: joint names in the order of the file; names that the model does not have are ignored.
     """
     own = [str(name) for name in model.names][1:]
     filed = [name for name in names if name in own]
@@ -34,7 +34,7 @@ def remember_order(model: Model, names: Sequence[str]) -> None:
 
 
 def file_order(model: Model) -> tuple[str, ...] | None:
-    """Names of the joints in the order of the file, where it differs from the model's; None else.
+    """Return the joint names in the order of the file, or None if the model has the same order.
 
     Args:
         model: pinocchio.Model.
@@ -43,7 +43,7 @@ def file_order(model: Model) -> tuple[str, ...] | None:
 
 
 def order_words(model: Model) -> str | None:
-    """That the orders differ, and how; None where they do not.
+    """Return a message on the two different orders, or None if they agree.
 
     Args:
         model: pinocchio.Model.
@@ -59,13 +59,13 @@ def order_words(model: Model) -> str | None:
 
 
 def tell_order(model: Model, given: object, what: str, sizes: Literal["nqs", "nvs"]) -> None:
-    """Warns where a list of the joints' values was perhaps written in the order of the file.
+    """Warn if a list of joint values may have been written in the order of the file.
 
     Args:
         model: pinocchio.Model.
         given: values of all joints.
         what: words for messages.
-        sizes: which of the model tell how many values each joint has.
+        sizes: attribute of the model with the number of values of each joint.
     """
     if not isinstance(given, (list, tuple)):
         return
@@ -80,7 +80,7 @@ def tell_order(model: Model, given: object, what: str, sizes: Literal["nqs", "nv
 
 
 def find_stack_level() -> int:
-    """How many frames up the caller of this package stands."""
+    """Return the stack level of the first caller outside this package."""
     frame, level = sys._getframe(1), 1
     while frame.f_back is not None and str(frame.f_globals.get("__name__", "")).startswith("pin_nonideal"):
         frame, level = frame.f_back, level + 1

@@ -1,6 +1,6 @@
-"""Where the frames and joints of a tree are, without Pinocchio's Data.
+"""Forward kinematics of frames and joints without Pinocchio's Data.
 
-Data holds tensors of nv^3 numbers, gigabytes from some five hundred degrees of freedom on.
+Data holds tensors of nv^3 numbers, which take gigabytes above about 500 degrees of freedom.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pin_nonideal.types import Array, Model, Placement
 
 
 def joint_placements(model: Model, q: Array) -> list[Placement]:
-    """Frames of all joints in the world: oM_i = oM_parent  M_i  J_i(q), the universe's first.
+    """Compute the placements of all joints in the world: oM_i = oM_parent  M_i  J_i(q), universe first.
 
     Args:
         model: pinocchio.Model.
@@ -31,13 +31,13 @@ def joint_placements(model: Model, q: Array) -> list[Placement]:
 
 
 def frame_on_joint(model: Model, name: str) -> tuple[int, Placement]:
-    """The joint that carries a frame, and the frame's placement on it.
+    """Return the joint that carries a frame, and the placement of the frame on the joint.
 
-    A joint without a frame of its own, which a model built by hand may hold, is found by its name as well.
+    The name of a joint without a frame is accepted as well; hand-built models may have such joints.
 
     Args:
         model: pinocchio.Model.
-        name: of a frame or a joint of the model.
+        name: name of a frame or a joint of the model.
 
     Returns:
         Index of the joint, and a pinocchio.SE3.
@@ -49,11 +49,11 @@ def frame_on_joint(model: Model, name: str) -> tuple[int, Placement]:
 
 
 def frame_index(model: Model, name: str) -> int:
-    """Index of the frame of that name; of several, a body's before a joint's, and those before all others.
+    """Return the index of a frame; among frames of one name, bodies come before joints and other kinds.
 
     Args:
         model: pinocchio.Model.
-        name: of a frame of the model.
+        name: name of a frame of the model.
     """
     kinds = (pin.FrameType.BODY, pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT, pin.FrameType.OP_FRAME)
     found = (int(model.getFrameId(name, kind)) for kind in kinds if model.existFrame(name, kind))
@@ -61,19 +61,20 @@ def frame_index(model: Model, name: str) -> int:
 
 
 def frame_motion(model: Model, name: str, q: Array, v: Array) -> tuple[Array, Array, Array]:
-    """How a frame moves over many states, by the joints between it and the world.
+    """Compute placement and twist of a frame at many states, from the joints between frame and world.
 
-    v_i = X_i^-1 v_parent + S_i(q) dq_i,  in the axes of each body; the frame's last, turned into world axes.
+    The recursion is v_i = X_i^-1 v_parent + S_i(q) dq_i in body axes. The twist of the frame is then rotated
+    into world axes.
 
     Args:
         model: pinocchio.Model.
-        name: of a frame or a joint of the model.
+        name: name of a frame or a joint of the model.
         q: configurations, (n, nq).
         v: velocities, (n, nv).
 
     Returns:
-        Place of its origin [m], (n, 3); its axes by columns, (n, 3, 3); velocity of its origin and of its
-        rotation in world axes [m/s; rad/s], (n, 6).
+        Position of the origin [m], (n, 3); axes by columns, (n, 3, 3); linear velocity of the origin and
+        angular velocity in world axes [m/s; rad/s], (n, 6).
     """
     carrier, local = frame_on_joint(model, name)
     chain = [int(i) for i in model.supports[carrier]][1:]

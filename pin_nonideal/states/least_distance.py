@@ -1,4 +1,4 @@
-"""Least moves under rows that are held and gaps that stay open or touch.
+"""Least displacements under linear equality rows and nonnegative gaps.
 
 [Lawson, Hanson: Solving Least Squares Problems, 1974, ch. 23: least distance programming.]
 """
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from pin_nonideal.types import Array
 
-# Directions that the rows hold by less than this part of the best held ones they do not hold.
+# Singular values of rows below this part of the largest count as zero.
 HELD = 1e-9
-# A move as many times longer than the deepest gap leads out of it nowhere near.
+# Displacements longer than the deepest penetration by this factor are rejected.
 LONGEST_WAY_OUT = 1e6
 
 
@@ -22,12 +22,12 @@ Numbers = NDArray[np.intp]
 
 
 class LeastMove(NamedTuple):
-    """The shortest sum of a move so far and a further one.
+    """Step that gives the least total displacement.
 
     Attributes:
-        x: the further one, (n,).
-        touching: the numbers of the gaps that it brings to zero and presses on.
-        pull: the largest multiplier of a row or gap.
+        x: step, (n,).
+        touching: indices of the active gaps, which have a positive multiplier.
+        pull: largest multiplier of a row or gap.
     """
 
     x: Array
@@ -36,7 +36,7 @@ class LeastMove(NamedTuple):
 
 
 def held(B: Array) -> tuple[Array, Array, Array]:
-    """Singular values of the rows that hold something, with their vectors U (m, r) and V^T (r, nv).
+    """Return the nonzero singular values of the rows, with their vectors U (m, r) and V^T (r, nv).
 
     Args:
         B: rows, (m, nv).
@@ -47,7 +47,7 @@ def held(B: Array) -> tuple[Array, Array, Array]:
 
 
 def complement(Vt: Array) -> Array:
-    """Orthonormal columns that span what the orthonormal rows leave.
+    """Return orthonormal columns that span the null space of orthonormal rows, (n, n - r).
 
     Args:
         Vt: rows, (r, n).
@@ -58,19 +58,19 @@ def complement(Vt: Array) -> Array:
 
 
 def least_move(B: Array, phi: Array, G: Array, gap: Array, move: Array) -> LeastMove | None:
-    """The x with least |move + x|^2 under B x = -phi and gap + G x >= 0; None where there is none nearby.
+    """Compute x with least |move + x|^2 under B x = -phi and gap + G x >= 0, or None if none is nearby.
 
     Args:
-        B: rows that are held, (m, n).
-        phi: their residuals, (m,).
+        B: equality rows, (m, n).
+        phi: residuals of the equality rows, (m,).
         G: rows of the gaps, (k, n).
         gap: gaps, (k,).
-        move: from the start, (n,).
+        move: displacement from the start, (n,).
     """
     U, s, Vt = held(B)
     onto = -Vt.T @ ((U.T @ phi) / s)
     open_directions = complement(Vt)
-    back = -open_directions @ (open_directions.T @ move)  # along what the rows leave open
+    back = -open_directions @ (open_directions.T @ move)  # in the null space of the rows
     C, lacking = G @ open_directions, -(gap + G @ (onto + back))
     out, pressed = _way_out(C, lacking)
     if out is None:
@@ -82,8 +82,8 @@ def least_move(B: Array, phi: Array, G: Array, gap: Array, move: Array) -> Least
 
 
 def _way_out(C: Array, lacking: Array) -> tuple[Array | None, Array]:
-    """The shortest u with C u >= lacking, None where there is none nearby, and u = C^T pressed."""
-    from scipy.optimize import nnls  # where a contact starts inside only: its import takes long
+    """Compute the shortest u = C^T pressed with C u >= lacking, and pressed; u is None if none is nearby."""
+    from scipy.optimize import nnls  # imported only for initial penetration, since the import is slow
 
     deepest = float(lacking.max(initial=0.0))
     if deepest <= 0.0:

@@ -1,12 +1,13 @@
-"""The closed configuration nearest to a given one, from however far away.
+"""Global search for the nearest configuration that satisfies the holonomic constraints.
 
-With d(q) the move from q0 to q in tangent coordinates, this is min d^T M(q0) d / 2 over phi(q) = 0.  Damped
-steps close the loops; then Newton's method for the Lagrangian slides along the constraints until
-M(q0) d + A^T lam = 0, downhill all the way.  Loops may close in several ways: where the move is long other
-starts are tried as well, and the nearest closure wins.
+The problem is min d^T M(q0) d / 2 over phi(q) = 0. The displacement d(q) from q0 to q is in tangent
+coordinates. Damped steps close the loops. Newton's method for the Lagrangian then descends along the
+constraints until M(q0) d + A^T lam = 0. Loops may have several closures. If the displacement is long, the
+search uses further starts and returns the nearest closure.
 
-Nothing here has a unit: rows are divided by their reach and moves by the units of `Loops`, so that lengths,
-scales of rows and copies of rows change nothing.
+All quantities are dimensionless: rows are divided by their scales, and displacements by the units of
+`Search`. The result is thus independent of length units, row scales and duplicate rows. The scale of a row is
+its largest change if one coordinate moves by its unit.
 """
 
 from __future__ import annotations
@@ -23,36 +24,39 @@ from pin_nonideal.types import Array, Model
 
 from .least_distance import complement, held
 
-# A gap below this part of the reach of its row is left to the core's Newton method, which squares it.
+# Scaled residual at which the search ends; the core's Newton method squares it.
 CLOSED = 1e-9
-# A gap that stays above this part of it after projection is a loop that does not close.
+# Residual above which a loop counts as open after projection.
 CLOSURE_TOLERANCE = 1e-8
 CLOSING_STEPS, RETRACTIONS, SLIDES, HALVINGS = 300, 15, 60, 25
-# Of the steps that close: part of the mean square of a row at first, and between which it stays.
+# Damping of the closing steps relative to the mean square of a row: initial value and bounds.
 DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-14, 1e10
-# The part of the move along the constraints at which a closure counts as stationary: rounding over gaps.
+# Relative slope of the distance along the constraints at which a closure is stationary: rounding over gaps.
 STATIONARY = 1e-10
-# Rounding of a move, as a part of moving everything by its unit.
+# Rounding of a displacement, relative to a displacement of all coordinates by their units.
 ROUNDING = 1e-13
-# Differences of gradients, over a part of a unit.
+# Step of gradient differences [units].
 DIFFERENCE = 1e-6
-# Rows that miss their slope by more than CORNER of a move, at this part of a unit, have a corner nearby.
+# A row has a corner nearby if, at a displacement of NEAR_CORNER units, it differs from its linear model by
+# more than CORNER of the displacement.
 NEAR_CORNER, CORNER = 1e-2, 0.1
-# A second derivative below minus this (1 without curvature) tells a saddle, where gradients alone would stay.
+# A second derivative below -SADDLE (1 without curvature) marks a saddle point, at which the gradient
+# vanishes. ESCAPE is the displacement off a saddle point [units].
 SADDLE, ESCAPE = 1e-5, 0.05
 LEAST_CURVATURE = 1e-2
-# Freedoms beyond which second derivatives, one evaluation each, are not taken.
+# Maximum number of open directions for second derivatives, each of which needs one gradient evaluation.
 MANY_FREEDOMS = 200
-# Starts until a closure is found, and further ones beside it where its move is longer than FAR units, some
-# more where it is longer than VERY_FAR; of few freedoms up to MOST_STARTS until the nearest came so OFTEN.
+# Maximum number of starts until a closure is found, and number of further starts if its displacement is
+# longer than FAR units (twice as many above VERY_FAR). With at most FEW_FREEDOMS coordinates, starts continue
+# up to MOST_STARTS until the nearest closure was found OFTEN times.
 STARTS, FURTHER_STARTS, FAR, VERY_FAR = 24, 12, 0.05, 0.5
 MOST_STARTS, OFTEN, FEW_FREEDOMS = 60, 4, 12
-SPREADS = (0.1, 0.3, 0.5, 1.0)  # of these, in turn: of a unit, or of the longest move so far beyond that
-# Closures with a worse conditioned mass matrix than this (gimbal lock) are kept only without a better one.
+SPREADS = (0.1, 0.3, 0.5, 1.0)  # spreads of starts, in turn, over max(1 unit, displacement of best closure)
+# Smallest reciprocal condition number of the mass matrix. Closures below it (gimbal lock) are a fallback.
 WELL_CONDITIONED = 1e-10
-# Stands for what is zero and divides.
+# Smallest divisor.
 TINY = 1e-300
-# Two distances that differ by less than this part are the same, and those of one closure found twice.
+# Relative difference below which two distances are equal, and below which they belong to one closure.
 SAME, SAME_CLOSURE = 1e-9, 1e-6
 TURN = 2.0 * np.pi
 
@@ -60,14 +64,14 @@ Rows = Callable[[Array], tuple[Array, Array]]
 
 
 class Closure(NamedTuple):
-    """A configuration on the constraints, or the one that came nearest to them.
+    """A configuration on the constraints, or the iterate with the smallest residual.
 
     Attributes:
         q: configuration, (nq,).
-        gap: largest residual over the reach of its row.
-        distance: from where the search began, in the metric of its mass matrix.
-        settled: no closure around it is nearer.
-        iterations: steps taken in all.
+        gap: largest scaled residual.
+        distance: distance from the start, in the metric of the mass matrix at the start.
+        settled: whether the distance is a local minimum.
+        iterations: total number of steps.
     """
 
     q: Array
@@ -78,14 +82,14 @@ class Closure(NamedTuple):
 
 
 class Place(NamedTuple):
-    """What a configuration is to the search, in coordinates x in which |x| is a distance.
+    """Iterate of the search, in coordinates x in which |x| is the distance.
 
     Attributes:
         q: configuration, (nq,).
-        move: from the start, (nv,).
-        half: x = half dq, (nv, nv).
-        B: rows, (m, nv).
-        phi: their residuals, (m,).
+        move: displacement from the start, (nv,).
+        half: matrix of x = half dq, (nv, nv).
+        B: scaled rows, (m, nv).
+        phi: scaled residuals, (m,).
     """
 
     q: Array
@@ -96,22 +100,23 @@ class Place(NamedTuple):
 
     @property
     def gap(self) -> float:
-        """The largest residual."""
+        """Largest scaled residual."""
         return float(np.abs(self.phi).max(initial=0.0))
 
 
 class Search:
-    """Closures around a configuration.
+    """Search for closures around a configuration.
 
     Args:
         model: pinocchio.Model.
-        rows: q -> (A, phi) of the holonomic rows over their reach, (m, nv) and (m,).
+        rows: q -> (A, phi) of the holonomic rows over their scales, (m, nv) and (m,).
         mass: q -> M(q), (nv, nv).
-        metric: positive definite, (nv, nv): that of the distance.
-        unit: a long move of each coordinate, (nv,).
-        angles: which coordinates are angles, (nv,).
-        q0: where it begins, (nq,).
-        free: which coordinates move, (nv,); all when None.  Of the others nothing above holds entries.
+        metric: positive definite metric of the distance, (nv, nv).
+        unit: unit displacement of each coordinate, (nv,).
+        angles: mask of coordinates that are angles, (nv,).
+        q0: start configuration, (nq,).
+        free: mask of coordinates that move, (nv,); all when None. The arguments above have entries for free
+            coordinates only, so their nv is the number of free coordinates.
     """
 
     def __init__(
@@ -133,16 +138,19 @@ class Search:
         self.iterations = 0
 
     def nearest(self) -> tuple[Closure, bool]:
-        """The nearest closure found, and whether nothing speaks against it being the nearest of all.
+        """Return the nearest closure found, and whether the search confirms it as nearest.
+
+        A closure is confirmed if it is a local minimum, no fallback is nearer, and several starts found it.
+        One start suffices if the displacement is short.
 
         Raises:
-            numpy.linalg.LinAlgError: numbers ran away.
+            numpy.linalg.LinAlgError: a number overflows.
         """
         best: Closure | None = None
         fallback: Closure | None = None
         open_place = self._place(self.q0)
         starts, further, often = STARTS, 0, 0
-        generator = np.random.default_rng(0)  # the same closure every time
+        generator = np.random.default_rng(0)  # a fixed seed makes the result deterministic
         most = MOST_STARTS if len(self.unit) <= FEW_FREEDOMS else 0
         k = 0
         while k < starts or (further and often < OFTEN and k < most):
@@ -155,7 +163,7 @@ class Search:
                     open_place = min(place, open_place, key=self._lacking)
                     continue
                 found = self._unwound(self._settle(place))
-            except UserFunctionError:  # a way that leads where a function of the user has no value
+            except UserFunctionError:  # a user function raises on the path of this start
                 continue
             if conditioning(self.mass(found.q)) <= WELL_CONDITIONED:
                 fallback = fallback if fallback and fallback.distance <= found.distance else found
@@ -179,7 +187,7 @@ class Search:
         return Closure(open_place.q, lacking, self._distance(open_place), False, self.iterations), False
 
     def _unwound(self, found: Closure) -> Closure:
-        """The nearer one of a closure and of what it is without whole turns of joints."""
+        """Return the nearer of a closure and the closure without whole turns of its joints."""
         move = self._difference(found.q)
         turns = np.where(self.angles, np.round(move / TURN), 0.0)
         if not turns.any():
@@ -188,15 +196,15 @@ class Search:
         return min(found, self._settle(place), key=lambda c: c.distance) if self._is_closed(place) else found
 
     def _is_closed(self, place: Place) -> bool:
-        """Whether all rows are met there, but for what the core's Newton method squares."""
+        """Check if all residuals are small enough for the core's Newton method."""
         return self._lacking(place) <= CLOSED
 
     def _lacking(self, place: Place) -> float:
-        """The largest gap."""
+        """Return the largest residual."""
         return place.gap
 
     def _longest(self, q: Array) -> float:
-        """The longest move of a coordinate [units]."""
+        """Return the longest displacement of a coordinate [units]."""
         return float((np.abs(self._difference(q)) / self.unit).max(initial=0.0))
 
     def _place(self, q: Array) -> Place:
@@ -212,7 +220,7 @@ class Search:
         return float(np.linalg.norm(place.move))
 
     def _go(self, place: Place, x: Array, part: float = 1.0) -> Array:
-        """The configuration a move x away, which is cut to one unit."""
+        """Return the configuration after a displacement x, which is cut to one unit per coordinate."""
         dq = np.linalg.solve(place.half, x)
         longest = float((np.abs(dq) / self.unit).max(initial=0.0))
         if not np.isfinite(longest):
@@ -220,7 +228,7 @@ class Search:
         return self._integrate(place.q, dq * (part / max(longest, 1.0)))
 
     def _integrate(self, q: Array, dq: Any) -> Array:
-        """The configuration from which the free coordinates of q have moved by dq."""
+        """Return q with its free coordinates moved by dq."""
         if self.free is not None:
             whole = np.zeros(self.model.nv)
             whole[self.free] = dq
@@ -229,14 +237,14 @@ class Search:
         return moved
 
     def _difference(self, q: Array) -> Array:
-        """The move of the free coordinates from the start to q."""
+        """Return the displacement of the free coordinates from the start to q."""
         move: Array = pin.difference(self.model, self.q0, q)
         return move if self.free is None else move[self.free]
 
     # --- onto the constraints -------------------------------------------------------------------------------
 
     def _close(self, q: Array) -> Place:
-        """Levenberg-Marquardt steps x = -B^T (B B^T + damping I)^-1 phi down to the constraints."""
+        """Close the loops by Levenberg-Marquardt steps x = -B^T (B B^T + damping I)^-1 phi."""
         place, damping = self._place(q), DAMPING
         for _ in range(CLOSING_STEPS):
             if place.gap <= ROUNDING:
@@ -257,7 +265,7 @@ class Search:
         return place
 
     def _retract(self, q: Array) -> Place | None:
-        """Back onto the constraints from nearby, by least moves."""
+        """Return to the constraints from nearby by least-norm Newton steps, or None on failure."""
         place = self._place(q)
         for _ in range(RETRACTIONS):
             gap = place.gap
@@ -273,14 +281,14 @@ class Search:
     # --- along the constraints ------------------------------------------------------------------------------
 
     def _settle(self, place: Place) -> Closure:
-        """The nearest closure downhill; its start where that is a corner, in which rows have no direction."""
+        """Descend to a local minimum of the distance; return the start if the descent ends at a corner."""
         found, settled = self._slide(place)
         if not settled and self._has_corner(found):
             found = place
         return Closure(found.q, found.gap, self._distance(found), settled, self.iterations)
 
     def _slide(self, place: Place) -> tuple[Place, bool]:
-        """Newton's method for the Lagrangian in the open directions, and whether it ends in a minimum."""
+        """Apply Newton's method for the Lagrangian in the open directions; return if it ends in a minimum."""
         settled = False
         for _ in range(SLIDES):
             U, s, Vt = held(place.B)
@@ -301,14 +309,14 @@ class Search:
                 x = -directions @ (parts / np.maximum(np.abs(curvature), LEAST_CURVATURE))
                 trial = self._downhill(place, x, float(np.linalg.norm(slope)))
             if trial is None:
-                # Where neither distance nor slope falls any more it is rounding.
+                # Neither distance nor slope decreases, so the remaining slope may be rounding.
                 settled = bool(np.linalg.norm(slope) <= 1e3 * STATIONARY * self._distance(place))
                 break
             place = trial
         return place, settled
 
     def _has_corner(self, place: Place) -> bool:
-        """Whether the rows change their direction at once, such as those of a disk that lies flat."""
+        """Check if row directions change abruptly, as for a disk that lies flat."""
         _, _, Vt = held(place.B)
         slope = place.move - Vt.T @ (Vt @ place.move)
         x = NEAR_CORNER * self._unit_length(place, slope) * slope
@@ -316,11 +324,11 @@ class Search:
         return bool(max(np.abs(phi - place.phi).max(initial=0.0) for phi in there) > CORNER * NEAR_CORNER)
 
     def _unit_length(self, place: Place, x: Array) -> float:
-        """How far along x some coordinate moves by its unit."""
+        """Return the factor of x at which the first coordinate moves by its unit."""
         return 1.0 / max(float((np.abs(np.linalg.solve(place.half, x)) / self.unit).max()), TINY)
 
     def _downhill(self, place: Place, x: Array, slope: float) -> Place | None:
-        """The first of ever shorter moves along x that comes nearer, or, at rounding, is less steep."""
+        """Backtrack along x until the distance falls, or, if it changes by rounding only, the slope falls."""
         distance = self._distance(place)
         for k in range(HALVINGS):
             trial = self._retract(self._go(place, x, 0.5**k))
@@ -334,12 +342,12 @@ class Search:
         return None
 
     def _slope(self, place: Place) -> float:
-        """How much of the move lies in the open directions."""
+        """Return the norm of the displacement in the open directions."""
         _, _, Vt = held(place.B)
         return float(np.linalg.norm(place.move - Vt.T @ (Vt @ place.move)))
 
     def _curvature(self, place: Place, lam: Array, open_directions: Array) -> tuple[Array, Array]:
-        """Second derivatives of the Lagrangian along the open directions, rising, and their directions."""
+        """Return ascending second derivatives of the Lagrangian in the open directions, and directions."""
         n = open_directions.shape[1]
         if n == 0 or n > MANY_FREEDOMS:
             return np.ones(n), open_directions
@@ -354,13 +362,13 @@ class Search:
 
     @staticmethod
     def _gradient(place: Place, lam: Array) -> Array:
-        """Of |move|^2/2 + lam . phi, in tangent coordinates."""
+        """Return the gradient of |move|^2/2 + lam . phi, in tangent coordinates."""
         gradient: Array = place.half.T @ (place.move + place.B.T @ lam)
         return gradient
 
 
 def conditioning(M: Array) -> float:
-    """Smallest over largest eigenvalue of M scaled to unit diagonal; 0 where M overflows.
+    """Return the smallest over the largest eigenvalue of M scaled to unit diagonal; 0 if M overflows.
 
     Args:
         M: mass matrix, (nv, nv).

@@ -1,4 +1,4 @@
-"""States by name: a configuration or velocity as numbers (nq,) or (nv,), or as a table by joint name.
+"""Parsing of states: a configuration or velocity as numbers (nq,) or (nv,), or as a table by joint name.
 
 One parser serves Scene, simulate, project, solve, load, the command line and robot.yaml.
 """
@@ -19,7 +19,7 @@ from pin_nonideal.validation import array, by_name, number
 from .joint_layout import CIRCLES, configuration, unit_parts
 from .joint_order import tell_order
 
-# A quaternion written by hand this close to unit length is normalized; one farther away is a mistake.
+# A hand-written quaternion within this distance of unit length is normalized; others are errors.
 WRITTEN_UNIT_TOLERANCE = 1e-3
 
 
@@ -27,9 +27,9 @@ class Piece(NamedTuple):
     """A named part of the values of one joint.
 
     Attributes:
-        first: where it begins among the joint's values.
-        size: how many numbers are given.
-        kind: "" for numbers as they are, "rpy" or "angle" for what becomes a quaternion or (cos, sin).
+        first: index of the first value in the joint's values.
+        size: number of given values.
+        kind: "" for plain numbers, "rpy" for angles of a quaternion, "angle" for the angle of (cos, sin).
     """
 
     first: int
@@ -38,7 +38,7 @@ class Piece(NamedTuple):
 
 
 TURN = {"quaternion": Piece(0, 4), "rpy": Piece(0, 3, "rpy")}
-# Pieces of a joint's configuration and velocity, by the beginning of the name of its kind.
+# Pieces of a joint's configuration and velocity, by the prefix of the joint kind.
 PIECES: dict[str, tuple[dict[str, Piece], dict[str, Piece]]] = {
     "JointModelFreeFlyer": (
         {"xyz": Piece(0, 3)} | {name: piece._replace(first=3) for name, piece in TURN.items()},
@@ -61,20 +61,20 @@ def named_configuration(
     what: str,
     parts: Sequence[tuple[str, slice]] | None = None,
 ) -> Array:
-    """A configuration from numbers or by name, (nq,).
+    """Return a configuration from numbers, a table by joint name, or a name, (nq,).
 
-    A table holds, by joint name, a number, the joint's values, or a table of them: {"xyz": .., "rpy": ..} or
-    {"xyz": .., "quaternion": [x, y, z, w]} of a floating base (also called "base", or by its body), "rpy" or
-    "quaternion" of a ball joint, "xy" and "angle" of a planar one, "xyz" of a translation; an angle [rad]
-    stands for its (cos, sin).  What it leaves out stays as in `base`.  A text names a reference
-    configuration of the model.
+    A table maps a joint name to a number, to the joint's values, or to a table of pieces. A floating base has
+    the pieces "xyz" and either "rpy" or "quaternion" [x, y, z, w]. Its name is that of the joint or the body,
+    or "base". A ball joint has "rpy" or "quaternion", a planar joint "xy" and "angle", and a translation
+    joint "xyz". An angle [rad] replaces (cos, sin). Missing entries stay as in `base`. A string is the name
+    of a reference configuration of the model.
 
     Args:
         model: pinocchio.Model.
         given: see above.
         base: configuration that a table changes, (nq,).
         what: words for messages.
-        parts: those of `unit_parts`, when known.
+        parts: result of `unit_parts`, if known.
 
     Raises:
         InputError: wrong shape, not finite, or a part far from unit length.
@@ -97,11 +97,11 @@ def named_configuration(
 
 
 def named_velocity(model: Model, given: State, base: Array, what: str) -> Array:
-    """A velocity from numbers or by name, (nv,).
+    """Return a velocity from numbers or from a table by joint name, (nv,).
 
-    A table holds, by joint name, a number, the joint's values, or a table of them: "linear" and "angular" of
-    a floating base (in its own axes, as Pinocchio has them) or a planar joint, "angular" of a ball joint,
-    "linear" of a translation.  What it leaves out stays as in `base`.
+    A table maps a joint name to a number, to the joint's values, or to a table of pieces. A planar joint and
+    a floating base (in body axes, as in Pinocchio) have the pieces "linear" and "angular". A ball joint has
+    "angular", and a translation joint "linear". Missing entries stay as in `base`.
 
     Args:
         model: pinocchio.Model.
@@ -184,11 +184,11 @@ def named_joint_samples(model: Model, given: Any, count: int, what: str) -> Arra
 
 
 def named_entries(model: Model, given: State | None) -> NDArray[np.bool_] | None:
-    """Which entries of a velocity a table names, (nv,); None of anything else.
+    """Return the mask of entries that a table of a velocity names, (nv,), or None without a table.
 
     Args:
         model: pinocchio.Model.
-        given: a velocity as `named_velocity` takes it.
+        given: a velocity as in `named_velocity`.
     """
     if not isinstance(given, Mapping):
         return None
@@ -196,11 +196,11 @@ def named_entries(model: Model, given: State | None) -> NDArray[np.bool_] | None
 
 
 def named_coordinates(model: Model, given: State | None) -> NDArray[np.bool_] | None:
-    """Which tangent coordinates a table of a configuration names, (nv,); None of anything else.
+    """Return the mask of tangent coordinates that a table of a configuration names, (nv,), or None.
 
     Args:
         model: pinocchio.Model.
-        given: a configuration as `named_configuration` takes it.
+        given: a configuration as in `named_configuration`.
     """
     if not isinstance(given, Mapping):
         return None
@@ -223,15 +223,15 @@ def named_coordinates(model: Model, given: State | None) -> NDArray[np.bool_] | 
 
 
 def joint_named(model: Model, name: object, what: str) -> int:
-    """Index of the joint of that name; a floating base goes by "base" and by the name of its body as well.
+    """Return the index of a joint; a floating base also has the names "base" and that of its body.
 
     Args:
         model: pinocchio.Model.
-        name: of the joint.
+        name: name of the joint.
         what: words for messages.
 
     Raises:
-        UnknownNameError: there is none.
+        UnknownNameError: no joint has that name.
     """
     known = [str(n) for n in model.names][1:]
     if isinstance(name, str) and name in known:
@@ -250,14 +250,14 @@ def joint_named(model: Model, name: object, what: str) -> int:
 
 
 def _values(model: Model, j: int, level: int, value: Any, now: Array, what: str) -> Array:
-    """Values of one joint: of its configuration (level 0) or of its velocity (1).
+    """Return the values of one joint, of its configuration (level 0) or its velocity (level 1).
 
     Args:
         model: pinocchio.Model.
         j: index of the joint.
         level: see above.
-        value: what was given.
-        now: the values so far, which the pieces that are not given keep.
+        value: the given number, values, table or SE3.
+        now: current values, which missing pieces keep.
         what: words for messages.
     """
     kind = model.joints[j].shortname()
@@ -273,7 +273,7 @@ def _values(model: Model, j: int, level: int, value: Any, now: Array, what: str)
 
 
 def _pieced(kind: str, level: int, table: Mapping[Any, Any], now: Array, what: str) -> Array:
-    """Values of a joint whose pieces are given by name."""
+    """Return the values of a joint from a table of its pieces."""
     pieces = next((both[level] for start, both in PIECES.items() if kind.startswith(start)), {})
     values = np.array(now)
     for key, given in table.items():
@@ -294,15 +294,15 @@ def _pieced(kind: str, level: int, table: Mapping[Any, Any], now: Array, what: s
 
 
 def with_unit_lengths(model: Model, q: Array, what: str) -> Array:
-    """Quaternions and (cos, sin) pairs written by hand, of unit length.
+    """Normalize hand-written quaternions and (cos, sin) pairs of a configuration in place, and return it.
 
     Args:
         model: pinocchio.Model.
-        q: configuration, (nq,); changed.
+        q: configuration, (nq,), modified in place.
         what: words for messages.
 
     Raises:
-        InputError: one is far from unit length.
+        InputError: a quaternion or pair is far from unit length.
     """
     for joint, part in unit_parts(model):
         length = float(np.linalg.norm(q[part]))

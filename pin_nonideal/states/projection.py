@@ -1,4 +1,4 @@
-"""States on the constraints: the core's Newton method from nearby, the search for the nearest from afar."""
+"""Projection onto the constraints: the core's Newton method for nearby states, a global search for others."""
 
 from __future__ import annotations
 
@@ -33,42 +33,44 @@ from .report import ProjectionReport, report_of
 from .rows import copies, gap_rows, holonomic_rows, rows_at
 from .scales import VANISHING, chain, coordinate, slides
 
-# Rows that no velocity meets better than this part of 1 + |v| contradict each other.
+# Largest remaining rate of consistent rows, relative to 1 + |v|.
 RATE_TOLERANCE = 1e-6
-# Where Newton's method moves nothing by more than this part of its unit, it misses the nearest state by
-# rounding.
+# Newton's method returns the nearest state, to rounding, if no coordinate moves by more than this part of its
+# unit.
 NEARBY = 1e-6
-SURELY = 0.1  # of it, in ambient coordinates: no difference of configurations is ten times as long
-# Residuals up to this part of the length are tried by it at all.
+SURELY = 0.1  # factor of NEARBY in ambient coordinates; a tangent displacement is never ten times as long
+# Largest residual from which Newton's method is tried, relative to the length of the mechanism.
 NEWTON_REACH = 1e-3
-# A move of more than this part of a unit is worth a word.
+# Displacements above this part of a unit are reported.
 LITTLE = 1e-3
-# Part of the size of the scene by which a gap is negative by rounding.
+# Penetration up to this part of the size of the scene is rounding.
 INSIDE = 1e-12
-# Part of the length, of one at most, by which a contact may start inside: more is no rounding of a pose.
+# Largest initial penetration, relative to the length of the mechanism or to 1 m if the mechanism is longer.
+# Deeper penetration cannot be rounding of a pose.
 DEEP = 1e-2
-# The inertia that a coordinate has at least in the distance where M is singular, as a part of the largest.
+# Inertia that the metric gains if M is singular, relative to the largest inertia.
 LEAST_INERTIA = 1e-9
-# Parts of a move at which rows are sampled, each where the one before is beyond a function of the user.
+# Parts of a displacement at which rows are sampled. If a user function raises, the next part is tried.
 NEARER = (1.0, 0.1, 1e-2, 1e-3)
-# A search in more freedoms takes minutes: Newton's method has the first word, however large the gap.
+# Maximum number of degrees of freedom for a search, which takes minutes above it. Newton's method is then
+# tried from any residual.
 MANY_FREEDOMS = 300
 
 
 class Projection:
-    """The projection onto the constraints of one scene.
+    """Projection onto the constraints of one scene.
 
     Args:
         model: pinocchio.Model.
-        program: the scene as the core knows it.
-        q0: a configuration, (nq,), whose lengths count where the model has none.
-        idle: names of contacts that nothing moves.
-        is_start: whether a run may start at q0.  Else functions of the user are not called there, and the
-            lengths of the first start count.
+        program: the core's program.
+        q0: configuration that defines the length of the mechanism if its model has no lengths, (nq,).
+        idle: names of contacts that no joint moves.
+        is_start: whether a run may start at q0. If not, user functions are not called at q0, and the first
+            start defines the length.
 
     Attributes:
-        unit: a long move of each coordinate, (nv,): a radian, or the length of the mechanism.
-        length: of the mechanism [m]: the longest chain of joints and frames.
+        unit: unit displacement of each coordinate, (nv,): a radian, or the length of the mechanism.
+        length: length of the mechanism [m]: the longest chain of joints and frames.
     """
 
     def __init__(
@@ -89,13 +91,13 @@ class Projection:
         self._has_gaps = bool(self._gaps.any())
 
     def _measure(self, length: float) -> None:
-        """Takes the length of the mechanism, 1 m where it has none."""
+        """Set the length of the mechanism; zero is replaced by 1 m."""
         self.length = length or 1.0
         self.unit = np.where(self._slides, self.length, 1.0)
         self._closed = CLOSURE_TOLERANCE * min(1.0, self.length)
 
     def measure_at(self, q: Array) -> None:
-        """Measures the mechanism at its first start, where its length is not known before.
+        """Compute the length of the mechanism at its first start, if it is not known yet.
 
         Args:
             q: configuration of the start, (nq,).
@@ -107,22 +109,22 @@ class Projection:
     def nearest(
         self, q: Array, v: Array, t: float, held: Held = NOTHING_HELD
     ) -> tuple[Array, Array, ProjectionReport]:
-        """Nearest state with phi(q, t) = 0 and A v + phi_t = 0.
+        """Return the nearest state with phi(q, t) = 0 and A v + phi_t = 0.
 
         Args:
             q: configuration, (nq,).
             v: velocity, (nv,).
             t: time [s].
-            held: entries of q and v that stay as they are.
+            held: entries of q and v to hold.
 
         Returns:
-            q (nq,), v (nv,), and how far both moved.
+            q (nq,), v (nv,), and the report of their displacements.
 
         Raises:
-            LoopClosureError: no configuration satisfies the constraints.
-            InputError: a contact starts too deep inside its plane, or the constraints do not allow the held
+            LoopClosureError: no configuration that satisfies the constraints is found.
+            InputError: a contact starts with deep penetration, or the constraints do not admit the held
                 entries together.
-            InconsistentConstraintsError: no velocity does.
+            InconsistentConstraintsError: no velocity satisfies the constraints.
         """
         if not self.program.rows:
             return (
@@ -166,22 +168,22 @@ class Projection:
     def _hold(
         self, runner: core.Runner, q: Array, on: Array, held: NDArray[np.bool_], firm: bool, t: float
     ) -> tuple[Array, tuple[int, bool] | None]:
-        """The configuration near q that keeps its named coordinates.
+        """Return the configuration near q with held coordinates.
 
         Args:
             runner: a workspace of the core.
-            q: configuration as it was given, (nq,).
-            on: the nearest one on the constraints, (nq,).
-            held: named coordinates, (nv,).
-            firm: whether it is an error that they cannot stay; else the nearest configuration is returned.
+            q: given configuration, (nq,).
+            on: nearest configuration on the constraints, (nq,).
+            held: mask of named coordinates, (nv,).
+            firm: whether an error is raised if coordinates cannot be held; otherwise `on` is returned.
             t: time [s].
 
         Returns:
-            The configuration, (nq,); and the steps of a search for it with whether it is known to be the
-            nearest, or None where it took none.
+            The configuration, (nq,), and (steps of the search, whether it confirms the closure as nearest),
+            or None without a search.
 
         Raises:
-            InputError: the constraints do not allow the named coordinates together.
+            InputError: the constraints do not admit the named coordinates together.
         """
         search = None
         if moves(self.model, q, on, held, self.unit):
@@ -198,19 +200,19 @@ class Projection:
     def _require_met(
         self, runner: core.Runner, q: Array, found: Array, met: bool, nearest: bool, t: float
     ) -> None:
-        """Raises where a search has ended off the constraints, or far from where contacts alone were inside.
+        """Check that a search ended on the constraints, and near its start if only contacts were violated.
 
         Args:
             runner: a workspace of the core.
-            q: where the search began, (nq,).
-            found: where it ended, (nq,).
-            met: whether all constraints are met there.
-            nearest: whether it is known to be the nearest.
+            q: start of the search, (nq,).
+            found: end of the search, (nq,).
+            met: whether all constraints are satisfied at the end.
+            nearest: whether the search confirms the end as nearest.
             t: time [s].
 
         Raises:
             LoopClosureError: loops stay open.
-            InputError: the loops close, and a contact was found no way out of its plane, or a far one.
+            InputError: the loops are closed at q, but no short displacement removes the penetration.
         """
         phi, now = self._residuals(runner, q, t), self._residuals(runner, found, t)
         inside = not self._is_outside(q, phi) and largest_loop_gap(phi, self.program) <= self._closed
@@ -223,9 +225,9 @@ class Projection:
     def _polished(
         self, runner: core.Runner, q: Array, v: Array, t: float
     ) -> tuple[Array, Array, float, float]:
-        """What a search has found brought to rounding, the largest residual and rate there.
+        """Polish the result of a search to rounding; return the state, its largest residual and rate.
 
-        Where a contact would go in again by it, or other bodies far, the search has the last word.
+        If polishing moves far or causes penetration, the result of the search is kept.
         """
         on, v_on, _, after, rate = runner.project(q, v, t, np.inf)
         stays = self._is_nearby(q, on) and self._is_outside(on, self._residuals(runner, on, t))
@@ -236,17 +238,19 @@ class Projection:
     def nearest_of_each(
         self, q: Array, v: Array, t: float, threads: int, numbers: tuple[list[tuple[str, int, str]], Array]
     ) -> tuple[Array, Array, dict[int, PinNonidealError | core.CoreFailure]]:
-        """What `nearest` gives for each of many, on several threads as long as Newton's method suffices.
+        """Return the result of `nearest` for each of many states; Newton's method uses several threads.
+
+        States for which Newton's method does not suffice are projected one after another.
 
         Args:
             q: configurations, (n, nq).
             v: velocities, (n, nv).
             t: time [s].
             threads: number of native threads.
-            numbers: of the program that differ between them, see `compilation.run_numbers`.
+            numbers: numbers of the program that differ between runs, see `compilation.parameter_overrides`.
 
         Returns:
-            q (n, nq), v (n, nv), and what `nearest` raised, by state.
+            q (n, nq), v (n, nv), and the exceptions of `nearest` by index of the state.
         """
         failures: dict[int, PinNonidealError | core.CoreFailure] = {}
         if not self.program.rows:
@@ -275,27 +279,27 @@ class Projection:
         return on, v_on, failures
 
     def _length_at(self, q: Array) -> float:
-        """The largest slide or residual of a mechanism whose joints and frames all coincide."""
+        """Return the largest sliding coordinate or residual, as the length of a mechanism without lengths."""
         away = pin.difference(self.model, pin.neutral(self.model), q)[self._slides]
         phi = rows_at(self.program.runner(), q, np.zeros(self.model.nv), 0.0)[2]
         return max(_largest(away), _largest(phi))
 
     def _reached(self) -> float:
-        """The largest residual from which Newton's method is tried."""
+        """Return the largest residual from which Newton's method is tried."""
         return np.inf if self.model.nv > MANY_FREEDOMS else NEWTON_REACH * self.length
 
     def _residuals(self, runner: core.Runner, q: Array, t: float) -> Array:
-        """Of all rows, (m,)."""
+        """Return the residuals of all rows, (m,)."""
         return rows_at(runner, q, np.zeros(self.model.nv), t)[2]
 
     def _is_outside(self, q: Array, phi: Array) -> bool:
-        """Whether no contact is inside its plane by more than rounding."""
+        """Check if no contact penetrates by more than rounding."""
         away = pin.difference(self.model, pin.neutral(self.model), q)[self._slides]
         size = max(1.0, self.length, _largest(away))
         return bool(phi[self._gaps].min(initial=0.0) >= -INSIDE * size)
 
     def _stays_outside(self, runner: core.Runner, q: Array, on: Array, t: float) -> bool:
-        """Whether that is so before and after a move."""
+        """Check if no contact penetrates before and after a displacement."""
         return not self._has_gaps or all(self._is_outside(x, self._residuals(runner, x, t)) for x in (q, on))
 
     def _is_nearby(self, q: Array, on: Array) -> bool:
@@ -309,9 +313,10 @@ class Projection:
         newton: Array | None,
         free: NDArray[np.bool_] | None = None,
     ) -> tuple[Closure, bool]:
-        """The nearest closure, and whether it is known to be; Newton's own where a search takes minutes.
+        """Return the nearest closure, and whether the search confirms it as nearest.
 
-        `free`: coordinates that may move, (nv,); all when None.
+        If a search would take minutes, the result `newton` of Newton's method is returned. `free` is the mask
+        of coordinates that may move, (nv,); all when None.
         """
         if free is not None and not free.any():
             return Closure(q, np.inf, 0.0, False, 0), False
@@ -339,11 +344,11 @@ class Projection:
             if not self._has_gaps:
                 return Search(*given).nearest()
             return SearchOutside(self._rows(runner, q, t, unit, self._gaps, own), *given).nearest()
-        except np.linalg.LinAlgError:  # numbers that ran away: no closure
+        except np.linalg.LinAlgError:  # a number overflowed: no closure
             return Closure(q, np.inf, 0.0, False, 0), False
 
     def _unit_at(self, runner: core.Runner, q: Array, t: float) -> Array:
-        """The units of a search: slides go as far as the least moves do that close one gap each."""
+        """Return the units of a search; slide units cover the least displacements that close single rows."""
         A, _, phi, _ = rows_at(runner, q, np.zeros(self.model.nv), t)
         phi = np.where(self._gaps, np.minimum(phi, 0.0), phi)
         weighted = A * self.unit
@@ -362,7 +367,7 @@ class Projection:
         wanted: NDArray[np.bool_],
         free: NDArray[np.bool_],
     ) -> Rows:
-        """The wanted rows of free coordinates over their reach, without copies and rows that move nothing."""
+        """Return the wanted rows of free coordinates over their scales, without duplicate and zero rows."""
         zero, generator = np.zeros(self.model.nv), np.random.default_rng(1)
         moves = [unit * generator.standard_normal(self.model.nv) for _ in range(3)]
         samples = [self._sample(runner, q, move, t) for move in moves]
@@ -382,29 +387,29 @@ class Projection:
     def _sample(
         self, runner: core.Runner, q: Array, move: Array, t: float
     ) -> tuple[Array, Array, Array, Array]:
-        """The rows a move away, or nearer where a function of the user has no value there."""
+        """Return the rows after a displacement; it is shortened if a user function raises."""
         for part in NEARER:
             with suppress(UserFunctionError):
                 return rows_at(runner, pin.integrate(self.model, q, part * move), np.zeros(self.model.nv), t)
         return rows_at(runner, q, np.zeros(self.model.nv), t)
 
     def _metric(self, M: Array) -> Array:
-        """M, with a little inertia for coordinates that move none where it is singular."""
+        """Return M, with a small inertia added to each coordinate if M is singular."""
         if conditioning(M) > WELL_CONDITIONED:
             return M
         return M + np.diag(LEAST_INERTIA * (np.diag(M) * self.unit**2).max() / self.unit**2)
 
     def _furthest(self, move: Array) -> int:
-        """The coordinate that moves by most of its unit."""
+        """Return the coordinate with the largest displacement over its unit."""
         return int(np.argmax(np.abs(move) / self.unit))
 
     def notes(self, q: Array, on: Array, held: NDArray[np.bool_] | None = None) -> list[str]:
-        """A sentence on a configuration that was moved more than a little; none for one that was not.
+        """Return notes on a notable displacement of a configuration, or no note.
 
         Args:
-            q: as it was given, (nq,).
-            on: where the run starts, (nq,).
-            held: coordinates that were named, (nv,), or None.
+            q: given configuration, (nq,).
+            on: configuration at the start of the run, (nq,).
+            held: mask of named coordinates, (nv,), or None.
         """
         if held is not None:
             return told_coordinates(self.model, q, on, held, self.unit)
@@ -423,17 +428,17 @@ class Projection:
 def nearest_closure(
     model: Model, program: core.Program, runner: core.Runner, q: Array, enough: float
 ) -> tuple[Array, float]:
-    """The configuration near q with the smallest gaps that are found, whether closed or not.
+    """Return the configuration near q with the smallest residual found, closed or not.
 
     Args:
         model: pinocchio.Model.
-        program: the scene as the core knows it.
-        runner: a workspace of it.
+        program: the core's program.
+        runner: a workspace of the program.
         q: configuration, (nq,).
-        enough: gap that needs no search from farther away [m or rad].
+        enough: residual up to which no search is needed [m or rad].
 
     Returns:
-        The configuration, (nq,), and its largest gap [m or rad].
+        The configuration, (nq,), and its largest residual [m or rad].
     """
     zero = np.zeros(model.nv)
     projection = Projection(model, program, q)
@@ -448,7 +453,7 @@ def nearest_closure(
 
 
 def _mass(model: Model, runner: core.Runner) -> Callable[[Array], Array]:
-    """Mass matrix at a configuration, q -> M, (nv, nv)."""
+    """Return the mass matrix as a function q -> M, (nv, nv)."""
     n, zero = model.nv, np.zeros(model.nv)
     return lambda q: runner.terms(q, zero)[0].reshape(n, n)
 

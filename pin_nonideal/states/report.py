@@ -1,4 +1,4 @@
-"""The report of a projection: how far it moved a state, and which named entries it held."""
+"""Report of a projection: displacements of a state, and held named entries."""
 
 from __future__ import annotations
 
@@ -17,23 +17,25 @@ from .scales import coordinate
 
 @dataclass(frozen=True)
 class ProjectionReport:
-    """How far a projection moved a state.
+    """Displacements of a state by a projection.
 
     Attributes:
-        distance: sqrt(d^T M(q) d) of the move d = q' - q in tangent coordinates [sqrt(kg) m].
-        coordinate: the one that moved most, by the name of its joint, with a number from 0 on where the joint
-            has several; of lengths and angles the one that moved by more of its unit, a radian or the length
-            of the mechanism.  Empty where nothing moved.
-        moved: how far that one moved [rad or m].
+        distance: sqrt(d^T M(q) d) of the displacement d = q' - q in tangent coordinates [sqrt(kg) m].
+        coordinate: name of the coordinate with the largest displacement over its unit, a radian or the length
+            of the mechanism. The name is that of the joint, with an index from 0 if the joint has several
+            coordinates. Empty without a displacement.
+        moved: displacement of this coordinate [rad or m].
         gap: largest residual before [m or rad, in the scale of its row].
-        iterations: steps of the search; 0 where Newton's method sufficed.
-        nearest: whether this is the nearest consistent configuration as far as can be told: no nearer one
-            lies around it, nor was one found from other starts, of which two ended here.
+        iterations: steps of the search; 0 if Newton's method sufficed.
+        nearest: whether the search confirms the configuration as nearest: it is a local minimum of the
+            distance, and no other start led to a nearer one. After a long displacement, two starts must end
+            at it.
         velocity_distance: sqrt(d^T M d) of the change d = v' - v of the velocity [sqrt(kg) m/s].
-        velocity_coordinate: the one whose velocity changed most, as `coordinate`; empty where none changed.
-        velocity_changed: by how much that one did [rad/s or m/s].
-        held: coordinates whose values were named and stayed as they were, by the same names.
-        held_velocities: the same of velocities.
+        velocity_coordinate: name of the coordinate with the largest change of velocity over its unit; empty
+            without a change.
+        velocity_changed: change of velocity of this coordinate [rad/s or m/s].
+        held: names of the named coordinates, which are held.
+        held_velocities: names of the named velocities, which are held.
     """
 
     distance: float = 0.0
@@ -60,18 +62,18 @@ def report_of(
     iterations: int = 0,
     nearest: bool = True,
 ) -> ProjectionReport:
-    """The report of one projection.
+    """Return the report of one projection.
 
     Args:
         model: pinocchio.Model.
-        unit: a long move of each coordinate, (nv,).
+        unit: unit displacement of each coordinate, (nv,).
         mass: q -> M, (nv, nv).
         given: q (nq,) and v (nv,) before.
-        found: the same after.
+        found: q (nq,) and v (nv,) after.
         held: named entries.
         gap: largest residual before [m or rad, in the scale of its row].
         iterations: steps of the search.
-        nearest: whether the configuration is known to be the nearest.
+        nearest: whether the search confirms the configuration as nearest.
     """
     (q, v), (on, v_on) = given, found
     move, change = pin.difference(model, q, on), v_on - v
@@ -95,7 +97,7 @@ def report_of(
 def _farthest(
     model: Model, unit: Array, mass: Callable[[Array], Array], q: Array, change: Array
 ) -> tuple[float, str, float]:
-    """Length of a change in the metric of M(q), the coordinate that changes most of its unit, its change."""
+    """Return the length of a change in the metric of M(q), and name and change of its largest coordinate."""
     if not change.any():
         return 0.0, "", 0.0
     dof = int(np.argmax(np.abs(change) / unit))
@@ -106,5 +108,5 @@ def _farthest(
 
 
 def _names(model: Model, named: NDArray[np.bool_] | None) -> tuple[str, ...]:
-    """Named entries as `ProjectionReport` lists them."""
+    """Return the names of the named entries."""
     return () if named is None else tuple(coordinate(model, int(dof)) for dof in np.flatnonzero(named))

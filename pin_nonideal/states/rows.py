@@ -1,4 +1,4 @@
-"""Rows of all constraints and contacts of a program, in the order and scale of the descriptions."""
+"""Constraint rows of a program, in the order and scale of the descriptions."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from pin_nonideal.types import Array
 
 
 def row_slices(program: core.Program | core.Builder) -> dict[str, slice]:
-    """Rows of each constraint and contact, by name.
+    """Return the rows of each constraint and contact, by name.
 
     Args:
-        program: the scene as the core knows it, finished or not.
+        program: the core's program, finished or under construction.
     """
     blocks = sorted(program.constraints, key=lambda c: c.first)
     return {c.name: slice(c.first, c.first + c.count) for c in blocks}
 
 
 def holonomic_rows(program: core.Program) -> NDArray[np.bool_]:
-    """Which rows hold a position, (m,); others, and contacts that may open, leave nothing to project it on.
+    """Return the mask of rows that constrain a position and belong to no unilateral contact, (m,).
 
     Args:
-        program: the scene as the core knows it.
+        program: the core's program.
     """
     out = np.zeros(program.rows, dtype=bool)
     for c in program.constraints[: program.first_gap]:
@@ -34,11 +34,11 @@ def holonomic_rows(program: core.Program) -> NDArray[np.bool_]:
 
 
 def gap_rows(program: core.Program, idle: Collection[str] = ()) -> NDArray[np.bool_]:
-    """Which rows are gaps of contacts that may open, (m,).
+    """Return the mask of rows that are gaps of unilateral contacts, (m,).
 
     Args:
-        program: the scene as the core knows it.
-        idle: names of contacts that nothing moves, which are left out.
+        program: the core's program.
+        idle: names of contacts that no joint moves, which are excluded.
     """
     out = np.zeros(program.rows, dtype=bool)
     for c in program.constraints[program.first_gap :]:
@@ -47,7 +47,7 @@ def gap_rows(program: core.Program, idle: Collection[str] = ()) -> NDArray[np.bo
 
 
 def rows_at(runner: core.Runner, q: Array, v: Array, t: float) -> tuple[Array, Array, Array, Array]:
-    """A (m, nv), b (m,), residual (m,) and rate (m,) of all rows at one state, dropped ones too.
+    """Compute A (m, nv), b (m,), residual (m,) and rate (m,) of all rows at a state, removed rows included.
 
     Args:
         runner: a workspace of the core.
@@ -60,34 +60,34 @@ def rows_at(runner: core.Runner, q: Array, v: Array, t: float) -> tuple[Array, A
 
 
 def row_lengths(runner: core.Runner, q: Array, v: Array, t: float, *, own: bool = False) -> Array:
-    """The greatest length that rows could have at q in the metric of M^-1, or their own, (m + d,).
+    """Compute the greatest possible lengths of rows at q in the metric of M^-1, or their lengths, (m + d,).
 
-    The rows of `rows_at` come first, then the d directions along which frictional elements slip.  The
-    greatest length of a row between two bodies is taken over all directions of its force and couple at its
-    point.  A row is short beside it where the joints leave no freedom, as out of the plane of a planar loop.
+    The rows of `rows_at` come first, then the d slip directions of friction elements. The greatest length of
+    a row between two bodies is the maximum over all directions of its force and couple at its point. A row is
+    much shorter if the joints leave no freedom, as out of the plane of a planar loop.
 
     Args:
-        runner: a workspace of the core, whose friction carries nothing afterwards.
+        runner: a workspace of the core; its friction elements are unloaded afterwards.
         q: configuration, (nq,).
         v: velocity, (nv,).
         t: time [s].
-        own: whether to return the lengths that the rows have.
+        own: whether to return the lengths of the rows instead of their greatest possible lengths.
     """
     return np.asarray(runner.row_lengths(q, v, t, own))
 
 
-# Rows over their greatest lengths depend on others, or vanish, below this singular value: closures and
-# rounding reach about 1e-12, directions of light mechanisms lie above 1e-7.
+# Singular value of rows over their greatest lengths below which rows are dependent or vanish. Closures and
+# rounding give about 1e-12; directions of light mechanisms lie above 1e-7.
 DEPENDENT = 1e-9
 
 
 def shortest(scaled: Array, y: Array, lengths: Array) -> Array:
-    """The x of least norm among those with the least |scaled diag(lengths) x - y|, (n,).
+    """Solve min |scaled diag(lengths) x - y| for the x of least norm, (n,).
 
     Args:
-        scaled: matrix with columns over their greatest lengths; its singular values tell the rank, (m, n).
+        scaled: matrix with columns over their greatest lengths; its singular values define the rank, (m, n).
         y: right-hand side, (m,).
-        lengths: greatest lengths of the columns, (n,); x is zero where they are zero.
+        lengths: greatest lengths of the columns, (n,); entries of x are zero for zero lengths.
     """
     used = lengths > 0.0
     x = np.zeros(len(lengths))
@@ -99,25 +99,25 @@ def shortest(scaled: Array, y: Array, lengths: Array) -> Array:
     return x
 
 
-# Rows whose directions differ by less than this part are copies: rounding of the kinematics.
+# Relative difference of directions below which rows are duplicates: rounding of the kinematics.
 SAME_ROW = 1e-11
-# How far projections of copies may differ: rounding of long sums.
+# Relative difference of the projections of duplicates onto a random vector: rounding of long sums.
 SUM_ROUNDING = 1e-9
 
 
 def copies(wide: Array, candidates: NDArray[np.bool_], direction: int) -> list[tuple[int, int, float]]:
-    """Rows that are multiples of earlier ones: (row, the first such row, row over it).
+    """Return the rows that are multiples of earlier rows, as (row, first, factor): row = factor first.
 
     Args:
-        wide: rows at several states side by side, with what belongs to them, (m, n).
-        candidates: rows to look at, (m,).
-        direction: the columns that tell the length of a row stand before this one.
+        wide: rows at several states side by side, followed by right-hand sides or residuals, (m, n).
+        candidates: mask of rows to compare, (m,).
+        direction: number of leading columns that define the length of a row.
     """
     length = np.linalg.norm(wide[:, :direction], axis=1)
     rows = np.flatnonzero(candidates & (length > 0.0))
     unit = wide[rows] / length[rows, None]
     probe = unit @ np.random.default_rng(2).standard_normal(unit.shape[1])
-    side = np.where(probe < 0.0, -1.0, 1.0)  # a copy may be turned around
+    side = np.where(probe < 0.0, -1.0, 1.0)  # a duplicate may have the opposite sign
     unit, probe = unit * side[:, None], np.abs(probe)
     order = np.argsort(probe, kind="stable")
     taken = np.zeros(len(rows), dtype=bool)

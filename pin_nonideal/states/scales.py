@@ -1,4 +1,4 @@
-"""How far mechanisms reach: their lengths, and which coordinates are lengths."""
+"""Length scales of mechanisms, and the coordinates that are lengths."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from pin_nonideal.types import Model
 
-# Part of the largest below which a row or an axis is rounding.
+# Rows and axes below this part of the largest are rounding.
 VANISHING = 1e-11
 
 
 def chain(model: Model) -> float:
-    """The longest way from the world to a joint or frame along the tree, slides left out [m].
+    """Return the longest path along the tree from the world to a joint or frame, without slides [m].
 
     Args:
         model: pinocchio.Model.
@@ -26,7 +26,7 @@ def chain(model: Model) -> float:
 
 
 def slides(model: Model) -> NDArray[np.bool_]:
-    """Which coordinates are lengths, (nv,).
+    """Return the mask of coordinates that are lengths, (nv,).
 
     Args:
         model: pinocchio.Model.
@@ -41,11 +41,11 @@ def slides(model: Model) -> NDArray[np.bool_]:
 
 
 def coordinate(model: Model, dof: int) -> str:
-    """The name of a coordinate: that of its joint, with a number from 0 on where the joint has several.
+    """Return the name of a coordinate: the joint name, with an index from 0 if the joint has several.
 
     Args:
         model: pinocchio.Model.
-        dof: its number.
+        dof: index of the coordinate.
     """
     i = next(i for i, j in enumerate(model.joints) if i and j.idx_v <= dof < j.idx_v + j.nv)
     joint = model.joints[i]

@@ -1,1 +1,1 @@
-"""Scenes at rest, and the torques of a given motion."""
+"""Statics of scenes: equilibria, feasibility of rest, and inverse dynamics."""

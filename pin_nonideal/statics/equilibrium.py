@@ -1,4 +1,4 @@
-"""equilibrium: a configuration where a scene can rest without friction, and whether it is stable."""
+"""equilibrium: equilibrium configurations of a scene without dry friction, and their stability."""
 
 from __future__ import annotations
 
@@ -17,35 +17,37 @@ from pin_nonideal.validation import choice, count, number
 
 from .residual import AtRest, Balance, weight
 
-# Central differences of forces: the cube root of rounding, where rounding and curvature cost the same.
+# Step of central differences of forces [units]: the cube root of rounding, at which the errors by rounding
+# and by curvature are equal.
 DIFFERENCE = 6e-6
-# Longest step [units, see `AtRest.units`], the shortest that still leads somewhere, and most of them.
+# Longest step [units, see `AtRest.units`], shortest step, and maximum number of steps.
 LONGEST, SHORTEST, MOST = 0.5, 1e-13, 300
-CLOSINGS = 20  # iterations to the place where a contact closes
-# Newton step at which an equilibrium counts as found [units].
+CLOSINGS = 20  # maximum number of iterations to the configuration at which a contact closes
+# Newton step at which an equilibrium is found [units].
 CLOSE = 1e-9
-# A motion has no stiffness where it is below this part of the forces in play along it over a unit of motion,
-# or below that part of the stiffnesses that cancel in it: the state is neutral that way.
+# A direction is neutral if its stiffness is below NEUTRAL times the force scale over a unit displacement, or
+# below CANCELED times the stiffnesses that cancel in it.
 NEUTRAL, CANCELED = 1e-7, 1e-10
-LEAST_RATE = 1e-12  # where nothing at all has a stiffness [1/s^2]
-# Forces along a motion balance below this part of those in play along it; so much of a stiffness is rounding.
+LEAST_RATE = 1e-12  # smallest divisor of neutral directions [1/s^2]
+# Tolerance of balanced forces relative to the force scale, and rounding of a stiffness relative to its size.
 BALANCED, ROUNDING = 1e-9, 1e-14
 
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """A state of rest.
+    """An equilibrium configuration and its stability.
 
     Attributes:
         q: configuration, (nq,).
         lam: multipliers of all rows in F + A^T lam = 0, of least norm, (m,).
-        left: largest force that is left along a motion that the constraints allow [N or N m].
-        free: those motions, orthonormal columns, (nv, k).
-        stiffness: of the scene along them, - free^T d(F + A^T lam)/dq free, (k, k).
-        rates: eigenvalues of the stiffness over the inertia along them [1/s^2], (k,), by their real part:
-            squares of angular frequencies of small motions; a negative or complex one grows.
-        stable: True, False, or None where it is neutral some way.
-        starts: how many starts it took.
+        left: largest unbalanced force along the motions that the constraints admit [N or N m].
+        free: orthonormal basis of the motions that the constraints admit, (nv, k).
+        stiffness: stiffness matrix along `free`, - free^T d(F + A^T lam)/dq free, (k, k).
+        rates: eigenvalues of the stiffness relative to the inertia along `free`, sorted by real part
+            [1/s^2], (k,). They are squared angular frequencies of small motions. A negative or complex
+            eigenvalue belongs to a growing motion.
+        stable: True, False, or None if a direction is neutral and no motion grows.
+        starts: number of starts used.
     """
 
     q: Array
@@ -67,29 +69,28 @@ def equilibrium(
     stable: bool = True,
     starts: int = 8,
 ) -> Equilibrium:
-    """A state of rest with all constraints held, found from q0; dry friction counts for nothing.
+    """Find an equilibrium on the constraints near q0, without dry friction.
 
-    The forces along the motions that the constraints allow are brought to zero: free^T F(q) = 0 where
-    phi(q, t) = 0.  Contacts that touch at q0, or come to touch in the search, are held; open ones give no
-    force.
-    Steps of Newton's method with the stiffness made positive in the metric of M go downhill, to a stable
-    state; from q0 first, then from others around it.  `rest` tells what friction holds besides.
+    The equations are free^T F(q) = 0 and phi(q, t) = 0: forces vanish along the motions that the constraints
+    admit. Contacts that touch at q0, or close during the search, are held. Open contacts exert no force.
+    Newton steps with the stiffness made positive in the metric of M descend to a stable state. The first
+    start is q0; further starts lie around it. `rest` checks if dry friction holds other configurations.
 
     Args:
         scene: the scene.
-        q0: configuration to start from, (nq,) or by joint name; the scene's initial one when None.
-        tau: torques in place of the scene's actuation, (nv,) or by joint name.
-        t: time at which actuation and constraints are taken [s].
-        stable: False takes the nearest state of rest that Newton's method meets, be it unstable.
-        starts: from how many configurations it is sought.
+        q0: start configuration, (nq,) or by joint name; the scene's initial configuration when None.
+        tau: torques that replace the scene's actuation, (nv,) or by joint name.
+        t: time at which actuation and constraints are evaluated [s].
+        stable: whether to search for a stable equilibrium. False accepts any equilibrium of Newton's method.
+        starts: maximum number of starts.
 
     Returns:
-        The Equilibrium; where no stable one was met, the best that was.
+        The Equilibrium; if no stable equilibrium is found, the first one of another kind.
 
     Raises:
         InputError: an argument does not fit, or rows restrict the velocity only.
         LoopClosureError: the loops cannot be closed.
-        EquilibriumError: no state of rest was found.
+        EquilibriumError: no equilibrium is found.
     """
     if not isinstance(scene, Scene):
         raise InputError(f"equilibrium: scene must be a Scene; got {type(scene).__name__}")
@@ -117,26 +118,26 @@ def equilibrium(
 
 
 class _Search:
-    """One search after another."""
+    """Searches for an equilibrium from several starts."""
 
     def __init__(self, rest: AtRest, downhill: bool) -> None:
         self.rest, self.downhill = rest, downhill
         self.model: Any = rest.scene.model
         self.least = np.inf
         self.nearest = np.array(rest.scene.q0)
-        self.unit = np.ones(rest.scene.model.nv)  # a long move of each coordinate
+        self.unit = np.ones(rest.scene.model.nv)  # unit displacement of each coordinate
 
     def elsewhere(self, start: Array, k: int) -> Array | None:
-        """Another start, farther away with each; always the same ones."""
+        """Return the k-th start, with a spread that grows with k; deterministic."""
         rest, unit = self.rest, self.rest.units(self.rest.mass(start), self.rest.free(start))
         move = unit * np.random.default_rng(k).standard_normal(self.model.nv) * min(1.5, 0.3 * k)
         try:
             return rest.scene.project(pin.integrate(self.model, start, move), rest.still, rest.t)[0]
-        except (LoopClosureError, InputError):  # of a contact that would start inside
+        except (LoopClosureError, InputError):  # InputError: a contact would start with penetration
             return None
 
     def run(self, q: Array, start: int) -> Equilibrium | None:
-        """From one configuration; None where it leads nowhere."""
+        """Search from one configuration; None if the search fails."""
         self.rest.begin(q)
         self.unit = self.rest.units(self.rest.mass(q), self.rest.free(q))
         now, longest = self.rest.balance(q), LONGEST
@@ -160,13 +161,13 @@ class _Search:
         return None
 
     def note(self, q: Array, now: Balance) -> None:
-        """Keeps where the least was left."""
+        """Store the configuration with the smallest unbalanced force."""
         left = float(np.linalg.norm(now.left))
         if left < self.least:
             self.least, self.nearest = left, q
 
     def reason(self) -> str:
-        """Why nothing was found: what drives it where the least was left, or what falls."""
+        """Return the reason of a failed search: a drive that exceeds all resistance, or unbalanced forces."""
         rubs = "; dry friction counts for nothing here: `rest` tells whether it holds" * bool(
             self.rest.scene.element_names
         )
@@ -192,19 +193,19 @@ class _Search:
         )
 
     def in_play(self, now: Balance, inertia: Array) -> Array:
-        """Forces beside which those along the columns of free must be small: what acts, the weight, (k,)."""
+        """Return the force scale along the columns of free, from acting forces and weight, (k,)."""
         acting = np.abs(now.F) + np.abs(now.A.T) @ np.abs(now.lam)
-        pull = weight(self.rest.scene) * np.sqrt(np.diag(inertia))  # the most that it does along each
+        pull = weight(self.rest.scene) * np.sqrt(np.diag(inertia))  # largest force along each column
         return np.asarray(np.abs(now.free).T @ acting + pull)
 
     def polished(self, q: Array, now: Balance, move: Array) -> tuple[Array, Balance]:
-        """After one more step, down to rounding, where that leaves less."""
+        """Return the state after one more step if its unbalanced force is smaller, else the given state."""
         there = self.rest.scene.project(pin.integrate(self.model, q, move), self.rest.still, self.rest.t)[0]
         then = self.rest.balance(there)
         return (there, then) if np.linalg.norm(then.left) < np.linalg.norm(now.left) else (q, now)
 
     def stiffness(self, q: Array, now: Balance) -> Array:
-        """- free^T d(F + A^T lam)/dq free with lam held, by central differences."""
+        """Compute - free^T d(F + A^T lam)/dq free at constant lam, by central differences."""
         columns = []
         for direction in now.free.T:
             ends, part = [], DIFFERENCE / float(np.linalg.norm(direction / self.unit))
@@ -216,14 +217,14 @@ class _Search:
         return now.free.T @ np.array(columns).T if k else np.zeros((0, 0))
 
     def neutral(self, now: Balance, inertia: Array, stiffness: Array, shapes: Array) -> Array:
-        """Stiffness of each shape, a column, that counts as none: each by what adds up in it alone, (k,)."""
+        """Return the stiffness of each shape (column) below which it is neutral, from its own terms, (k,)."""
         size = np.abs(shapes)
         motion = np.linalg.norm(now.free / self.unit[:, None], axis=0)
         canceled = CANCELED * np.abs(stiffness) + NEUTRAL * np.diag(motion * self.in_play(now, inertia))
         return np.asarray(np.einsum("ik,ij,jk->k", size, canceled, size))
 
     def move(self, q: Array, now: Balance, stiffness: Array) -> tuple[Array, float, bool]:
-        """The step to take; how far Newton's method has to go; whether a force acts without stiffness."""
+        """Return the step, the length of the Newton step, and whether a force acts in a neutral direction."""
         from scipy.linalg import eigh
 
         if not len(now.left):
@@ -243,7 +244,7 @@ class _Search:
         return now.free @ (shapes @ steps), distance, bool(pushed.any())
 
     def to_contact(self, q: Array, move: Array) -> Array:
-        """The part of a move up to where the first open contact closes, by regula falsi."""
+        """Shorten a displacement to the point at which the first open contact closes, by regula falsi."""
         if not self.rest.open.any():
             return move
         before = self.rest.gaps_at(q)
@@ -256,7 +257,7 @@ class _Search:
         return move
 
     def step(self, q: Array, now: Balance, move: Array) -> tuple[Array, Balance] | None:
-        """Where a step leads, unless it climbs: the work of the forces along it must not be negative."""
+        """Return the state after a step, or None if the forces do negative work along it."""
         scene, move = self.rest.scene, self.to_contact(q, move)
         try:
             there = scene.project(pin.integrate(self.model, q, move), self.rest.still, self.rest.t)[0]
@@ -272,7 +273,7 @@ class _Search:
         return (there, then) if work > 0.0 or near else None
 
     def result(self, q: Array, now: Balance, stiffness: Array, start: int) -> Equilibrium:
-        """The equilibrium at a configuration, with its stability."""
+        """Return the equilibrium at a configuration, with its stability."""
         from scipy.linalg import eig
 
         inertia = now.free.T @ self.rest.mass(q) @ now.free

@@ -1,4 +1,4 @@
-"""inverse_dynamics: the torques that give a scene an acceleration, through loops and against friction."""
+"""inverse_dynamics: torques for a given acceleration, with loop constraints and friction."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from pin_nonideal.validation import array, by_name, number, sequence
 
 from .residual import AtRest, weight
 
-# An acceleration follows the constraints to this part of its terms.
+# Tolerance of A a = b, relative to its terms.
 FOLLOWS = 1e-6
-ROUNDING = 1e-6  # of accelerations where nothing weighs [m/s^2 or rad/s^2], to FOLLOWS of it
-# Slip below this part of the scene's speed is rest, and so it is for its acceleration.
+ROUNDING = 1e-6  # acceleration scale without weight [m/s^2 or rad/s^2], multiplied by FOLLOWS
+# Slip rates and slip accelerations below this part of 1 + the largest velocity or acceleration count as zero.
 AT_REST = 1e-9
-# Passes over friction that depends on the torques, and the part of the forces to which they balance.
+# Maximum number of iterations for load-dependent friction, and their relative tolerance.
 PASSES, BALANCED = 200, 1e-13
-DIFFERENCE = 1e-6  # along the motion, for what rows gain by it
+DIFFERENCE = 1e-6  # step along the motion for the time derivative of slip rows [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,10 +40,10 @@ class InverseDynamics:
     """Torques of a motion.
 
     Attributes:
-        tau: of all degrees of freedom, zero where nothing is actuated [N m or N], (nv,).
-        lam: multipliers of all rows with them, (m,).
-        left: largest generalized force that they cannot give along a motion that the constraints allow; 0 to
-            rounding where they suffice.
+        tau: torques of all degrees of freedom, zero if not actuated [N m or N], (nv,).
+        lam: multipliers of all rows under these torques, (m,).
+        left: largest generalized force that the torques cannot supply along the admissible motions; zero, up
+            to rounding, if the torques suffice.
     """
 
     tau: Array
@@ -61,33 +61,33 @@ def inverse_dynamics(
     bounds: tuple[Any, Any] | None = None,
     t: float = 0.0,
 ) -> InverseDynamics:
-    """Torques with which the scene accelerates by a: of least norm where several do.
+    """Compute the torques of least norm that give the scene the acceleration a.
 
-    If both forces and torques drive, the norm multiplies forces by an arm: the root mean square radius of
-    gyration of the driven joints.
+    If joints are driven by forces and by torques, the norm multiplies forces by a lever arm: the root mean
+    square radius of gyration of the driven joints.
 
-    free^T (M a - F - C - tau) = 0 along the motions `free` that the constraints allow, with tau on the
-    actuated joints only and friction C of the very reactions that come with it; the scene's own actuation
-    counts for nothing.  An element that rests and shall go on resting gives nothing: torques hold alone.
-    Contacts that are open, or that the motion opens, give no force.
+    The torques satisfy free^T (M a - F - C - tau) = 0 along the motions `free` that the constraints admit.
+    They act on the actuated joints only. Friction C follows from the reactions under these torques. The
+    scene's actuation is ignored. A sticking element that stays at rest exerts no friction. Contacts that are
+    open, or that the motion opens, exert no force.
 
     Args:
         scene: the scene.
         q: configuration, (nq,) or by joint name, on the constraints.
         v: velocity, (nv,) or by joint name.
-        a: acceleration, (nv,) or by joint name (zero for the others); it must follow the constraints.
-        actuated: names of the joints that are driven; all when None.
-        bounds: least and largest torques: numbers, arrays of the actuated degrees of freedom, or by joint
-            name, without bound for the others.
+        a: acceleration, (nv,) or by joint name (zero for missing joints); it must satisfy the constraints.
+        actuated: names of the driven joints; all when None.
+        bounds: lower and upper torque limits: numbers, arrays of the actuated degrees of freedom, or by joint
+            name, without limit for missing joints.
         t: time [s].
 
     Returns:
-        The InverseDynamics; `scene.acceleration(q, v, tau=result.tau)` gives a where `left` is zero.
+        The InverseDynamics; `scene.acceleration(q, v, tau=result.tau)` returns a if `left` is zero.
 
     Raises:
-        InputError: an argument does not fit, or a breaks the constraints.
-        UnknownNameError: there is no such joint.
-        FrictionConvergenceError: friction that depends on the torques did not settle.
+        InputError: an argument does not fit, or a violates the constraints.
+        UnknownNameError: a joint does not exist.
+        FrictionConvergenceError: the iteration for load-dependent friction did not converge.
     """
     if not isinstance(scene, Scene):
         raise InputError(f"inverse_dynamics: scene must be a Scene; got {type(scene).__name__}")
@@ -108,7 +108,7 @@ def inverse_dynamics(
 
 
 def _driven(scene: Scene, actuated: Sequence[str] | None) -> list[int]:
-    """Degrees of freedom of the actuated joints."""
+    """Return the degrees of freedom of the actuated joints."""
     if actuated is None:
         return list(range(scene.model.nv))
     if isinstance(actuated, str):
@@ -140,13 +140,13 @@ def _bounds(scene: Scene, bounds: Any, dofs: list[int]) -> tuple[Array, Array]:
 
 
 def _allowed(rest: AtRest, q: Array, A: Array, b: Array, a: Array) -> Array:
-    """Allowed residual of each row of A a = b: a part of its terms and of gravity's effect, (m,)."""
+    """Return the allowed residual of each row of A a = b, relative to its terms and to gravity, (m,)."""
     falls = rest.scaled_rows(q, rest.root(q))[1] * weight(rest.scene)
     return np.asarray(FOLLOWS * (np.abs(A) @ np.abs(a) + np.abs(b) + falls + ROUNDING))
 
 
 def _open_contacts(rest: AtRest, A: Array, b: Array, rate: Array, a: Array, allowed: Array) -> None:
-    """Opens the contacts that the motion takes apart, by their rate or by their acceleration A a - b."""
+    """Open the contacts whose gaps the motion opens, by their rate or by their acceleration A a - b."""
     if rest.gaps.any():
         rest.release((rate > AT_REST * (1.0 + np.abs(rate).max())) | (A @ a - b > allowed))
 
@@ -154,7 +154,7 @@ def _open_contacts(rest: AtRest, A: Array, b: Array, rate: Array, a: Array, allo
 def _check_follows(
     scene: Scene, A: Array, b: Array, a: Array, open_rows: NDArray[np.bool_], allowed: Array
 ) -> None:
-    """Refuses an acceleration that breaks the constraints, A a = b, or enters a closed contact."""
+    """Raise InputError if an acceleration violates A a = b of a constraint or closed contact."""
     missed = np.where(open_rows, 0.0, np.abs(A @ a - b))
     if (missed > allowed).any():
         worst = int(np.argmax(missed / allowed))
@@ -167,7 +167,7 @@ def _check_follows(
 
 
 class _Torques:
-    """Torques of one motion, in passes over friction that depends on them."""
+    """Torques of one motion, by iterations over load-dependent friction."""
 
     def __init__(self, rest: AtRest, q: Array, v: Array, a: Array, dofs: list[int]) -> None:
         self.rest, self.q, self.v, self.a, self.free = rest, q, v, a, rest.free(q)
@@ -179,7 +179,7 @@ class _Torques:
         self.modes, self.slipping = self._modes()
 
     def _modes(self) -> tuple[list[Any], Array]:
-        """Modes by the slip, or by its acceleration from rest; and a velocity at which all of them slip."""
+        """Return modes from slip, or its acceleration at rest, and a velocity at which all elements slip."""
         runner, t, v, model = self.rest.runner, self.rest.t, self.v, self.rest.scene.model
         rows = [
             runner.slip_rows(pin.integrate(model, self.q, s * DIFFERENCE * v), v, t).reshape(-1, len(v))
@@ -203,7 +203,7 @@ class _Torques:
         return modes, v + ahead * self.a if begins else v
 
     def solve(self, limits: tuple[Array, Array] | None) -> InverseDynamics:
-        """Torques of least norm, within their limits, until friction is that of their own reactions."""
+        """Iterate torques of least norm, within their limits, until friction agrees with the reactions."""
         G = self.free.T @ self.select / self.arms
         root = np.linalg.cholesky(self.free.T @ self.M @ self.free)
         scaled = np.linalg.solve(root, G) / self.lengths
@@ -211,7 +211,7 @@ class _Torques:
         tau, before = np.zeros(len(self.v)), np.inf
         for _ in range(PASSES):
             now = self.rest.runner.solve(self.q, self.slipping, self.rest.t, tau, self.modes)
-            given = now.F - tau + now.C  # beside the torques
+            given = now.F - tau + now.C  # forces without the torques
             needed = self.free.T @ (self.M @ self.a - given)
             u = _least(scaled, np.linalg.solve(root, needed), self.lengths, moments)
             change = self.select @ (u / self.arms) - tau
@@ -235,7 +235,7 @@ class _Torques:
 
 
 def _least(scaled: Array, needed: Array, lengths: Array, limits: tuple[Array, Array] | None) -> Array:
-    """The least u of least |scaled (lengths u) - needed|; within limits, exact on those it touches."""
+    """Solve min |scaled (lengths u) - needed| for the u of least norm; active limits hold exactly."""
     u = shortest(scaled, needed, lengths)
     if limits is None or ((limits[0] <= u) & (u <= limits[1])).all():
         return np.asarray(u)

@@ -1,4 +1,4 @@
-"""Forces of a scene at rest, and the motions that its constraints allow."""
+"""Forces of a scene at rest, and the motions that its constraints admit."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from pin_nonideal.types import Array
 
 
 class Balance(NamedTuple):
-    """What acts on a scene at rest.
+    """Forces on a scene at rest.
 
     Attributes:
-        F: given forces and laws at rest, without dry friction [N or N m], (nv,).
-        A: rows of all constraints and contacts, zero where these are open, (m, nv).
-        lam: multipliers that leave the least of F + A^T lam in the metric of M^-1, those of least norm, (m,).
-        free: velocities that the rows allow, orthonormal columns, (nv, k).
+        F: applied forces and laws at rest, without dry friction [N or N m], (nv,).
+        A: rows of all constraints and contacts, zero for open contacts, (m, nv).
+        lam: multipliers of least norm that minimize |F + A^T lam| in the metric of M^-1, (m,).
+        free: orthonormal basis of the velocities that the rows admit, (nv, k).
         left: free^T F, which is zero in equilibrium, (k,).
     """
 
@@ -33,26 +33,26 @@ class Balance(NamedTuple):
     left: Array
 
 
-# A contact touches if its gap is below this part of the scene's length, and of one meter, as at starts of
-# runs.
+# A contact touches if its gap is below this part of the scene's length, or of 1 m if the scene is shorter, as
+# at starts of runs.
 TOUCHING = 1e-10
 
 
 class AtRest:
-    """A scene at rest: its forces at any configuration, without dry friction.
+    """Forces of a scene at rest at any configuration, without dry friction.
 
-    Functions of time stand still: constraints that they move hold the places of that time.
+    Functions of time are frozen: driven constraints keep their value at time t.
 
     Args:
         scene: the scene.
-        tau: torques in place of the scene's actuation, (nv,), or None.
+        tau: torques that replace the scene's actuation, (nv,), or None.
         t: time [s].
-        q: configuration that tells which contacts are open, (nq,).
+        q: configuration that defines the open contacts, (nq,).
 
     Attributes:
-        gaps: rows of contacts that may open, (m,).
-        touching: gap up to which they touch [m].
-        open: those of open contacts, which give no force, (m,).
+        gaps: mask of rows of unilateral contacts, (m,).
+        touching: gap up to which a contact touches [m].
+        open: mask of rows of open contacts, which exert no force, (m,).
     """
 
     def __init__(self, scene: Scene, tau: Array | None, t: float, q: Array) -> None:
@@ -67,7 +67,7 @@ class AtRest:
         self.begin(q)
 
     def begin(self, q: Array) -> None:
-        """Holds the contacts that touch at a configuration, and no others.
+        """Close the contacts that touch at a configuration, and open all others.
 
         Args:
             q: configuration, (nq,).
@@ -76,7 +76,7 @@ class AtRest:
         self.touch(q)
 
     def touch(self, q: Array) -> bool:
-        """Holds the contacts that touch at a configuration too; returns whether there are more than before.
+        """Close the contacts that touch at a configuration; return whether any contact was closed.
 
         Args:
             q: configuration, (nq,).
@@ -88,15 +88,15 @@ class AtRest:
         return bool((before != self.open).any())
 
     def release(self, rows: NDArray[np.bool_]) -> None:
-        """Opens contacts.
+        """Open contacts.
 
         Args:
-            rows: their rows, (m,).
+            rows: mask of their rows, (m,).
         """
         self.open = self.open | (self.gaps & rows)
 
     def gaps_at(self, q: Array) -> Array:
-        """Gaps of the open contacts [m], (k,).
+        """Return the gaps of the open contacts [m], (k,).
 
         Args:
             q: configuration, (nq,).
@@ -104,7 +104,7 @@ class AtRest:
         return rows_at(self.runner, q, self.still, self.t)[2][self.open]
 
     def forces(self, q: Array) -> Array:
-        """Given forces and laws at rest, without dry friction, (nv,).
+        """Compute applied forces and laws at rest, without dry friction, (nv,).
 
         Args:
             q: configuration, (nq,).
@@ -113,7 +113,7 @@ class AtRest:
         return np.asarray(now.F + now.C)
 
     def undriven(self, q: Array) -> Array:
-        """Those forces without the scene's actuation or the torques in its place, (nv,).
+        """Compute applied forces and laws at rest, without actuation and torques, (nv,).
 
         Args:
             q: configuration, (nq,).
@@ -122,7 +122,7 @@ class AtRest:
         return np.asarray(now.F + now.C)
 
     def rows(self, q: Array) -> Array:
-        """Rows of all constraints and closed contacts, (m, nv); a row that rounding alone makes is zero.
+        """Return the rows of all constraints and closed contacts, (m, nv); rows of rounding are zero.
 
         Args:
             q: configuration, (nq,).
@@ -130,7 +130,7 @@ class AtRest:
         return self.scaled_rows(q, self.root(q))[0]
 
     def directions(self, q: Array) -> tuple[Array, Array, Array]:
-        """Slip directions of frictional elements; a direction that rounding alone makes is zero.
+        """Return the slip directions of friction elements; directions of rounding are zero.
 
         Args:
             q: configuration, (nq,).
@@ -146,7 +146,7 @@ class AtRest:
         return np.where(short, 0.0, D), lengths, np.where(short, 0.0, scaled)
 
     def root(self, q: Array) -> Array:
-        """Lower triangular, M = root root^T, (nv, nv).
+        """Return the lower Cholesky factor of M = root root^T, (nv, nv).
 
         Args:
             q: configuration, (nq,).
@@ -154,11 +154,11 @@ class AtRest:
         return np.asarray(np.linalg.cholesky(self.mass(q)))
 
     def scaled_rows(self, q: Array, root: Array) -> tuple[Array, Array, Array]:
-        """Rows A, their greatest lengths, and the rows over these in the metric of M^-1, M = root root^T.
+        """Return rows A, their greatest lengths, and the rows over these lengths in the metric of M^-1.
 
         Args:
             q: configuration, (nq,).
-            root: see above, (nv, nv).
+            root: Cholesky factor of M = root root^T, (nv, nv).
 
         Returns:
             A (m, nv), lengths (m,), and scaled rows (m, nv).
@@ -170,7 +170,7 @@ class AtRest:
         return np.where(short[:, None], 0.0, A), lengths, np.where(short[:, None], 0.0, scaled)
 
     def balance(self, q: Array) -> Balance:
-        """What acts at one configuration.
+        """Return the forces at one configuration.
 
         Args:
             q: configuration, (nq,).
@@ -182,7 +182,7 @@ class AtRest:
         return Balance(F, A, lam, free, free.T @ F)
 
     def free(self, q: Array) -> Array:
-        """Velocities that the rows allow, orthonormal columns, (nv, k).
+        """Return an orthonormal basis of the velocities that the rows admit, (nv, k).
 
         Args:
             q: configuration, (nq,).
@@ -191,7 +191,7 @@ class AtRest:
         return _free(self.scaled_rows(q, root)[2], root)
 
     def mass(self, q: Array) -> Array:
-        """M(q), (nv, nv).
+        """Return the mass matrix M(q), (nv, nv).
 
         Args:
             q: configuration, (nq,).
@@ -200,15 +200,16 @@ class AtRest:
         return np.asarray(self.runner.terms(q, self.still)[0].reshape(n, n))
 
     def units(self, M: Array, free: Array, dofs: Collection[int] | None = None) -> Array:
-        """Moves of coordinates that compare with a radian: 1, and of slides a length, (k,).
+        """Return unit displacements of coordinates: 1 rad for angles, and a length for slides, (k,).
 
-        The length is the root mean radius of gyration by the motions that the constraints allow, so that
-        neither the unit of length nor the mount changes it; 1 where nothing turns or nothing slides.
+        The length is the root mean square radius of gyration along the motions that the constraints admit.
+        It is independent of the unit of length and of the mount. It is 1 if all coordinates are angles or all
+        are slides.
 
         Args:
             M: mass matrix, (nv, nv).
-            free: those motions, (nv, r).
-            dofs: the coordinates, k of them; all when None.
+            free: basis of the motions that the constraints admit, (nv, r).
+            dofs: the k coordinates; all when None.
         """
         own = list(range(len(M)) if dofs is None else dofs)
         along = self._slides[own]
@@ -220,7 +221,7 @@ class AtRest:
 
 
 def _free(scaled: Array, root: Array) -> Array:
-    """Orthonormal columns that span the velocities that scaled rows allow, M = root root^T."""
+    """Return an orthonormal basis of the velocities that scaled rows admit, M = root root^T."""
     if not len(scaled):
         return np.eye(len(root))
     _, values, turned = np.linalg.svd(scaled)
@@ -229,7 +230,7 @@ def _free(scaled: Array, root: Array) -> Array:
 
 
 def weight(scene: Scene) -> float:
-    """Length of the weight of all bodies in the metric of M^-1, if each could move freely [sqrt(kg) m/s^2].
+    """Compute the norm of the weight of free bodies in the metric of M^-1 [sqrt(kg) m/s^2].
 
     Args:
         scene: the scene.
@@ -239,7 +240,7 @@ def weight(scene: Scene) -> float:
 
 
 def restricts_velocity_only(scene: Scene) -> bool:
-    """Whether some row restricts the velocity and not the position, as that of a knife edge does.
+    """Check if a row restricts the velocity but no position, such as a knife edge.
 
     Args:
         scene: the scene.

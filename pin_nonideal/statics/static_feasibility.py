@@ -1,4 +1,4 @@
-"""rest: whether dry friction and contacts can hold a configuration at rest, and by how much."""
+"""rest: feasibility of rest of a configuration under dry friction and contacts, with its margin."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ from pin_nonideal.validation import number
 
 from .residual import AtRest, weight
 
-# A cone is met when a force lies outside of it by less than this part of the largest; so many cuts at most.
+# Tolerance of cone violations relative to the largest force, and maximum number of rounds of cuts.
 CUT, MOST_CUTS = 1e-9, 60
-# Directions in which a disk or ball is bounded at first.
+# Number of initial cut directions of a disk.
 FIRST = 8
-# The margin is found to this; factors of friction beyond this one mean that no friction would do.
+# Tolerance of the margin, and friction factor above which no friction suffices.
 FOUND, MOST_FACTOR = 1e-9, 1e6
-# Part of the weight beside which forces are small: they balance to CUT of this.
+# Smallest force scale, relative to the weight; forces balance to CUT times the force scale.
 LIGHT = 1e-3
-PARTS = ("", "torsional", "rolling")  # of what rubs in a contact, by the ends of the elements' names
+PARTS = ("", "torsional", "rolling")  # suffixes of the names of a contact's friction elements
 
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """Whether a state can rest.
+    """Feasibility of rest of a configuration, with its margin and forces.
 
     Attributes:
-        rests: whether forces within all limits balance it.
-        margin: 1 less the least part of all friction limits within which they do: 1 where no friction is
-            needed, 0 where it just holds, negative where so much more would be needed; -inf where no
-            friction would do.
-        friction: force of each frictional element by name along its directions, with all limits used up
-            equally as little as possible [N or N m]; empty where none would do.
-        lam: multipliers of all rows beside it, contacts pressing, (m,).
+        rests: whether forces within all limits balance the configuration.
+        margin: 1 minus the smallest common factor of all friction limits for which forces balance. It is 1 if
+            no friction is needed, 0 if friction just suffices, negative if larger limits are needed, and -inf
+            if no friction suffices.
+        friction: force of each friction element by name, along its slip directions, for the smallest factor
+            [N or N m]; empty if no friction suffices.
+        lam: multipliers of all rows with this friction; contacts press, (m,).
     """
 
     rests: bool
@@ -51,19 +51,19 @@ class Rest:
 
 
 def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: float = 0.0) -> Rest:
-    """Whether a scene can stay at rest: forces in all cones that balance it, and the margin.
+    """Check if friction and contact forces can hold a scene at rest, and compute the margin.
 
-    Sought are multipliers lam and friction forces f with F + A^T lam + D^T f = 0, contacts pressing
-    (lam >= 0, and 0 where they are open) and |f_e| <= k limit_e of every frictional element, and the least
-    factor k of static limits.  Limits of contacts follow the lam sought; those of joints that rub under load
-    are those that the reactions of the stuck scene give, of least norm where they are not unique.  Disks and
-    balls are cut as finely as needed by planes, each program is linear and solved exactly.
+    The unknowns are multipliers lam, friction forces f and the smallest factor k of the static limits. They
+    satisfy F + A^T lam + D^T f = 0 and |f_e| <= k limit_e for each friction element e. Contacts press:
+    lam >= 0, and lam = 0 for open contacts. Limits of contacts depend on the unknown lam. Load-dependent
+    limits of joints are computed from the reactions of the sticking scene, with least norm if they are not
+    unique. Cutting planes approximate disks and balls; each linear program is solved exactly.
 
     Args:
         scene: the scene.
-        q: configuration, (nq,) or by joint name; the scene's closed initial one when None.
-        tau: torques in place of the scene's actuation, (nv,) or by joint name.
-        t: time at which actuation and constraints are taken [s].
+        q: configuration, (nq,) or by joint name; None for the scene's closed initial configuration.
+        tau: torques that replace the scene's actuation, (nv,) or by joint name.
+        t: time at which actuation and constraints are evaluated [s].
 
     Returns:
         The Rest.
@@ -88,18 +88,18 @@ def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: f
 
 
 class _Cones:
-    """The program of one configuration.
+    """Linear programs for the cones of one configuration.
 
-    Unknowns are lam (m), the friction forces (d) and an excess s by which every limit may be passed.  All of
-    them are measured in the metric of M^-1, each over the greatest length of its row or element and over the
-    largest force in play, so that neither units nor the mount change the tolerances.
+    The unknowns are lam (m), the friction forces (d) and an excess s over all limits. They are measured in
+    the metric of M^-1, over the greatest length of their row or element, and over the largest force.
+    Tolerances are therefore independent of units and of the mount.
 
     Attributes:
         A: rows of constraints and contacts, (m, nv).
-        parts: place of each element's forces among the unknowns.
+        parts: slice of each element's forces in the unknowns.
         balance: forces of the unknowns along an orthonormal basis of their span, (r, m + d).
         load: forces that the unknowns must balance along that basis, (r,).
-        holds: whether all forces lie in the span of that basis.
+        holds: whether the load lies in the span of that basis.
     """
 
     def __init__(self, scene: Scene, at_rest: AtRest, q: Array) -> None:
@@ -138,7 +138,7 @@ class _Cones:
     def _limits(
         self, scene: Scene, at_rest: AtRest, q: Array
     ) -> tuple[Array, list[tuple[int, float] | None]]:
-        """Limits that are known [N or N m]; (row, coefficient) of those that follow a contact."""
+        """Return known limits [N or N m], and (row, coefficient) of limits that depend on a contact force."""
         elements = len(self.sizes)
         following: list[tuple[int, float] | None] = [None] * elements
         rows = scene.constraint_slices
@@ -160,12 +160,12 @@ class _Cones:
             modes = [
                 core.Mode.unloaded if mode == core.Mode.sticking and x == 0.0 else mode
                 for mode, x in zip(modes, stuck.limits, strict=True)
-            ]  # an element whose limit is zero holds nothing
+            ]  # an element with a zero limit cannot stick
             lasts = modes != before
         return known, following
 
     def solve(self, factor: float) -> tuple[float, Array]:
-        """Least excess with all limits times a factor, over the unit of force, and the forces there."""
+        """Return the least scaled excess with all limits multiplied by a factor, and the forces of it."""
         for _ in range(MOST_CUTS):
             excess, x = self._program(factor)
             outside = [
@@ -178,7 +178,7 @@ class _Cones:
         return excess, x * self.unit / self.lengths
 
     def _limit(self, e: int, factor: float) -> tuple[Array, float]:
-        """A limit as coefficients of the unknowns and a number."""
+        """Return a limit as coefficients of the unknowns and a constant."""
         row = np.zeros(self.count)
         follows = self.following[e]
         if follows is not None:
@@ -192,7 +192,7 @@ class _Cones:
         return float(np.linalg.norm(x[self.parts[e]]) - row @ x - constant)
 
     def _program(self, factor: float) -> tuple[float, Array]:
-        """The linear program of the cuts so far: least s with n f - limit <= s for each."""
+        """Solve the linear program of the current cuts: least s with n f - limit <= s for each cut."""
         from scipy.optimize import linprog
 
         rows, bounds = [], []
@@ -225,7 +225,7 @@ class _Cones:
         return float(found.x[-1]), np.asarray(found.x[:-1])
 
     def least_factor(self) -> float:
-        """Least factor of all limits with which forces balance, by halving; infinite where none does."""
+        """Return the least factor of all limits for which forces balance, by bisection, or infinity."""
         low, high = 0.0, MOST_FACTOR / (1.0 + MOST_FACTOR)
         if self.solve(0.0)[0] <= CUT:
             return 0.0
@@ -241,7 +241,7 @@ class _Cones:
 
 
 def _directions(size: int) -> Iterator[Array]:
-    """Unit vectors that bound an interval, a disk or a ball from outside."""
+    """Yield unit vectors of the initial cuts around an interval, a disk or a ball."""
     if size == 1:
         yield from (np.array([1.0]), np.array([-1.0]))
     elif size == 2:

@@ -57,7 +57,8 @@ struct RestingProblem {
 
     RestingProblem(const Program& program, Workspace& workspace, const VecX& velocity, const std::vector<int>& gaps,
                    const std::vector<int>& others, const ClosingQuestion& asked, const RunState& state)
-        : p(program), w(workspace), v(velocity), question(asked), before(state), rows(program, workspace, gaps, true, others) {
+        : p(program), w(workspace), v(velocity), question(asked), before(state),
+          rows(program, workspace, gaps, true, others) {
         const int all = static_cast<int>(rows.W.rows());
         int n = 0;
         MatX share = MatX::Zero(all, all);

@@ -1,4 +1,4 @@
-"""What each contact is: frozen descriptions of what touches what, and of the friction there."""
+"""Frozen descriptions of contacts and their friction."""
 
 from __future__ import annotations
 
@@ -46,36 +46,34 @@ __all__ = [
 
 @dataclass(frozen=True)
 class PointContact:
-    """The origin of a frame, or a sphere around it, touches a plane, with Coulomb friction there.
+    """Contact of a frame's origin, or of a sphere around it, with a plane, with Coulomb friction.
 
-    Gap: phi = n . (p - p_plane) - height - radius [m], which is never negative: the contact opens where it
-    would have to pull, and closes where its gap does, with an impact: the gap's rate after it is at least
-    -restitution times the one before (Newton), and the impulse along the plane lies in Coulomb's cone.  With
-    unilateral=False it is kept closed, as a wheel in a groove, and a pull is only reported.
-    Rows: 1 while it is closed.  lam: the normal force on the frame's body [N]; positive presses, zero while
-    open.
-    Sliding friction on the body at the contact point: -mu lam u/|u|, with u the slip velocity in the
-    plane, Eqs. (77)-(80); sticking holds while the tangential force is below static_ratio mu lam.
-    A spot of contact of some size resists turning too.  With w the angular velocity of the frame's body
-    against that of the plane, the torque torsional |lam| opposes its part along the normal (spinning), and
-    the torque rolling |lam| its part along the plane (rolling); each sticks and slips on its own, as sliding
-    does.
+    Gap: phi = n . (p - p_plane) - height - radius [m], which is never negative. The contact opens if it would
+    need tension, and closes with an impact when its gap reaches zero. The rate of the gap after an impact is
+    at least -restitution times the rate before (Newton). The impulse along the plane lies in Coulomb's cone.
+    With unilateral=False the contact stays closed, as a wheel in a groove, and tension is only reported.
+    Rows: 1 while closed. lam: normal force on the frame's body [N]; positive presses, zero while open.
+    Sliding friction on the body at the contact point: -mu lam u/|u|, with the slip velocity u in the plane,
+    Eqs. (77)-(80). Sticking holds while the tangential force is below static_ratio mu lam.
+    A contact area resists rotation too. The angular velocity of the frame's body relative to the plane has a
+    part along the normal (spinning) and a part in the plane (rolling). The torque torsional |lam| opposes
+    spinning, and the torque rolling |lam| opposes rolling. Sliding, spinning and rolling stick and slip
+    independently.
 
     Args:
         frame: name of a frame of the model.
         mu: kinetic coefficient of friction.
-        static_ratio: static over kinetic friction of all three, at least 1.
-        plane: name of the frame whose origin the plane goes through (its body may move); None for the world's
-            origin.
+        static_ratio: static over kinetic friction for sliding, spinning and rolling, at least 1.
+        plane: name of a frame with origin in the plane (its body may move); None for the world's origin.
         normal: normal of the plane, in the axes of the plane's frame: "x", "y", "z" or three numbers.
         radius: radius of the sphere around the frame's origin [m]; 0 for a point.
-        offset: where the point or the sphere's middle is, in the axes of the frame [m].
-        height: of the plane over the origin of its frame, along the normal [m].
-        torsional: torque against spinning over normal force [m]; where the spot is a circle of radius R,
-            2/3 mu R when it presses evenly and 3/16 pi mu R when it is that of a sphere (Hertz).
-        rolling: torque against rolling over normal force [m], the lever of rolling resistance.
-        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
-        unilateral: whether it may open.
+        offset: position of the point or the sphere's center, in the axes of the frame [m].
+        height: height of the plane above the origin of its frame, along the normal [m].
+        torsional: torque against spinning over normal force [m]. For a circular contact area of radius R, it
+            is 2/3 mu R under uniform pressure and 3/16 pi mu R under a sphere (Hertz).
+        rolling: torque against rolling over normal force [m], the lever arm of rolling resistance.
+        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
+        unilateral: whether the contact may open.
         name: used in messages and results.
     """
 
@@ -118,15 +116,15 @@ class PointContact:
 class JointLimit:
     """Stops of a joint of one degree of freedom: lower <= q <= upper.
 
-    Gaps: q - lower and upper - q [rad or m], each a contact of its own that opens and closes as PointContact
-    does; they are called "NAME lower" and "NAME upper".
-    Rows: 1 while a stop is touched.  lam: the torque or force of that stop, away from it [N m or N].
+    Gaps: q - lower and upper - q [rad or m]. Each stop is a separate contact that opens and closes like a
+    PointContact; the names are "NAME lower" and "NAME upper".
+    Rows: 1 while a stop is closed. lam: torque or force of the stop, away from it [N m or N].
 
     Args:
         joint: name of the joint.
-        lower: least position [rad or m]; None for the model's own, where that is finite.
-        upper: largest position; None likewise.
-        restitution: rate after an impact over that before, 0 to 1.
+        lower: smallest position [rad or m]; None for the model's limit, if finite.
+        upper: largest position [rad or m]; None for the model's limit, if finite.
+        restitution: rate after an impact over the rate before, 0 to 1.
         name: used in messages and results; by default "JointLimit(JOINT)".
     """
 
@@ -150,25 +148,25 @@ class JointLimit:
 
 @dataclass(frozen=True)
 class UserContact:
-    """Any gap that opens and closes, as Python functions.
+    """A unilateral contact with a user-defined gap, as Python functions.
 
     Gap: g(t, q) [m or rad], never negative; A a = b is its second derivative, d^2 g/dt^2 = A a - b.
     d gap/dt = rate and d rate/dt = A a - b are checked once by differences.
-    Rows: 1 while it is closed.  lam: the force on the gap [N or N m], scaled as A is; zero while open.
-    Sliding friction opposes the slip velocities `directions` v, with mu lam at most while it slips and
-    static_ratio mu lam while it sticks; the rates of the directions are differences along the motion.
-    Nothing bounds the curvature of the gap between two steps: a touch is sought where its cubic between them
-    and twice that curvature cannot rule it out.
+    Rows: 1 while closed. lam: force on the gap [N or N m], in the scale of A; zero while open.
+    Sliding friction opposes the slip velocities `directions` v. It is at most mu lam while slipping and
+    static_ratio mu lam while sticking. Rates of the directions are differences along the motion.
+    The curvature of the gap between two steps has no bound. The step is searched for a contact unless the
+    cubic interpolant of the gap, with twice its curvature, excludes one.
 
     Args:
-        function: (t, q, v, data) -> (A, b), shapes (1, nv) and (1,), as of a `UserConstraint`; A does not
+        function: (t, q, v, data) -> (A, b), shapes (1, nv) and (1,), as in `UserConstraint`; A does not
             depend on v.
         gap: (t, q) -> g.
-        rate: (t, q, v) -> dg/dt; A v and a difference in time when None.
-        directions: (t, q) -> rows of slip at right angles to each other, (1, nv) or (2, nv); needed with mu.
+        rate: (t, q, v) -> dg/dt; A v plus a difference in time when None.
+        directions: (t, q) -> orthogonal slip rows, (1, nv) or (2, nv); needed with mu.
         mu: kinetic coefficient of friction.
         static_ratio: static over kinetic friction, at least 1.
-        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 
@@ -200,14 +198,14 @@ class UserContact:
 def box_contacts(
     frame: str, size: ArrayLike, plane: str | None = None, *, name: str | None = None, **more: Any
 ) -> list[PointContact]:
-    """The contacts of a box with a plane: its eight corners, a `PointContact` each.
+    """Return the contacts of a box with a plane: one `PointContact` for each of the eight corners.
 
     Args:
-        frame: name of the frame in the middle of the box, along its edges.
-        size: its edges along x, y and z [m], (3,).
+        frame: name of the frame at the center of the box, with axes along its edges.
+        size: edges along x, y and z [m], (3,).
         plane: name of the plane's frame, as in `PointContact`.
-        name: the corners are called "NAME -x-y-z" to "NAME +x+y+z"; by default the frame's name.
-        **more: mu, static_ratio, normal, height, restitution and unilateral of each.
+        name: prefix of the corner names "NAME -x-y-z" to "NAME +x+y+z"; the frame's name by default.
+        **more: mu, static_ratio, normal, height, restitution and unilateral of each corner.
 
     Raises:
         InputError: a size is not positive.

@@ -1,4 +1,4 @@
-"""Checks that descriptions of contacts have in common; they also turn numbers into floats and tuples."""
+"""Common checks of contact descriptions, which also convert numbers to floats and tuples."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from pin_nonideal.validation import array, fraction, label, nonnegative, optiona
 
 
 def check_rubbing(c: Any, *lengths: str) -> str:
-    """Name, friction, restitution, and lengths that are not negative.
+    """Check name, friction, restitution, and nonnegative lengths.
 
     Args:
         c: the description.
-        lengths: names of its fields.
+        lengths: names of the fields of lengths.
 
     Returns:
         Words for messages.
@@ -29,14 +29,14 @@ def check_rubbing(c: Any, *lengths: str) -> str:
 
 
 def check_two_frames(c: Any, who: str) -> None:
-    """Names of frames on two bodies.
+    """Check that the names of both frames differ.
 
     Args:
         c: the description.
         who: words for messages.
 
     Raises:
-        InputError: they are the same.
+        InputError: the names are equal.
     """
     text(f"{who}: frame1", c.frame1)
     text(f"{who}: frame2", c.frame2)
@@ -45,7 +45,7 @@ def check_two_frames(c: Any, who: str) -> None:
 
 
 def check_vectors(c: Any, who: str, *keys: str) -> None:
-    """Fields of three numbers each.
+    """Check fields of three numbers each.
 
     Args:
         c: the description.

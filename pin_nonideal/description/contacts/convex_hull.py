@@ -1,4 +1,4 @@
-"""Convex hulls: corners, faces and edges of a cloud of points, and whether a mesh is convex."""
+"""Convex hulls: corners, faces and edges of points, and checks of meshes for convexity."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from pin_nonideal.errors import InputError
 from pin_nonideal.types import Array
 
-# Sine of the angle between two triangles of a hull below which they are one face: their normals are known to
-# fewer digits than those of their corners.
+# Largest sine of the angle between two triangles of one face; normals have fewer digits than corners.
 ONE_FACE = 1e-9
-# Part of the size of a mesh by which its surface may lie inside its hull: files keep single precision.
+# Largest depth of a mesh surface inside its hull, relative to the size of the mesh: files have single
+# precision.
 SINGLE_PRECISION = 1e-6
-# Part of the size of a hull within which corners are one.
+# Distance of equal corners, relative to the size of the hull.
 ONE_CORNER = 1e-12
-# Places of a mesh that are compared with all faces of its hull at once, to bound memory.
+# Number of mesh points that are compared with all faces of the hull at once, to bound memory.
 AT_ONCE = 1000
 
 
@@ -28,7 +28,7 @@ class ConvexHull:
     Attributes:
         points: corners, (n, 3).
         planes: outward normal and offset of each face, n . x = offset, (f, 4).
-        edges: two corners and the two faces that meet there, (e, 4).
+        edges: indices of the two corners and the two faces of each edge, (e, 4).
     """
 
     points: Array
@@ -37,16 +37,16 @@ class ConvexHull:
 
 
 def convex_hull(points: Array, what: str) -> ConvexHull:
-    """The convex hull of points; triangles that lie in one plane are one face.
+    """Compute the convex hull of points; coplanar triangles are merged into one face.
 
     Args:
-        points: (n, 3).
+        points: points, (n, 3).
         what: words for messages.
 
     Raises:
-        InputError: they span no solid.
+        InputError: the points span no solid.
     """
-    from scipy.spatial import ConvexHull as Qhull  # for a solid only: its import takes long
+    from scipy.spatial import ConvexHull as Qhull  # imported on first use, since the import is slow
     from scipy.spatial import QhullError
 
     try:
@@ -72,7 +72,7 @@ def convex_hull(points: Array, what: str) -> ConvexHull:
 
 
 def _faces(normals: Array, neighbors: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The face that each triangle belongs to, numbered from 0."""
+    """Return the face index of each triangle, from 0."""
     face = np.full(len(normals), -1)
     count = 0
     for first in range(len(normals)):
@@ -89,15 +89,15 @@ def _faces(normals: Array, neighbors: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def shrunk(points: Array, by: float, what: str) -> Array:
-    """Corners of the hull of points when each of its faces moves inward.
+    """Compute the corners of the hull of points with its faces moved inward.
 
     Args:
-        points: (n, 3).
-        by: how far [m].
+        points: points, (n, 3).
+        by: inward displacement of the faces [m].
         what: words for messages.
 
     Raises:
-        InputError: nothing is left of it.
+        InputError: the hull is too thin.
     """
     from scipy.spatial import HalfspaceIntersection
 
@@ -116,11 +116,11 @@ def shrunk(points: Array, by: float, what: str) -> Array:
 
 
 def check_convex(points: Array, triangles: NDArray[np.int64], what: str) -> None:
-    """Raises where a mesh is not the surface of its convex hull.
+    """Check that a mesh is the surface of its convex hull.
 
     Args:
-        points: (n, 3).
-        triangles: numbers of the corners of each, (m, 3).
+        points: points, (n, 3).
+        triangles: indices of the corners of each triangle, (m, 3).
         what: words for messages.
 
     Raises:

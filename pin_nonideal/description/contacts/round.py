@@ -1,4 +1,4 @@
-"""Contacts of spheres and capsules that belong to two bodies: frozen descriptions."""
+"""Frozen descriptions of contacts of spheres, capsules and boxes on two bodies."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["BoxContact", "CapsuleContact", "SphereContact"]
 
 
 def _check(c: SphereContact | CapsuleContact | BoxContact) -> str:
-    """What both say: names of frames, radii and friction."""
+    """Check the common fields: names of frames, radii and friction."""
     who = check_rubbing(c, "radius1", "radius2")
     check_two_frames(c, who)
     if c.radius1 + c.radius2 == 0.0:
@@ -26,23 +26,23 @@ def _check(c: SphereContact | CapsuleContact | BoxContact) -> str:
 
 @dataclass(frozen=True)
 class SphereContact:
-    """Two spheres around the origins of two frames, or a sphere and a point, touch with Coulomb friction.
+    """Contact of two spheres around two frames' origins, or of a sphere and a point, with Coulomb friction.
 
-    Gap: phi = |p1 - p2| - radius1 - radius2 [m], never negative; it opens, closes and strikes as that of a
-    `PointContact` does.
-    Rows: 1 while it is closed.  lam: the normal force on the body of frame1 [N], away from the other; zero
-    while open.
-    Sliding friction opposes the slip of the two bodies at the place where they touch, with mu lam at most
-    while it slips and static_ratio mu lam while it sticks.
+    Gap: phi = |p1 - p2| - radius1 - radius2 [m], never negative. Opening, closing and impacts are those of a
+    `PointContact`.
+    Rows: 1 while closed. lam: normal force on the body of frame1 [N], away from the other body; zero while
+    open.
+    Sliding friction opposes the slip of the two bodies at the contact point. It is at most mu lam while
+    slipping and static_ratio mu lam while sticking.
 
     Args:
-        frame1: name of the frame in the middle of the first sphere.
-        frame2: name of the frame in the middle of the second, on another body or the world.
-        radius1: radius of the first [m].
-        radius2: radius of the second [m]; 0 for a point.
+        frame1: name of the frame at the center of the first sphere.
+        frame2: name of the frame at the center of the second sphere, on another body or the world.
+        radius1: radius of the first sphere [m].
+        radius2: radius of the second sphere [m]; 0 for a point.
         mu: kinetic coefficient of friction.
         static_ratio: static over kinetic friction, at least 1.
-        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 
@@ -64,23 +64,23 @@ Segment = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 @dataclass(frozen=True)
 class CapsuleContact:
-    """Two capsules, or a capsule and a sphere, touch: all within a radius of a segment on each body.
+    """Contact of two capsules, or of a capsule and a sphere, with Coulomb friction.
 
-    Gap: the least distance of the two segments less both radii [m]; else as `SphereContact`.  One place
-    touches: two capsules that lie along each other touch at the middle of one of them, and do not resist
-    tipping about it.
-    Rows: 1 while it is closed.  lam: the normal force on the body of frame1 [N], away from the other.
+    A capsule is the set of points within a radius of a segment.
+    Gap: distance of the two segments minus both radii [m]; otherwise as `SphereContact`. The contact has one
+    point: parallel capsules touch at the middle of one of them and do not resist tipping about this point.
+    Rows: 1 while closed. lam: normal force on the body of frame1 [N], away from the other body.
 
     Args:
         frame1: name of a frame on the first body.
-        frame2: name of a frame on the second, or of the world.
+        frame2: name of a frame on the second body, or of the world.
         segment1: both ends of the first segment in the axes of frame1 [m]; the same point twice for a sphere.
-        segment2: both ends of the second in those of frame2 [m].
-        radius1: radius around the first [m].
-        radius2: radius around the second [m].
+        segment2: both ends of the second segment in the axes of frame2 [m].
+        radius1: radius of the first capsule [m].
+        radius2: radius of the second capsule [m].
         mu: kinetic coefficient of friction.
         static_ratio: static over kinetic friction, at least 1.
-        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 
@@ -104,24 +104,24 @@ class CapsuleContact:
 
 @dataclass(frozen=True)
 class BoxContact:
-    """A sphere, or a point, touches a box: a solid along edges of its own, rounded with radius2.
+    """Contact of a sphere, or a point, with a box whose edges are rounded with radius2.
 
-    Gap: the distance of the sphere's middle from the box less by radius2 on all sides, less both radii [m];
-    else as `SphereContact`.
-    Rows: 1 while it is closed.  lam: the normal force on the body of frame1 [N], away from the box.
+    Gap: distance of the sphere's center from the box shrunk by radius2 on all sides, minus both radii [m];
+    otherwise as `SphereContact`.
+    Rows: 1 while closed. lam: normal force on the body of frame1 [N], away from the box.
 
     Args:
         frame1: name of a frame on the body of the sphere.
         frame2: name of a frame on the body of the box, or of the world.
-        size: edges of the box [m], (3,), the rounding included.
+        size: edges of the box [m], (3,), including the rounding.
         radius1: radius of the sphere [m]; 0 for a point.
-        radius2: radius to which the edges of the box are rounded [m], less than half its least edge.
-        offset: where the sphere's middle is, in the axes of frame1 [m].
-        xyz: where the middle of the box is, in the axes of frame2 [m].
-        rpy: how its edges are turned against frame2, roll, pitch and yaw [rad].
+        radius2: rounding radius of the edges of the box [m], less than half its shortest edge.
+        offset: center of the sphere, in the axes of frame1 [m].
+        xyz: center of the box, in the axes of frame2 [m].
+        rpy: orientation of the box in frame2, roll, pitch and yaw [rad].
         mu: kinetic coefficient of friction.
         static_ratio: static over kinetic friction, at least 1.
-        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 
@@ -149,7 +149,7 @@ class BoxContact:
 
 
 def segments(c: SphereContact | CapsuleContact) -> tuple[Array, Array]:
-    """Both segments, (2, 3) each, in the axes of their frames.
+    """Return both segments in the axes of their frames, (2, 3) each.
 
     Args:
         c: the description.

@@ -1,4 +1,4 @@
-"""Contacts of ellipsoids, disks, cylinders, cones and convex hulls: frozen descriptions."""
+"""Frozen descriptions of contacts of ellipsoids, disks, cylinders, cones and convex hulls."""
 
 from __future__ import annotations
 
@@ -28,26 +28,25 @@ __all__ = ["CylinderContact", "EllipsoidContact", "HullContact", "RevolvedContac
 
 @dataclass(frozen=True)
 class EllipsoidContact:
-    """An ellipsoid, or a disk, touches a plane with its lowest point, with Coulomb friction there.
+    """Contact of the lowest point of an ellipsoid, or a disk, with a plane, with Coulomb friction.
 
-    Gap: phi = n . (p - p_plane) - height - |D R^T n| [m], p the middle, R the axes and D the semiaxes; else
-    as that of a `PointContact` that may open.  One semiaxis may be zero: a disk, which touches with its rim
-    and rolls on it, as a coin or a wheel does.  One that lies on its face has no lowest point: points of the
-    face carry it, as a `GeometryContact` of a cylinder gives them.
-    Rows: 1 while it is closed.  lam: the normal force on the frame's body [N].
+    Gap: phi = n . (p - p_plane) - height - |D R^T n| [m], with center p, axes R and semiaxes D; otherwise as
+    a unilateral `PointContact`. One semiaxis may be zero: such a disk touches and rolls on its rim, like a
+    coin or a wheel. A disk that lies on its face has no lowest point. Use contact points of the face instead,
+    as a `GeometryContact` of a cylinder creates them.
+    Rows: 1 while closed. lam: normal force on the frame's body [N].
 
     Args:
         frame: name of a frame on the body.
-        semiaxes: half the lengths along the axes [m], (3,), at most one of them zero.
+        semiaxes: half lengths along the axes [m], (3,), at most one of them zero.
         mu: kinetic coefficient of friction.
         static_ratio: static over kinetic friction, at least 1.
-        plane: name of the frame whose origin the plane goes through (its body may move); None for the world's
-            origin.
+        plane: name of a frame with origin in the plane (its body may move); None for the world's origin.
         normal: normal of the plane, in the axes of the plane's frame: "x", "y", "z" or three numbers.
-        offset: where the middle is, in the axes of the frame [m].
-        rpy: how the axes are turned against the frame, roll, pitch and yaw [rad].
-        height: of the plane over the origin of its frame, along the normal [m].
-        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        offset: center of the ellipsoid, in the axes of the frame [m].
+        rpy: orientation of the axes in the frame, roll, pitch and yaw [rad].
+        height: height of the plane above the origin of its frame, along the normal [m].
+        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 
@@ -80,21 +79,21 @@ class EllipsoidContact:
 
 @dataclass(frozen=True)
 class HullContact:
-    """A sphere, or a point, touches the convex hull of points of another body, with Coulomb friction there.
+    """Contact of a sphere, or a point, with the convex hull of points of another body, with Coulomb friction.
 
-    Gap: the distance of the sphere's middle from the hull, less both radii [m]; else as `SphereContact`.
-    Rows: 1 while it is closed.  lam: the normal force on the body of frame1 [N], away from the hull.
+    Gap: distance of the sphere's center from the hull, minus both radii [m]; otherwise as `SphereContact`.
+    Rows: 1 while closed. lam: normal force on the body of frame1 [N], away from the hull.
 
     Args:
         frame1: name of a frame on the body of the sphere.
         frame2: name of a frame on the body of the hull, or of the world.
-        points: in the axes of frame2 [m], (n, 3); those inside the hull of the others add nothing.
+        points: points in the axes of frame2 [m], (n, 3); points inside the hull of the others have no effect.
         radius1: radius of the sphere [m]; 0 for a point.
         radius2: radius around the hull [m], which rounds its edges and moves its faces outward.
-        offset: where the sphere's middle is, in the axes of frame1 [m].
+        offset: center of the sphere, in the axes of frame1 [m].
         mu: kinetic coefficient of friction.
         static_ratio: static over kinetic friction, at least 1.
-        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 
@@ -120,29 +119,28 @@ class HullContact:
 
 @dataclass(frozen=True)
 class CylinderContact:
-    """A sphere or a capsule touches a cylinder or a cone of another body, with Coulomb friction there.
+    """Contact of a sphere or a capsule with a cylinder or a cone of another body, with Coulomb friction.
 
-    Gap: the distance of the sphere's middle, or of the capsule's middle line, from the solid, less both radii
-    [m]; else as `SphereContact`.  One place touches: a capsule that lies along the solid touches in the
-    middle of what lies beside it.
-    Rows: 1 while it is closed.  lam: the normal force on the body of frame1 [N], away from the solid.
+    Gap: distance of the sphere's center, or of the capsule's segment, from the solid, minus both radii [m];
+    otherwise as `SphereContact`. The contact has one point: a capsule along the solid touches in the middle
+    of their common length.
+    Rows: 1 while closed. lam: normal force on the body of frame1 [N], away from the solid.
 
     Args:
-        frame1: name of a frame on the body of the sphere.
+        frame1: name of a frame on the body of the sphere or capsule.
         frame2: name of a frame on the body of the solid, or of the world.
-        length: of the solid along its axis [m].
+        length: length of the solid along its axis [m].
         below: radius of the face at the lower end of the axis [m].
-        above: radius of that at the upper end [m]; `below` when None, and 0 for the tip of a cone.
+        above: radius of the face at the upper end [m]; `below` when None, and 0 for the tip of a cone.
         radius1: radius of the sphere or capsule [m]; 0 for a point or a line.
-        offset: where the sphere's middle is, in the axes of frame1 [m].
-        xyz: where the middle of the axis is, in the axes of frame2 [m].
-        rpy: how the solid, its axis along z, is turned against frame2, roll, pitch and yaw [rad].
+        offset: center of the sphere, in the axes of frame1 [m].
+        xyz: center of the solid's axis, in the axes of frame2 [m].
+        rpy: orientation of the solid, with axis z, in frame2, roll, pitch and yaw [rad].
         mu: kinetic coefficient of friction.
         static_ratio: static over kinetic friction, at least 1.
-        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
         name: used in messages and results.
-        end: of a capsule, whose middle line goes from offset to there, in the axes of frame1 [m]; None for a
-            sphere.
+        end: end of a capsule's segment, which starts at offset, in the axes of frame1 [m]; None for a sphere.
         radius2: radius around the solid [m], which rounds its rims and moves its faces and side outward.
     """
 
@@ -181,23 +179,23 @@ class CylinderContact:
 
 @dataclass(frozen=True)
 class RimContact:
-    """A disk, the rim of a cylinder or cone, touches the convex hull of points of another body.
+    """Contact of a disk, the rim of a cylinder or cone, with the convex hull of points of another body.
 
-    Gap: the distance of the disk from the hull, less radius2 [m]; else as `SphereContact`.  One place
-    touches: with a disk that lies on a face points of it have to carry it, a `HullContact` each.
-    Rows: 1 while it is closed.  lam: the normal force on the body of frame1 [N], away from the hull.
+    Gap: distance of the disk from the hull, minus radius2 [m]; otherwise as `SphereContact`. The contact has
+    one point: a disk that lies on a face needs further contact points, one `HullContact` each.
+    Rows: 1 while closed. lam: normal force on the body of frame1 [N], away from the hull.
 
     Args:
         frame1: name of a frame on the body of the disk.
         frame2: name of a frame on the body of the hull, or of the world.
-        points: in the axes of frame2 [m], (n, 3); those inside the hull of the others add nothing.
+        points: points in the axes of frame2 [m], (n, 3); points inside the hull of the others have no effect.
         rim: radius of the disk [m].
         radius2: radius around the hull [m], which rounds its edges and moves its faces outward.
-        offset: where the disk's middle is, in the axes of frame1 [m].
-        rpy: how the disk, its axis along z, is turned against frame1, roll, pitch and yaw [rad].
+        offset: center of the disk, in the axes of frame1 [m].
+        rpy: orientation of the disk, with axis z, in frame1, roll, pitch and yaw [rad].
         mu: kinetic coefficient of friction.
         static_ratio: static over kinetic friction, at least 1.
-        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 
@@ -224,27 +222,27 @@ class RimContact:
 
 @dataclass(frozen=True)
 class RevolvedContact:
-    """Two cylinders, cones or disks touch, each with a radius around it, with Coulomb friction there.
+    """Contact of two cylinders, cones or disks with rounding radii, with Coulomb friction.
 
-    Gap: the distance of both, less both radii [m]; else as `SphereContact`.  One place touches: where two
-    lie along each other or face on face, points of them have to carry them as well.
-    Rows: 1 while it is closed.  lam: the normal force on the body of frame1 [N], away from the other.
+    Gap: distance of both solids, minus both radii [m]; otherwise as `SphereContact`. The contact has one
+    point: solids that lie along each other, or face on face, need further contact points.
+    Rows: 1 while closed. lam: normal force on the body of frame1 [N], away from the other body.
 
     Args:
-        frame1: name of a frame on the body of the first.
-        frame2: name of a frame on the body of the second, or of the world.
-        solid1: length along its axis and radii of the faces at its lower and upper end [m], (3,); one radius
-            may be 0, the tip of a cone, and without length both are that of a disk.
-        solid2: the same of the second.
-        radius1: radius around the first [m], which rounds its rims and moves its faces and side outward.
-        radius2: radius around the second [m].
-        xyz1: where the middle of the first one's axis is, in the axes of frame1 [m].
-        rpy1: how the first, its axis along z, is turned against frame1, roll, pitch and yaw [rad].
-        xyz2: where the middle of the second one's axis is, in the axes of frame2 [m].
-        rpy2: how the second is turned against frame2 [rad].
+        frame1: name of a frame on the body of the first solid.
+        frame2: name of a frame on the body of the second solid, or of the world.
+        solid1: length along the axis, and radii of the lower and upper face [m], (3,). One radius may be 0,
+            for the tip of a cone. Zero length with equal radii is a disk.
+        solid2: length and radii of the second solid [m], (3,).
+        radius1: radius around the first solid [m], which rounds its rims and moves its surface outward.
+        radius2: radius around the second solid [m].
+        xyz1: center of the first solid's axis, in the axes of frame1 [m].
+        rpy1: orientation of the first solid, with axis z, in frame1, roll, pitch and yaw [rad].
+        xyz2: center of the second solid's axis, in the axes of frame2 [m].
+        rpy2: orientation of the second solid, with axis z, in frame2, roll, pitch and yaw [rad].
         mu: kinetic coefficient of friction.
         static_ratio: static over kinetic friction, at least 1.
-        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 
@@ -279,14 +277,14 @@ class RevolvedContact:
 
 
 def hull_points(given: object, who: str) -> tuple[Vector3, ...]:
-    """Points that span a solid.
+    """Return points as tuples, after a check that they span a solid.
 
     Args:
-        given: (n, 3).
+        given: points, (n, 3).
         who: words for messages.
 
     Raises:
-        InputError: they do not, or are none.
+        InputError: the points are invalid or span no solid.
     """
     points = array(f"{who}: points", given, (None, 3))
     convex_hull(points, f"{who}: points")
@@ -294,14 +292,14 @@ def hull_points(given: object, who: str) -> tuple[Vector3, ...]:
 
 
 def core_hull(c: HullContact | RimContact) -> tuple[list[float], list[float], list[int]]:
-    """The hull in the axes of frame2 as the core takes it, one number after the other.
+    """Return the hull in the axes of frame2 as flat lists for the core.
 
     Args:
         c: the description.
 
     Returns:
-        Corners; of each face its outward normal and its offset along it; of each edge the numbers of two
-        corners and of the two faces that meet there.
+        Corners (3 numbers each); outward normal and offset of each face (4 numbers); indices of the two
+        corners and the two faces of each edge (4 numbers).
     """
     hull = convex_hull(np.array(c.points), label(c))
     return hull.points.ravel().tolist(), hull.planes.ravel().tolist(), hull.edges.ravel().tolist()
