@@ -21,7 +21,7 @@ from .state import SceneStates
 Rest = ParamSpec("Rest")
 Result = TypeVar("Result")
 
-# What to do if laws and dynamics allow several motions.
+# Behavior if laws and dynamics admit several motions.
 SEVERAL = ("error", "continue")
 
 

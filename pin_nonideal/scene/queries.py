@@ -21,7 +21,7 @@ class Queries:
         compiled: the compiled scene.
         states: its states.
         evaluator: evaluates it.
-        name: of the scene, for messages.
+        name: name of the scene in messages.
     """
 
     def __init__(self, compiled: CompiledScene, states: SceneStates, evaluator: Evaluator, name: str) -> None:

@@ -49,7 +49,7 @@ class Origin:
     Attributes:
         table: name and parameters for `load`, or None.
         shapes: functions that read the shapes for display and for collisions again, or None.
-        assembly_tolerance: of the scene [m or rad].
+        assembly_tolerance: assembly tolerance of the scene [m or rad].
     """
 
     table: Table | None
@@ -493,10 +493,10 @@ class Scene:
             add_contacts: contacts in addition.
             add_forces: forces in addition.
             remove: names of present constraints, laws, contacts and forces to leave out.
-            actuation: of the new scene, None for none; the present one when left out.
+            actuation: actuation of the new scene, None for no actuation; unchanged if left out.
             q0: initial configuration, (nq,) or by joint name (the others as now); the present one when None.
             v0: initial velocity, (nv,) or by joint name (the others as now); the present one when None.
-            name: of the new scene; the present one when None.
+            name: name of the new scene; the present name when None.
 
         Returns:
             The new Scene.

@@ -58,7 +58,7 @@ class SceneStates:
     Args:
         compiled: the compiled scene.
         initial: its initial state.
-        name: of the scene, for messages.
+        name: name of the scene in messages.
 
     Attributes:
         held: entries of the initial state that were named.

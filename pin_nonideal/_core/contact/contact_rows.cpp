@@ -23,6 +23,11 @@ void free_contacts(const Program& p, Workspace& w, const std::vector<char>& touc
 }
 
 void release_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                      const std::vector<char>& touching) {
+    release_contacts(p, w, t, q, v, touching, std::vector<Mode>(p.frictions.size(), unloaded));
+}
+
+void release_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                       const std::vector<char>& touching, const std::vector<Mode>& modes) {
     free_contacts(p, w, touching, modes);
     begin_step(p, w, t, q, v);

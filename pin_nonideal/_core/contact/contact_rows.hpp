@@ -8,8 +8,9 @@ namespace pn {
 
 // Evaluate touching contacts as rows without constraint forces and friction. `touching` is by gap.
 void free_contacts(const Program& p, Workspace& w, const std::vector<char>& touching);
-// Do the same with the friction of slipping elements in `modes`, which contacts have none of, and compute the motion at
-// (t, q, v).
+// Do the same and compute the motion at (t, q, v). The second form keeps the friction of elements that slip in `modes`.
+void release_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                      const std::vector<char>& touching);
 void release_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                       const std::vector<char>& touching, const std::vector<Mode>& modes);
 

@@ -251,8 +251,8 @@ void RestingMotion::answer(const Program& p, Workspace& w, ModeQuestion& questio
 
 namespace {
 
-// Calls act(problem) with the contacts of `question.rest` as a cone problem; the workspace is as before afterwards. Returns
-// false if they are no cone problem, or if other rows allow no motion.
+// Call act(problem) with the contacts of `question.rest` and the other elements at rest as a cone problem. The workspace
+// is unchanged afterwards. Return false if they are no cone problem, or if other rows admit no motion.
 template <class Act>
 bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ClosingQuestion& question,
                   const Act& act) {
