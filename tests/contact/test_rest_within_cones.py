@@ -27,6 +27,16 @@ def test_solve(family, seed):
 
 
 @families
+@pytest.mark.parametrize("seed", seeds(range(200), count=10))
+def test_friction_of_a_joint_beside_changes_nothing(family, seed):
+    case = wedged.beside_a_rough_rotor(family(seed))
+    admissible = may_rest(case.touches, case.centers, case.loads)
+    solution = case.scene.solve(*case.scene.initial_state())
+    assert admissible is None or admissible == (np.abs(solution.a).max() <= STILL)
+    assert solution.a[-1] == 0.0
+
+
+@families
 @pytest.mark.parametrize("method", ["dop853", "dopri5", "rk4", "semi_implicit_euler", "moreau"])
 @pytest.mark.parametrize("seed", seeds(range(200), count=2))
 def test_runs_from_rest(family, method, seed):

@@ -181,4 +181,20 @@ def balls(rng, flat, count):
     return radii, centers
 
 
+def beside_a_rough_rotor(case):
+    """The same bodies beside a pendulum whose friction holds it, in one scene."""
+    model = case.scene.model.copy()
+    joint = model.addJoint(0, pin.JointModelRX(), pin.SE3(np.eye(3), np.array([0.0, 0.0, 5.0])), "rotor")
+    model.appendBodyToJoint(
+        joint, pin.Inertia(1.0, np.array([0.0, 0.1, 0.0]), 0.01 * np.eye(3)), pin.SE3.Identity()
+    )
+    scene = pn.Scene(
+        model,
+        contacts=case.scene.contacts,
+        laws=[pn.JointFriction("rotor", coulomb=2.0)],
+        q0=np.append(case.scene.q0, 0.0),
+    )
+    return Wedged(scene, case.touches, case.centers, case.loads)
+
+
 FAMILIES = (ball_between_planes, box_in_corner, uneven_stance, table_in_valley, pile_of_balls)
