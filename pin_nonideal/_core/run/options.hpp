@@ -1,4 +1,4 @@
-// Options of a run.
+// Options of one run, as the caller sets them.
 #pragma once
 
 #include <algorithm>
