@@ -1,6 +1,6 @@
 """What loads of the world's robots, and what of it is right: a table over folders of URDF and MJCF files.
 
-    python -m benchmarks.models FOLDER ... [--write docs/models.md]
+    python -m benchmarks.models FOLDER ... [--write docs/reference/models.md]
 
 Each folder is a row; "example-robot-data" stands for the names of that package.  Right means, at random
 states that meet the constraints: for MJCF MuJoCo's own M, bias, actuator forces and accelerations (contacts
