@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import posixpath
 import re
 from pathlib import Path
 from typing import Any
 
 from mkdocs.structure.files import File, Files
 
-OUTSIDE = re.compile(r"\]\(\.\./([^)#]+)(#[^)]*)?\)")
+LINK = re.compile(r"\]\((\.\./[^)#]+)(#[^)]*)?\)")
 TABLE = re.compile(r"(?:^\| `\w+` \|.*\n)+", re.MULTILINE)
+NAMES = "reference/names.md"
 ROOT = Path(__file__).resolve().parent.parent
+
+
+def _outside(page: str, link: str) -> str | None:
+    """Return the path in the checkout that a link of a page leads to, None if it leads to a page or picture."""
+    target = posixpath.normpath(posixpath.join("docs", posixpath.dirname(page), link))
+    return None if target.startswith("docs/") else target
 
 
 def _place(target: str) -> str:
@@ -19,15 +27,18 @@ def _place(target: str) -> str:
 
 
 def _with_docstrings(table: re.Match[str]) -> str:
-    """Return a table of names, with the directives of mkdocstrings for each name."""
+    """Return a table of names followed by the docstring of each name."""
     names = re.findall(r"^\| `(\w+)`", table[0], re.MULTILINE)
     return "\n\n".join([table[0], *(f"::: pin_nonideal.{name}" for name in names), ""])
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the files that pages link to."""
+    """Add the files of the checkout that pages link to."""
     for page in files.documentation_pages():
-        for target, _ in OUTSIDE.findall(page.content_string):
+        for link, _ in LINK.findall(page.content_string):
+            target = _outside(page.src_uri, link)
+            if target is None:
+                continue
             path = ROOT / target
             if path.is_file() and files.get_file_from_path(_place(target)) is None:
                 text = path.read_text(encoding="utf-8")
@@ -36,11 +47,20 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Redirect links to the added files; links to folders are removed and their names kept."""
-    if page.file.src_uri == "reference.md":
-        return TABLE.sub(_with_docstrings, markdown)
+    """Redirect the links of a page to these files, and add the docstrings of the reference.
+
+    A folder has no page, so its name stays without a link.
+    """
+    source = page.file.src_uri
+    if source == NAMES:
+        markdown = TABLE.sub(_with_docstrings, markdown)
 
     def moved(match: re.Match[str]) -> str:
-        return f"]({_place(match[1])})" if (ROOT / match[1]).is_file() else "]"
+        target = _outside(source, match[1])
+        if target is None:
+            return match[0]
+        if not (ROOT / target).is_file():
+            return "]"
+        return f"]({posixpath.relpath(_place(target), posixpath.dirname(source))})"
 
-    return OUTSIDE.sub(moved, markdown)
+    return LINK.sub(moved, markdown)

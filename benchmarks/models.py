@@ -1,6 +1,6 @@
 """Table of the models that load, and of their correctness, over folders of URDF and MJCF files.
 
-    python -m benchmarks.models FOLDER ... [--write docs/models.md]
+    python -m benchmarks.models FOLDER ... [--write docs/reference/models.md]
 
 Each folder is a row.  "example-robot-data" stands for the robots of that package.  A right model agrees with
 the reference at random consistent states.  The reference of MJCF is MuJoCo's M, bias, actuator forces and

@@ -12,8 +12,8 @@ from .goals import OURS, Records, key_figures, power
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORDED = ROOT / "benchmarks" / "results"
-DOCUMENT = ROOT / "docs" / "benchmarks.md"
-PICTURES = ROOT / "docs" / "benchmarks"
+DOCUMENT = ROOT / "docs" / "reference" / "benchmarks.md"
+PICTURES = ROOT / "docs" / "reference" / "benchmarks"
 README = ROOT / "README.md"
 BEGIN, END = "<!-- benchmarks: begin -->\n", "<!-- benchmarks: end -->\n"
 

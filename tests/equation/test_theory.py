@@ -1,4 +1,4 @@
-"""docs/theory.md agrees with the sources: tasks of files, and files of numbered equations."""
+"""docs/explanation/theory.md agrees with the sources: tasks of files, and files of numbered equations."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = ROOT / "pin_nonideal" / "_core"
-THEORY = ROOT / "docs" / "theory.md"
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+THEORY = ROOT / "docs" / "explanation" / "theory.md"
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 PYTHON = sorted(
     p for room in ("pin_nonideal", "oracles", "examples", "tests") for p in (ROOT / room).rglob("*.py")
 )
@@ -50,7 +50,7 @@ def computed_in_core(path):
 def table():
     """Rows of the table of the core: headers (a folder stands for its own), and their equations."""
     for line in THEORY.read_text(encoding="utf-8").splitlines():
-        named = re.findall(r"\]\(\.\./pin_nonideal/_core/([\w/.]+)\)", line)
+        named = re.findall(r"\]\(\.\./\.\./pin_nonideal/_core/([\w/.]+)\)", line)
         if line.startswith("| ") and named:
             files = []
             for name in named:

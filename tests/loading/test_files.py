@@ -142,7 +142,7 @@ def test_a_scene_that_does_not_fit_a_run_is_refused(tmp_path):
 
 
 def test_the_page_of_robots_says_what_the_list_says():
-    page = (Path(__file__).parents[2] / "docs" / "robots.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "how_to" / "robots.md").read_text(encoding="utf-8")
     assert [name for name, said in pn.robots() if f"| `{name}` | {said} |" not in page] == []
 
 

@@ -17,7 +17,7 @@ import pytest
 from pin_nonideal.loading.load import load, robots
 
 ROOT = Path(__file__).resolve().parents[2]
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(
     r"^(?:<!-- (?P<mark>[a-z:._ ]+) -->\n)?```(?P<language>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL
 )
@@ -26,7 +26,7 @@ RUN_SECONDS = 120
 
 
 class Block(NamedTuple):
-    """A fenced block of a Markdown file: `mark` is the HTML comment right above it."""
+    """A fenced block of a Markdown file: `document` is its path in the checkout, `mark` the comment right above it."""
 
     document: str
     line: int
@@ -35,13 +35,18 @@ class Block(NamedTuple):
     text: str
 
 
+def place(path: Path) -> str:
+    """Return the path of a document in the checkout."""
+    return path.relative_to(ROOT).as_posix()
+
+
 def blocks() -> list[Block]:
     found = []
     for path in DOCUMENTS:
         text = path.read_text(encoding="utf-8")
         for match in BLOCK.finditer(text):
             line = text.count("\n", 0, match.start()) + 1
-            found.append(Block(path.name, line, match["mark"] or "", match["language"], match["text"]))
+            found.append(Block(place(path), line, match["mark"] or "", match["language"], match["text"]))
     return found
 
 
@@ -84,7 +89,7 @@ def test_marked_python_blocks_run(document: str, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+@pytest.mark.parametrize("path", DOCUMENTS, ids=place)
 def test_links_lead_to_files(path: Path) -> None:
     broken = [
         link for link in LINK.findall(path.read_text(encoding="utf-8")) if not (path.parent / link).exists()
@@ -94,8 +99,8 @@ def test_links_lead_to_files(path: Path) -> None:
 
 def test_the_folder_of_the_robots_page_loads(tmp_path: Path) -> None:
     files = {(b.document, b.mark): b.text for b in blocks() if b.mark.startswith("file: ")}
-    (tmp_path / "robot.urdf").write_text(files["first_use.md", "file: linkage.urdf"], encoding="utf-8")
-    (tmp_path / "robot.yaml").write_text(files["robots.md", "file: robot.yaml"], encoding="utf-8")
+    (tmp_path / "robot.urdf").write_text(files["docs/tutorials/first_use.md", "file: linkage.urdf"], encoding="utf-8")
+    (tmp_path / "robot.yaml").write_text(files["docs/how_to/robots.md", "file: robot.yaml"], encoding="utf-8")
     scene = load(tmp_path)
     assert [c.name for c in scene.constraints] == ["loop"]
     assert [law.joint for law in scene.laws] == ["rocker_joint"]
@@ -103,7 +108,7 @@ def test_the_folder_of_the_robots_page_loads(tmp_path: Path) -> None:
 
 
 def test_every_robot_is_in_the_table() -> None:
-    text = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "how_to" / "robots.md").read_text(encoding="utf-8")
     assert [name for name, _ in robots() if f"| `{name}` |" not in text] == []
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pin_nonideal as pn
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "equation_by_equation.md"
+PAGE = ROOT / "docs" / "explanation" / "equation_by_equation.md"
 LAST = 81  # equations of the paper
 CODE = re.compile(r"`([^`]+)`")
 

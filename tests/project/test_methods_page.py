@@ -1,4 +1,4 @@
-"""The tables of docs/methods.md agree with the package."""
+"""The tables of docs/how_to/methods.md agree with the package."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 import pin_nonideal as pn
 
-PAGE = (Path(__file__).parents[2] / "docs" / "methods.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "how_to" / "methods.md").read_text(encoding="utf-8")
 TABLE = re.compile(r"<!-- table: (\S+) (\S+) -->\n\|.*\n\| ---.*\n((?:\|.*\n)+)")
 # Rounding differs between processors: a step more or fewer, and another error below the tolerance.
 EVALUATIONS, ERROR = 0.03, 3.0

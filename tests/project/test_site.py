@@ -29,14 +29,14 @@ def text(page: str) -> str:
 
 
 def test_the_reference_has_every_public_name() -> None:
-    rows = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", text("reference.md"), re.MULTILINE))
+    rows = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", text("reference/names.md"), re.MULTILINE))
     first = {
         n: (inspect.getdoc(getattr(pn, n)) or "").split("\n\n")[0].replace("\n", " ") for n in pn.__all__
     }
     assert {name: words.replace("|", "\\|") for name, words in first.items()} == rows
 
 
-@pytest.mark.parametrize("page", sorted(path.name for path in DOCS.glob("*.md")))
+@pytest.mark.parametrize("page", sorted(path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md")))
 def test_names_on_pages_exist(page: str) -> None:
     unknown = []
     for owner, name in re.findall(r"\b(pn|scene|run)\.([a-zA-Z]\w*)", text(page)):
@@ -46,14 +46,14 @@ def test_names_on_pages_exist(page: str) -> None:
 
 
 def test_worked_examples_are_short_and_checked() -> None:
-    blocks = re.findall(r"```python\n(.*?)```", text("worked_examples.md"), re.DOTALL)
+    blocks = re.findall(r"```python\n(.*?)```", text("tutorials/worked_examples.md"), re.DOTALL)
     assert len(blocks) == 5
     assert all(len(block.splitlines()) < 60 for block in blocks)
     assert all(block.count("\nassert ") >= 2 for block in blocks)
 
 
 def test_the_gallery_shows_every_robot() -> None:
-    shown = set(re.findall(r"stills/(\w+)\.jpg", text("gallery.md")))
+    shown = set(re.findall(r"stills/(\w+)\.jpg", text("reference/gallery.md")))
     assert {name for name, _ in pn.robots()} <= shown
 
 
@@ -72,6 +72,6 @@ def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
     quiet = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, env=quiet)
     assert done.returncode == 0, done.stderr
-    page = (tmp_path / "site" / "reference.html").read_text(encoding="utf-8")
+    page = (tmp_path / "site" / "reference" / "names.html").read_text(encoding="utf-8")
     assert [name for name in pn.__all__ if f'id="pin_nonideal.{name}"' not in page] == []
     assert (tmp_path / "site" / "source" / "pin_nonideal" / "equation.py.txt").exists()

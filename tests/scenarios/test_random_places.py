@@ -37,7 +37,7 @@ def check(seed):
 # At rest the joints of seed 21 and the teeth between them share one load, and their limits depend on each
 # other.  The search for modes raises FrictionParadoxError, as for one in ten of the stress seeds.
 # In seed 11 three elements that share a load stick, and their loads are not unique.  The loads of the search
-# differ from the minimum-norm loads, by which limits are reported (docs/limits.md).
+# differ from the minimum-norm loads, by which limits are reported (docs/reference/limits.md).
 SHARED = pytest.param(11, marks=pytest.mark.xfail(reason="limits by another sharing than holds", strict=True))
 
 
