@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def _outside(page: str, link: str) -> str | None:
-    """Return the path in the checkout that a link of a page leads to, None if it leads to a page or picture."""
+    """Return the path in the checkout that a link leads to, None if it leads to a page or picture."""
     target = posixpath.normpath(posixpath.join("docs", posixpath.dirname(page), link))
     return None if target.startswith("docs/") else target
 
