@@ -1,16 +1,19 @@
-"""Hook of mkdocs: adds docstrings below the tables of the reference, and linked files outside of docs/."""
+"""Hook of mkdocs: docstrings of the reference, formulas as MathML, files outside of docs/ that pages link to."""
 
 from __future__ import annotations
 
+import html
 import posixpath
 import re
 from pathlib import Path
 from typing import Any
 
+from latex2mathml.converter import convert
 from mkdocs.structure.files import File, Files
 
 LINK = re.compile(r"\]\((\.\./[^)#]+)(#[^)]*)?\)")
 TABLE = re.compile(r"(?:^\| `\w+` \|.*\n)+", re.MULTILINE)
+FORMULA = re.compile(r'<(span|div) class="arithmatex">\\(?:\(|\[)(.*?)\\(?:\)|\])</\1>', re.DOTALL)
 NAMES = "reference/names.md"
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -64,3 +67,13 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
         return f"]({posixpath.relpath(_place(target), posixpath.dirname(source))})"
 
     return LINK.sub(moved, markdown)
+
+
+def on_page_content(content: str, **_: Any) -> str:
+    """Write the formulas of a page as MathML, which browsers show without scripts and without a network."""
+
+    def formula(match: re.Match[str]) -> str:
+        display = "block" if match[1] == "div" else "inline"
+        return convert(html.unescape(match[2]).strip(), display=display)
+
+    return FORMULA.sub(formula, content)

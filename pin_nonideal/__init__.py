@@ -4,7 +4,7 @@
     run = pn.simulate(scene, duration=5.0)
     pn.replay(run, "four_bar.html")
 
-Names and units follow Pinocchio and the paper; see docs/explanation/theory.md for both.
+Names and units follow Pinocchio and the paper; see docs/explanation/equation_of_motion.md for both.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""docs/explanation/theory.md agrees with the sources: tasks of files, and files of numbered equations."""
+"""The pages of the theory and the sources agree on the headers of the core and the lines of each equation."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = ROOT / "pin_nonideal" / "_core"
-THEORY = ROOT / "docs" / "explanation" / "theory.md"
+EXPLANATION = ROOT / "docs" / "explanation"
+THEORY = [
+    EXPLANATION / f"{name}.md"
+    for name in ("equation_of_motion", "contact_mechanics", "stick_and_slip", "integration_and_events")
+]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 PYTHON = sorted(
     p for room in ("pin_nonideal", "oracles", "examples", "tests") for p in (ROOT / room).rglob("*.py")
@@ -48,8 +52,8 @@ def computed_in_core(path):
 
 
 def table():
-    """Rows of the table of the core: headers (a folder stands for its own), and their equations."""
-    for line in THEORY.read_text(encoding="utf-8").splitlines():
+    """Rows of the tables of the core: headers (a folder stands for its own), and their equations."""
+    for line in "\n".join(page.read_text(encoding="utf-8") for page in THEORY).splitlines():
         named = re.findall(r"\]\(\.\./\.\./pin_nonideal/_core/([\w/.]+)\)", line)
         if line.startswith("| ") and named:
             files = []
@@ -59,7 +63,7 @@ def table():
             yield files, {int(n) for n in equations}
 
 
-def test_the_table_has_every_header_of_the_core_once():
+def test_the_tables_have_every_header_of_the_core_once():
     named = [str(file.relative_to(CORE)) for files, _ in table() for file in files]
     mechanics = [file for file in HEADERS if file.parent != MODULE.parent]  # the door to Python holds none
     assert sorted(named) == sorted(str(file.relative_to(CORE)) for file in mechanics)
@@ -79,7 +83,7 @@ def test_every_source_has_its_own_header(source):
     assert first[1] == str(header.relative_to(CORE))
 
 
-def test_equations_of_the_table_stand_in_its_files():
+def test_equations_of_the_tables_stand_in_their_files():
     credited = [(files, equations) for files, equations in table() if equations]
     assert {39, 40} <= set().union(*(equations for _, equations in credited))
     for files, equations in credited:
