@@ -1,4 +1,4 @@
-"""Hook of mkdocs: docstrings of the reference, formulas as MathML, files outside of docs/ that pages link to."""
+"""Hook of mkdocs: docstrings of the reference, formulas as MathML, linked files outside of docs/."""
 
 from __future__ import annotations
 
