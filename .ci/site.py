@@ -1,4 +1,4 @@
-"""Hook of mkdocs: docstrings of the reference, formulas as MathML, files outside of docs/ that pages link to."""
+"""Hook of mkdocs: docstrings of the reference, formulas as MathML, links to files outside of docs/."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def _outside(page: str, link: str) -> str | None:
-    """Return the path in the checkout that a link of a page leads to, None if it leads to a page or picture."""
+    """Return the path in the checkout of the target of a link, None for pages and pictures."""
     target = posixpath.normpath(posixpath.join("docs", posixpath.dirname(page), link))
     return None if target.startswith("docs/") else target
 

@@ -69,7 +69,8 @@ actions:
   build        compile the core in a temporary folder: processor time, wall time and memory by room
   build-peers  compile the C++ peers (some minutes, once)
   references   compute the references anew
-  report       keep the full results of the output folder; write docs/reference/benchmarks.md and the README's table
+  report       keep the full results of the output folder; write docs/reference/benchmarks.md and the table
+               of the README
 """
 
 

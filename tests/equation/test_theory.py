@@ -1,4 +1,4 @@
-"""The pages of the theory and the sources agree on the headers of the core and on the lines of each equation."""
+"""The pages of the theory agree with the sources on headers of the core and lines of equations."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ RUN_SECONDS = 120
 
 
 class Block(NamedTuple):
-    """A fenced block of a Markdown file: `document` is its path in the checkout, `mark` the comment right above it."""
+    """A fenced block of a Markdown file: `document` is its path, `mark` the HTML comment right above it."""
 
     document: str
     line: int
@@ -99,7 +99,9 @@ def test_links_lead_to_files(path: Path) -> None:
 
 def test_the_folder_of_the_robots_page_loads(tmp_path: Path) -> None:
     files = {(b.document, b.mark): b.text for b in blocks() if b.mark.startswith("file: ")}
-    (tmp_path / "robot.urdf").write_text(files["docs/tutorials/first_use.md", "file: linkage.urdf"], encoding="utf-8")
+    (tmp_path / "robot.urdf").write_text(
+        files["docs/tutorials/first_use.md", "file: linkage.urdf"], encoding="utf-8"
+    )
     (tmp_path / "robot.yaml").write_text(files["docs/how_to/robots.md", "file: robot.yaml"], encoding="utf-8")
     scene = load(tmp_path)
     assert [c.name for c in scene.constraints] == ["loop"]
