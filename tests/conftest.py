@@ -10,6 +10,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# No test depends on the load of the machine.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 # Shells make background processes and their children ignore Ctrl-C.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
