@@ -14,7 +14,7 @@ from mkdocs.structure.files import File, Files
 LINK = re.compile(r"\]\((\.\./[^)#]+)(#[^)]*)?\)")
 TABLE = re.compile(r"(?:^\| `\w+` \|.*\n)+", re.MULTILINE)
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\(?:\(|\[)(.*?)\\(?:\)|\])</\1>', re.DOTALL)
-NAMES = "reference/names.md"
+NAMES = "reference/names/"
 ROOT = Path(__file__).resolve().parent.parent
 
 
@@ -55,7 +55,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     A folder has no page, so its name stays without a link.
     """
     source = page.file.src_uri
-    if source == NAMES:
+    if source.startswith(NAMES):
         markdown = TABLE.sub(_with_docstrings, markdown)
 
     def moved(match: re.Match[str]) -> str:

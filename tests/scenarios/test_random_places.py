@@ -37,7 +37,8 @@ def check(seed):
 # At rest the joints of seed 21 and the teeth between them share one load, and so decide each other's limits:
 # the search for modes ends in a FrictionParadoxError, as for one in ten of the stress seeds.
 # In seed 11 three elements that share a load stick, and what each carries is not unique: the search finds a
-# sharing that the one of least norm, by which limits are reported, does not hold to (docs/reference/limits.md).
+# sharing that the one of least norm, by which limits are reported, does not hold to
+# (docs/reference/limits.md).
 SHARED = pytest.param(11, marks=pytest.mark.xfail(reason="limits by another sharing than holds", strict=True))
 
 
