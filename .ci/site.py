@@ -74,6 +74,8 @@ def on_page_content(content: str, **_: Any) -> str:
 
     def formula(match: re.Match[str]) -> str:
         display = "block" if match[1] == "div" else "inline"
-        return convert(html.unescape(match[2]).strip(), display=display)
+        shown = convert(html.unescape(match[2]).strip(), display=display)
+        # Browsers read the style of a cell, not its `columnalign`.
+        return re.sub(r'columnalign="(left|right)"', r'style="text-align: \1"', shown)
 
     return FORMULA.sub(formula, content)
