@@ -14,7 +14,7 @@ from mkdocs.structure.files import File, Files
 LINK = re.compile(r"\]\((\.\./[^)#]+)(#[^)]*)?\)")
 TABLE = re.compile(r"(?:^\| `\w+` \|.*\n)+", re.MULTILINE)
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\(?:\(|\[)(.*?)\\(?:\)|\])</\1>', re.DOTALL)
-NAMES = "reference/names.md"
+NAMES = "reference/names/"
 ROOT = Path(__file__).resolve().parent.parent
 
 
@@ -55,7 +55,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     A folder has no page, so its name stays without a link.
     """
     source = page.file.src_uri
-    if source == NAMES:
+    if source.startswith(NAMES):
         markdown = TABLE.sub(_with_docstrings, markdown)
 
     def moved(match: re.Match[str]) -> str:
@@ -74,6 +74,8 @@ def on_page_content(content: str, **_: Any) -> str:
 
     def formula(match: re.Match[str]) -> str:
         display = "block" if match[1] == "div" else "inline"
-        return convert(html.unescape(match[2]).strip(), display=display)
+        shown = convert(html.unescape(match[2]).strip(), display=display)
+        # Browsers read the style of a cell, not its `columnalign`.
+        return re.sub(r'columnalign="(left|right)"', r'style="text-align: \1"', shown)
 
     return FORMULA.sub(formula, content)

@@ -76,15 +76,23 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-HEAD = f"""# Models of the world
+HEAD = f"""# Models of others
 
-Made by `python -m benchmarks.models FOLDER ...` over folders of models that others have written. *Loads*
-counts the files that load as they are, *with help* those that load with `density=1000.0` (links without
-inertia) or with `allow=` (what cannot be carried over; then M and bias alone are compared). *Right* are those
-whose mass matrix, bias forces, actuator forces and accelerations are MuJoCo's (MJCF), or whose accelerations
-are Pinocchio's (URDF), to {RIGHT:g} at {STATES} random states; where a file has rounded its loops,
-accelerations to {ROUNDED:g}. *No model* are fragments that MuJoCo refuses by itself. Copies of such sets
-often lack large files; a body whose mass is that of a mesh which is not there is refused.
+`python -m benchmarks.models FOLDER ...` writes this page. It loads models that others have written and
+compares them with MuJoCo (MJCF) or Pinocchio (URDF) at {STATES} random states. The columns count files:
+
+- *No model*: fragments that MuJoCo refuses by itself.
+- *Loads*: files that load without arguments.
+- *With help*: files that load with `density=1000.0` (for links without inertia) or with `allow=` (for
+  unsupported features). With `allow=` the comparison covers M and the bias forces only.
+- *Right*: files with the mass matrix, bias forces, actuator forces and accelerations of MuJoCo, or with the
+  accelerations of Pinocchio, to {RIGHT:g}. The accelerations of files with rounded loops agree to
+  {ROUNDED:g}.
+- *Wrong*: files that load and differ.
+- *Refused*: files that end in an error. Copies of such sets often lack large files, and a body whose mass
+  comes from a missing mesh is refused.
+
+The last column is the mean number of notes of a file.
 
 | models | files | no model | loads | with help | right | wrong | refused | notes a file |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |"""

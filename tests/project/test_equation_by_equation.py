@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "explanation" / "equation_by_equation.md"
 LAST = 81  # number of the paper's last equation
 HEADING = re.compile(r"^### \((\d+)\)(?:-\((\d+)\))? .+$", re.MULTILINE)
-ITEM = re.compile(r"^- (Computed by|Tested by|Explained in) (.+?)(?=^- |^#|\Z)", re.MULTILINE | re.DOTALL)
+ITEM = re.compile(r"^- (Computed by|Tested by|Explained in)\s+(.+?)(?=^- |^#|\Z)", re.MULTILINE | re.DOTALL)
 REFERENCE = re.compile(r"`([\w/]+\.(?:py|cpp|hpp))::([\w.:]+)`")
 LINK = re.compile(r"\]\(([\w/.]+)#([\w-]+)\)")
 
