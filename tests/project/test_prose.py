@@ -22,6 +22,7 @@ ROOMS = [
     if room.is_dir() and room.name not in {"_core", "__pycache__", "robots", *EXEMPT}
 ]
 ROOMS += [ROOT / name for name in ("benchmarks", "examples", "oracles", "tests")]
+ROOMS += [ROOT / "docs" / name for name in ("explanation", "reference")]
 
 
 @pytest.mark.parametrize("room", ROOMS, ids=lambda room: str(room.relative_to(ROOT)))
