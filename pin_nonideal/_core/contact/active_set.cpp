@@ -54,6 +54,10 @@ bool goes_its_way(const Program& p, Workspace& w, const VecX& v) {
 
 namespace {
 
+bool slips_anywhere(const Workspace& w) {
+    return std::any_of(w.state.mode.begin(), w.state.mode.end(), [](Mode mode) { return slips(mode); });
+}
+
 // Active sets tried at one state.
 struct Search {
     const Program& p;
@@ -225,8 +229,9 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
     }
     try {
         close(question.rest, nullptr);
-        // The loads of redundant rows do not show whether all friction that holds is within its cones.
-        if (!w.now.rows.redundant || !w.state.sticks_anywhere()) return;
+        // Multipliers of redundant rows do not show if friction at rest is within its cones. Slipping friction follows the
+        // loads of minimum norm, which cones do not.
+        if (question.prescribed || !w.now.rows.redundant || !w.state.sticks_anywhere() || slips_anywhere(w)) return;
         if (!answer) answer = together();
         if (answer) return close(answer->closed, &*answer);
         return close(question.rest, nullptr);

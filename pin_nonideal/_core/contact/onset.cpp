@@ -14,6 +14,7 @@ namespace pn {
 namespace {
 
 constexpr double none = 1e-12;      // rounding relative to the scale of accelerations
+constexpr double clearly = 1e-6;    // motion that differs from rest, relative to the scale of accelerations
 constexpr double at_limit = 1e-9;   // rounding relative to the limit of a force
 constexpr double breaking_by = 1e-6;  // relative reduction of the limit of elements that just reached it
 constexpr int most_releases = 4;    // rounds that set kinetic limits of slipping contacts
@@ -54,6 +55,7 @@ struct RestingProblem {
     MatX drag;                           // friction of slipping contacts along all rows, per unknown
     MatX W, dragging;  // accelerations of the problem's rows for a unit of each unknown, and for its friction
     VecX w0, f;
+    bool several = false;  // rest holds, though a motion was found too
 
     RestingProblem(const Program& program, Workspace& workspace, const VecX& velocity, const std::vector<int>& gaps,
                    const std::vector<int>& others, const ClosingQuestion& asked, const RunState& state)
@@ -166,7 +168,7 @@ struct RestingProblem {
         return true;
     }
 
-    bool moves() const { return (w0 + W * f).cwiseAbs().maxCoeff() > none * in_play(); }
+    bool moves(double tolerance) const { return (w0 + W * f).cwiseAbs().maxCoeff() > tolerance * in_play(); }
 
     // Rest is preferred to motion if both are possible.
     bool hold(ConeComplementarity& solver) {
@@ -181,7 +183,13 @@ struct RestingProblem {
         ConeComplementarity solver;
         for (int round = 0; round < most_releases; ++round) {
             const bool solved = solver.solve(W, w0, cones, warm || round > 0, f) == ConeStatus::solved;
-            if (round == 0 && !warm && (!solved || moves()) && hold(solver)) break;
+            if (round == 0 && !warm && (!solved || moves(none))) {
+                const bool another = solved && moves(clearly);
+                if (hold(solver)) {
+                    several = another;
+                    break;
+                }
+            }
             if (!solved) return false;
             if (!release()) break;
         }
@@ -247,6 +255,7 @@ void RestingMotion::answer(const Program& p, Workspace& w, ModeQuestion& questio
         if (p.frictions[e].dim > 1 && slips(modes[e])) w.state.slip_direction[e] = w.state.last_direction[e] = direction[e];
     }
     question.answered = true;
+    question.several = several;
 }
 
 namespace {
@@ -293,6 +302,7 @@ std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, doub
     const bool found = with_problem(p, w, t, q, v, question, [&](RestingProblem& problem) {
         if (!problem.solve(out.shared)) return false;
         problem.read(out);
+        out.several = problem.several;
         return true;
     });
     if (!found) return std::nullopt;

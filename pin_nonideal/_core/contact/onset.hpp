@@ -15,6 +15,7 @@ struct RestingMotion {
     std::vector<Mode> modes;      // by element
     std::vector<Vec3> direction;  // slip direction at onset, by element
     std::vector<Vec3> friction;   // friction of each element, along its directions
+    bool several = false;         // rest is admissible, and a motion from rest as well
     bool shared = false;          // contacts are hyperstatic
     bool is_near = false;         // only an initial guess for the search of the motion
 
@@ -28,6 +29,7 @@ struct ClosingQuestion {
     int opening = -1;           // contact of `rest` whose load just reached zero
     int arrived = -1;           // element that just came to rest or reached its limit
     std::vector<int> breaking;  // elements that stuck and just reached their limit: they slip
+    bool prescribed = false;    // the caller sets the modes
     bool struck = false;        // after an impact the velocity decides if a sticking element slips
 };
 // Solve for the motion of the contacts at rest at (t, q, v). Return nothing if other laws depend on loads too, or if no

@@ -270,7 +270,12 @@ struct Search {
     }
 
     void run() {
-        if (question.answered) return apply(question.modes, false);
+        if (question.answered) {
+            apply(question.modes, false);
+            w.now.several = question.several;
+            w.now.several_element = list.front();
+            return;
+        }
         if (keeps_suggestion()) return;
         std::vector<Mode> modes = question.modes;
         for (int e : list) modes[e] = unloaded;

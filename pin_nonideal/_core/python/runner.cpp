@@ -55,6 +55,7 @@ void Runner::choose_contacts(double t, const std::optional<std::vector<Mode>>& m
     ClosingQuestion question;
     question.rest = touching_contacts(*p, *w, t, q, v, true).rest;
     question.struck = true;
+    question.prescribed = modes.has_value();
     close_contacts(*p, *w, t, q, v, question, [&](const RestingMotion* together) {
         update_kinematics(*p, *w, t, q, v);
         choose_friction(t, modes, together);
