@@ -54,8 +54,10 @@ bool goes_its_way(const Program& p, Workspace& w, const VecX& v) {
 
 namespace {
 
-bool slips_anywhere(const Workspace& w) {
-    return std::any_of(w.state.mode.begin(), w.state.mode.end(), [](Mode mode) { return slips(mode); });
+bool slides_anywhere(const Program& p, const Workspace& w, const VecX& v) {
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
+        if (slips(w.state.mode[e]) && !at_rest(p, w, e, v)) return true;
+    return false;
 }
 
 // Active sets tried at one state.
@@ -229,9 +231,9 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
     }
     try {
         close(question.rest, nullptr);
-        // Multipliers of redundant rows do not show if friction at rest is within its cones. Slipping friction follows the
-        // loads of minimum norm, which cones do not.
-        if (question.prescribed || !w.now.rows.redundant || !w.state.sticks_anywhere() || slips_anywhere(w)) return;
+        // Multipliers of redundant rows do not show if friction at rest is within its cones. Sliding friction follows the
+        // loads of minimum norm, and the solution of the cones need not.
+        if (question.prescribed || !w.now.rows.redundant || !w.state.sticks_anywhere() || slides_anywhere(p, w, v)) return;
         if (!answer) answer = together();
         if (answer) return close(answer->closed, &*answer);
         return close(question.rest, nullptr);
