@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
@@ -12,6 +13,7 @@ from tests.support.seeds import seeds
 
 STILL = 1e-6  # [m/s^2, rad/s^2]: motion that is slower than this is rounding
 DURATION = 0.05  # [s]
+SAME = 1e-7  # part of the accelerations by which equal motions may differ
 ROUNDING = 1e-8  # part of the weight: least squares of nearly dependent rows
 
 families = pytest.mark.parametrize("family", wedged.FAMILIES, ids=lambda family: family.__name__)
@@ -34,6 +36,26 @@ def test_friction_of_a_joint_beside_changes_nothing(family, seed):
     solution = case.scene.solve(*case.scene.initial_state())
     assert admissible is None or admissible == (np.abs(solution.a).max() <= STILL)
     assert solution.a[-1] == 0.0
+
+
+@pytest.mark.parametrize("family", wedged.FAMILIES[:4], ids=lambda family: family.__name__)
+@pytest.mark.parametrize("seed", seeds(range(300), count=10))
+def test_axes_units_order_and_copies_change_nothing(family, seed):
+    inertia, gravity, touches = wedged.on_points(family(seed))
+    rng = np.random.default_rng(seed)
+    turn = pin.Quaternion(rng.normal(size=4)).normalized().matrix()
+    a = wedged.transformed(inertia, gravity, touches)
+    for change in (
+        {"turn": turn},
+        {"length": 1e3},
+        {"length": 1e-3},
+        {"mass": 1e3},
+        {"mass": 1e-3},
+        {"order": rng.permutation(len(touches))},
+        {"copies": 2},
+    ):
+        again = wedged.transformed(inertia, gravity, touches, **change)
+        assert np.abs(again - a).max() <= SAME * (1.0 + np.abs(a).max()), change
 
 
 @families

@@ -197,4 +197,44 @@ def beside_a_rough_rotor(case):
     return Wedged(scene, case.touches, case.centers, case.loads)
 
 
+def on_points(case):
+    """The inertia, gravity and (point, normal, mu) of a case of one body."""
+    inertia = case.scene.model.inertias[1]
+    touches = [(touch.point, touch.normal, touch.mu) for touch in case.touches]
+    return inertia, case.loads[:3] / inertia.mass, touches
+
+
+def transformed(inertia, gravity, touches, *, turn=None, length=1.0, mass=1.0, order=None, copies=1):
+    """Acceleration from rest of one body after a change, in the first axes and units.
+
+    Args:
+        inertia: of the body.
+        gravity: in world axes.
+        touches: (point, normal, mu) of each contact.
+        turn: rotation of the world, (3, 3).
+        length: new units of length per old one.
+        mass: new units of mass per old one.
+        order: permutation of the contacts.
+        copies: times that each contact is stated.
+    """
+    turn = np.eye(3) if turn is None else turn
+    order = range(len(touches)) if order is None else order
+    body = pin.Inertia(inertia.mass * mass, np.zeros(3), inertia.inertia * mass * length**2)
+    model = model_of([body], turn @ gravity * length)
+    contacts = []
+    for k in order:
+        point, normal, mu = touches[k]
+        for copy in range(copies):
+            name = f"{k} {copy}"
+            add_frame(model, f"foot {name}", 1, point * length, np.eye(3))
+            add_plane(model, f"plane {name}", turn @ point * length, turn @ normal)
+            touch = pn.PointContact(f"foot {name}", mu=mu, plane=f"plane {name}", name=f"touch {name}")
+            contacts.append(touch)
+    q0 = np.concatenate([np.zeros(3), pin.Quaternion(turn).coeffs()])
+    scene = pn.Scene(model, contacts=contacts, q0=q0)
+    a = scene.solve(*scene.initial_state()).a.copy()  # in the axes of the body, which turn with the world
+    a[:3] /= length
+    return a
+
+
 FAMILIES = (ball_between_planes, box_in_corner, uneven_stance, table_in_valley, pile_of_balls)

@@ -24,7 +24,7 @@ constexpr int most_aligned = 8;
 // No body closes a wider gap [m or rad] within `touching_time`: its speed would exceed the speed of light.
 constexpr double sure_gap = 1e-3;
 // Minimum number of contacts that can share a load in several ways.
-constexpr int may_share = 3;
+constexpr int may_share = 2;
 
 // Slip accelerations below `slow`, relative to the scale of accelerations, do not define a direction. `astray` is the
 // allowed deviation of the direction (1 - cosine).
@@ -226,6 +226,7 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
     std::optional<RestingMotion> answer;
     if (many && question.breaking.empty()) {
         answer = together();
+        if (answer && answer->closed == question.rest && !answer->slides()) return close(answer->closed, &*answer);
         if (answer && answer->shared && answer->slides() && decides_alone(*answer)) return;
         if (answer && answer->shared) return close(answer->closed, &*answer);
     }
