@@ -105,7 +105,9 @@ def _torques_of(function: Callable[..., Any], model: Model, who: str) -> Callabl
 
     def torques(*arguments: Any) -> Any:
         tau = function(*arguments)
-        return named_joint_values(model, tau, who) if by_name(tau) is not None else tau
+        if type(tau) is np.ndarray or by_name(tau) is None:
+            return tau
+        return named_joint_values(model, tau, who)
 
     return torques
 

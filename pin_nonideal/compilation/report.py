@@ -55,7 +55,7 @@ def _label(said: object) -> str:
     """Return a label of a force or an actuation: its name, joint or frame, and its kind."""
     kind = type(said).__name__
     name = getattr(said, "name", None) or getattr(said, "joint", None) or getattr(said, "frame", None)
-    if kind in ("ndarray", "list", "tuple"):
+    if kind in ("ndarray", "list", "tuple", "dict"):
         return "constant torques"
     return f"{name} ({kind})" if isinstance(name, str) else {"function": "function (t, q, v)"}.get(kind, kind)
 

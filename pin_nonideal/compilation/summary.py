@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -181,6 +181,8 @@ def _made(said: Any) -> Table:
     kind = type(said).__name__
     if kind in ("ndarray", "list", "tuple"):
         kind, fields = "constant torques", {"torque": said}
+    elif isinstance(said, Mapping):
+        kind, fields = "constant torques", dict(said)
     elif kind == "function":
         kind, fields = "function (t, q, v)", {"function": said}
     return {"kind": kind, "made_with": {key: _plain(x) for key, x in fields.items()}}
@@ -191,6 +193,8 @@ def _plain(x: Any) -> Any:
         return x.tolist()
     if isinstance(x, (list, tuple)):
         return [_plain(each) for each in x]
+    if isinstance(x, Mapping):
+        return {str(name): _plain(each) for name, each in x.items()}
     if isinstance(x, np.generic):
         return x.item()
     if x is None or isinstance(x, (bool, int, float, str)):

@@ -164,3 +164,11 @@ def test_errors_name_the_nearest_joint(robot, make, message):
 def test_namespace_is_no_table():
     with pytest.raises(pn.InputError, match="actuation"):
         pn.Scene(model(), actuation=SimpleNamespace(elbow=1.0))
+
+
+def test_descriptions_show_torques_and_gains_by_name(robot):
+    told = pn.Scene(robot, actuation=BY_NAME).describe().to_dict()["actuation"]
+    assert told == {"kind": "constant torques", "made_with": BY_NAME}
+    held = pn.Scene(robot, actuation=pn.HoldPosition({"elbow": 20.0}, 1.0)).describe()
+    assert held.to_dict()["actuation"]["made_with"]["kp"] == {"elbow": 20.0}
+    assert "elbow" in str(held)
