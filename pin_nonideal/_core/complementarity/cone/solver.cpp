@@ -14,7 +14,7 @@ using ConeKind = ConeElement::Kind;
 constexpr double solved = 1e-11;     // error of a solution
 constexpr double no_force = 1e10;    // larger forces, in the problem's units, only squeeze
 constexpr double held = 1e-7;        // velocity of rest at the end of the central path, relative to the largest w0
-constexpr double still = 1e-12;      // velocity of rest of a solution, relative to the largest w0
+constexpr double still = 1e-12;      // velocity of rest of a solution, relative to its terms
 constexpr double evened = 1e-13;     // error of a minimum-norm solution
 constexpr int few_steps = 3, first_steps = 20, more_steps = 30;
 constexpr int most_turns = 30, most_rounds = 40, sweeps = 40, most_starts = 100;
@@ -73,9 +73,7 @@ bool ConeComplementarity::hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref
     if (!x.allFinite()) return false;
     problem_.respond(x, w);
     if (w.cwiseAbs().maxCoeff() > held) return false;
-    if (!polish(x, more_steps)) return false;
-    problem_.respond(x, w);
-    if (w.cwiseAbs().maxCoeff() > still) return false;
+    if (!polish(x, more_steps) || !stands_still(x)) return false;
     unique_shares_ = newton_.regular();
     auto even = f_.vector(problem_.n);
     even = x;
@@ -84,6 +82,22 @@ bool ConeComplementarity::hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref
         x = even;
     tidy(x);
     f = problem_.force_unit() * problem_.scale().cwiseProduct(x);
+    return true;
+}
+
+// Check if the velocity of each element is rounding of its own terms. The largest velocity of all would hide slip beside
+// much lighter bodies.
+bool ConeComplementarity::stands_still(const Eigen::Ref<const VecX>& f) {
+    auto w = w_.vector(problem_.n);
+    problem_.respond(f, w);
+    for (int e = 0; e < problem_.size(); ++e) {
+        double speed = 0.0, terms = 0.0;
+        for (int i = problem_.at[e]; i < problem_.at[e] + problem_.elements[e].dim; ++i) {
+            speed = std::max(speed, std::abs(w[i]));
+            terms = std::max(terms, std::abs(problem_.w0()[i]) + problem_.W().row(i).cwiseAbs().dot(f.cwiseAbs()));
+        }
+        if (speed > still * terms) return false;
+    }
     return true;
 }
 

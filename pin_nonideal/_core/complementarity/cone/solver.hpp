@@ -53,6 +53,7 @@ public:
 private:
     bool search(Eigen::Ref<VecX> f, bool warm);
     bool polish(Eigen::Ref<VecX> f, int most_steps);
+    bool stands_still(const Eigen::Ref<const VecX>& f);
     bool approach(Eigen::Ref<VecX> f);
     bool take_nearest(Eigen::Ref<VecX> f);
     bool stiffen(Eigen::Ref<VecX> f);
