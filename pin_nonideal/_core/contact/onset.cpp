@@ -131,6 +131,12 @@ struct RestingProblem {
 
     double in_play() const { return w0.cwiseAbs().maxCoeff() + (W.cwiseAbs() * f.cwiseAbs()).maxCoeff(); }
 
+    // Scale of the accelerations of one cone. That of all cones would hide the slip of a body beside much lighter ones.
+    double in_play(size_t i) const {
+        const auto rows_of = W.middleRows(first[i], cones[i].dim);
+        return w0.segment(first[i], cones[i].dim).cwiseAbs().maxCoeff() + (rows_of.cwiseAbs() * f.cwiseAbs()).maxCoeff();
+    }
+
     // Check if friction is at its limit. A contact that shares a load may have a load of rounding only.
     bool at_its_limit(size_t i) const {
         const double most = cones[i].bound * (head(i) ? f[first[i]] : 1.0), rounding = none * f.cwiseAbs().maxCoeff();
@@ -145,7 +151,7 @@ struct RestingProblem {
             const int e = rows.element(i);
             if (tail(i) == 0 || e < 0 || !at_its_limit(i)) continue;
             const double kinetic = p.frictions[e].kinetic_limit(strength(e), 0.0);
-            if (!(tail_of(a, i).norm() > none * in_play()) || !(kinetic < cones[i].bound)) continue;
+            if (!(tail_of(a, i).norm() > none * in_play(i)) || !(kinetic < cones[i].bound)) continue;
             cones[i].bound = kinetic;
             any = true;
         }
@@ -168,7 +174,12 @@ struct RestingProblem {
         return true;
     }
 
-    bool moves(double tolerance) const { return (w0 + W * f).cwiseAbs().maxCoeff() > tolerance * in_play(); }
+    bool moves(double tolerance) const {
+        const VecX a = w0 + W * f;
+        for (size_t i = 0; i < cones.size(); ++i)
+            if (a.segment(first[i], cones[i].dim).cwiseAbs().maxCoeff() > tolerance * in_play(i)) return true;
+        return false;
+    }
 
     // Rest is preferred to motion if both are possible.
     bool hold(ConeComplementarity& solver) {
@@ -212,9 +223,9 @@ struct RestingProblem {
 
     void read(RestingMotion& out) const {
         const VecX a = w0 + W * f;
-        const double least = none * in_play();
         for (size_t i = 0; i < cones.size(); ++i) {
             const int e = rows.element(i);
+            const double least = none * in_play(i);
             if (i < rows.gaps.size()) {
                 const int gap = rows.gaps[i];
                 out.closed[gap] = a[first[i]] <= least;

@@ -206,6 +206,11 @@ std::optional<double> EventLocator::release_rate(double t, const VecX& y, const 
     asked = {modes, {}, {}};
     for (int e = 0; e < system_.ne; ++e)
         if (!is_open(p, w, e) && at_rest(p, w, e, system_.v)) asked.at_rest.push_back(e);
+    // Contacts hold as long as any forces within their cones do, not only those of minimum norm.
+    if (!p.gaps.empty() && closed_contacts_hold(p, w, t, system_.q, system_.v)) {
+        begin_step(p, w, t, system_.q, system_.v);
+        return std::nullopt;
+    }
     double rate = 0.0;
     try {
         resolve_modes(p, w, t, system_.q, system_.v, asked);
@@ -220,10 +225,8 @@ std::optional<double> EventLocator::release_rate(double t, const VecX& y, const 
     set_modes(p, w, modes);
     w.state.slip_direction = directions;
     w.state.last_direction = last_directions;
-    // Contacts hold as long as any forces within their cones do, not only those of minimum norm.
-    const bool hold = rate > noise && !p.gaps.empty() && closed_contacts_hold(p, w, t, system_.q, system_.v);
     begin_step(p, w, t, system_.q, system_.v);
-    if (rate <= noise || hold) return std::nullopt;  // an element held by others does not move, whatever its force
+    if (rate <= noise) return std::nullopt;  // an element held by others does not move, whatever its force
     return rate;
 }
 
