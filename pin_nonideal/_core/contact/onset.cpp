@@ -131,11 +131,13 @@ struct RestingProblem {
 
     double in_play() const { return w0.cwiseAbs().maxCoeff() + (W.cwiseAbs() * f.cwiseAbs()).maxCoeff(); }
 
-    // Scale of the accelerations of one cone. That of all cones would hide the slip of a body beside much lighter ones.
-    double in_play(size_t i) const {
-        const auto rows_of = W.middleRows(first[i], cones[i].dim);
-        return w0.segment(first[i], cones[i].dim).cwiseAbs().maxCoeff() + (rows_of.cwiseAbs() * f.cwiseAbs()).maxCoeff();
+    // Scale of the accelerations of some rows. That of all rows would hide the slip of a body beside much lighter ones.
+    double in_play(int row, int count) const {
+        if (count == 0) return 0.0;
+        return w0.segment(row, count).cwiseAbs().maxCoeff() +
+               (W.middleRows(row, count).cwiseAbs() * f.cwiseAbs()).maxCoeff();
     }
+    double slip_in_play(size_t i) const { return in_play(first[i] + head(i), tail(i)); }
 
     // Check if friction is at its limit. A contact that shares a load may have a load of rounding only.
     bool at_its_limit(size_t i) const {
@@ -151,7 +153,7 @@ struct RestingProblem {
             const int e = rows.element(i);
             if (tail(i) == 0 || e < 0 || !at_its_limit(i)) continue;
             const double kinetic = p.frictions[e].kinetic_limit(strength(e), 0.0);
-            if (!(tail_of(a, i).norm() > none * in_play(i)) || !(kinetic < cones[i].bound)) continue;
+            if (!(tail_of(a, i).norm() > none * slip_in_play(i)) || !(kinetic < cones[i].bound)) continue;
             cones[i].bound = kinetic;
             any = true;
         }
@@ -177,7 +179,9 @@ struct RestingProblem {
     bool moves(double tolerance) const {
         const VecX a = w0 + W * f;
         for (size_t i = 0; i < cones.size(); ++i)
-            if (a.segment(first[i], cones[i].dim).cwiseAbs().maxCoeff() > tolerance * in_play(i)) return true;
+            if ((head(i) && std::abs(a[first[i]]) > tolerance * in_play(first[i], 1)) ||
+                tail_of(a, i).norm() > tolerance * slip_in_play(i))
+                return true;
         return false;
     }
 
@@ -225,10 +229,9 @@ struct RestingProblem {
         const VecX a = w0 + W * f;
         for (size_t i = 0; i < cones.size(); ++i) {
             const int e = rows.element(i);
-            const double least = none * in_play(i);
             if (i < rows.gaps.size()) {
                 const int gap = rows.gaps[i];
-                out.closed[gap] = a[first[i]] <= least;
+                out.closed[gap] = a[first[i]] <= none * in_play();
                 if (e < 0 || !out.closed[gap]) continue;
                 if (slides[i]) {
                     const Vec3 u = slip_velocity(w.now, p.frictions[e]);
@@ -240,7 +243,7 @@ struct RestingProblem {
             out.modes[e] = sticking;
             const VecX friction = tail_of(f, i), slip = tail_of(a, i);
             for (int k = 0; k < tail(i); ++k) out.friction[e][k] = friction[k];
-            if (tail(i) == 0 || !at_its_limit(i) || !(slip.norm() > least)) continue;
+            if (tail(i) == 0 || !at_its_limit(i) || !(slip.norm() > none * slip_in_play(i))) continue;
             // At a slow slip onset the force defines the direction more accurately than the acceleration.
             const bool tells = friction.norm() > none * f.cwiseAbs().maxCoeff();
             const VecX way = tells ? VecX(-friction.normalized()) : VecX(slip.normalized());

@@ -85,18 +85,23 @@ bool ConeComplementarity::hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref
     return true;
 }
 
-// Check if the velocity of each element is rounding of its own terms. The largest velocity of all would hide slip beside
-// much lighter bodies.
+// Check if all velocities are rounding of their own terms, along the normal and across it. The largest velocity of all
+// would hide slip beside much lighter bodies.
 bool ConeComplementarity::stands_still(const Eigen::Ref<const VecX>& f) {
     auto w = w_.vector(problem_.n);
     problem_.respond(f, w);
-    for (int e = 0; e < problem_.size(); ++e) {
+    const auto stands = [&](int begin, int end) {
         double speed = 0.0, terms = 0.0;
-        for (int i = problem_.at[e]; i < problem_.at[e] + problem_.elements[e].dim; ++i) {
+        for (int i = begin; i < end; ++i) {
             speed = std::max(speed, std::abs(w[i]));
             terms = std::max(terms, std::abs(problem_.w0()[i]) + problem_.W().row(i).cwiseAbs().dot(f.cwiseAbs()));
         }
-        if (speed > still * terms) return false;
+        return speed <= still * terms;
+    };
+    for (int e = 0; e < problem_.size(); ++e) {
+        const int begin = problem_.at[e], end = begin + problem_.elements[e].dim;
+        const int tail = begin + problem_.elements[e].is(ConeKind::contact);
+        if (!stands(begin, tail) || !stands(tail, end)) return false;
     }
     return true;
 }
