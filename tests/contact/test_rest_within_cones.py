@@ -16,6 +16,17 @@ DURATION = 0.05  # [s]
 SAME = 1e-7  # part of the accelerations by which equal motions may differ
 ROUNDING = 1e-8  # part of the weight: least squares of nearly dependent rows
 
+# The search for modes ends without a motion, although the cones allow one (docs/reference/limits.md).
+NO_MOTION = {(wedged.pile_of_balls, 132)}
+
+
+@pytest.fixture(autouse=True)
+def _known(request):
+    arguments = request.node.callspec.params
+    if (arguments["family"], arguments["seed"]) in NO_MOTION:
+        request.applymarker(pytest.mark.xfail(raises=pn.FrictionParadoxError, strict=True))
+
+
 families = pytest.mark.parametrize("family", wedged.FAMILIES, ids=lambda family: family.__name__)
 
 
