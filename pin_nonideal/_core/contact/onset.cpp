@@ -14,6 +14,7 @@ namespace pn {
 namespace {
 
 constexpr double none = 1e-12;      // rounding relative to the scale of accelerations
+constexpr double noise = 1e-14;     // rounding of a slip without own terms, relative to the scale of all accelerations
 constexpr double clearly = 1e-6;    // motion that differs from rest, relative to the scale of accelerations
 constexpr double at_limit = 1e-9;   // rounding relative to the limit of a force
 constexpr double breaking_by = 1e-6;  // relative reduction of the limit of elements that just reached it
@@ -137,7 +138,9 @@ struct RestingProblem {
         return w0.segment(row, count).cwiseAbs().maxCoeff() +
                (W.middleRows(row, count).cwiseAbs() * f.cwiseAbs()).maxCoeff();
     }
-    double slip_in_play(size_t i) const { return in_play(first[i] + head(i), tail(i)); }
+    // Accelerations of these rows, and of the slip of a cone, that are rounding.
+    double rounding(int row, int count) const { return none * in_play(row, count) + noise * in_play(); }
+    double slip_rounding(size_t i) const { return rounding(first[i] + head(i), tail(i)); }
 
     // Check if friction is at its limit. A contact that shares a load may have a load of rounding only.
     bool at_its_limit(size_t i) const {
@@ -153,7 +156,7 @@ struct RestingProblem {
             const int e = rows.element(i);
             if (tail(i) == 0 || e < 0 || !at_its_limit(i)) continue;
             const double kinetic = p.frictions[e].kinetic_limit(strength(e), 0.0);
-            if (!(tail_of(a, i).norm() > none * slip_in_play(i)) || !(kinetic < cones[i].bound)) continue;
+            if (!(tail_of(a, i).norm() > slip_rounding(i)) || !(kinetic < cones[i].bound)) continue;
             cones[i].bound = kinetic;
             any = true;
         }
@@ -176,11 +179,11 @@ struct RestingProblem {
         return true;
     }
 
-    bool moves(double tolerance) const {
+    bool moves() const {
         const VecX a = w0 + W * f;
         for (size_t i = 0; i < cones.size(); ++i)
-            if ((head(i) && std::abs(a[first[i]]) > tolerance * in_play(first[i], 1)) ||
-                tail_of(a, i).norm() > tolerance * slip_in_play(i))
+            if ((head(i) && std::abs(a[first[i]]) > rounding(first[i], 1)) ||
+                tail_of(a, i).norm() > slip_rounding(i))
                 return true;
         return false;
     }
@@ -198,8 +201,8 @@ struct RestingProblem {
         ConeComplementarity solver;
         for (int round = 0; round < most_releases; ++round) {
             const bool solved = solver.solve(W, w0, cones, warm || round > 0, f) == ConeStatus::solved;
-            if (round == 0 && !warm && (!solved || moves(none))) {
-                const bool another = solved && moves(clearly);
+            if (round == 0 && !warm && (!solved || moves())) {
+                const bool another = solved && (w0 + W * f).cwiseAbs().maxCoeff() > clearly * in_play();
                 if (hold(solver)) {
                     several = another;
                     break;
@@ -243,7 +246,7 @@ struct RestingProblem {
             out.modes[e] = sticking;
             const VecX friction = tail_of(f, i), slip = tail_of(a, i);
             for (int k = 0; k < tail(i); ++k) out.friction[e][k] = friction[k];
-            if (tail(i) == 0 || !at_its_limit(i) || !(slip.norm() > none * slip_in_play(i))) continue;
+            if (tail(i) == 0 || !at_its_limit(i) || !(slip.norm() > slip_rounding(i))) continue;
             // At a slow slip onset the force defines the direction more accurately than the acceleration.
             const bool tells = friction.norm() > none * f.cwiseAbs().maxCoeff();
             const VecX way = tells ? VecX(-friction.normalized()) : VecX(slip.normalized());

@@ -15,6 +15,7 @@ constexpr double solved = 1e-11;     // error of a solution
 constexpr double no_force = 1e10;    // larger forces, in the problem's units, only squeeze
 constexpr double held = 1e-7;        // velocity of rest at the end of the central path, relative to the largest w0
 constexpr double still = 1e-12;      // velocity of rest of a solution, relative to its terms
+constexpr double noise = 1e-14;      // rounding relative to the largest velocity
 constexpr double evened = 1e-13;     // error of a minimum-norm solution
 constexpr int few_steps = 3, first_steps = 20, more_steps = 30;
 constexpr int most_turns = 30, most_rounds = 40, sweeps = 40, most_starts = 100;
@@ -90,13 +91,14 @@ bool ConeComplementarity::hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref
 bool ConeComplementarity::stands_still(const Eigen::Ref<const VecX>& f) {
     auto w = w_.vector(problem_.n);
     problem_.respond(f, w);
+    const double all = 1.0 + (problem_.W().cwiseAbs() * f.cwiseAbs()).maxCoeff();
     const auto stands = [&](int begin, int end) {
         double speed = 0.0, terms = 0.0;
         for (int i = begin; i < end; ++i) {
             speed = std::max(speed, std::abs(w[i]));
             terms = std::max(terms, std::abs(problem_.w0()[i]) + problem_.W().row(i).cwiseAbs().dot(f.cwiseAbs()));
         }
-        return speed <= still * terms;
+        return speed <= still * terms + noise * all;
     };
     for (int e = 0; e < problem_.size(); ++e) {
         const int begin = problem_.at[e], end = begin + problem_.elements[e].dim;

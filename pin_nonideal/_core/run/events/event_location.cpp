@@ -206,27 +206,28 @@ std::optional<double> EventLocator::release_rate(double t, const VecX& y, const 
     asked = {modes, {}, {}};
     for (int e = 0; e < system_.ne; ++e)
         if (!is_open(p, w, e) && at_rest(p, w, e, system_.v)) asked.at_rest.push_back(e);
-    // Contacts hold as long as any forces within their cones do, not only those of minimum norm.
-    if (!p.gaps.empty() && closed_contacts_hold(p, w, t, system_.q, system_.v)) {
-        begin_step(p, w, t, system_.q, system_.v);
-        return std::nullopt;
-    }
     double rate = 0.0;
+    std::optional<Failure> paradox;
     try {
         resolve_modes(p, w, t, system_.q, system_.v, asked);
         for (int e : asked.at_rest)
             if (modes[e] == sticking && w.state.mode[e] != sticking)
                 rate = std::max(rate, std::abs(slip_rate_along_mode(p, w, e)));
     } catch (const Failure& failure) {  // sticking fails: unilateral contacts change together with the elements
-        if (p.gaps.empty() || failure.kind != Failure::Kind::not_converged) throw;
+        const bool is_paradox = failure.kind == Failure::Kind::paradox;
+        if (p.gaps.empty() || (!is_paradox && failure.kind != Failure::Kind::not_converged)) throw;
+        if (is_paradox) paradox = failure;
         rate = HUGE_VAL;
     }
     const double noise = no_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     set_modes(p, w, modes);
     w.state.slip_direction = directions;
     w.state.last_direction = last_directions;
+    // Contacts hold as long as any forces within their cones do, not only those of minimum norm.
+    const bool hold = rate > noise && !p.gaps.empty() && closed_contacts_hold(p, w, t, system_.q, system_.v);
+    if (paradox && !hold) throw *paradox;
     begin_step(p, w, t, system_.q, system_.v);
-    if (rate <= noise) return std::nullopt;  // an element held by others does not move, whatever its force
+    if (rate <= noise || hold) return std::nullopt;  // an element held by others does not move, whatever its force
     return rate;
 }
 
