@@ -39,7 +39,8 @@ class Evaluator:
     def __init__(self, compiled: CompiledScene, states: SceneStates) -> None:
         self.runner = compiled.program.runner()
         self._compiled, self._states = compiled, states
-        self._nv = int(compiled.model.nv)
+        self._model, self._nv = compiled.model, int(compiled.model.nv)
+        self._is_of = compiled.program.is_of
 
     def solve(
         self,
@@ -97,11 +98,14 @@ class Evaluator:
             InputError: wrong shapes or numbers.
             InconsistentConstraintsError, FrictionParadoxError, SingularMassError: there is no solution.
         """
-        self._states.require_unchanged()
+        if not self._is_of(self._model):
+            self._states.require_unchanged()
         if self._compiled.unchecked:
             self._states.check_functions_at(q, v, t)
+        if several not in SEVERAL:
+            choice("acceleration: several", several, SEVERAL)
         a = np.empty(self._nv)
-        self.runner.continues = choice("acceleration: several", several, SEVERAL) == "continue"
+        self.runner.continues = several == "continue"
         try:  # arrays of the right shape go straight to the core, which checks sizes, lengths and finiteness
             self.runner.acceleration(q, v, t, tau, a)
         except (TypeError, ValueError, core.CoreFailure):
