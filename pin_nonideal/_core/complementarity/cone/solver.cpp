@@ -291,38 +291,47 @@ bool ConeComplementarity::scatter(Eigen::Ref<VecX> f) {
     return false;
 }
 
+void add_residuals(const ConeElement& e, const double* f, const double* w, double force, double speed,
+                   ConeResiduals& out) {
+    constexpr double least = std::numeric_limits<double>::min();
+    force = std::max(force, least);
+    speed = std::max(speed, least);
+    const int head = e.is(ConeKind::contact);
+    double limit = e.bound, ft = 0.0, wt = 0.0, product = 0.0;
+    if (head) {
+        limit *= std::max(f[0], 0.0);
+        out.signorini = std::max({out.signorini, -w[0] / speed, -f[0] / force, std::abs(f[0] * w[0]) / (force * speed)});
+    }
+    for (int k = head; k < e.dim; ++k) {
+        ft += f[k] * f[k];
+        wt += w[k] * w[k];
+        product += f[k] * w[k];
+    }
+    ft = std::sqrt(ft);
+    wt = std::sqrt(wt);
+    if (e.is(ConeKind::equality)) {
+        out.signorini = std::max(out.signorini, wt / speed);
+    } else {
+        out.coulomb = std::max(out.coulomb, (ft - limit) / force);
+        out.dissipation = std::max(out.dissipation, std::abs(product + limit * wt) / (force * speed));
+    }
+}
+
 ConeResiduals ConeComplementarity::residuals(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
                                              const std::vector<ConeElement>& elements,
                                              const Eigen::Ref<const VecX>& f) {
-    constexpr double least = std::numeric_limits<double>::min();
     ConeResiduals out;
     if (w0.size() == 0) return out;
-    const double force = std::max(f.cwiseAbs().maxCoeff(), least);
+    const double force = f.cwiseAbs().maxCoeff(), free = w0.cwiseAbs().maxCoeff();
     int i = 0;
     for (const ConeElement& e : elements) {
-        const int head = e.is(ConeKind::contact), d = e.dim;
-        Eigen::Vector3d w = Eigen::Vector3d::Zero(), ft = w, wt = w;
-        double speed = std::max(w0.cwiseAbs().maxCoeff(), least), limit = e.bound;
-        for (int k = 0; k < d; ++k) {
+        double w[3] = {0.0, 0.0, 0.0}, speed = free;
+        for (int k = 0; k < e.dim; ++k) {
             w[k] = w0[i + k] + W.row(i + k).dot(f);
             speed = std::max(speed, W.row(i + k).cwiseAbs().dot(f.cwiseAbs()));
         }
-        if (head) {
-            limit *= std::max(f[i], 0.0);
-            const double product = std::abs(f[i] * w[0]) / (force * speed);
-            out.signorini = std::max({out.signorini, -w[0] / speed, -f[i] / force, product});
-        }
-        for (int k = head; k < d; ++k) {
-            ft[k] = f[i + k];
-            wt[k] = w[k];
-        }
-        if (e.is(ConeKind::equality)) {
-            out.signorini = std::max(out.signorini, wt.norm() / speed);
-        } else {
-            out.coulomb = std::max(out.coulomb, (ft.norm() - limit) / force);
-            out.dissipation = std::max(out.dissipation, std::abs(ft.dot(wt) + limit * wt.norm()) / (force * speed));
-        }
-        i += d;
+        add_residuals(e, f.data() + i, w, force, speed, out);
+        i += e.dim;
     }
     return out;
 }

@@ -20,6 +20,10 @@ struct ConeResiduals {
     double dissipation = 0.0;  // error of f_t . w_t = -mu f_n |w_t|, f . w = -limit |w|
 };
 
+// Add the errors of an element with forces f and velocities w to `out`. `force` and `speed` are their scales.
+void add_residuals(const ConeElement& element, const double* f, const double* w, double force, double speed,
+                   ConeResiduals& out);
+
 class ConeComplementarity {
 public:
     // Solve for f. If `warm`, f holds a guess (often the solution of the previous step), otherwise its value is

@@ -1,0 +1,132 @@
+// Dense kernels on small matrices stored by rows. Blocks of six, the free bodies, have loops of fixed length.
+#pragma once
+
+#include <cmath>
+#include <utility>
+
+#include "math/lanes.hpp"
+
+namespace pn {
+
+// A := its lower Cholesky factor. Returns false if a pivot is not positive.
+inline bool cholesky(double* A, int n) {
+    for (int j = 0; j < n; ++j) {
+        double pivot = A[j * n + j];
+        for (int k = 0; k < j; ++k) pivot -= A[j * n + k] * A[j * n + k];
+        if (!(pivot > 0.0) || !(pivot < HUGE_VAL)) return false;
+        A[j * n + j] = std::sqrt(pivot);
+        const double inverse = 1.0 / A[j * n + j];
+        for (int i = j + 1; i < n; ++i) {
+            double sum = A[i * n + j];
+            for (int k = 0; k < j; ++k) sum -= A[i * n + k] * A[j * n + k];
+            A[i * n + j] = sum * inverse;
+        }
+    }
+    return true;
+}
+
+// x := L^-1 x and x := L^-T x.
+inline void solve_lower(const double* L, int n, double* x) {
+    for (int i = 0; i < n; ++i) {
+        double sum = x[i];
+        for (int k = 0; k < i; ++k) sum -= L[i * n + k] * x[k];
+        x[i] = sum / L[i * n + i];
+    }
+}
+inline void solve_lower_transpose(const double* L, int n, double* x) {
+    for (int i = n - 1; i >= 0; --i) {
+        x[i] /= L[i * n + i];
+        for (int k = 0; k < i; ++k) x[k] -= L[i * n + k] * x[i];
+    }
+}
+
+// X := L^-1 X for X of n rows and m columns.
+template <int N = 0>
+PN_INLINE void solve_lower_columns(const double* L, int n, double* X, int m) {
+    if (N) n = m = N;
+    for (int i = 0; i < n; ++i) {
+        for (int l = 0; l < i; ++l) {
+            const double a = L[i * n + l];
+            for (int c = 0; c < m; ++c) X[i * m + c] -= a * X[l * m + c];
+        }
+        const double inverse = 1.0 / L[i * n + i];
+        for (int c = 0; c < m; ++c) X[i * m + c] *= inverse;
+    }
+}
+
+// C -= A B, with A (m, k) and B (k, n).
+template <int N = 0>
+PN_INLINE void subtract_product(double* C, const double* A, const double* B, int m, int k, int n) {
+    if (N) m = k = n = N;
+    for (int i = 0; i < m; ++i)
+        for (int l = 0; l < k; ++l) {
+            const double a = A[i * k + l];
+            for (int j = 0; j < n; ++j) C[i * n + j] -= a * B[l * n + j];
+        }
+}
+
+// C -= A^T B, with A (k, m) and B (k, n).
+template <int N = 0>
+PN_INLINE void subtract_transpose_product(double* C, const double* A, const double* B, int m, int k, int n) {
+    if (N) m = k = n = N;
+    for (int l = 0; l < k; ++l)
+        for (int i = 0; i < m; ++i) {
+            const double a = A[l * m + i];
+            for (int j = 0; j < n; ++j) C[i * n + j] -= a * B[l * n + j];
+        }
+}
+
+// C += A^T B, with A (k, m) and B (k, n).
+template <int N = 0>
+PN_INLINE void add_transpose_product(double* C, const double* A, const double* B, int k, int m, int n) {
+    if (N) m = n = N;
+    for (int l = 0; l < k; ++l)
+        for (int i = 0; i < m; ++i) {
+            const double a = A[l * m + i];
+            if (!N && a == 0.0) continue;
+            for (int j = 0; j < n; ++j) C[i * n + j] += a * B[l * n + j];
+        }
+}
+
+// Factor A = P L U in place with exchanges of rows. Returns false if a pivot is zero.
+inline bool eliminate(double* A, int* exchanges, int n) {
+    for (int c = 0; c < n; ++c) {
+        int best = c;
+        for (int i = c + 1; i < n; ++i)
+            if (std::abs(A[i * n + c]) > std::abs(A[best * n + c])) best = i;
+        exchanges[c] = best;
+        if (best != c)
+            for (int j = 0; j < n; ++j) std::swap(A[best * n + j], A[c * n + j]);
+        if (!(std::abs(A[c * n + c]) > 0.0) || !(std::abs(A[c * n + c]) < HUGE_VAL)) return false;
+        const double inverse = 1.0 / A[c * n + c];
+        for (int i = c + 1; i < n; ++i) {
+            const double factor = A[i * n + c] *= inverse;
+            for (int j = c + 1; j < n; ++j) A[i * n + j] -= factor * A[c * n + j];
+        }
+    }
+    return true;
+}
+
+// X := A^-1 X for X of m columns, with the factors of eliminate.
+template <int N = 0>
+PN_INLINE void substitute(const double* A, const int* exchanges, int n, double* X, int m) {
+    if (N) n = m = N;
+    for (int c = 0; c < n; ++c)
+        if (exchanges[c] != c)
+            for (int j = 0; j < m; ++j) std::swap(X[c * m + j], X[exchanges[c] * m + j]);
+    for (int i = 1; i < n; ++i)
+        for (int l = 0; l < i; ++l) {
+            const double a = A[i * n + l];
+            for (int j = 0; j < m; ++j) X[i * m + j] -= a * X[l * m + j];
+        }
+    for (int i = n - 1; i >= 0; --i) {
+        for (int l = i + 1; l < n; ++l) {
+            const double a = A[i * n + l];
+            for (int j = 0; j < m; ++j) X[i * m + j] -= a * X[l * m + j];
+        }
+        const double inverse = 1.0 / A[i * n + i];
+        for (int j = 0; j < m; ++j) X[i * m + j] *= inverse;
+    }
+}
+
+}  // namespace pn

@@ -1,0 +1,318 @@
+#include "complementarity/blocks/newton.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pn {
+
+namespace {
+
+using ConeKind = ConeElement::Kind;
+
+constexpr double least_response = 1e-13;  // response of a direction that counts as none, relative to the other ones
+constexpr double decrease = 0.01;         // required part of the predicted decrease of the squared error
+constexpr int most_refusals = 4, most_unguarded = 3;  // refused steps, then full steps without decrease
+constexpr double most_proximal = 0.1;     // largest weight of the proximal term
+constexpr double more_proximal = 5.0;     // growth of the weight after a refused step
+constexpr double kept_from = 0.3, kept_to = 3.0;      // change of the weight that keeps the factor
+constexpr double stagnant = 0.25;         // ratio of two errors that counts as no progress near the solution
+constexpr double nearly = 1e-9;           // error near the solution
+
+}  // namespace
+
+void BlockNewton::pose(const BlockProblem& p) {
+    rho_.assign(p.rows, 0.0);
+    root_rho_.assign(p.rows, 0.0);
+    G_.assign(9 * p.elements.size(), 0.0);
+    piece_.assign(p.elements.size(), Piece::unknown);
+    for (VecX* x : {&y_, &e_, &z_, &df_, &dw_, &f_try_, &w_try_, &f_best_}) x->resize(p.rows);
+    dx_.resize(p.free.size());
+    for (const BlockElement& e : p.elements) {
+        const Mat3 W = p.own_response(e);
+        const int head = e.head(), tail = e.dim() - head;
+        const double normal = head ? W.c[0][0] : 0.0;
+        double across = 0.0;
+        for (int k = head; k < e.dim(); ++k) across += W.c[k][k] / tail;
+        const double most = std::max(normal, across);
+        const auto inverse = [&](double own) { return most > 0.0 ? 1.0 / (own > least_response * most ? own : most) : 1.0; };
+        for (int k = 0; k < e.dim(); ++k) {
+            rho_[e.row + k] = inverse(k < head ? normal : across);
+            root_rho_[e.row + k] = std::sqrt(rho_[e.row + k]);
+        }
+    }
+}
+
+void BlockNewton::move(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w) const {
+    for (int n : island.nodes) x.segment(p.nodes[n].first, p.nodes[n].size).setZero();
+    for (int i : island.elements) p.push(p.elements[i], f, x);
+    for (int n : island.nodes) {
+        p.solve_mass(n, x);
+        x.segment(p.nodes[n].first, p.nodes[n].size) += p.free.segment(p.nodes[n].first, p.nodes[n].size);
+    }
+    for (int i : island.elements) {
+        const BlockElement& e = p.elements[i];
+        p.respond(e, x, w);
+        for (int k = 0; k < e.dim(); ++k) w[e.row + k] += p.offset[e.row + k];
+    }
+}
+
+BlockNewton::Projection BlockNewton::projection(const BlockElement& e, const double* y) const {
+    Projection out;
+    const int head = e.head(), d = e.dim();
+    double radius = e.cone.bound;
+    if (e.cone.is(ConeKind::equality)) {
+        out.piece = Piece::sticks;
+        std::copy(y, y + d, out.P);
+        return out;
+    }
+    if (head) {
+        if (!(y[0] > 0.0)) return out;
+        out.P[0] = y[0];
+        radius *= y[0];
+    }
+    double square = 0.0;
+    for (int k = head; k < d; ++k) square += y[k] * y[k];
+    const double length = std::sqrt(square);
+    if (length <= radius || d == head) {
+        out.piece = Piece::sticks;
+        std::copy(y + head, y + d, out.P + head);
+        return out;
+    }
+    out.piece = Piece::slips;
+    out.ratio = radius / length;
+    for (int k = head; k < d; ++k) {
+        out.t[k] = y[k] / length;
+        out.P[k] = radius * out.t[k];
+    }
+    return out;
+}
+
+bool BlockNewton::project(const BlockProblem& p, const Island& island, VecX& f) const {
+    bool changes = false;
+    for (int i : island.elements) {
+        const BlockElement& e = p.elements[i];
+        const Projection there = projection(e, f.data() + e.row);
+        for (int k = 0; k < e.dim(); ++k) {
+            changes |= f[e.row + k] != there.P[k];
+            f[e.row + k] = there.P[k];
+        }
+    }
+    return changes;
+}
+
+// Evaluate the errors e and their squared length in units of energy. Return the largest error of an element relative to
+// its forces, or to those of the largest free velocity.
+double BlockNewton::evaluate(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, double& merit) {
+    merit = 0.0;
+    double worst = 0.0;
+    for (int i : island.elements) {
+        const BlockElement& e = p.elements[i];
+        for (int r = e.row; r < e.row + e.dim(); ++r) y_[r] = (1.0 - compliance_) * f[r] - rho_[r] * w[r];
+        const Projection there = projection(e, y_.data() + e.row);
+        double error = 0.0, size = unit_;
+        for (int k = 0; k < e.dim(); ++k) {
+            const int r = e.row + k;
+            e_[r] = there.P[k] - f[r];
+            merit += e_[r] * e_[r] / rho_[r];
+            error = std::max(error, std::abs(e_[r]) / root_rho_[r]);
+            size = std::max(size, std::abs(f[r]) / root_rho_[r]);
+        }
+        if (!(error < HUGE_VAL)) worst = HUGE_VAL;
+        else if (error > 0.0) worst = std::max(worst, error / size);
+    }
+    return worst;
+}
+
+void BlockNewton::worst(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, int& element,
+                        double& velocity) const {
+    double largest = -1.0;
+    for (int i : island.elements) {
+        const BlockElement& e = p.elements[i];
+        double y[3], error = 0.0, size = unit_, miss = 0.0;
+        for (int k = 0; k < e.dim(); ++k) y[k] = f[e.row + k] - rho_[e.row + k] * w[e.row + k];
+        const Projection there = projection(e, y);
+        for (int k = 0; k < e.dim(); ++k) {
+            const int r = e.row + k;
+            const double distance = std::abs(there.P[k] - f[r]);
+            error = std::max(error, distance / root_rho_[r]);
+            size = std::max(size, std::abs(f[r]) / root_rho_[r]);
+            miss = std::max(miss, distance / rho_[r]);
+        }
+        if (!(error > largest * size)) continue;
+        largest = error / size;
+        element = i;
+        velocity = miss;
+    }
+}
+
+// Compute G of all elements. Return true if the linear pieces differ from those of the last factor, or if `anew`.
+bool BlockNewton::linearize(const BlockProblem& p, const Island& island, double d, bool anew, bool& symmetric) {
+    bool changes = anew;
+    symmetric = true;
+    for (int i : island.elements) {
+        const BlockElement& e = p.elements[i];
+        const Projection there = projection(e, y_.data() + e.row);
+        changes |= there.piece != piece_[i] || (there.piece == Piece::slips && e.dim() > 1);
+        symmetric &= there.piece != Piece::slips || !e.head() || e.cone.bound == 0.0;
+        piece_[i] = there.piece;
+    }
+    if (!changes) return false;
+    const double yielding = d + compliance_;
+    for (int i : island.elements) {
+        const BlockElement& e = p.elements[i];
+        const int head = e.head(), n = e.dim();
+        double* G = &G_[9 * i];
+        std::fill(G, G + 9, 0.0);
+        if (piece_[i] == Piece::open) continue;
+        if (head) G[0] = rho_[e.row] / yielding;
+        if (piece_[i] == Piece::sticks) {
+            for (int k = head; k < n; ++k) G[k * n + k] = rho_[e.row + k] / yielding;
+            continue;
+        }
+        const Projection there = projection(e, y_.data() + e.row);
+        const double turn = there.ratio / (1.0 - (1.0 - yielding) * there.ratio);
+        for (int k = head; k < n; ++k) {
+            if (head) G[k * n] = e.cone.bound * there.t[k] * rho_[e.row] / yielding;
+            for (int l = head; l < n; ++l)
+                G[k * n + l] = rho_[e.row + k] * turn * ((k == l ? 1.0 : 0.0) - there.t[k] * there.t[l]);
+        }
+    }
+    return true;
+}
+
+// Compute z of all elements, and dx = J^T z.
+void BlockNewton::local_step(const BlockProblem& p, const Island& island, double d, VecX& dx) {
+    const double yielding = d + compliance_;
+    for (int n : island.nodes) dx.segment(p.nodes[n].first, p.nodes[n].size).setZero();
+    for (int i : island.elements) {
+        const BlockElement& e = p.elements[i];
+        const int head = e.head(), n = e.dim();
+        const double* error = e_.data() + e.row;
+        double* z = z_.data() + e.row;
+        const bool sticks = piece_[i] == Piece::sticks, slips = piece_[i] == Piece::slips;
+        if (head) z[0] = sticks || slips ? error[0] / yielding : error[0];
+        for (int k = head; k < n; ++k) z[k] = sticks ? error[k] / yielding : error[k];
+        if (slips) {
+            const Projection there = projection(e, y_.data() + e.row);
+            double along = 0.0;
+            for (int k = head; k < n; ++k) along += there.t[k] * error[k];
+            const double pushed = head ? e.cone.bound * (1.0 - yielding) * z[0] : 0.0;
+            for (int k = head; k < n; ++k)
+                z[k] = there.t[k] * (along + pushed) +
+                       (error[k] - along * there.t[k]) / (1.0 - (1.0 - yielding) * there.ratio);
+        }
+        p.push(e, z_, dx);
+    }
+}
+
+// Compute the step df of the forces, and the change dw that it causes.
+void BlockNewton::find_step(const BlockProblem& p, const Island& island, const BlockFactor& factor, double d) {
+    local_step(p, island, d, dx_);
+    factor.solve(dx_);
+    for (int i : island.elements) {
+        const BlockElement& e = p.elements[i];
+        p.respond(e, dx_, dw_);
+        const int n = e.dim();
+        const double* G = &G_[9 * i];
+        for (int k = 0; k < n; ++k) {
+            double force = z_[e.row + k];
+            for (int l = 0; l < n; ++l) force -= G[k * n + l] * dw_[e.row + l];
+            df_[e.row + k] = force;
+        }
+    }
+    for (int n : island.nodes) dx_.segment(p.nodes[n].first, p.nodes[n].size).setZero();
+    for (int i : island.elements) p.push(p.elements[i], df_, dx_);
+    for (int n : island.nodes) p.solve_mass(n, dx_);
+    for (int i : island.elements) p.respond(p.elements[i], dx_, dw_);
+}
+
+// Find the longest of some steps that reduces the squared error enough. Return false if none does.
+bool BlockNewton::shorten(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, double bound,
+                          int most_halvings, double& length) {
+    length = 1.0;
+    for (int halving = 0; halving <= most_halvings; ++halving, length *= 0.5) {
+        for (int i : island.elements) {
+            const BlockElement& e = p.elements[i];
+            for (int r = e.row; r < e.row + e.dim(); ++r) {
+                f_try_[r] = f[r] + length * df_[r];
+                w_try_[r] = w[r] + length * dw_[r];
+            }
+        }
+        double there;
+        evaluate(p, island, f_try_, w_try_, there);
+        if (there <= (1.0 - decrease * length) * bound) return true;
+    }
+    length = 1.0;
+    return false;
+}
+
+double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFactor& factor, Search search,
+                          double compliance, VecX& f, VecX& x, VecX& w) {
+    compliance_ = compliance;
+    const bool bold = search == Search::bold;
+    const auto each_row = [&](const auto& act) {
+        for (int i : island.elements)
+            for (int r = p.elements[i].row; r < p.elements[i].row + p.elements[i].dim(); ++r) act(r);
+    };
+    unit_ = 0.0;
+    for (int i : island.elements) p.respond(p.elements[i], p.free, w);
+    each_row([&](int r) { unit_ = std::max(unit_, root_rho_[r] * std::abs(w[r] + p.offset[r])); });
+    move(p, island, f, x, w);
+    double merit, error = evaluate(p, island, f, w, merit), least = error;
+    if (error <= parameters_.solved) return error;
+    factor.analyse(p, island);
+    for (int i : island.elements) piece_[i] = Piece::unknown;
+    each_row([&](int r) { f_best_[r] = f[r]; });
+    const auto cautious = [&] { return std::clamp(error, parameters_.proximal, most_proximal); };
+    double weight = bold ? parameters_.proximal : cautious();
+    double factored = 0.0, recent[4] = {merit, merit, merit, merit};
+    int refusals = 0, unguarded = 0, stagnant_steps = 0;
+    for (int step = 0; step < parameters_.steps && error > parameters_.solved; ++step, ++steps_) {
+        if (!bold) weight = cautious();
+        const bool anew = !(weight >= kept_from * factored && weight <= kept_to * factored);
+        bool symmetric = true;
+        if (anew) factored = weight;
+        if (linearize(p, island, factored, anew, symmetric)) {
+            ++factors_;
+            if (!factor.factor(p, island, G_, symmetric)) break;
+        }
+        find_step(p, island, factor, factored);
+        double length;
+        const double bound = bold ? merit : std::max({recent[0], recent[1], recent[2], recent[3]});
+        const bool accepted = shorten(p, island, f, w, bound, bold ? 2 : 6, length);
+        if (!accepted && bold && refusals < most_refusals && weight < kept_from * most_proximal) {
+            weight = step == 0 ? cautious() : std::min(most_proximal, more_proximal * weight);
+            ++refusals;
+            factored = 0.0;
+            evaluate(p, island, f, w, merit);
+            continue;
+        }
+        if (!accepted) {
+            if (++unguarded > most_unguarded) break;
+            refusals = 0;
+        }
+        each_row([&](int r) { f[r] += length * df_[r]; });
+        move(p, island, f, x, w);
+        const double before = error, merit_before = merit;
+        error = evaluate(p, island, f, w, merit);
+        recent[step % 4] = merit;
+        if (!(merit < HUGE_VAL)) break;
+        if (accepted && length == 1.0) {
+            refusals = 0;
+            weight = std::max({parameters_.proximal, weight * (merit < 0.1 * merit_before ? 0.01 : 0.3),
+                               std::min(1e-3 * error, most_proximal)});
+        }
+        if (error < least) {
+            least = error;
+            each_row([&](int r) { f_best_[r] = f[r]; });
+        }
+        if (least < nearly && error > stagnant * before && ++stagnant_steps > 1) break;
+    }
+    if (error > least || !(error < HUGE_VAL)) {
+        each_row([&](int r) { f[r] = f_best_[r]; });
+        move(p, island, f, x, w);
+    }
+    return least;
+}
+
+}  // namespace pn

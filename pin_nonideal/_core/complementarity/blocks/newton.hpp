@@ -1,0 +1,82 @@
+// Semismooth Newton method on the natural map of the exact laws of contact and friction.
+//
+// With y = f - rho w and the projection P of each element (for a contact, P_n = max(0, y_n) and P_T the projection of
+// y_T on the disk of radius mu P_n), the laws hold exactly if
+//     e(f) = P(f - rho w) - f = 0.
+// A step has a proximal term d (f - f_now) / rho. It is exact at a solution, and regular for any redundancy of the rows.
+// With A = dP/dy, S = I - (1 - d) A, z = S^-1 e and G = S^-1 A diag(rho):
+//     (M + J^T G J) dx = J^T z,   df = z - G J dx.
+// rho is the inverse of an element's own response. (P. Alart, A. Curnier, "A mixed formulation for frictional contact
+// problems prone to Newton like solution methods", Comput. Methods Appl. Mech. Engrg. 92, 1991.)
+#pragma once
+
+#include "complementarity/blocks/factor.hpp"
+
+namespace pn {
+
+struct BlockNewtonParameters {
+    double solved = 1e-12;    // error that needs no further step
+    double proximal = 1e-8;   // least weight d of the proximal term
+    int steps = 40;           // maximum number of steps
+};
+
+class BlockNewton {
+public:
+    using Parameters = BlockNewtonParameters;
+
+    explicit BlockNewton(const Parameters& parameters = {}) : parameters_(parameters) {}
+
+    // Set up the stiffness rho of all elements.
+    void pose(const BlockProblem& p);
+    // bold: least proximal term first, which few refused steps enlarge, then full steps. It is fast from a good guess.
+    // patient: a proximal term as large as the error, and steps that may increase the error for a while.
+    enum class Search { bold, patient };
+
+    // Solve the laws of an island from the forces f. Return the error of the best forces found. They are left in f,
+    // with their x, and w = J x + offset. All elements yield by the part `compliance` of their own response.
+    // `factor` keeps the order of elimination of the island.
+    double solve(const BlockProblem& p, const Island& island, BlockFactor& factor, Search search, double compliance,
+                 VecX& f, VecX& x, VecX& w);
+    // Compute x and w of the island under the forces f.
+    void move(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w) const;
+    // Find the element of an island with the largest relative error, and that error as a velocity.
+    void worst(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, int& element,
+               double& velocity) const;
+    // Project forces onto their cones. Return true if this changes them.
+    bool project(const BlockProblem& p, const Island& island, VecX& f) const;
+
+    double stiffness(int row) const { return rho_[row]; }
+    const std::vector<double>& stiffnesses() const { return rho_; }
+    double unit() const { return unit_; }  // largest free velocity of the last island
+    int steps() const { return steps_; }      // steps since construction
+    int factors() const { return factors_; }  // factorizations since construction
+
+private:
+    enum class Piece : signed char { open, sticks, slips, unknown };
+
+    // Projection of one element: direction and length of y_T, and radius of the disk.
+    struct Projection {
+        Piece piece = Piece::open;
+        double P[3] = {0.0, 0.0, 0.0};
+        double t[3] = {0.0, 0.0, 0.0};
+        double ratio = 0.0;  // radius over length
+    };
+
+    Projection projection(const BlockElement& e, const double* y) const;
+    double evaluate(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, double& merit);
+    bool linearize(const BlockProblem& p, const Island& island, double d, bool anew, bool& symmetric);
+    void local_step(const BlockProblem& p, const Island& island, double d, VecX& dx);
+    void find_step(const BlockProblem& p, const Island& island, const BlockFactor& factor, double d);
+    bool shorten(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, double bound,
+                 int most_halvings, double& length);
+
+    Parameters parameters_;
+    std::vector<double> rho_, root_rho_, G_;
+    std::vector<Piece> piece_;
+    VecX y_, e_, z_, df_, dx_, dw_, f_try_, w_try_, f_best_;
+    double compliance_ = 0.0;
+    double unit_ = 0.0;  // largest free velocity of the island, in units of the square root of an energy
+    int steps_ = 0, factors_ = 0;
+};
+
+}  // namespace pn

@@ -1,0 +1,102 @@
+#include "complementarity/blocks/problem.hpp"
+
+#include <cmath>
+
+#include "complementarity/blocks/kernels.hpp"
+
+namespace pn {
+
+void BlockProblem::clear() {
+    nodes.clear();
+    elements.clear();
+    M.clear();
+    J.clear();
+    rows = 0;
+}
+
+BlockMap BlockProblem::add_node(int size, int first) {
+    nodes.push_back({size, first, static_cast<int>(M.size())});
+    M.resize(M.size() + size * size, 0.0);
+    return {M.data() + nodes.back().M, size, size};
+}
+
+int BlockProblem::add_element(const ConeElement& cone, int node, int other) {
+    BlockElement e;
+    e.cone = cone;
+    e.row = rows;
+    e.node[0] = node;
+    e.node[1] = other;
+    for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
+        e.J[side] = static_cast<int>(J.size());
+        J.resize(J.size() + cone.dim * nodes[e.node[side]].size, 0.0);
+    }
+    rows += cone.dim;
+    elements.push_back(e);
+    return static_cast<int>(elements.size()) - 1;
+}
+
+bool BlockProblem::factor() {
+    L_ = M;
+    for (const BlockNode& node : nodes)
+        if (!cholesky(L_.data() + node.M, node.size)) return false;
+    return true;
+}
+
+void BlockProblem::solve_mass(int n, VecX& x) const {
+    const BlockNode& node = nodes[n];
+    solve_lower(L_.data() + node.M, node.size, x.data() + node.first);
+    solve_lower_transpose(L_.data() + node.M, node.size, x.data() + node.first);
+}
+
+void BlockProblem::respond(const BlockElement& e, const VecX& x, VecX& w) const {
+    if (e.column >= 0) {
+        w[e.row] = J[e.J[0] + e.column] * x[nodes[e.node[0]].first + e.column];
+        return;
+    }
+    for (int k = 0; k < e.dim(); ++k) w[e.row + k] = 0.0;
+    for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
+        const BlockNode& node = nodes[e.node[side]];
+        const double *row = J.data() + e.J[side], *at = x.data() + node.first;
+        for (int k = 0; k < e.dim(); ++k, row += node.size) {
+            double sum = 0.0;
+            for (int i = 0; i < node.size; ++i) sum += row[i] * at[i];
+            w[e.row + k] += sum;
+        }
+    }
+}
+
+void BlockProblem::push(const BlockElement& e, const VecX& f, VecX& x) const {
+    if (e.column >= 0) {
+        x[nodes[e.node[0]].first + e.column] += J[e.J[0] + e.column] * f[e.row];
+        return;
+    }
+    for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
+        const BlockNode& node = nodes[e.node[side]];
+        const double* row = J.data() + e.J[side];
+        double* at = x.data() + node.first;
+        for (int k = 0; k < e.dim(); ++k, row += node.size) {
+            const double force = f[e.row + k];
+            for (int i = 0; i < node.size; ++i) at[i] += row[i] * force;
+        }
+    }
+}
+
+Mat3 BlockProblem::own_response(const BlockElement& e) const {
+    Mat3 W;
+    for (Vec3& column : W.c) column = Vec3::Zero();
+    for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
+        const BlockNode& node = nodes[e.node[side]];
+        const int n = node.size, d = e.dim();
+        work_.assign(J.begin() + e.J[side], J.begin() + e.J[side] + d * n);
+        for (int k = 0; k < d; ++k) solve_lower(L_.data() + node.M, n, work_.data() + k * n);
+        for (int i = 0; i < d; ++i)
+            for (int j = 0; j < d; ++j) {
+                double sum = 0.0;
+                for (int k = 0; k < n; ++k) sum += work_[i * n + k] * work_[j * n + k];
+                W.c[j][i] += sum;
+            }
+    }
+    return W;
+}
+
+}  // namespace pn

@@ -1,0 +1,70 @@
+// Contact and friction forces f of many elements on separate trees of bodies, without the matrix of their responses.
+//
+// A node is a tree with its inertia matrix M. An element acts on one or two nodes:
+//     M (x - free) = J^T f,   w = J x + offset,
+// with x the accelerations, or velocities at the end of a step over its length. Laws between f and w are those of
+// cone/problem.hpp. M has one block a node, and J one block for each node of an element. Matrices are stored by rows.
+#pragma once
+
+#include <vector>
+
+#include "complementarity/cone/problem.hpp"
+
+namespace pn {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using BlockMap = Eigen::Map<RowMajor>;
+using ConstBlockMap = Eigen::Map<const RowMajor>;
+
+struct BlockNode {
+    int size = 0, first = 0;  // number of unknowns, and the first in x
+    int M = 0;                // first entry of M and of its factor
+};
+
+struct BlockElement {
+    ConeElement cone;
+    int row = 0;              // first row of f, w and offset
+    int node[2] = {-1, -1};   // the second one is -1 for an element of one node
+    int J[2] = {0, 0};        // first entries of the blocks of J
+    int column = -1;          // only nonzero column of a single row on one node
+
+    int dim() const { return cone.dim; }
+    int head() const { return cone.is(ConeElement::Kind::contact) ? 1 : 0; }  // rows of the normal
+};
+
+class BlockProblem {
+public:
+    std::vector<BlockNode> nodes;
+    std::vector<BlockElement> elements;
+    std::vector<double> M, J;
+    VecX free, offset;  // x without forces by unknown of the whole scene, and offset by row
+    int rows = 0;
+
+    void clear();
+    // Add a node for the unknowns first ... first + size - 1, and return its block of M, set to zero.
+    BlockMap add_node(int size, int first);
+    // Add an element on one node or two, and return its index. Its blocks of J are zero.
+    int add_element(const ConeElement& cone, int node, int other = -1);
+    BlockMap jacobian(const BlockElement& e, int side) {
+        return {J.data() + e.J[side], e.dim(), nodes[e.node[side]].size};
+    }
+    ConstBlockMap jacobian(const BlockElement& e, int side) const {
+        return {J.data() + e.J[side], e.dim(), nodes[e.node[side]].size};
+    }
+    // Factor the blocks of M. Returns false if one is not positive definite.
+    bool factor();
+    // x := M^-1 x on a node.
+    void solve_mass(int node, VecX& x) const;
+    // w = J x of an element, at its rows.
+    void respond(const BlockElement& e, const VecX& x, VecX& w) const;
+    // x += J^T f of an element.
+    void push(const BlockElement& e, const VecX& f, VecX& x) const;
+    // Response of an element's own rows to its own forces, J M^-1 J^T.
+    Mat3 own_response(const BlockElement& e) const;
+
+private:
+    std::vector<double> L_;  // lower Cholesky factors of the blocks of M
+    mutable std::vector<double> work_;
+};
+
+}  // namespace pn

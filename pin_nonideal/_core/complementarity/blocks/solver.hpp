@@ -1,0 +1,49 @@
+// Solver of contact and friction on separate trees, island by island.
+#pragma once
+
+#include "complementarity/blocks/newton.hpp"
+#include "complementarity/cone/solver.hpp"
+
+namespace pn {
+
+class BlockSolver {
+public:
+    BlockProblem problem;  // set by the caller: nodes, elements, free and offset
+
+    // Prepare the problem once its nodes and elements are set. Returns false if an inertia is not positive definite.
+    bool pose();
+    // Solve for the forces f from a guess, usually those of the last step. Return the largest error of an element,
+    // relative to its forces. Forces that share a load stay close to the guess.
+    double solve(VecX& f);
+    // Compute the motion under the forces f.
+    void move(const VecX& f);
+    // Errors of the laws at the last motion. Velocities are relative to those without forces, or to an element's own
+    // response to its forces if that is larger.
+    ConeResiduals residuals(const VecX& f) const;
+
+    // Element that misses the laws most in its own units, and the velocity by which it misses them.
+    struct Miss { int element = -1; double velocity = 0.0; };
+    const Miss& miss() const { return miss_; }
+    double error() const { return error_; }  // largest relative error of an element
+    int newton_steps() const { return newton_.steps(); }
+    const VecX& x() const { return x_; }  // motion by unknown, of the nodes
+    const VecX& w() const { return w_; }  // rows of the motion
+
+private:
+    double solve(int island, VecX& f);
+    bool stiffen(int island, VecX& f);
+    bool attempt(int island, VecX& f);
+    double newton(int island, BlockNewton::Search search, double compliance, VecX& f);
+
+    BlockNewton newton_;
+    VecX best_, on_path_;
+    double least_ = 0.0;  // error of best_
+    Islands islands_;
+    std::vector<BlockFactor> factors_;  // one for each island
+    VecX x_, w_;
+    double error_ = 0.0;
+    Miss miss_;
+    double free_speed_ = 0.0;  // largest w without forces
+};
+
+}  // namespace pn
