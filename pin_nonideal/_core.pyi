@@ -437,6 +437,9 @@ class EventKind(enum.Enum):
     lift_off = 13
     """a contact opens"""
 
+    relaxed = 14
+    """from here on steps miss the laws of contact, by the velocity in `miss`"""
+
 class Event:
     @property
     def time(self) -> float: ...
@@ -449,6 +452,9 @@ class Event:
 
     @property
     def energy_change(self) -> float: ...
+
+    @property
+    def miss(self) -> float: ...
 
     @property
     def impulse(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...

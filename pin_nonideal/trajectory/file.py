@@ -210,6 +210,8 @@ def scene_again(origin: Any, joints: Sequence[JointPlace], rows: Table, notes: l
 
 def _listed(e: Event) -> list[Any]:
     """An event as a file holds it."""
+    if e.kind == "relaxed":
+        return [e.time, e.kind, e.element, e.miss]
     if e.impulse is None or e.v_minus is None or e.v_plus is None:
         return [e.time, e.kind, e.element]
     vectors = [x.tolist() for x in (e.impulse, e.v_minus, e.v_plus)]
@@ -219,7 +221,7 @@ def _listed(e: Event) -> list[Any]:
 def _event(t: float, kind: str, element: str, change: float = 0.0, *vectors: Sequence[float]) -> Event:
     """An event as a file gives it."""
     if not vectors:
-        return Event(float(t), str(kind), str(element))
+        return Event(float(t), str(kind), str(element), miss=float(change))
     impulse, before, after = (np.array(x, dtype=float) for x in vectors)
     return Event(float(t), str(kind), str(element), impulse, float(change), before, after)
 

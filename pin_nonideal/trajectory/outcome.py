@@ -138,7 +138,7 @@ def _event(scene: Scene, event: core.Event, functions: Sequence[str]) -> Event:
         return Event(event.time, event.kind.name, names[event.element])
     name = compiled_scene(scene).program.constraints[event.element].name
     if event.kind not in (core.EventKind.impact, core.EventKind.jump):
-        return Event(event.time, event.kind.name, name)
+        return Event(event.time, event.kind.name, name, miss=event.miss)
     change = event.energy_change
     return Event(event.time, event.kind.name, name, event.impulse, change, event.v_minus, event.v_plus)
 

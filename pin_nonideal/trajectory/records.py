@@ -26,7 +26,8 @@ class Event:
             impulse, "touch_down" where one closes without, or its bouncing ends, and "lift_off" where one
             opens; of joints with `EffortLimits` "saturate" where a drive is asked for more than it has, and
             "desaturate" where it gives again what is asked; "jump" of a prescribed motion or length whose
-            rate jumps.
+            rate jumps; "relaxed" of a contact from where on steps of "moreau" miss its laws, because no forces
+            meet them or none were found.
         element: name of the law, contact, joint or constraint.
         impulse: of an impact [N s], (3,): along the contact's normal, then along its directions of slip; of a
             jump (impulse, 0, 0), of the motion's row [N s or N m s].
@@ -34,6 +35,7 @@ class Event:
             the work of the motion's impulse.
         v_minus: velocity before an impact or jump, (nv,).
         v_plus: velocity after it, (nv,).
+        miss: of "relaxed" the velocity by which the laws are missed [m/s or rad/s].
     """
 
     time: float
@@ -43,6 +45,7 @@ class Event:
     energy_change: float = 0.0
     v_minus: Array | None = None
     v_plus: Array | None = None
+    miss: float = 0.0
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Event):

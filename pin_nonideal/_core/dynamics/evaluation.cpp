@@ -88,6 +88,7 @@ void configure(const Program& p, Workspace& w, double t, const VecX& q, const Ve
     w.now.renew();
     place_bodies(p.mechanism, w.now.terms, q);
     mass_matrix(p.mechanism, w.now.terms);
+    if (w.now.drives.active) w.now.drives.add_inertia(p.mechanism, w.now.terms);
     factor_mass(p, w, t);
     if (!p.blocks.empty()) factor_placed_rows(p, w, t, v);
 }
@@ -124,6 +125,7 @@ void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v) {
         given_forces(p, w, t, w.now.terms.q, v);
         w.now.F += w.now.tau + w.now.external;
     }
+    if (w.now.drives.active) w.now.F += w.now.drives.force;
     if (!p.mechanism.deep_dofs.empty()) place_wrenches(p, w);
     if (!p.blocks.empty()) move_rows(p, w, t, v);
 }
@@ -188,6 +190,12 @@ void evaluate_block(const Program& p, Workspace& w, double t, const VecX& v, int
     evaluate(block.kind, state, Part::motion, values);
     if (!values.has_A) fill_A(block, p.mechanism, w.now.terms, values, w.now.A.data() + block.offset);
     values.has_A = values.constant_A;
+}
+
+void move_block(const Program& p, Workspace& w, double t, const VecX& v, int i) {
+    if (p.has_user_rows) return evaluate_block(p, w, t, v, i);
+    const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
+    evaluate(p.blocks[i].kind, state, Part::motion, w.now.values[i]);
 }
 
 void measure_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) {

@@ -34,6 +34,8 @@ void follow_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap
 void evaluate_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap);
 // Evaluate the rows of any block for given placements and velocities.
 void evaluate_block(const Program& p, Workspace& w, double t, const VecX& v, int block);
+// Evaluate rates and biases of an evaluated block at another velocity.
+void move_block(const Program& p, Workspace& w, double t, const VecX& v, int block);
 
 // Compute the largest residual and rate over all described rows at the state last evaluated. A contact that may open
 // contributes its penetration, and its rate only if it is closed. `sure` marks the open gaps (by index) to skip.

@@ -150,6 +150,7 @@ void Program::finish() {
         }
     }
     driven_exactly = moves_in_time && !by_differences;
+    has_user_rows = by_differences || !affine_rates;
     std::sort(breaks.begin(), breaks.end());
     breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());
     std::vector<char> constrained(mechanism.joints.size(), 0);

@@ -72,6 +72,7 @@ struct Program {
     std::vector<double> breaks;          // known break times of the functions of time, ascending
     bool searches_breaks = false;        // some user function of time does not declare its breaks
     bool asks_functions = false;         // user functions may change the forces while nothing moves
+    bool has_user_rows = false;          // some rows come from user functions, A and b together
     bool affine_rates = true;            // the rate of every row is A(q, t) v + phi_t
     std::vector<int> constrained_joints;     // joints whose bodies the constraints tie, and their ancestors in the tree
     std::vector<Angle> constrained_angles;   // of these joints

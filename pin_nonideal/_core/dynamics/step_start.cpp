@@ -115,7 +115,7 @@ bool configure_step(const Program& p, Workspace& w) {
 }
 
 // Evaluate laws after the rows are independent. Dependent rows would pass meaningless multipliers to the laws.
-static void move_step(const Program& p, Workspace& w, double t, const VecX& v, bool chosen) {
+void continue_step(const Program& p, Workspace& w, double t, const VecX& v, bool chosen) {
     assemble_forces(p, w, t, v);
     solve_dynamics(p, w, t, v);
     if (w.now.rows.blocks.empty() || !w.now.rows.redundant) return;
@@ -131,7 +131,7 @@ static void move_step(const Program& p, Workspace& w, double t, const VecX& v, b
 
 void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     configure(p, w, t, q, v);
-    move_step(p, w, t, v, configure_step(p, w));
+    continue_step(p, w, t, v, configure_step(p, w));
 }
 
 // Fraction of the kinetic energy of v that the rows in use would remove.
@@ -149,7 +149,7 @@ void keep_moving(const Program& p, Workspace& w, double t, const VecX& v) {
     const auto choose = [&](double tolerance) {
         w.state.rank_tolerance = tolerance;
         choose_rows_anew(p, w);
-        move_step(p, w, t, v, true);
+        continue_step(p, w, t, v, true);
     };
     double tolerance = w.state.rank_tolerance;
     while (tolerance < most_unheld && part_stopped(p, w, t, v) > stopped_part) choose(tolerance *= unheld_growth);
@@ -169,7 +169,7 @@ void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX&
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v, bool chosen, bool evaluates) {
     if (w.state.steps_since != never_decided) ++w.state.steps_since;
     const bool moved = project_velocity(p, w, t, v);
-    if (evaluates) move_step(p, w, t, v, chosen);
+    if (evaluates) continue_step(p, w, t, v, chosen);
     return moved;
 }
 

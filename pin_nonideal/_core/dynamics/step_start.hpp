@@ -7,6 +7,8 @@ namespace pn {
 
 // Evaluate and choose the independent rows. Contradicting rows raise a failure.
 void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
+// Evaluate in a configured workspace at another velocity. `chosen`: the rows were just chosen.
+void continue_step(const Program& p, Workspace& w, double t, const VecX& v, bool chosen = false);
 // Configure and choose the independent rows, without forces. Return true if it chose rows.
 bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 // Choose the independent rows in a configured workspace. Return true if it chose rows.

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "constraints/rank.hpp"
+#include "dynamics/implicit_drives.hpp"
 #include "dynamics/program.hpp"
 #include "complementarity/fixed_point/equation.hpp"
 
@@ -110,6 +111,7 @@ struct Evaluation {
     std::vector<Force> body_force;    // given forces on bodies
     VecX override_torque;
     bool has_override = false;
+    ImplicitDrives drives;            // springs and dampers that a time step takes implicitly
 
     // Invalidate the values derived from a motion.
     void renew() { reactions.current = has_holding = false; }

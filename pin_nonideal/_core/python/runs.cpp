@@ -251,6 +251,7 @@ static void bind_outcome(nb::module_& m) {
         .def_ro("kind", &Event::kind)
         .def_ro("element", &Event::element)
         .def_ro("energy_change", &Event::energy_change)
+        .def_ro("miss", &Event::miss)
         .def_prop_ro("impulse", [](const Event& e) { return to_numpy(VecX(e.impulse.eigen())); },
                      nb::rv_policy::automatic)
         .def_prop_ro("v_minus", [](const Event& e) { return to_numpy(e.v_minus); }, nb::rv_policy::automatic)

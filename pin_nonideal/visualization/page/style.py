@@ -11,6 +11,7 @@ EVENTS = {
     "impact": ("#b91c1c", "strikes, with an impulse"),
     "touch_down": ("#92400e", "closes without an impulse"),
     "lift_off": ("#0369a1", "opens"),
+    "relaxed": ("#7f1d1d", "steps miss the laws of a contact from here on"),
     "chatter": ("#0891b2", "a cluster of events, stepped over in time"),
     "several": ("#db2777", "the laws allow several motions from here on"),
     "paradox": ("#9d174d", "the laws allow no motion at a step's end"),

@@ -59,8 +59,8 @@ static void fields(Archive& a, Progress& x) {
 }
 
 static void fields(Archive& a, Event& x) {
-    auto& [time, kind, element, impulse, energy_change, v_minus, v_plus] = x;
-    a(time, kind, element, impulse, energy_change);
+    auto& [time, kind, element, impulse, energy_change, v_minus, v_plus, miss] = x;
+    a(time, kind, element, impulse, energy_change, miss);
     a.sized(v_minus);
     a.sized(v_plus);
 }

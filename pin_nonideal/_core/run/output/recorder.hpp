@@ -16,7 +16,8 @@ namespace pn {
 
 struct Event {
     enum class Kind {
-        stick, slip, reverse, pull, chatter, several, paradox, user, saturate, desaturate, jump, impact, touch_down, lift_off
+        stick, slip, reverse, pull, chatter, several, paradox, user, saturate, desaturate, jump, impact, touch_down, lift_off,
+        relaxed
     };
     double time;
     Kind kind;
@@ -25,6 +26,7 @@ struct Event {
     Vec3 impulse = Vec3::Zero();
     double energy_change = 0.0;
     VecX v_minus = {}, v_plus = {};
+    double miss = 0.0;  // relaxed: velocity [m/s or rad/s] by which the laws are missed
     static bool of_drive(Kind kind) { return kind == Kind::saturate || kind == Kind::desaturate; }
     static bool of_contact(Kind kind) { return kind == Kind::pull || kind >= Kind::impact; }
 };
@@ -49,6 +51,7 @@ constexpr EventKind event_kinds[] = {
     {Event::Kind::impact, "impact", "a contact strikes, with an impulse"},
     {Event::Kind::touch_down, "touch_down", "a contact closes without an impulse, or its bouncing ends"},
     {Event::Kind::lift_off, "lift_off", "a contact opens"},
+    {Event::Kind::relaxed, "relaxed", "from here on steps miss the laws of contact, by the velocity in `miss`"},
 };
 
 struct Recording {

@@ -54,7 +54,7 @@ bool TimeStepping::rests() const {
 // needs them if its direction or limit depends on them.
 bool TimeStepping::asks_for_motion(double end, double t_end) const {
     if (asked_always_ || end >= t_end || end >= options_.end() || output_.next() <= end + same_time(end)) return true;
-    return std::any_of(w.now.slipping.begin(), w.now.slipping.end(), [&](int e) {
+    return system_.ng == 0 && std::any_of(w.now.slipping.begin(), w.now.slipping.end(), [&](int e) {
         return p.frictions[e].dim > 1 || p.frictions[e].reaction != Reaction::none;
     });
 }
@@ -66,6 +66,12 @@ void TimeStepping::take_part(double end, double t_end, double least) {
     const bool whole = h >= (1.0 - least_part) * left;
     moreau_contacts_.step(t, whole ? left : h, now_.y, now_.moved_energy, now_.impact_energy);
     t = whole ? end : t + h;
+    const MoreauContacts::Relaxed& relaxed = moreau_contacts_.relaxed();
+    if (relaxed.block >= 0 && !relaxes_) {
+        out_.events.push_back({t, Event::Kind::relaxed, relaxed.block});
+        out_.events.back().miss = relaxed.miss;
+    }
+    relaxes_ = relaxed.block >= 0;
     const bool goes_through = options_.method.scheme == Method::Scheme::moreau;
     system_.settle(t, now_.y, now_.rate, whole && asks_for_motion(end, t_end), goes_through);
     now_.moved_energy += system_.moved_energy;

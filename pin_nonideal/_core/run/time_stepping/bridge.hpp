@@ -40,6 +40,7 @@ private:
     Moreau moreau_;
     MoreauContacts moreau_contacts_;
     const bool lasts_;     // a state that a step leaves unchanged stays unchanged
+    bool relaxes_ = false;  // the last step missed the laws of contact
     bool stands_ = false;  // the last step left the state unchanged
     const bool asked_always_;  // accelerations are needed at every step's end
     VecX y_from_;

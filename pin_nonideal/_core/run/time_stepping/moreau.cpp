@@ -31,7 +31,7 @@ std::vector<int> all_elements(const System& system) {
 
 Moreau::Moreau(System& system)
     : system_(system), p(system.p), w(system.w), problem_(p, all_elements(system)), modes_(system.ne, unloaded),
-      unloaded_(modes_), q_mid_(VecX::Zero(system.nq)), power_(VecX::Zero(system.nw)), limit_(system.ne, problem_.rows),
+      unloaded_(modes_), mean_(p), drives_(p), flight_(p, drives_), q_mid_(VecX::Zero(system.nq)), power_(VecX::Zero(system.nw)), limit_(system.ne, problem_.rows),
       force_limit_(limit_) {
     problem_.alpha0 = alpha_ = near_ = VecX::Zero(problem_.rows);
     for (int dim : problem_.dims) boxes_ = boxes_ && dim == 1;
@@ -43,47 +43,62 @@ void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
     v0_ = system_.velocity(y);
     move_ = 0.5 * h * v0_;
     retract(m, y.data(), move_.data(), q_mid_.data());
-    solve_without_friction(t + 0.5 * h);
-    pose_problem();
-    solve_friction(t);
-    end_velocity();
-    if (system_.energy) book_work(y, moved_energy);
+    const double middle = t + 0.5 * h;
+    set_modes(p, w, unloaded_);
+    mean_.begin(h, v0_);
+    system_.read(y);
+    JointDrives::Step drives(drives_, p, w, t, h, system_.q, v0_);
+    sweep(middle, drives, begin_rows(p, w, middle, q_mid_, mean_.value()), true);
+    while (mean_.move())
+        sweep(middle, drives, p.has_user_rows && begin_rows(p, w, middle, q_mid_, mean_.value()), p.has_user_rows);
+    flight_.move(p, w, h, y.data(), v0_, mean_.value(), v1_);
+    if (system_.energy) {
+        moved_energy += drives.energy(mean_.start(), mean_.finish());
+        book_work(y, moved_energy);
+    }
     set_modes(p, w, modes_);
     if (system_.nz > 0) y.segment(system_.nq + system_.nv, system_.nz) += h * w.now.dz;
     move_ = 0.5 * h * v1_;
     retract(m, q_mid_.data(), move_.data(), y.data());
+    flight_.place(p, y.data());
     y.segment(system_.nq, system_.nv) = v1_;
 }
 
-void meet_at_end(const Program& p, const Evaluation& now, double h, VecX& b) {
-    for (int i = 0; i < p.first_gap; ++i) {
-        const Block& block = p.blocks[i];
-        for (size_t k = 0; k < block.kept.size(); ++k)
-            b[block.row + k] = 0.5 * b[block.row + k] - now.values[i].rate[block.kept[k]] / h;
-    }
+// Solve the step with the forces at the mean velocity found so far. `anew`: the rows have changed.
+void Moreau::sweep(double t, JointDrives::Step& drives, bool chosen, bool anew) {
+    drives.move(mean_.start(), mean_.value());
+    solve_without_friction(t, chosen);
+    if (anew) respond();
+    pose_problem();
+    solve_friction(t);
+    end_velocity();
 }
 
 // Solve the motion without friction of the elements, with constraints satisfied at the step's end.
-void Moreau::solve_without_friction(double t) {
-    set_modes(p, w, unloaded_);
-    begin_step(p, w, t, q_mid_, v0_);
+void Moreau::solve_without_friction(double t, bool chosen) {
+    continue_step(p, w, t, mean_.value(), chosen);
     a_free_ = w.now.a;
     lam_free_ = w.now.lam;
     if (w.now.rows.blocks.empty()) return;
     b_ = w.now.b;
-    meet_at_end(p, w.now, h_, b_);
+    mean_.meet_at_end(p, w, b_);
     solve_motion(p, w, p.has_laws(), b_, a_free_, lam_free_);
+}
+
+void Moreau::respond() {
+    problem_.respond_in_step(p, w);
+    problem_.clean(p, w);
 }
 
 // Set up the friction problem. Slip velocities at the step's end over h replace slip accelerations.
 void Moreau::pose_problem() {
-    problem_.respond_in_step(p, w);
-    problem_.clean(p, w);
     problem_.along(p, w, a_free_, problem_.alpha0);
     int at = 0;
     for (const Friction& friction : p.frictions) {
-        const RowValues& values = w.now.values[friction.block];
-        for (int k = 0; k < friction.dim; ++k) problem_.alpha0[at++] += values.rate[k] / h_ + 0.5 * values.drift[k];
+        const Block& block = p.blocks[friction.block];
+        mean_.start_rates(p, w, friction.block);
+        for (int k = 0; k < friction.dim; ++k)
+            problem_.alpha0[at++] += w.scratch.r[block.row + k] / h_ + 0.5 * w.now.values[friction.block].drift[k];
     }
 }
 
@@ -106,9 +121,10 @@ double Moreau::update_limits(double t) {
     even_ = true;
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const Friction& friction = p.frictions[e];
+        const SlipLimits load = load_limits(p, w, friction, t, w.now.terms.q, mean_.value());
+        const bool rests = mean_.start_speed(p, w, friction) == 0.0;
         const double speed = slip_velocity(w.now, friction).norm();
-        const SlipLimits load = load_limits(p, w, friction, t, w.now.terms.q, v0_);
-        const SlipLimits limit = load * (speed == 0.0 ? friction.static_ratio : friction.speed_factor(speed));
+        const SlipLimits limit = load * (rests ? friction.static_ratio : friction.speed_factor(speed));
         change = std::max({change, std::abs(limit.reach() - limit_[e]), std::abs(limit.middle() - limit_.middle[at])});
         limit_.size[e] = limit.reach();
         limit_.middle[at] = limit.middle();
@@ -126,7 +142,7 @@ void Moreau::solve_friction(double t) {
     for (int pass = 0; pass < load_passes; ++pass) {
         // Limits that depend on no load need no motion.
         if (pass == 0 || p.needs_reactions) apply_forces();
-        const double change = update_limits(t + 0.5 * h_);
+        const double change = update_limits(t);
         const double largest = system_.ne > 0 ? std::max(0.0, limit_.size.maxCoeff()) : 0.0;
         if (pass > 0 && (change <= load_tolerance * largest || !p.needs_reactions)) return;
         if (!even_) force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_);
@@ -143,7 +159,8 @@ void Moreau::end_velocity() {
     alpha_ = problem_.alpha0;
     alpha_.noalias() += problem_.W * force_;
     problem_.acceleration(p, w, force_, a_friction_);
-    v1_ = v0_ + h_ * (a_free_ + a_friction_);
+    a_friction_ += a_free_;
+    mean_.end(a_friction_, v1_);
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const int dim = problem_.dims[e];
         w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim) = force_.segment(at, dim);
@@ -161,7 +178,7 @@ void Moreau::end_velocity() {
 void Moreau::book_work(VecX& y, double& moved_energy) {
     w.now.lam = lam_free_;
     w.now.lam.noalias() += problem_.multipliers * force_;
-    move_ = 0.5 * (v0_ + v1_);
+    move_ = 0.5 * (mean_.start() + mean_.finish());
     powers(p, w, move_, power_.data());  // powers of all forces but dry friction, whose modes are not set yet
     problem_.along(p, w, move_, alpha_);
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {

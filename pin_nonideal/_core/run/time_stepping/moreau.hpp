@@ -1,8 +1,9 @@
 // Time stepping at velocity level (Moreau's midpoint rule). With the slip velocities u at the step's end and the
 // percussions P,
-//     M (v1 - v0) = h (F + C) + A^T P + N^T P_f,   A v1 + phi_t = 0.
-// P_f opposes u within h times its limit. The scheme has order 1 and no creep: sticking elements have zero velocity.
-// All elements are solved together in every step.
+//     q_m = q0 + h/2 v0,   M (v1 - v0) = h (F + C)(q_m, (v0 + v1)/2) + A^T P + N^T P_f,   q1 = q_m + h/2 v1,
+//     A v1 + phi_t = 0,
+// and P_f opposes u within h times its limit. The scheme has order 2 between events and no creep: sticking elements have
+// zero velocity. All elements are solved together.
 #pragma once
 
 #include <vector>
@@ -11,12 +12,11 @@
 #include "complementarity/friction_limits.hpp"
 #include "friction/problem.hpp"
 #include "run/integrators/system.hpp"
+#include "run/time_stepping/free_flight.hpp"
+#include "run/time_stepping/joint_drives.hpp"
+#include "run/time_stepping/mean_velocity.hpp"
 
 namespace pn {
-
-// Set the right-hand sides b that satisfy the constraints at the end of a step of length h. The rows are evaluated at
-// the middle of the step, so half of their own change is still to come.
-void meet_at_end(const Program& p, const Evaluation& now, double h, VecX& b);
 
 class Moreau {
 public:
@@ -27,7 +27,9 @@ public:
     void step(double t, double h, VecX& y, double& moved_energy);
 
 private:
-    void solve_without_friction(double t);
+    void sweep(double t, JointDrives::Step& drives, bool chosen, bool anew);
+    void solve_without_friction(double t, bool chosen);
+    void respond();
     void pose_problem();
     void solve_friction(double t);
     void apply_forces();
@@ -41,6 +43,9 @@ private:
     FrictionProblem problem_;  // problem of all elements
     std::vector<Mode> modes_, unloaded_;
     double h_ = 0.0;
+    MeanVelocity mean_;
+    JointDrives drives_;
+    FreeFlight flight_;
     VecX q_mid_, v0_, v1_, move_, b_, a_free_, lam_free_;  // free: without friction of the elements
     VecX a_friction_, alpha_, near_;
     BoxProgram box_;

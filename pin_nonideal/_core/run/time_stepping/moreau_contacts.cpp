@@ -33,14 +33,17 @@ constexpr double least_response = 1e-13;  // minimum response of a row under the
 // Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners share
 // its load. Also the accepted error of a limit, relative to the forces. The statistics report both.
 constexpr double most_miss = 1e-7;
+// Largest error of the laws that a step may have, relative to an element's forces, if no forces meet them. An event
+// reports it.
+constexpr double most_relaxed = 1e-2;
 
 }  // namespace
 
 MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
-    : system_(system), p(system.p), w(system.w), watch_(watch), was_closed_(system.ng, 0), closed_(system.ng, 0),
+    : system_(system), p(system.p), w(system.w), mean_(p), drives_(p), flight_(p, drives_), watch_(watch), was_closed_(system.ng, 0), closed_(system.ng, 0),
       open_(system.ng, 0), modes_(system.ne, unloaded), unloaded_(modes_), q_mid_(VecX::Zero(system.nq)),
       v0_(VecX::Zero(system.nv)), v1_(v0_), a_free_(v0_),
-      power_(VecX::Zero(system.nw)), zero_(VecX::Zero(p.layout.rows)), force_(v0_) {
+      power_(VecX::Zero(system.nw)), trees_(system.p), zero_(VecX::Zero(p.layout.rows)), force_(v0_) {
     if (system.ng == 0) return;
     solver_.take_misses(most_miss);
     for (const Gap& gap : p.gaps) rounded_by_.push_back(rounded_by(p.blocks[gap.block].kind));
@@ -49,10 +52,7 @@ MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
         if (p.frictions[e].gap < 0) own_.push_back(e);
     const int most = p.layout.rows;
     unit_ = lam_ = lam_free_ = zero_;
-    w0_ = w1_ = f_ = VecX::Zero(most);
-    W_.resize(most, most);
-    response_.resize(system.nv, most);
-    multipliers_.resize(most, most);
+    w0_ = w1_ = f_ = offset_ = middle_ = free_response_ = VecX::Zero(most);
     touching_.reserve(system.ng);
     rubbing_.reserve(system.ne);
     rows_.reserve(most);
@@ -93,23 +93,66 @@ void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, dou
         was_closed_ = w.state.closed;
     }
     marked_ |= watched;
+    relaxed_ = {};
     if (watch_.gaps.current || q_looked_.size() == 0) {
         q_looked_ = y.head(system_.nq);
         watch_.begin_time_steps(width_rounding * scene_size(p, w));
     }
-    solve_free(middle);
-    find_touching(middle);
-    add_rows();
-    respond();
-    solve(middle);
-    end_velocity();
-    if (system_.energy) book_work(y, moved_energy, impact_energy);
+    select(open_, unloaded_, true);
+    mean_.begin(h, v0_);
+    system_.read(y);
+    JointDrives::Step drives(drives_, p, w, t, h, system_.q, v0_);
+    sweep(middle, drives, begin_rows(p, w, middle, q_mid_, mean_.value()), true);
+    while (mean_.move() && correct(middle, drives)) {}
+    flight_.begin();
+    for (const StepRow& row : rows_) flight_.touch(p.blocks[row.block]);
+    flight_.move(p, w, h, y.data(), v0_, mean_.value(), v1_);
+    if (system_.energy) {
+        moved_energy += drives.energy(mean_.start(), mean_.finish());
+        book_work(y, moved_energy, impact_energy);
+    }
     select(closed_, modes_, rows_.empty());
     marked_ = watched || !rows_.empty();
     if (system_.nz > 0) y.segment(system_.nq + system_.nv, system_.nz) += h * w.now.dz;
     force_ = 0.5 * h * v1_;
     retract(m, q_mid_.data(), force_.data(), y.data());
+    flight_.place(p, y.data());
     y.segment(system_.nq, system_.nv) = v1_;
+}
+
+// Solve the step with the forces at the mean velocity found so far.
+void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool chosen, bool first) {
+    drives.move(mean_.start(), mean_.value());
+    solve_free(t, chosen);
+    if (first) {
+        find_touching(t);
+        add_rows();
+    } else {
+        move_touching(t);
+    }
+    measure_free();
+    const bool anew = first || p.has_user_rows;
+    if (anew) separate_ = !limits_follow_loads() && trees_.pose(p, w, rows_, cones_, a_free_, offset_);
+    else if (separate_) trees_.release(a_free_, offset_);
+    responded_ &= !anew;
+    if (!separate_) respond();
+    recall_forces();
+    solve(t);
+    end_velocity();
+}
+
+// Solve the step again with the forces at the mean velocity. If no motion is found, return false with that of the first
+// sweep.
+bool MoreauContacts::correct(double t, JointDrives::Step& drives) {
+    try {
+        sweep(t, drives, p.has_user_rows && begin_rows(p, w, t, q_mid_, mean_.value()), false);
+        return true;
+    } catch (const Failure& failure) {
+        if (failure.kind != Failure::Kind::not_converged) throw;
+        mean_.begin(h_, v0_);
+        sweep(t, drives, p.has_user_rows && begin_rows(p, w, t, q_mid_, mean_.value()), false);
+        return false;
+    }
 }
 
 // Set contacts and modes, with their rows. During most of a flight nothing changes. `flies`: no contact is closed and
@@ -120,16 +163,15 @@ void MoreauContacts::select(const std::vector<char>& closed, const std::vector<M
 }
 
 // Solve the motion without contacts and dry friction, with constraints satisfied at the step's end.
-void MoreauContacts::solve_free(double t) {
-    select(open_, unloaded_, true);
-    begin_step(p, w, t, q_mid_, v0_);
+void MoreauContacts::solve_free(double t, bool chosen) {
+    continue_step(p, w, t, mean_.value(), chosen);
     a_free_ = w.now.a;
     if (w.now.rows.blocks.empty()) {
         w.now.rows.distance = 1.0;
         return;
     }
     unit_ = w.now.b;
-    meet_at_end(p, w.now, h_, unit_);
+    mean_.meet_at_end(p, w, unit_);
     lam_free_ = w.now.lam;
     solve_motion(p, w, p.has_laws(), unit_, a_free_, lam_free_);
     unit_.setZero();
@@ -150,7 +192,7 @@ const VecX& MoreauContacts::way_since_last() {
 void MoreauContacts::find_touching(double t) {
     touching_.clear();
     for (int i : watch_.come(way_since_last())) {
-        measure_gap(p, w, t, v0_, i);
+        measure_gap(p, w, t, mean_.value(), i);
         const double width = gap_width(p, w, i);
         const bool touches = was_closed_[i] || (width <= 0.0 && tells_way_out(i, width));
         if (touches) touching_.push_back(i);
@@ -158,18 +200,27 @@ void MoreauContacts::find_touching(double t) {
     }
     watch_.leave_far();
     for (int i : touching_) {
-        evaluate_block(p, w, t, v0_, p.gaps[i].block);
-        for (int e : p.gaps[i].elements) evaluate_block(p, w, t, v0_, p.frictions[e].block);
+        evaluate_block(p, w, t, mean_.value(), p.gaps[i].block);
+        for (int e : p.gaps[i].elements) evaluate_block(p, w, t, mean_.value(), p.frictions[e].block);
     }
     if (touching_.size() > 1) leave_one_of_each_place(p, w, was_closed_, touching_);
 }
 
+// Evaluate the contacts that take part at a new mean velocity.
+void MoreauContacts::move_touching(double t) {
+    for (int i : touching_) {
+        move_block(p, w, t, mean_.value(), p.gaps[i].block);
+        for (int e : p.gaps[i].elements) move_block(p, w, t, mean_.value(), p.frictions[e].block);
+    }
+    for (size_t e = 0; e < parts_.size(); ++e)
+        if (parts_[e].gap >= 0 && parts_[e].element >= 0) cones_[e].bound = coefficient(parts_[e]);
+}
+
 // Return the coefficient of a contact: the static one if it sticks or comes to rest.
-double MoreauContacts::coefficient(int element) const {
-    const Friction& friction = p.frictions[element];
-    const double speed = slip_velocity(w.now, friction).norm();
-    const bool rests = modes_[element] == sticking || speed <= rest_rate(v0_);
-    return rests ? friction.holding_limit(friction.mu) : friction.kinetic_limit(friction.mu, speed);
+double MoreauContacts::coefficient(const Part& part) const {
+    const Friction& friction = p.frictions[part.element];
+    return part.rests ? friction.holding_limit(friction.mu)
+                      : friction.kinetic_limit(friction.mu, slip_velocity(w.now, friction).norm());
 }
 
 void MoreauContacts::add_part(Part part, int block, int kept, ConeElement element) {
@@ -191,9 +242,11 @@ void MoreauContacts::add_rows() {
     for (int i : touching_) {
         const Gap& gap = p.gaps[i];
         const int slides = gap.sliding < 0 ? 0 : static_cast<int>(p.blocks[p.frictions[gap.sliding].block].kept.size());
-        const double mu = gap.sliding < 0 ? 0.0 : coefficient(gap.sliding);
-        const double approach = gap.restitution * std::min(0.0, gap_rate(p, w, i));
-        add_part({i, gap.sliding, approach}, gap.block, 1, ConeElement::contact(1 + slides, mu));
+        Part part{i, gap.sliding, gap.restitution * std::min(0.0, gap_rate(p, w, i))};
+        part.rests = gap.sliding >= 0 && (modes_[gap.sliding] == sticking ||
+                                          slip_velocity(w.now, p.frictions[gap.sliding]).norm() <= rest_rate(v0_));
+        const double mu = gap.sliding < 0 ? 0.0 : coefficient(part);
+        add_part(part, gap.block, 1, ConeElement::contact(1 + slides, mu));
         for (int e : gap.elements)
             if (e != gap.sliding) rubbing_.push_back(e);
     }
@@ -204,13 +257,27 @@ void MoreauContacts::add_rows() {
     }
 }
 
-// Compute the response to a unit of each force, and the velocities at the step's end without the forces, over h.
+// Check if a limit of dry friction follows a load. The loads must then be those of minimum norm among all that share
+// them alike: other ones need not settle.
+bool MoreauContacts::limits_follow_loads() const {
+    return std::any_of(rubbing_.begin(), rubbing_.end(), [&](int e) {
+        return p.frictions[e].gap >= 0 || p.frictions[e].load != Friction::Load::none;
+    });
+}
+
+// Compute the response to a unit of each force.
 void MoreauContacts::respond() {
     const int n = static_cast<int>(rows_.size());
-    if (n == 0) return;
+    if (n == 0 || responded_) return;
+    responded_ = true;
+    if (W_.rows() < n) {
+        W_.resize(n, n);
+        response_.resize(system_.nv, n);
+        multipliers_.resize(p.layout.rows, n);
+    }
     scaled_ = !w.now.rows.refine;
     for (int column = 0; column < n; ++column) {
-        const Row& row = rows_[column];
+        const StepRow& row = rows_[column];
         const Block& block = p.blocks[row.block];
         force_.setZero();
         unit_[block.row + row.k] = 1.0;
@@ -231,30 +298,38 @@ void MoreauContacts::respond() {
             }
         }
         if (!w.now.rows.blocks.empty()) multipliers_.col(column) = lam_;
-        f_[column] = free;
+        free_response_[column] = free;
     }
     if (scaled_) gram(response_, n, W_);
     for (int i = 0; i < n; ++i)
-        if (W_(i, i) <= least_response * f_[i]) W_(i, i) = 0.0;
+        if (W_(i, i) <= least_response * free_response_[i]) W_(i, i) = 0.0;
     for (int i = 0; i < n; ++i)
         for (int j = 0; j < i; ++j) {
             const bool held = W_(i, i) == 0.0 || W_(j, j) == 0.0;
             W_(i, j) = W_(j, i) = held ? 0.0 : 0.5 * (W_(i, j) + W_(j, i));
         }
-    measure_free();
 }
 
+// Compute the velocities at the step's end without the forces, over h.
 void MoreauContacts::measure_free() {
     const int n = static_cast<int>(rows_.size());
     for (int i = 0; i < n; ++i) {
         const Block& block = p.blocks[rows_[i].block];
-        const RowValues& values = w.now.values[rows_[i].block];
-        const int k = block.kept[rows_[i].k];
-        if (i == 0 || rows_[i].block != rows_[i - 1].block) multiply(block, w.now.A, a_free_, w.scratch.r);
-        w0_[i] = w.scratch.r[block.row + rows_[i].k] + values.rate[k] / h_ + 0.5 * values.drift[k];
-        f_[i] = w.state.percussion[block.row + rows_[i].k];
+        if (i == 0 || rows_[i].block != rows_[i - 1].block) mean_.start_rates(p, w, rows_[i].block);
+        const double drift = w.now.values[rows_[i].block].drift[block.kept[rows_[i].k]];
+        offset_[i] = w.scratch.r[block.row + rows_[i].k] / h_ + 0.5 * drift;
     }
-    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) w0_[at] += parts_[e].approach / h_;
+    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) offset_[at] += parts_[e].approach / h_;
+    for (int i = 0; i < n; ++i) {
+        const Block& block = p.blocks[rows_[i].block];
+        if (i == 0 || rows_[i].block != rows_[i - 1].block) multiply(block, w.now.A, a_free_, w.scratch.r);
+        w0_[i] = offset_[i] + w.scratch.r[block.row + rows_[i].k];
+    }
+}
+
+// Guess the forces of the last step.
+void MoreauContacts::recall_forces() {
+    for (size_t i = 0; i < rows_.size(); ++i) f_[i] = w.state.percussion[p.blocks[rows_[i].block].row + rows_[i].k];
 }
 
 // Compute the motion under the forces f.
@@ -263,9 +338,13 @@ void MoreauContacts::apply() {
     w.now.a = a_free_;
     w.now.renew();
     if (n == 0) return;
-    force_.noalias() = response_.leftCols(n) * f_.head(n);
-    if (scaled_) solve_Rt(p.mechanism, w.now.terms, force_);
-    w.now.a += force_;
+    if (separate_) {
+        trees_.move(f_, w.now.a, w1_);
+    } else {
+        force_.noalias() = response_.leftCols(n) * f_.head(n);
+        if (scaled_) solve_Rt(p.mechanism, w.now.terms, force_);
+        w.now.a += force_;
+    }
     if (w.now.rows.blocks.empty()) w.now.lam.setZero();
     else {
         w.now.lam = lam_free_;
@@ -287,10 +366,11 @@ bool MoreauContacts::limits_settle(double t) {
     for (size_t e = 0; e < parts_.size(); ++e) {
         if (!cones_[e].is(ConeElement::Kind::box)) continue;
         const Friction& friction = p.frictions[parts_[e].element];
+        const bool rests = mean_.start_speed(p, w, friction) == 0.0;
         const double speed = slip_velocity(w.now, friction).norm();
         const SlipLimits load = friction.gap >= 0 ? SlipLimits(friction.constant + friction.mu * w.now.lam[friction.row])
-                                                  : load_limits(p, w, friction, t, w.now.terms.q, v0_);
-        const SlipLimits limits = load * (speed == 0.0 ? friction.static_ratio : friction.speed_factor(speed));
+                                                  : load_limits(p, w, friction, t, w.now.terms.q, mean_.value());
+        const SlipLimits limits = load * (rests ? friction.static_ratio : friction.speed_factor(speed));
         const double limit = limits.reach();
         change = std::max({change, std::abs(limit - cones_[e].bound), std::abs(limits.middle() - parts_[e].middle)});
         largest = std::max(largest, limit);
@@ -304,41 +384,82 @@ bool MoreauContacts::limits_settle(double t) {
     return settles;
 }
 
-// Shift the forces by the middles of their limits (sign 1) or back (sign -1). Boxes of the cone problem are centered at
-// zero force.
-void MoreauContacts::measure_from_middles(double sign) {
-    const int n = static_cast<int>(rows_.size());
-    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
-        if (parts_[e].middle == 0.0) continue;
-        f_[at] -= sign * parts_[e].middle;
-        w0_.head(n) += sign * parts_[e].middle * W_.col(at).head(n);
-    }
+// Collect the middles of the limits. Boxes of the cone problem are centered at zero force.
+void MoreauContacts::collect_middles() {
+    middle_.head(static_cast<Eigen::Index>(rows_.size())).setZero();
+    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e)
+        if (parts_[e].middle != 0.0) middle_[at] = parts_[e].middle;
 }
 
-// Rest goes on if forces within all cones hold it. Returns whether they do, with these forces in place of others.
+// Solve the laws tree by tree if possible, else with the responses of all rows.
+bool MoreauContacts::solve_laws() {
+    const int n = static_cast<int>(rows_.size());
+    collect_middles();
+    guess_ = f_.head(n);
+    const double error = separate_ ? trees_.solve(cones_, middle_, f_) : HUGE_VAL;
+    bool solved = error <= most_miss;
+    const bool starts = v0_.cwiseAbs().maxCoeff() <= rest_speed;
+    if (solved && !(starts && moves())) return true;
+    respond();
+    if (!solved) {
+        relaxed_f_ = f_.head(n);
+        f_.head(n) = guess_;
+    }
+    const auto W = W_.topLeftCorner(n, n);
+    f_.head(n) -= middle_.head(n);
+    w1_.head(n) = w0_.head(n);
+    w1_.head(n).noalias() += W * middle_.head(n);
+    if (!solved) solved = solver_.solve(W, w1_.head(n), cones_, true, f_.head(n), true) == ConeStatus::solved;
+    if (starts) solved = keep_rest(solved) || solved;
+    f_.head(n) += middle_.head(n);
+    if (!solved && error <= most_relaxed) {
+        f_.head(n) = relaxed_f_;
+        relax();
+        return true;
+    }
+    return solved;
+}
+
+// Accept the best forces found, although they miss the laws of contact.
+void MoreauContacts::relax() {
+    const BlockSolver::Miss& miss = trees_.miss();
+    const Part& part = parts_[miss.element];
+    relaxed_ = {part.gap >= 0 ? p.gaps[part.gap].block : p.frictions[part.element].block, h_ * miss.velocity};
+}
+
+// Compute the rows under the forces f.
+void MoreauContacts::measure_end() {
+    const int n = static_cast<int>(rows_.size());
+    if (separate_) return trees_.move(f_, v1_, w1_);
+    w1_.head(n) = w0_.head(n);
+    w1_.head(n).noalias() += W_.topLeftCorner(n, n) * f_.head(n);
+}
+
+bool MoreauContacts::moves() {
+    const int n = static_cast<int>(rows_.size());
+    measure_end();
+    return w1_.head(n).cwiseAbs().maxCoeff() > limit_rounding * w0_.head(n).cwiseAbs().maxCoeff();
+}
+
+// Rest goes on if forces within all cones hold it. Returns whether they do, with these forces in place of others. The
+// rows without forces are in w1.
 bool MoreauContacts::keep_rest(bool solved) {
     const int n = static_cast<int>(rows_.size());
     const auto W = W_.topLeftCorner(n, n);
-    w1_.head(n) = w0_.head(n);
-    w1_.head(n).noalias() += W * f_.head(n);
-    const bool moves = w1_.head(n).cwiseAbs().maxCoeff() > limit_rounding * w0_.head(n).cwiseAbs().maxCoeff();
-    return (!solved || moves) && solver_.hold(W, w0_.head(n), cones_, f_.head(n));
+    const bool moves = (w1_.head(n) + W * f_.head(n)).cwiseAbs().maxCoeff() >
+                       limit_rounding * w1_.head(n).cwiseAbs().maxCoeff();
+    return (!solved || moves) && solver_.hold(W, w1_.head(n), cones_, f_.head(n));
 }
 
 void MoreauContacts::solve(double t) {
     const int n = static_cast<int>(rows_.size());
-    const auto W = W_.topLeftCorner(n, n);
     const bool loads = n > 0 && cones_.back().is(ConeElement::Kind::box);  // limits that may depend on the motion
     last_change_ = HUGE_VAL;
     for (int pass = 0; n > 0; ++pass) {
         if (loads || pass > 0) apply();
         if (limits_settle(t) && pass > 0) break;
         if (pass == load_passes) throw Failure(Failure::Kind::not_converged, t);
-        measure_from_middles(1.0);
-        bool solved = solver_.solve(W, w0_.head(n), cones_, true, f_.head(n), true) == ConeStatus::solved;
-        if (v0_.cwiseAbs().maxCoeff() <= rest_speed) solved = keep_rest(solved) || solved;
-        measure_from_middles(-1.0);
-        if (!solved) throw Failure(Failure::Kind::not_converged, t);
+        if (!solve_laws()) throw Failure(Failure::Kind::not_converged, t);
         ++w.counters.iterations;
     }
     if (n == 0) apply();
@@ -346,27 +467,33 @@ void MoreauContacts::solve(double t) {
     presses_ = n > 0;
     for (int i = 0; i < n; ++i) w.state.percussion[p.blocks[rows_[i].block].row + rows_[i].k] = f_[i];
     if (n == 0) return;
-    measure_from_middles(1.0);
-    const ConeResiduals r = ConeComplementarity::residuals(W, w0_.head(n), cones_, f_.head(n));
-    measure_from_middles(-1.0);
+    const ConeResiduals r = residuals();
     w.counters.signorini = std::max(w.counters.signorini, r.signorini);
     w.counters.coulomb = std::max(w.counters.coulomb, r.coulomb);
     w.counters.dissipation = std::max(w.counters.dissipation, r.dissipation);
+}
+
+ConeResiduals MoreauContacts::residuals() {
+    const int n = static_cast<int>(rows_.size());
+    if (separate_) return trees_.residuals(middle_, f_);
+    const auto W = W_.topLeftCorner(n, n);
+    w1_.head(n) = w0_.head(n);
+    w1_.head(n).noalias() += W * middle_.head(n);
+    return ConeComplementarity::residuals(W, w1_.head(n), cones_, f_.head(n) - middle_.head(n));
 }
 
 // Compute the velocity, the closed contacts and the modes at the step's end. An element sticks if its force stays below
 // its limit, or if its slip is zero.
 void MoreauContacts::end_velocity() {
     const int n = static_cast<int>(rows_.size());
-    v1_ = v0_ + h_ * w.now.a;
+    if (n > 0) measure_end();
+    mean_.end(w.now.a, v1_);
     if (marked_) {
         std::fill(closed_.begin(), closed_.end(), char(0));
         std::fill(modes_.begin(), modes_.end(), unloaded);
     }
     if (n == 0) return;
     const double still = rest_rate(v1_), clear = limit_rounding * f_.head(n).cwiseAbs().maxCoeff();
-    w1_.head(n) = w0_.head(n);
-    w1_.head(n).noalias() += W_.topLeftCorner(n, n) * f_.head(n);
     w1_.head(n) *= h_;
     for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
         const Part& part = parts_[e];
@@ -388,6 +515,7 @@ void MoreauContacts::end_velocity() {
     for (int e : own_) rest(e);
     for (int i : touching_)
         for (int e : p.gaps[i].elements) rest(e);
+    marked_ = true;
 }
 
 // Add the work over the step, by the mean velocity. If a slip reverses inside the step, the friction that opposes its
@@ -398,12 +526,12 @@ void MoreauContacts::book_work(VecX& y, double& moved_energy, double& impact_ene
         w.now.lam = lam_free_;
         w.now.lam.noalias() += multipliers_.leftCols(n) * f_.head(n);
     }
-    force_ = 0.5 * (v0_ + v1_);
+    force_ = 0.5 * (mean_.start() + mean_.finish());
     powers(p, w, force_, power_.data());
     for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
         double power = 0.0;
         for (int k = 0; k < cones_[e].dim; ++k) {
-            const Row& row = rows_[at + k];
+            const StepRow& row = rows_[at + k];
             multiply(p.blocks[row.block], w.now.A, force_, w.scratch.r);
             const double part = w.scratch.r[p.blocks[row.block].row + row.k] * f_[at + k];
             if (k == 0 && parts_[e].gap >= 0) impact_energy += h_ * part;

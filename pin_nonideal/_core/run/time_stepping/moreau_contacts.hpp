@@ -7,6 +7,10 @@
 
 #include "complementarity/cone/solver.hpp"
 #include "run/events/gap_watch.hpp"
+#include "run/time_stepping/free_flight.hpp"
+#include "run/time_stepping/joint_drives.hpp"
+#include "run/time_stepping/mean_velocity.hpp"
+#include "run/time_stepping/separate_trees.hpp"
 
 namespace pn {
 
@@ -26,38 +30,57 @@ public:
     // project and evaluate the end.
     void step(double t, double h, VecX& y, double& moved_energy, double& impact_energy);
 
-private:
-    struct Row {
-        int block, k;
+    // Contact whose laws the last step missed, as a block or -1, and the velocity by which it missed them [m/s].
+    struct Relaxed {
+        int block = -1;
+        double miss = 0.0;
     };
+    const Relaxed& relaxed() const { return relaxed_; }
+
+private:
     struct Part {              // part of the cone problem
         int gap = -1;          // gap of a contact, -1 if none
         int element = -1;      // friction element: sliding of the contact, or a box
         double approach = 0.0; // restitution times the closing rate of the gap, at most 0
         double middle = 0.0;   // middle of the limits of a box with one direction
+        bool rests = false;    // the contact sticks at the step's start
     };
 
     bool tells_way_out(int gap, double width) const { return width > -nearly_all * rounded_by_[gap]; }
     void select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies);
-    void solve_free(double t);
+    void sweep(double t, JointDrives::Step& drives, bool chosen, bool first);
+    bool correct(double t, JointDrives::Step& drives);
+    void solve_free(double t, bool chosen);
     const VecX& way_since_last();
     void find_touching(double t);
+    void move_touching(double t);
     void add_rows();
     void add_part(Part part, int first_block, int kept, ConeElement element);
     void respond();
     void measure_free();
-    void measure_from_middles(double sign);
+    void recall_forces();
+    void collect_middles();
+    bool solve_laws();
+    void relax();
+    void measure_end();
+    bool moves();
     bool keep_rest(bool solved);
+    ConeResiduals residuals();
     void solve(double t);
     void apply();
+    bool limits_follow_loads() const;
     bool limits_settle(double t);
     void end_velocity();
     void book_work(VecX& y, double& moved_energy, double& impact_energy);
-    double coefficient(int element) const;
+    double coefficient(const Part& part) const;
 
     System& system_;
     const Program& p;
     Workspace& w;
+    Relaxed relaxed_;
+    MeanVelocity mean_;
+    JointDrives drives_;
+    FreeFlight flight_;
     double h_ = 0.0, last_change_ = 0.0;  // step, and last change of the limits between passes
     GapWatch& watch_;
     std::vector<int> touching_, own_;  // gaps that take part, and friction elements of no unilateral contact
@@ -67,12 +90,16 @@ private:
     std::vector<double> rounded_by_;   // rounding of each gap
     bool rounded_ = false;             // a gap has rounding
     bool marked_ = false;  // the last step had a closed contact or an active element
-    std::vector<Row> rows_;
+    std::vector<StepRow> rows_;
     std::vector<Part> parts_;
     std::vector<ConeElement> cones_;
     bool scaled_ = true;   // the response is a_s = R^T a
     bool presses_ = true;  // percussions of the last step may be nonzero
-    VecX q_mid_, q_looked_, v0_, v1_, a_free_, lam_free_, w0_, w1_, f_, power_, unit_, zero_, force_, lam_;
+    VecX q_mid_, q_looked_, v0_, v1_, a_free_, lam_free_, w0_, w1_, f_, power_;
+    VecX offset_, middle_, free_response_, guess_, relaxed_f_;
+    SeparateTrees trees_;
+    bool separate_ = false, responded_ = false;  // solved tree by tree, responses of all rows are known
+    VecX unit_, zero_, force_, lam_;
     MatX W_, response_, multipliers_;
     ConeComplementarity solver_;
 };

@@ -1,0 +1,29 @@
+// Springs and dampers of single dofs that a time step takes implicitly, with the stiffness K and the damping D:
+//     M + theta h D + theta^2 h^2 K   in place of M,
+//     F + D (v - v0) - (2 theta - 1) h K v0   in place of F at the velocity v.
+// Their force then follows the velocity and the position of the step's end by the part theta. With theta = 1/2 the step
+// is second order and keeps the energy of springs. Fast decay and vibrations that the step does not resolve take a
+// larger theta, so that they fade.
+#pragma once
+
+#include "tree/terms.hpp"
+
+namespace pn {
+
+struct ImplicitDrives {
+    bool active = false;
+    double h = 0.0;
+    VecX stiffness, damping;  // K and D by dof
+    VecX theta, inertia;      // inertia: theta h D + theta^2 h^2 K
+    VecX force;               // D (v - v0) - (2 theta - 1) h K v0
+
+    // Choose theta and add the inertia to M.
+    void add_inertia(const Mechanism& m, Terms& terms);
+    // Set the force at the velocity v.
+    void set_velocity(const VecX& v0, const VecX& v);
+};
+
+// Part of the end of a step of length h at which a spring and damper of one dof act, for its inertia.
+double implicit_part(double h, double inertia, double stiffness, double damping);
+
+}  // namespace pn

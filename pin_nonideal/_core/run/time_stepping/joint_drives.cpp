@@ -1,0 +1,69 @@
+#include "run/time_stepping/joint_drives.hpp"
+
+#include "dynamics/given_forces.hpp"
+
+namespace pn {
+
+JointDrives::JointDrives(const Program& p) {
+    const Mechanism& m = p.mechanism;
+    stiffness_ = damping_ = kp_ = kd_ = VecX::Zero(m.nv);
+    if (const auto* hold = std::get_if<HoldPosition>(&p.actuation)) {
+        kd_ = hold->kd;
+        for (const Chart& c : m.charts)
+            if (c.kind == Chart::Kind::vector || c.kind == Chart::Kind::circle)
+                kp_.segment(c.iv, c.kind == Chart::Kind::vector ? c.n : 1) =
+                    hold->kp.segment(c.iv, c.kind == Chart::Kind::vector ? c.n : 1);
+    }
+    for (const GivenForce& force : p.forces)
+        if (const auto* spring = std::get_if<JointSpring>(&force)) {
+            stiffness_[m.joints[spring->joint].iv] += spring->stiffness;
+            damping_[m.joints[spring->joint].iv] += spring->damping;
+        }
+    each_law<Viscous>(p.laws, [&](const Viscous& law) {
+        if (law.block < 0) damping_.segment(law.dof, law.count).array() += law.coefficient;
+    });
+    for (int dof = 0; dof < m.nv; ++dof) {
+        // Forces that drive motion stay explicit, and those in deep trees, of which M has no entries.
+        for (VecX* x : {&stiffness_, &damping_, &kp_, &kd_})
+            if (m.is_deep[dof] || !((*x)[dof] > 0.0)) (*x)[dof] = 0.0;
+    }
+    stiffness_ += kp_;
+    damping_ += kd_;
+    any_ = (stiffness_.array() != 0.0).any() || (damping_.array() != 0.0).any();
+}
+
+JointDrives::Step::Step(const JointDrives& drives, const Program& p, Workspace& w, double t, double h, const VecX& q0,
+                        const VecX& v0)
+    : now_(w.now) {
+    ImplicitDrives& step = now_.drives;
+    step.active = drives.any_;
+    if (!drives.any_) return;
+    step.h = h;
+    step.stiffness = drives.stiffness_;
+    step.damping = drives.damping_;
+    step.theta.resize(v0.size());
+    step.inertia.resize(v0.size());
+    step.force.setZero(v0.size());
+    if (!now_.has_override && !p.limits_effort()) return;
+    if (!now_.has_override) asked_torque(p, w, t, q0, v0, now_.tau);
+    for (int dof = 0; dof < v0.size(); ++dof) {
+        if (!now_.has_override && now_.tau[dof] > p.least_effort[dof] && now_.tau[dof] < p.most_effort[dof]) continue;
+        step.stiffness[dof] -= drives.kp_[dof];
+        step.damping[dof] -= drives.kd_[dof];
+    }
+}
+
+void JointDrives::Step::move(const VecX& v0, const VecX& v) {
+    if (now_.drives.active) now_.drives.set_velocity(v0, v);
+}
+
+double JointDrives::Step::energy(const VecX& v0, const VecX& v1) const {
+    const ImplicitDrives& step = now_.drives;
+    double energy = 0.0;
+    if (!step.active) return energy;
+    for (int dof = 0; dof < v0.size(); ++dof)
+        energy += 0.5 * (v0[dof] + v1[dof]) * (step.h * step.force[dof] - step.inertia[dof] * (v1[dof] - v0[dof]));
+    return energy;
+}
+
+}  // namespace pn

@@ -1,0 +1,38 @@
+// Springs, dampers, viscous friction and position control of single dofs, which time steps take implicitly.
+#pragma once
+
+#include "dynamics/workspace.hpp"
+
+namespace pn {
+
+class JointDrives {
+public:
+    explicit JointDrives(const Program& p);
+
+    // Check if a dof has a spring or damper.
+    bool acts_on(int dof) const { return stiffness_[dof] != 0.0 || damping_[dof] != 0.0; }
+    // Implicit forces during a step of length h from (t, q0, v0), until the object ends. Position control whose torque is
+    // at its limit stays explicit.
+    class Step {
+    public:
+        Step(const JointDrives& drives, const Program& p, Workspace& w, double t, double h, const VecX& q0,
+             const VecX& v0);
+        Step(const Step&) = delete;
+        ~Step() { now_.drives.active = false; }
+
+        // Set the velocity at which the forces are taken.
+        void move(const VecX& v0, const VecX& v);
+        // Return the energy that the implicit part of the forces added in the step from v0 to v1.
+        double energy(const VecX& v0, const VecX& v1) const;
+
+    private:
+        Evaluation& now_;
+    };
+
+private:
+    bool any_ = false;
+    VecX stiffness_, damping_;  // of all drives
+    VecX kp_, kd_;              // of the position control
+};
+
+}  // namespace pn

@@ -1,0 +1,87 @@
+#include "run/time_stepping/mean_velocity.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pn {
+
+// Change of the configuration in a step [rad or m] that counts as rounding.
+constexpr double configuration_rounding = 1e-13;
+// Change by a further sweep that is not worth it. The second sweep makes the step second order, and fast motion takes
+// more of them, which keep its energy.
+constexpr double close = 1e-9;
+constexpr int most_moves = 4;
+
+// Give the linear velocity of a free flyer in the axes into which its own turn in a time.
+static void turn_axes(VecX& v, int dof, double time) {
+    const Eigen::Vector3d angle = -time * v.segment<3>(dof + 3);
+    const double size = angle.norm();
+    if (size == 0.0) return;
+    v.segment<3>(dof) = Eigen::AngleAxisd(size, angle / size) * v.segment<3>(dof).eval();
+}
+
+MeanVelocity::MeanVelocity(const Program& p) : turning_(VecX::Zero(p.mechanism.nv)) {
+    for (const Joint& joint : p.mechanism.joints)
+        if (joint.kind == JointKind::free_flyer) flyers_.push_back(joint.iv);
+}
+
+void MeanVelocity::begin(double h, const VecX& v0) {
+    h_ = h;
+    start_ = v0;
+    for (int dof : flyers_) turn_axes(start_, dof, 0.5 * h);
+    value_ = start_;
+    moves_ = 0;
+    measure();
+}
+
+void MeanVelocity::measure() {
+    for (int dof : flyers_)
+        turning_.segment<3>(dof) = value_.segment<3>(dof + 3).cross(value_.segment<3>(dof));
+    back_ = start_ - value_ + 0.5 * h_ * turning_;
+}
+
+void MeanVelocity::end(const VecX& a, VecX& v1) {
+    end_ = start_ + h_ * (a + turning_);
+    v1 = end_;
+    for (int dof : flyers_) turn_axes(v1, dof, 0.5 * h_);
+}
+
+bool MeanVelocity::move() {
+    next_ = 0.5 * (start_ + end_);
+    double change = 0.0;
+    for (int k = 0; k < next_.size(); ++k) change = std::max(change, std::abs(next_[k] - value_[k]));
+    if (moves_ == most_moves || h_ * change <= (moves_ == 0 ? configuration_rounding : close)) return false;
+    value_ = next_;
+    ++moves_;
+    measure();
+    return true;
+}
+
+void MeanVelocity::start_rates(const Program& p, Workspace& w, int i) const {
+    const Block& block = p.blocks[i];
+    const RowValues& values = w.now.values[i];
+    const bool differs = moves_ > 0 || !flyers_.empty();
+    if (differs) multiply(block, w.now.A, back_, w.scratch.r);
+    for (size_t k = 0; k < block.kept.size(); ++k) {
+        double& rate = w.scratch.r[block.row + k];
+        rate = values.rate[block.kept[k]] + (differs ? rate : 0.0);
+    }
+}
+
+double MeanVelocity::start_speed(const Program& p, Workspace& w, const Friction& friction) const {
+    const Block& block = p.blocks[friction.block];
+    start_rates(p, w, friction.block);
+    return w.scratch.r.segment(block.row, block.kept.size()).norm();
+}
+
+void MeanVelocity::meet_at_end(const Program& p, Workspace& w, VecX& b) const {
+    for (int i = 0; i < p.first_gap; ++i) {
+        const Block& block = p.blocks[i];
+        if (block.kept.empty()) continue;
+        start_rates(p, w, i);
+        for (size_t k = 0; k < block.kept.size(); ++k)
+            b[block.row + k] = 0.5 * b[block.row + k] - w.scratch.r[block.row + k] / h_;
+    }
+}
+
+}  // namespace pn

@@ -1,0 +1,48 @@
+// Mean velocity of a time step, at which its forces are taken.
+#pragma once
+
+#include "dynamics/workspace.hpp"
+
+namespace pn {
+
+// The mean of the velocities at the start and at the end of a step depends on the forces. Sweeps find it: the first one takes
+// the forces at the velocity of the start.
+//
+// The linear velocity v of a free flyer is given in axes that turn with it. Inside a step it is given in the axes at the
+// middle of the step. Its rate there is the acceleration plus w x v, so a body that rolls or flies keeps its speed while
+// it turns.
+class MeanVelocity {
+public:
+    explicit MeanVelocity(const Program& p);
+
+    // Begin a step of length h at the velocity v0.
+    void begin(double h, const VecX& v0);
+    // Compute the velocity at the step's end for the acceleration a.
+    void end(const VecX& a, VecX& v1);
+    // Move the mean to that of the step's start and end for another sweep. Return false if none is needed.
+    bool move();
+
+    const VecX& value() const { return value_; }  // velocity at which the forces are taken
+    const VecX& start() const { return start_; }  // velocity of the start, in the axes at the middle of the step
+    const VecX& finish() const { return end_; }   // velocity of the end, in these axes
+    // Compute the rates of a block's kept rows at the velocity of the start, and half of their change by turning axes.
+    // The rows are evaluated at the mean velocity. The rates are stored in w.scratch.r at the block's rows.
+    void start_rates(const Program& p, Workspace& w, int block) const;
+    // Slip speed of a friction element at the velocity of the start.
+    double start_speed(const Program& p, Workspace& w, const Friction& friction) const;
+    // Set the right-hand sides b that satisfy the constraints at the end of the step. The rows are evaluated at the
+    // middle of the step, so half of their own change is still to come.
+    void meet_at_end(const Program& p, Workspace& w, VecX& b) const;
+
+private:
+    void measure();
+
+    std::vector<int> flyers_;  // first dofs of the free flyers
+    double h_ = 0.0;
+    VecX value_, start_, end_, next_;
+    VecX turning_;  // rates of the linear velocities by turning axes
+    VecX back_;     // velocity of the start minus mean, plus h/2 of these rates
+    int moves_ = 0;  // sweeps after the first one
+};
+
+}  // namespace pn
