@@ -123,3 +123,11 @@ def test_contributing_has_five_commands() -> None:
     commands = [b for b in blocks() if b.document == "CONTRIBUTING.md" and b.language == "sh"]
     assert len(commands) == 5
     assert all(len(block.text.splitlines()) == 1 for block in commands)
+
+
+def test_the_readme_is_short_and_its_blocks_have_ten_lines() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 120
+    runnable = [block for block in RUNNABLE if block.document == "README.md"]
+    assert len(runnable) == 5
+    assert [block.line for block in runnable if len(block.text.splitlines()) > 10] == []
