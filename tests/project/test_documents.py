@@ -131,3 +131,11 @@ def test_the_readme_is_short_and_its_blocks_have_ten_lines() -> None:
     runnable = [block for block in RUNNABLE if block.document == "README.md"]
     assert len(runnable) == 5
     assert [block.line for block in runnable if len(block.text.splitlines()) > 10] == []
+
+
+def test_the_readme_and_the_first_page_have_the_same_answers() -> None:
+    pages = [(ROOT / page).read_text(encoding="utf-8") for page in ("README.md", "docs/index.md")]
+    readme, index = (
+        page.split("<!-- answers: begin -->")[1].split("<!-- answers: end -->")[0] for page in pages
+    )
+    assert readme.replace("](docs/", "](") == index
