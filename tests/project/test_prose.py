@@ -23,6 +23,7 @@ ROOMS = [
 ]
 ROOMS += [ROOT / name for name in ("benchmarks", "examples", "oracles", "tests")]
 ROOMS += [ROOT / "docs" / name for name in ("explanation", "reference")]
+ROOMS += [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "docs" / "index.md"]
 
 
 @pytest.mark.parametrize("room", ROOMS, ids=lambda room: str(room.relative_to(ROOT)))
