@@ -22,7 +22,7 @@ ROOMS = [
     if room.is_dir() and room.name not in {"_core", "__pycache__", "robots", *EXEMPT}
 ]
 ROOMS += [ROOT / name for name in ("benchmarks", "examples", "oracles", "tests")]
-ROOMS += [ROOT / "docs" / name for name in ("explanation", "reference")]
+ROOMS += [ROOT / "docs" / name for name in ("explanation", "how_to", "reference", "tutorials")]
 ROOMS += [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "docs" / "index.md"]
 
 
