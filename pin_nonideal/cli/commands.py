@@ -215,13 +215,16 @@ def _points(table: Table, path: Path) -> list[Table]:
     return sweep_samples(said.pop("n", 0), **said, **ranges)
 
 
-def completion(parser: argparse.ArgumentParser, shell: str, robots: Sequence[str]) -> str:
-    """A script that completes commands, options and names of robots in a shell.
+def completion(
+    parser: argparse.ArgumentParser, shell: str, robots: Sequence[str], examples: Sequence[str]
+) -> str:
+    """Return a script that completes commands, options and names of robots and examples in a shell.
 
     Args:
         parser: of the command line.
         shell: "bash", "zsh" or "fish".
-        robots: names that complete as well.
+        robots: names of the robots.
+        examples: names of the examples, arguments of the command `example`.
     """
     actions = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
     commands = {name: _options(sub) for name, sub in actions[0].choices.items()}
@@ -229,7 +232,8 @@ def completion(parser: argparse.ArgumentParser, shell: str, robots: Sequence[str
         lines = ["complete -c pin-nonideal -f -n __fish_use_subcommand -a '" + " ".join(commands) + "'"]
         for name, own in commands.items():
             seen = f"__fish_seen_subcommand_from {name}"
-            lines.append(f"complete -c pin-nonideal -n '{seen}' -a '{' '.join(robots)}'")
+            names = examples if name == "example" else robots
+            lines.append(f"complete -c pin-nonideal -n '{seen}' -a '{' '.join(names)}'")
             lines += [f"complete -c pin-nonideal -n '{seen}' -l {option[2:]}" for option in own]
         return "\n".join(lines)
     cases = "\n".join(f'    {name}) words="{" ".join(own)}" ;;' for name, own in commands.items())
@@ -239,7 +243,9 @@ def completion(parser: argparse.ArgumentParser, shell: str, robots: Sequence[str
     case "${{COMP_WORDS[1]}}" in
 {cases}
     esac
-    case "$word" in -*) ;; *) words="{" ".join(robots)}" ;; esac
+    local names="{" ".join(robots)}"
+    if [ "${{COMP_WORDS[1]}}" = example ]; then names="{" ".join(examples)}"; fi
+    case "$word" in -*) ;; *) words="$names" ;; esac
   fi
   COMPREPLY=( $(compgen -W "$words" -- "$word") $(compgen -f -- "$word") )
 }}

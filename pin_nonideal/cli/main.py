@@ -1,4 +1,4 @@
-"""The command `pin-nonideal`: run robots, resume, replay and sweep, describe them, find where they rest.
+"""The command `pin-nonideal`: run robots and examples, resume, replay, sweep, describe, find states of rest.
 
 Exit codes: 0 done; 2 an error of the package, told in one line on standard error; 130 interrupted by Ctrl-C.
 What a run had computed when it failed or was interrupted is written to the files asked for all the same.
@@ -30,6 +30,7 @@ from .commands import (
     rest_robot,
     sweep_file,
 )
+from .examples import examples, run_example
 from .run import parameters, resume_run, run_robot
 
 EXIT_ERROR = 2
@@ -143,7 +144,11 @@ def _parser() -> argparse.ArgumentParser:
     equilibrium.add_argument("--json", action="store_true", help="for programs")
     equilibrium.set_defaults(command=_equilibrium)
 
-    listing = commands.add_parser("list", help="robots of the package, by name")
+    example = commands.add_parser("example", help="run an example, which draws a figure")
+    example.add_argument("name", metavar="NAME", help="name of an example from `list`")
+    example.set_defaults(command=_example)
+
+    listing = commands.add_parser("list", help="names of the robots and of the examples")
     listing.set_defaults(command=_list)
 
     info = commands.add_parser("info", help="joints, loops, rows, rank, mobility and what is skipped")
@@ -218,16 +223,24 @@ def _equilibrium(options: argparse.Namespace) -> int:
 
 
 def _complete(options: argparse.Namespace) -> int:
-    print(completion(_parser(), options.shell, [name for name, _ in robots()]))
+    names = [[name for name, _ in each] for each in (robots(), examples())]
+    print(completion(_parser(), options.shell, *names))
+    return 0
+
+
+def _example(options: argparse.Namespace) -> int:
+    print(f"wrote {run_example(options.name)}")
     return 0
 
 
 def _list(options: argparse.Namespace) -> int:
     del options
-    listed = robots()
-    width = max((len(name) for name, _ in listed), default=0)
-    for name, description in listed:
-        print(f"{name:{width}}  {description}".rstrip())
+    groups = {"robots: pin-nonideal run NAME": robots(), "examples: pin-nonideal example NAME": examples()}
+    width = max((len(name) for listed in groups.values() for name, _ in listed), default=0)
+    for title, listed in groups.items():
+        print(title)
+        for name, description in listed:
+            print(f"  {name:{width}}  {description}".rstrip())
     return 0
 
 

@@ -153,13 +153,14 @@ def test_samples_from_a_file(tmp_path, capsys):
 def test_completion(shell, capsys):
     assert main(["completion", shell]) == 0
     script = capsys.readouterr().out
-    for word in ("equilibrium", "four_bar", "checkpoint", "output-dt"):
+    for word in ("equilibrium", "four_bar", "checkpoint", "output-dt", "example", "gripper"):
         assert word in script
     if shell == "bash" and shutil.which("bash"):
-        asked = (
-            'COMP_WORDS=(pin-nonideal equilibrium four); COMP_CWORD=2; _pin_nonideal; echo "${COMPREPLY[@]}"'
-        )
-        told = subprocess.run(
-            ["bash", "-c", f"{script}\n{asked}"], capture_output=True, text=True, check=True
-        )
-        assert "four_bar" in told.stdout.split()
+        for words, name in (("equilibrium four", "four_bar"), ("example grip", "gripper")):
+            asked = (
+                f'COMP_WORDS=(pin-nonideal {words}); COMP_CWORD=2; _pin_nonideal; echo "${{COMPREPLY[@]}}"'
+            )
+            told = subprocess.run(
+                ["bash", "-c", f"{script}\n{asked}"], capture_output=True, text=True, check=True
+            )
+            assert name in told.stdout.split()
