@@ -72,7 +72,7 @@ class Scene:
         actuation: None, constant torques, (nv,) or by joint name, a function (t, q, v) -> tau, or a
             description of `pin_nonideal.description.actuation`.
         q0: initial configuration; the neutral one when None. Anchors without a second frame hold their frame
-            at its placement in q0. Every configuration argument is an array (nq,), a table by joint name such
+            at its placement in q0. A configuration is an array (nq,), a table by joint name such
             as {"crank": 1.0, "base": {"xyz": [0, 0, 1], "rpy": [0, 0, 1.57]}}, or the name of a reference
             configuration. Joints missing in a table keep their neutral value, and in `solve`, `project` and
             `simulate` their value in the scene's initial state. Projection onto the constraints holds the
