@@ -1,4 +1,4 @@
-"""What the command line does beside `run`: resume, replay, sweep, equilibrium, info, completion."""
+"""Commands beside `run` and `resume`: replay, sweep, equilibrium, info and completion."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SWEEP_KEYS = ("robot", "parameters", "duration", "grid", "samples", "options", "
 
 
 def plain_value(text: str) -> Any:
-    """A whole number, a number, true or false; anything else is text.
+    """Return a word as an integer, a number or a truth value, else as text.
 
     Args:
         text: a word of the command line.
@@ -41,10 +41,10 @@ def plain_value(text: str) -> Any:
 
 
 def named_values(words: Sequence[str], option: str) -> dict[str, Any] | None:
-    """JOINT=NUMBER[,NUMBER...] and JOINT.PIECE=... as a table by joint name; None of no words.
+    """Return JOINT=NUMBER[,NUMBER...] and JOINT.PIECE=... as a table by joint name, or None without words.
 
     Args:
-        words: of the command line.
+        words: words of the command line.
         option: its name, for messages.
 
     Raises:
@@ -72,7 +72,7 @@ def named_values(words: Sequence[str], option: str) -> dict[str, Any] | None:
 
 
 def replay_file(options: argparse.Namespace) -> int:
-    """Writes the replay of a saved run.
+    """Write the replay of a saved run.
 
     Args:
         options: run and page, paths; number of the run where that is a sweep's folder; robot, whose scene it
@@ -105,11 +105,11 @@ def replay_file(options: argparse.Namespace) -> int:
 
 
 def describe_robot(scene: Scene, as_json: bool) -> int:
-    """Prints what a robot is made of.
+    """Print the parts of a robot: joints, constraints, laws, rows and mobility.
 
     Args:
-        scene: the robot's.
-        as_json: as JSON, for programs.
+        scene: scene of the robot.
+        as_json: whether to print JSON, for programs.
     """
     if not as_json:
         print(scene.report())
@@ -124,12 +124,12 @@ def describe_robot(scene: Scene, as_json: bool) -> int:
 
 
 def rest_robot(scene: Scene, q0: Any, as_json: bool) -> int:
-    """Prints a state of rest.
+    """Print a state of rest.
 
     Args:
-        scene: the robot's.
-        q0: where to start, or None.
-        as_json: as JSON, for programs.
+        scene: scene of the robot.
+        q0: start configuration by joint name, or None.
+        as_json: whether to print JSON, for programs.
     """
     found = equilibrium(scene, q0)
     places = compiled_scene(scene).joints
@@ -149,7 +149,7 @@ def rest_robot(scene: Scene, q0: Any, as_json: bool) -> int:
 
 
 def sweep_file(options: argparse.Namespace) -> int:
-    """Runs the sweep that a YAML file describes.
+    """Run the sweep of a YAML file.
 
     Args:
         options: file, a path; jobs, a number or None.
@@ -179,7 +179,7 @@ def sweep_file(options: argparse.Namespace) -> int:
 
 
 class _Robot:
-    """Loads a robot with the parameters of one run; of a module, so that other processes have it."""
+    """Loader of a robot with the parameters of one run; other processes can import it."""
 
     def __init__(self, robot: str, fixed: Mapping[str, Any]) -> None:
         self.robot, self.fixed = robot, dict(fixed)
@@ -204,7 +204,7 @@ def _sweep_table(path: Path) -> Table:
 
 
 def _points(table: Table, path: Path) -> list[Table]:
-    """Parameters of the runs: a grid, or samples {n: .., kind: .., ranges: {name: [least, largest]}}."""
+    """Return parameters of the runs: a grid, or samples {n: .., kind: .., ranges: {name: [low, high]}}."""
     if bool(table.get("grid")) == bool(table.get("samples")):
         raise LoadingError(f'"{path}" must have one of the keys grid and samples')
     if table.get("grid"):
@@ -221,7 +221,7 @@ def completion(
     """Return a script that completes commands, options and names of robots and examples in a shell.
 
     Args:
-        parser: of the command line.
+        parser: parser of the command line.
         shell: "bash", "zsh" or "fish".
         robots: names of the robots.
         examples: names of the examples, arguments of the command `example`.
@@ -258,7 +258,7 @@ def _options(parser: argparse.ArgumentParser) -> list[str]:
 
 
 def events_told(run: Trajectory) -> str:
-    """The events of a run, a line each.
+    """Return the events of a run, one line each.
 
     Args:
         run: the run.

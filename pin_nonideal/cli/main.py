@@ -1,7 +1,7 @@
 """The command `pin-nonideal`: run robots and examples, resume, replay, sweep, describe, find states of rest.
 
-Exit codes: 0 done; 2 an error of the package, told in one line on standard error; 130 interrupted by Ctrl-C.
-What a run had computed when it failed or was interrupted is written to the files asked for all the same.
+Exit codes: 0 done; 2 an error of the package, in one line on standard error; 130 interrupted by Ctrl-C.
+A run that fails or is interrupted writes its samples to the requested files.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _print_no_more() -> None:
-    """Leaves what could not be printed to nobody, so that the interpreter does not try again at its end."""
+    """Redirect standard output to the null device, so that the interpreter does not flush it at its end."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"%(prog)s {pn.__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    run = commands.add_parser("run", help="simulate a robot and write what is asked for")
+    run = commands.add_parser("run", help="simulate a robot and write files")
     _add_robot(run)
     run.add_argument(
         "--duration", type=float, default=5.0, metavar="S", help="length of time [s] (default: 5)"
@@ -105,21 +105,23 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--record",
         metavar="NAMES",
-        help="what to record, separated by commas: a, forces, laws, reactions, energy, power "
+        help="recorded quantities, separated by commas: a, forces, laws, reactions, energy, power "
         "(default: nothing; forces,energy with --html or --plot)",
     )
     run.add_argument(
         "--several",
         choices=SEVERAL,
-        help="where friction allows several motions: stop (default), or go on with the nearest",
+        help="if friction allows several motions: error (default), or continue with the nearest",
     )
-    run.add_argument("--checkpoint", type=Path, metavar="FILE", help="keep the run in a file, for `resume`")
+    run.add_argument(
+        "--checkpoint", type=Path, metavar="FILE", help="file with the state of the run, for `resume`"
+    )
     _add_start(run)
     run.add_argument("--v0", **_start("velocity"))
     _add_writers(run)
     run.set_defaults(command=run_robot)
 
-    resume = commands.add_parser("resume", help="go on with a run from its checkpoint")
+    resume = commands.add_parser("resume", help="continue a run from its checkpoint")
     resume.add_argument("file", type=Path, metavar="CHECKPOINT", help="file of `run --checkpoint`")
     _add_writers(resume)
     resume.set_defaults(command=resume_run)
@@ -129,43 +131,47 @@ def _parser() -> argparse.ArgumentParser:
         "run", type=Path, metavar="RUN.npz", help="file of `run --save`, or folder of `sweep`"
     )
     replay.add_argument("page", type=Path, nargs="?", metavar="PAGE.html", help="default: the run's name")
-    replay.add_argument("--run", type=int, dest="number", metavar="K", help="which run of a sweep")
-    replay.add_argument("--robot", metavar="NAME_OR_PATH", help="of a run that does not know it")
+    replay.add_argument("--run", type=int, dest="number", metavar="K", help="number of the run in a sweep")
+    replay.add_argument("--robot", metavar="NAME_OR_PATH", help="robot of a run whose file does not name it")
     replay.set_defaults(command=replay_file)
 
-    sweep = commands.add_parser("sweep", help="run a robot with many parameters, into a folder")
+    sweep = commands.add_parser(
+        "sweep", help="run a robot with many parameters and store the runs in a folder"
+    )
     sweep.add_argument("file", type=Path, metavar="SWEEP.yaml", help="robot, duration, grid or samples, ...")
     sweep.add_argument("--jobs", type=int, metavar="N", help="parallel jobs; -1 for all processors")
     sweep.set_defaults(command=sweep_file)
 
-    equilibrium = commands.add_parser("equilibrium", help="find where a robot rests")
+    equilibrium = commands.add_parser("equilibrium", help="find a state of rest of a robot")
     _add_robot(equilibrium)
     _add_start(equilibrium)
-    equilibrium.add_argument("--json", action="store_true", help="for programs")
+    equilibrium.add_argument("--json", action="store_true", help="print JSON, for programs")
     equilibrium.set_defaults(command=_equilibrium)
 
     example = commands.add_parser("example", help="run an example, which draws a figure")
     example.add_argument("name", metavar="NAME", help="name of an example from `list`")
     example.set_defaults(command=_example)
 
-    listing = commands.add_parser("list", help="names of the robots and of the examples")
+    listing = commands.add_parser("list", help="print the names of robots and examples")
     listing.set_defaults(command=_list)
 
-    info = commands.add_parser("info", help="joints, loops, rows, rank, mobility and what is skipped")
+    info = commands.add_parser(
+        "info", help="print joints, loops, rows, rank, mobility and skipped operations"
+    )
     _add_robot(info)
-    info.add_argument("--json", action="store_true", help="all tables, for programs")
+    info.add_argument("--json", action="store_true", help="print all tables as JSON, for programs")
     info.set_defaults(command=_info)
 
     picture = commands.add_parser("render", help="picture or video of a run: .png, .gif, .webm, .mp4")
     picture.add_argument("run", metavar="RUN", help="file that `run --save` wrote (.npz)")
     picture.add_argument("out", type=Path, metavar="OUT", help="file to write")
     picture.add_argument(
-        "--robot", metavar="NAME_OR_PATH", help="robot of the run (default: the name that the run bears)"
+        "--robot", metavar="NAME_OR_PATH", help="robot of the run (default: the name in the file)"
     )
     picture.add_argument("--size", default="960x540", metavar="WxH", help="pixels (default: 960x540)")
     picture.add_argument("--seconds", type=float, default=6.0, help="length of a video [s] (default: 6)")
     picture.add_argument("--fps", type=float, default=25.0, help="pictures a second (default: 25)")
-    picture.add_argument("--time", type=float, metavar="S", help="of a single picture [s]")
+    picture.add_argument("--time", type=float, metavar="S", help="time of a still picture [s]")
     picture.add_argument("--set", action="append", default=[], dest="settings", metavar="KEY=VALUE")
     picture.set_defaults(command=_render)
 
@@ -174,7 +180,7 @@ def _parser() -> argparse.ArgumentParser:
     complete.set_defaults(command=_complete)
 
     bench = commands.add_parser(
-        "bench", help="run the benchmarks of a checkout; further words go to them", add_help=False
+        "bench", help="run the benchmarks of a checkout, with their own arguments", add_help=False
     )
     bench.set_defaults(command=_bench)
     return parser
@@ -195,7 +201,7 @@ def _add_robot(parser: argparse.ArgumentParser) -> None:
 
 
 def _start(what: str) -> Table:
-    """An option that gives a state by joint name."""
+    """Return the settings of an option for a state by joint name."""
     return {
         "action": "append",
         "default": [],
@@ -214,7 +220,7 @@ def _add_writers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--plot", type=Path, metavar="FILE", help="write a figure (.png, .pdf, .svg)")
     parser.add_argument("--save", type=Path, metavar="FILE", help="write the arrays (.npz)")
     parser.add_argument("--events", action="store_true", help="print the events, a line each")
-    parser.add_argument("--quiet", action="store_true", help="print nothing but what was asked for")
+    parser.add_argument("--quiet", action="store_true", help="print only requested output")
 
 
 def _equilibrium(options: argparse.Namespace) -> int:
