@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pin_nonideal.compilation.parameter_overrides import RunNumbers, run_numbers
 from pin_nonideal.core_loader import core
-from pin_nonideal.errors import InputError, PinNonidealError, RunError, RunInterrupted
+from pin_nonideal.errors import InputError, PinNonidealError, RunError, RunInterrupted, short_repr
 from pin_nonideal.scene.scene import Scene, compiled_scene, scene_states
 from pin_nonideal.states.joint_layout import require_resolved
 from pin_nonideal.types import Array
@@ -117,7 +117,7 @@ def rollout(
 def _starts(scene: Scene, q: Any, v: Any, parameters: Any) -> tuple[Array, Array]:
     """Return the initial states of all runs; a missing state is the scene's initial state."""
     if parameters is not None and not isinstance(parameters, Mapping):
-        raise InputError(f"rollout: parameters must be values by name; got {parameters!r}")
+        raise InputError(f"rollout: parameters must be values by name; got {short_repr(parameters)}")
     starts_q = None if q is None else array("rollout: q", q, (None, scene.model.nq), copy=False)
     starts_v = None if v is None else array("rollout: v", v, (None, scene.model.nv), copy=False)
     given: list[Any] = [each for each in (starts_q, starts_v) if each is not None]

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from pin_nonideal.atomic_files import file_path
-from pin_nonideal.errors import InputError, LoadingError, OutputError, RunError
+from pin_nonideal.errors import InputError, LoadingError, OutputError, RunError, short_repr
 from pin_nonideal.scene.scene import Scene
-from pin_nonideal.trajectory.file import read_from
+from pin_nonideal.trajectory.file import read_from, reason_of
 from pin_nonideal.trajectory.trajectory import Trajectory, restored
 from pin_nonideal.types import Table
 
@@ -48,16 +48,24 @@ class Sweep(Sequence[Trajectory]):
             with (self.folder / "index.jsonl").open(encoding="utf-8") as lines:
                 self._header = json.loads(next(lines))
                 if self._header["format"] != FORMAT:
-                    raise ValueError(f"format {self._header['format']} instead of {FORMAT}")
+                    raise LoadingError(
+                        f'"{self.folder}" holds no sweep of this version: its format is '
+                        f"{short_repr(self._header['format'])} instead of {FORMAT}; finish it with the "
+                        "version that began it"
+                    )
                 self.records: list[Table | None] = [None] * int(self._header["runs"])
                 self._places: list[tuple[str, int, int] | None] = [None] * len(self.records)
                 for line in lines:
                     if line.endswith("\n"):  # not cut off by a kill
                         self._take(json.loads(line))
             self._unlisted = list(self._found())
+        except LoadingError:
+            raise
         except (OSError, ValueError, LookupError, TypeError, StopIteration) as error:
+            absent = isinstance(error, FileNotFoundError)
+            reason = "there is no index.jsonl in it" if absent else reason_of(error)
             raise LoadingError(
-                f'"{self.folder}" holds no sweep: {type(error).__name__}: {error}; it must be a folder that '
+                f'"{self.folder}" holds no sweep: {reason}; it must be a folder that '
                 "sweep(..., store=folder) made"
             ) from error
 
@@ -162,6 +170,8 @@ def opened_store(folder: Path, digest: str, runs: int) -> list[int]:
         OutputError: it cannot be written.
     """
     index = folder / "index.jsonl"
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f'cannot write the sweep to "{folder}": it is a file; name a folder')
     if index.exists():
         held = Sweep(folder)
         if held._header.get("digest") != digest or held._header.get("format") != FORMAT:

@@ -13,23 +13,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pin_nonideal.errors import InputError
+from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.lazy_fields import MadeLater
 from pin_nonideal.scene.scene import Scene
 from pin_nonideal.states.joint_layout import JointPlace
 from pin_nonideal.types import Array, Table
 from pin_nonideal.validation import array
+from pin_nonideal.validation import count as whole_number
 
 from .by_name import force_of, frame_record, joint_record, law_record, reaction_of
 from .columns import columns
 from .dense_output import DenseOutput
+from .groups import RECORD_OF, GroupField
 from .records import Event, FrameRecord, JointRecord, LawRecord, Sample, Stats, UserEventRecord
 from .summary import summary
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(MadeLater):
-    """Samples of a run; what was not recorded is None.
+    """Samples of a run; what was not recorded is None or an empty table.
 
     Attributes:
         t: times [s], (nt,).
@@ -238,8 +240,12 @@ class Trajectory(MadeLater):
         """The first samples of a run.
 
         Args:
-            count: how many.
+            count: how many, at most all.
+
+        Raises:
+            InputError: `count` is no number of samples.
         """
+        count = whole_number("first: count", count, most=len(self.t))
         last = float(self.t[count - 1]) if count else -np.inf
         events = [e for e in self.events if e.time <= last]
         return dataclasses.replace(self.samples(slice(count)), events=events)
@@ -249,7 +255,17 @@ class Trajectory(MadeLater):
 
         Args:
             chosen: mask (nt,), indices or slice of samples.
+
+        Raises:
+            InputError: `chosen` is none of these, or an index lies outside.
         """
+        try:
+            np.arange(len(self.t))[chosen]
+        except (IndexError, TypeError, ValueError):
+            raise InputError(
+                f"samples: chosen must be a mask, indices or a slice of {len(self.t)} samples"
+                f"; got {short_repr(chosen)}"
+            ) from None
 
         def cut(value: Any, key: str) -> Any:
             if isinstance(value, dict) and key != "rows":
@@ -281,7 +297,7 @@ class Trajectory(MadeLater):
             raise InputError("at(t) needs the scene of the run, which this one has lost")
         times = array("at: t", t, (None,) if np.ndim(t) else ())
         run = Trajectory(**self.dense.at(self.scene, times.reshape(-1)))
-        if len(run) and run.energy is not None and self.energy is not None:
+        if len(run) and run.energy and self.energy:
             # The ledger balances from the start of the run on.
             run.energy["balance"] += run.energy["total"][0] - self.energy["total"][0]
         return run if np.ndim(t) else Sample(**run.samples(0).__dict__)
@@ -333,6 +349,9 @@ for _field in dataclasses.fields(Trajectory):
     elif _field.default_factory is not dataclasses.MISSING and _field.name != "stats":
         _MAKERS[_field.name] = _field.default_factory
 
+for _name in RECORD_OF:
+    setattr(Trajectory, _name, GroupField(_name))
+
 
 def with_defaults(fields: Table) -> Table:
     """All fields of a Trajectory but its counters: those given, and of all others the defaults."""
@@ -353,12 +372,16 @@ def restored(fields: Table, origin: Any, path: Any, scene: Scene | str | None) -
         InputError: the scene is not the one of the run.
         LoadingError: the scene cannot be loaded again.
     """
-    from .file import fits, scene_again
+    from .file import described, fits, scene_again
 
     run = Trajectory(**fields)
     if scene == "source":
         return dataclasses.replace(run, scene=scene_again(origin, run.joints, run.rows, run.notes))
-    if scene is not None and not (isinstance(scene, Scene) and fits(scene, run.joints, run.rows)):
-        name = scene.name if isinstance(scene, Scene) else scene
-        raise InputError(f'Trajectory.load: the scene "{name}" is not the one of the run in "{path}"')
+    if not (scene is None or isinstance(scene, Scene)):
+        raise InputError(f'Trajectory.load: scene must be a Scene, "source" or None; got {short_repr(scene)}')
+    if scene is not None and not fits(scene, run.joints, run.rows):
+        raise InputError(
+            f'Trajectory.load: the scene "{scene.name}" is not the one of the run in "{path}", which has '
+            f"{described(run.joints, run.rows)}; pass the scene that was simulated, or scene=None"
+        )
     return dataclasses.replace(run, scene=scene)

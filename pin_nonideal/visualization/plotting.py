@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pin_nonideal.atomic_files import file_path, whole_file
-from pin_nonideal.errors import InputError, OutputError
+from pin_nonideal.atomic_files import check_writable, file_path, whole_file
+from pin_nonideal.errors import InputError, OutputError, short_repr
 from pin_nonideal.visualization.page.figure_styles import Style
 from pin_nonideal.visualization.page.mode_timeline import bands_of, opens
 from pin_nonideal.visualization.page.signals import Plot, plots_of, several, wanted
@@ -70,10 +70,16 @@ def plot(
     """
     import matplotlib as mpl
 
+    target = None if path is None else file_path("plot: path", path)
+    if target is not None:
+        picture_format(target)
+        check_writable(target, "the figure")
     runs, labels = several(run, names, "a figure")
     look = Style(columns, style)
     if title is not None and not isinstance(title, str):
-        raise InputError(f"plot: title must be a string or None; got {title!r}")
+        raise InputError(f"plot: title must be a string or None; got {short_repr(title)}")
+    if ax is not None and not (hasattr(ax, "plot") and hasattr(ax, "figure")):
+        raise InputError(f"plot: ax must be axes of matplotlib; got {short_repr(ax)}")
     drawn = _asked(runs, usual(runs) if what is None else what)
     if ax is not None and len(drawn) != 1:
         raise InputError(f"plot: ax takes one plot; what asks for {len(drawn)}")
@@ -85,8 +91,8 @@ def plot(
             ax.set_title(heading)
         elif heading:
             figure.suptitle(heading, fontsize=12, fontweight="bold", x=0.01, ha="left")
-        if path is not None:
-            _save(figure, file_path("plot: path", path))
+        if target is not None:
+            _save(figure, target)
     return figure
 
 
