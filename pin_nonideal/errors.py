@@ -62,6 +62,8 @@ class JointOrderWarning(UserWarning):
 class RunError(PinNonidealError, RuntimeError):
     """A run stopped early.
 
+    The page "Why did my run stop" (docs/how_to/stopped_runs.md) treats each subclass.
+
     Attributes:
         trajectory: samples before the failure (`pin_nonideal.Trajectory`), or None outside of a run.
         time: time of the failure [s], or None.

@@ -70,11 +70,11 @@ def plot(
     """
     import matplotlib as mpl
 
+    runs, labels = several(run, names, "a figure")
     target = None if path is None else file_path("plot: path", path)
     if target is not None:
         picture_format(target)
         check_writable(target, "the figure")
-    runs, labels = several(run, names, "a figure")
     look = Style(columns, style)
     if title is not None and not isinstance(title, str):
         raise InputError(f"plot: title must be a string or None; got {short_repr(title)}")
