@@ -15,6 +15,7 @@ import numpy as np
 
 from pin_nonideal.atomic_files import file_path
 from pin_nonideal.errors import InputError, LoadingError, OutputError, RunError, short_repr
+from pin_nonideal.html_tables import table
 from pin_nonideal.scene.scene import Scene
 from pin_nonideal.trajectory.file import read_from, reason_of
 from pin_nonideal.trajectory.trajectory import Trajectory, restored
@@ -23,6 +24,7 @@ from pin_nonideal.types import Table
 from .pack import SUFFIX, archive_of, runs_in
 
 FORMAT = 2
+ROWS_SHOWN = 20  # runs in the table of a notebook
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
 
@@ -125,6 +127,21 @@ class Sweep(Sequence[Trajectory]):
         done = len(self) - len(self.missing)
         return f"sweep in {self.folder}: {done} of {len(self)} runs, {len(self.failures)} of them failed"
 
+    def _repr_html_(self) -> str:
+        numbers = ("t_end", "steps", "violation", "wall_s")
+        rows: list[list[object]] = []
+        for k, record in enumerate(self.records[:ROWS_SHOWN]):
+            if record is None:
+                rows.append([k, "", "missing"])
+                continue
+            said = ", ".join(f"{name}={short_repr(x)}" for name, x in record["parameters"].items())
+            shown = [f"{record[key]:.6g}" if record.get(key) is not None else "" for key in numbers]
+            rows.append([k, said, record["error"] or "done", *shown])
+        if len(self) > ROWS_SHOWN:
+            rows.append(["...", f"{len(self) - ROWS_SHOWN} more", ""])
+        title = str(self)
+        return table(title[0].upper() + title[1:], rows, ("run", "parameters", "outcome", *numbers))
+
     @property
     def missing(self) -> list[int]:
         """Runs that are not done."""
@@ -144,7 +161,7 @@ class Sweep(Sequence[Trajectory]):
         """
         done = [(k, r) for k, r in enumerate(self.records) if r is not None]
         names = sorted({key for _, r in done for key, x in r.items() if isinstance(x, (int, float))})
-        table: Table = {}
+        found: Table = {}
         for name in names:
             runs, values = zip(
                 *((k, r[name]) for k, r in done if isinstance(r.get(name), (int, float))), strict=True
@@ -152,9 +169,9 @@ class Sweep(Sequence[Trajectory]):
             x = np.array(values, dtype=float)
             levels = {level: float(np.quantile(x, level)) for level in QUANTILES}
             worst = int(runs[int(np.argmax(x))])
-            table[name] = {"mean": float(x.mean()), "std": float(x.std()), "count": len(x)}
-            table[name] |= {"quantiles": levels, "worst": worst}
-        return table
+            found[name] = {"mean": float(x.mean()), "std": float(x.std()), "count": len(x)}
+            found[name] |= {"quantiles": levels, "worst": worst}
+        return found
 
 
 def opened_store(folder: Path, digest: str, runs: int) -> list[int]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pin_nonideal.errors import InputError, short_repr
-from pin_nonideal.lazy_fields import MadeLater
+from pin_nonideal.html_tables import table
 from pin_nonideal.scene.scene import Scene
 from pin_nonideal.states.joint_layout import JointPlace
 from pin_nonideal.types import Array, Table
@@ -22,11 +23,15 @@ from pin_nonideal.validation import array
 from pin_nonideal.validation import count as whole_number
 
 from .by_name import force_of, frame_record, joint_record, law_record, reaction_of
-from .columns import columns
+from .columns import columns, units
 from .dense_output import DenseOutput
 from .groups import RECORD_OF, GroupField
+from .lazy_fields import MadeLater
 from .records import Event, FrameRecord, JointRecord, LawRecord, Sample, Stats, UserEventRecord
 from .summary import summary
+
+# A line of the summary: its heading, with a unit or not, and the rest from ": " or the first digit on.
+SUMMARY_LINE = re.compile(r"([a-z]+(?: [a-z]+)*(?: \[J\])?)(?:: +| +(?=\d))(.*)")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -139,11 +144,18 @@ class Trajectory(MadeLater):
     def __str__(self) -> str:
         return summary(self)
 
+    def _repr_html_(self) -> str:
+        first, *lines = summary(self).split("\n")
+        parts = [SUMMARY_LINE.fullmatch(line.strip()) for line in lines]
+        rows = [found.groups() if found else (line,) for found, line in zip(parts, lines, strict=True)]
+        return table(f"Trajectory {first}", rows)
+
     def columns(self) -> dict[str, Array]:
         """All that was recorded as named columns, (nt,) each: "t", "crank.q", "crank.v", "loop.lam.0", ...
 
         The names are those of joints, constraints, laws and ledgers, then of the field, then the number
-        within it; what belongs to no joint goes by its field alone.
+        within it; what belongs to no joint goes by its field alone.  A space in a name becomes "_"; two names
+        that become equal are told apart by "_2", "_3", ...
         """
         return columns(self)
 
@@ -224,6 +236,10 @@ class Trajectory(MadeLater):
     def to_dataframe(self) -> Any:
         """The `columns` as a pandas.DataFrame, one row a sample, with the time as its index.
 
+        Returns:
+            The frame; `frame.attrs["units"]` has the unit of each column and of the index, such as "rad/s".
+            A unit is "1" for numbers without one, as in quaternions, and empty if the run does not know it.
+
         Raises:
             InputError: pandas is not installed.
         """
@@ -234,7 +250,9 @@ class Trajectory(MadeLater):
                 f"to_dataframe needs pandas, which cannot be imported ({error}); pip install pandas, or take "
                 "run.columns()"
             ) from None
-        return pandas.DataFrame(self.columns()).set_index("t")
+        frame = pandas.DataFrame(self.columns()).set_index("t")
+        frame.attrs["units"] = units(self)
+        return frame
 
     def first(self, count: int) -> Trajectory:
         """The first samples of a run.

@@ -60,7 +60,7 @@ def plot(
         names: names of several runs; their numbers when None.
 
     Returns:
-        The matplotlib figure, to be changed, shown or saved.
+        The matplotlib figure, to be changed, shown or saved.  A notebook shows it as the result of a cell.
 
     Raises:
         InputError: something asked for was not recorded, `what` is empty or no list of plots, `ax` is given
@@ -143,13 +143,14 @@ def _figure(
     runs: Sequence[Trajectory], labels: Sequence[str], drawn: list[Drawn], look: Style, ax: Axes | None
 ) -> Figure:
     """All plots, those over time with one axis of time."""
-    from matplotlib.figure import Figure  # no pyplot: a program that draws to files needs no window system
+    # No pyplot: a program that draws to files needs no window system.
+    from .notebook_figure import NotebookFigure
 
     if ax is not None:
         figure, axes = ax.figure, [ax]
     else:
         heights = [_height(kind, parts, look) for kind, parts in drawn]
-        figure = Figure(figsize=(look.width, sum(heights) + 0.7), layout="constrained")
+        figure = NotebookFigure(figsize=(look.width, sum(heights) + 0.7), layout="constrained")
         axes = list(figure.subplots(len(drawn), 1, squeeze=False, height_ratios=heights)[:, 0])
     timed = [place for place, (kind, _) in zip(axes, drawn, strict=True) if kind != "relation"]
     for place in timed[1:]:
