@@ -80,8 +80,8 @@ def _all(run: Any) -> Iterator[tuple[str, Array, str]]:
     for name, (first, end, _) in run.rows.items():
         for field in ("lam", "lam_ideal"):
             multipliers = getattr(run, field)
-            part = None if multipliers is None else multipliers[:, first:end]
-            yield from _numbered(f"{name}.{field}", part, [EITHER_FORCE] * (end - first))
+            own = None if multipliers is None else multipliers[:, first:end]
+            yield from _numbered(f"{name}.{field}", own, [EITHER_FORCE] * (end - first))
     for k, name in enumerate(run.element_names):
         for field, of_all, unit in (("mode", run.modes, "1"), ("limit", run.limits, EITHER_FORCE)):
             if of_all is not None:
