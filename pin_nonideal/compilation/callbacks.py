@@ -139,7 +139,7 @@ def time_function(function: Any, who: str) -> Any:
     if isinstance(function, Polynomial):
         return ("polynomial", list(function.coefficients))
     if isinstance(function, Sinusoid):
-        return ("sinusoid", [function.amplitude, function.frequency, function.phase, function.offset])
+        return ("sinusoid", [function.amplitude, function.omega, function.phase, function.offset])
     if isinstance(function, Spline):
         return ("spline", function.breaks.tolist(), function.coefficients.ravel().tolist())
     jet = checked(function, f"{who}: function of time", (), (), ())

@@ -98,7 +98,7 @@ GAP = {
 BOX = {"size": [[0.01, 0.02, 0.03]], "frame2": ["universe"]}
 CAN = {"length": [0.01], "below": [0.01], "frame2": ["universe"], "xyz": [(0.0, 0.0, -9.0)]}
 GOOD_TIMES = {
-    "value": [0.1], "coefficients": [[1.0, 2.0]], "amplitude": [0.1], "frequency": [2.0],
+    "value": [0.1], "coefficients": [[1.0, 2.0]], "amplitude": [0.1], "omega": [2.0],
     "times": [[0.0, 1.0, 2.0]], "values": [[0.0, 1.0, 0.5]],
 }  # fmt: skip
 

@@ -137,7 +137,7 @@ def build(kind: type, values: Any, where: str) -> Any:
 
 
 def time_function(table: Table, where: str) -> Any:
-    """`{sinusoid: {amplitude: 1, frequency: 2}}` and its like.
+    """`{sinusoid: {amplitude: 1, omega: 2}}` and its like.
 
     Raises:
         LoadingError: not one known function with its arguments.
