@@ -37,6 +37,8 @@ from .store import Sweep, digest_of, failed_run, note, opened_store, record_of
 MOST_JOBS = 100_000  # also of negative numbers: -n leaves n - 1 processors free
 # Runs that a worker takes at once: enough that handing them over costs little, few enough to share evenly.
 MOST_AT_ONCE, SHARES = 200, 16
+# Arguments of `simulate` that are no options of a sweep.
+UNLIKE = ("scene", "duration", "progress", "checkpoint_interval")
 
 
 def sweep(
@@ -48,7 +50,7 @@ def sweep(
     store: str | os.PathLike[str] | None = None,
     failures: str = "raise",
     measure: Callable[[Trajectory], Mapping[str, float]] | None = None,
-    show: bool | None = None,
+    progress: bool | None = None,
     **options: Any,
 ) -> list[Any] | Sweep:
     """Simulates `make(**p)` for each p of `parameters`, in parallel.
@@ -69,7 +71,7 @@ def sweep(
         failures: "raise" stops at the first run that fails; "keep" goes on, and the error stands in its place
             (its `trajectory` has the samples before), in a store beside those samples.
         measure: run -> numbers by name, taken where the run is; they go into the index of a store.
-        show: progress bar on standard error; None shows it on a terminal only.
+        progress: progress bar on standard error; None shows it on a terminal only.
         options: passed to `simulate`.
 
     Returns:
@@ -99,16 +101,16 @@ def sweep(
         function("sweep: measure", measure, "(run) -> numbers by name")
         if store is None:
             raise InputError("sweep: measure writes into the index of a store; name one, or measure the runs")
-    choice("sweep: show", show, (True, False, None))
+    choice("sweep: progress", progress, (True, False, None))
     _check_options(length, options)
-    options.setdefault("progress", False)
+    options["progress"] = False  # of each run
     folder = None if store is None else file_path("sweep: store", store)
     numbers = list(range(len(table)))
     if folder is not None:
         numbers = opened_store(folder, digest_of(make, table, length, options), len(table))
     work = _Work(make, length, options, folder, keep, measure)
     found: list[Any] = [None] * (len(table) if folder is None else 0)
-    for part in _carried(work, [(k, dict(table[k])) for k in numbers], jobs, show):
+    for part in _carried(work, [(k, dict(table[k])) for k in numbers], jobs, progress):
         for k, result in part:
             if isinstance(result, PinNonidealError) and not (keep and folder is None):
                 raise result
@@ -125,7 +127,7 @@ def _check_options(duration: float, options: Table) -> None:
     Raises:
         InputError: `simulate` has no such option, or refuses its value.
     """
-    known = [name for name in inspect.signature(simulate).parameters if name not in ("scene", "duration")]
+    known = [name for name in inspect.signature(simulate).parameters if name not in UNLIKE]
     for name in options:
         if name not in known:
             raise InputError(f'sweep: `simulate` has no option "{name}"{nearest(name, known)}')
@@ -133,7 +135,7 @@ def _check_options(duration: float, options: Table) -> None:
 
 
 def _carried(
-    work: _Work, runs: list[Any], jobs: int | None, show: bool | None
+    work: _Work, runs: list[Any], jobs: int | None, progress: bool | None
 ) -> Iterator[list[tuple[int, Any]]]:
     """Results by parts as they come in, from joblib's workers."""
     from joblib import Parallel, delayed
@@ -147,7 +149,7 @@ def _carried(
     parts = [runs[i : i + size] for i in range(0, len(runs), size)]
     lazy = getattr(backend, "supports_return_generator", False)
     parallel = Parallel(n_jobs=jobs, batch_size=1, return_as="generator_unordered" if lazy else "list")
-    shown = sys.stderr.isatty() if show is None else show
+    shown = sys.stderr.isatty() if progress is None else progress
     try:
         with tqdm(total=len(runs), unit="run", disable=not shown) as bar:
             for part in parallel(delayed(work)(each) for each in parts):

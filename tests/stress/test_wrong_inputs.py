@@ -168,7 +168,7 @@ SWEEPS = {
     "unknown option": ("rtoll", lambda g: pn.sweep(never_made, [{}], 1.0, jobs=1, rtoll=1e-6, store="new")),
     "option out of its bounds": ("rtol", lambda g: pn.sweep(never_made, [{}], 1.0, rtol=3.0, store="new")),
     "record": ("record", lambda g: pn.sweep(never_made, [{}], 1.0, record="enrgy", store="new")),
-    "show": ("show", lambda g: pn.sweep(never_made, [{}], 1.0, show="bar", store="new")),
+    "progress": ("progress", lambda g: pn.sweep(never_made, [{}], 1.0, progress="bar", store="new")),
     "measure": ("measure", lambda g: pn.sweep(never_made, [{}], 1.0, measure=3, store="new")),
     "store that is a file": ("text.npz", lambda g: pn.sweep(never_made, [{}], 1.0, store="text.npz")),
     "store of other files": ("store", lambda g: pn.sweep(never_made, [{}], 1.0, store="full")),
