@@ -157,7 +157,8 @@ def _parser() -> argparse.ArgumentParser:
     picture.add_argument(
         "--robot", metavar="NAME_OR_PATH", help="robot of the run (default: the name that the run bears)"
     )
-    picture.add_argument("--size", default="960x540", metavar="WxH", help="pixels (default: 960x540)")
+    picture.add_argument("--width", type=int, default=960, help="of the picture [pixels] (default: 960)")
+    picture.add_argument("--height", type=int, default=540, help="of the picture [pixels] (default: 540)")
     picture.add_argument("--seconds", type=float, default=6.0, help="length of a video [s] (default: 6)")
     picture.add_argument("--fps", type=float, default=25.0, help="pictures a second (default: 25)")
     picture.add_argument("--time", type=float, metavar="S", help="of a single picture [s]")
@@ -240,12 +241,8 @@ def _render(options: argparse.Namespace) -> int:
     if run.scene is None:
         scene = pn.load(options.robot or run.name, **parameters(options.settings))
         run = replace(run, scene=scene)
-    try:
-        width, height = (int(x) for x in options.size.split("x"))
-    except ValueError:
-        raise InputError(f'--size needs WxH, for example 960x540; got "{options.size}"') from None
-    settings = {"width": width, "height": height, "seconds": options.seconds, "fps": options.fps}
-    print(f"wrote {render(run, options.out, **settings, time=options.time)}")
+    keys = ("width", "height", "seconds", "fps", "time")
+    print(f"wrote {render(run, options.out, **{key: getattr(options, key) for key in keys})}")
     return 0
 
 

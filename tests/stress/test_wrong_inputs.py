@@ -281,7 +281,7 @@ COMMANDS = {
     "replay text": ("text.npz", ["replay", "text.npz"]),
     "replay into no folder": ("none/a.html", ["replay", "run.npz", "none/a.html"]),
     "replay --run": ("--run", ["replay", "run.npz", "--run", "3"]),
-    "render --size": ("--size", ["render", "run.npz", "a.png", "--size", "large"]),
+    "render --width": ("width", ["render", "run.npz", "a.png", "--width", "0"]),
     "render into no folder": ("none/a.png", ["render", "run.npz", "none/a.png"]),
     "render --time": ("time", ["render", "run.npz", "a.png", "--time", "99"]),
     "sweep text": ("text.npz", ["sweep", "text.npz"]),
