@@ -126,15 +126,15 @@ def describe_robot(scene: Scene, as_json: bool) -> int:
     return 0
 
 
-def rest_robot(scene: Scene, q0: Any, as_json: bool) -> int:
+def rest_robot(scene: Scene, q: Any, as_json: bool) -> int:
     """Prints a state of rest.
 
     Args:
         scene: the robot's.
-        q0: where to start, or None.
+        q: where to start, or None.
         as_json: as JSON, for programs.
     """
-    found = equilibrium(scene, q0)
+    found = equilibrium(scene, q)
     places = compiled_scene(scene).joints
     values = {p.name: found.q[p.q_first : p.q_first + p.nq].tolist() for p in places}
     if as_json:

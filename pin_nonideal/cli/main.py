@@ -114,7 +114,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.add_argument("--checkpoint", type=Path, metavar="FILE", help="keep the run in a file, for `resume`")
     _add_start(run)
-    run.add_argument("--v0", **_start("velocity"))
+    run.add_argument("--v", **_start("velocity"))
     _add_writers(run)
     run.set_defaults(command=run_robot)
 
@@ -201,7 +201,7 @@ def _start(what: str) -> Table:
 
 
 def _add_start(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--q0", **_start("configuration"))
+    parser.add_argument("--q", **_start("configuration"))
 
 
 def _add_writers(parser: argparse.ArgumentParser) -> None:
@@ -215,7 +215,7 @@ def _add_writers(parser: argparse.ArgumentParser) -> None:
 
 def _equilibrium(options: argparse.Namespace) -> int:
     scene = pn.load(options.robot, **parameters(options.settings))
-    return rest_robot(scene, named_values(options.q0, "--q0"), options.json)
+    return rest_robot(scene, named_values(options.q, "--q"), options.json)
 
 
 def _complete(options: argparse.Namespace) -> int:

@@ -300,8 +300,8 @@ STATICS = [pn.equilibrium, pn.inverse_dynamics, pn.rest]
 def test_statics(function, scene, examples):
     q, v = scene.initial_state()
     good = {
-        "scene": [scene], "q": [q, None], "v": [v], "a": [scene.acceleration(q, v)],
-        "q0": [q, {"crank_joint": 1.0}], "tau": [np.ones(3), {"crank_joint": 0.1}], "t": [0.0], "starts": [1],
+        "scene": [scene], "q": [q, None, {"crank_joint": 1.0}], "v": [v], "a": [scene.acceleration(q, v)],
+        "tau": [np.ones(3), {"crank_joint": 0.1}], "t": [0.0], "starts": [1],
         "actuated": [["crank_joint"]], "bounds": [(-10.0, 10.0)],
     }  # fmt: skip
     if function is pn.inverse_dynamics:

@@ -271,7 +271,7 @@ COMMANDS = {
     "run --rtol": ("rtol", ["run", "four_bar", "--rtol", "7"]),
     "run --record": ("record", ["run", "four_bar", "--record", "enrgy"]),
     "run --set": ("--set", ["run", "four_bar", "--set", "N"]),
-    "run --q0": ("--q0", ["run", "four_bar", "--q0", "elbow"]),
+    "run --q": ("--q", ["run", "four_bar", "--q", "elbow"]),
     "run --save": ("none/a.npz", ["run", "four_bar", "--save", "none/a.npz"]),
     "run --html": ("folder", ["run", "four_bar", "--html", "folder"]),
     "run --plot": ("a.xyz", ["run", "four_bar", "--plot", "a.xyz"]),
@@ -286,7 +286,7 @@ COMMANDS = {
     "render --time": ("time", ["render", "run.npz", "a.png", "--time", "99"]),
     "sweep text": ("text.npz", ["sweep", "text.npz"]),
     "sweep option": ("rtoll", ["sweep", "sweep.yaml"]),
-    "equilibrium --q0": ("elbow", ["equilibrium", "four_bar", "--q0", "elbow=1"]),
+    "equilibrium --q": ("elbow", ["equilibrium", "four_bar", "--q", "elbow=1"]),
 }  # fmt: skip
 
 
