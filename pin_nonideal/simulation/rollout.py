@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -22,6 +23,8 @@ from .options import SCIPY, RunOptions, run_options
 from .results import finish
 from .rollout_arrays import RunArrays, run_arrays
 
+MOST_JOBS = 100_000  # of negative numbers: -n leaves n - 1 processors free
+
 
 def rollout(
     scene: Scene,
@@ -39,7 +42,7 @@ def rollout(
     max_steps: float | None = None,
     record: str | Sequence[str] = (),
     several: str = "error",
-    threads: int = 1,
+    jobs: int = 1,
     failures: str = "raise",
     as_arrays: bool = False,
 ) -> Any:
@@ -75,7 +78,7 @@ def rollout(
         max_steps: as in `simulate`.
         record: as in `simulate`; "dense" is not supported with parameters.
         several: "error" or "continue", as in `simulate`.
-        threads: number of native threads.
+        jobs: number of parallel jobs, in native threads; -1 for all processors, -2 for all but one.
         failures: "raise" raises the error of the first failed run after all runs have ended. "keep" returns
             errors in place of the trajectories of failed runs.
         as_arrays: whether to return a `RunArrays` with states by run and sample, without an object per run.
@@ -92,7 +95,7 @@ def rollout(
     """
     if not isinstance(scene, Scene):
         raise InputError(f"rollout: scene must be a Scene; got {type(scene).__name__}")
-    threads = count("rollout: threads", threads, least=1)
+    threads = _threads(jobs)
     keep = choice("rollout: failures", failures, ("raise", "keep")) == "keep"
     starts_q, starts_v = _starts(scene, q, v, parameters)
     options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, max_steps, record, several)
@@ -112,6 +115,17 @@ def rollout(
             error.results = results
         raise error
     return results
+
+
+def _threads(jobs: int) -> int:
+    """Return the number of threads for a number of jobs, of which a negative one counts free processors.
+
+    Raises:
+        InputError: it is zero or no number of jobs.
+    """
+    if count("rollout: jobs", jobs, least=-MOST_JOBS) == 0:
+        raise InputError("rollout: jobs must not be zero; use 1 for no parallel jobs, -1 for all processors")
+    return jobs if jobs > 0 else max(1, (os.cpu_count() or 1) + 1 + jobs)
 
 
 def _starts(scene: Scene, q: Any, v: Any, parameters: Any) -> tuple[Array, Array]:

@@ -312,7 +312,7 @@ def test_files_and_batches_keep_them(tmp_path):
     np.testing.assert_array_equal(run.law(contact).force, loaded.law(contact).force)
     np.testing.assert_array_equal(run.reaction(contact), loaded.reaction(contact))
     start = scene.initial_state()
-    batch = pn.rollout(scene, np.array([start[0]] * 2), np.array([start[1]] * 2), 0.5, threads=2, **options)
+    batch = pn.rollout(scene, np.array([start[0]] * 2), np.array([start[1]] * 2), 0.5, jobs=2, **options)
     assert_same_run(run, batch[1])
     swept = pn.sweep(sledge, [{}], 0.5, jobs=1, **options)
     assert_same_run(run, swept[0])

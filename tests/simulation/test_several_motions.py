@@ -192,6 +192,6 @@ class TestLostOnTheWay:
         scene = rising_load()
         single = pn.simulate(scene, 3.0, several="continue")
         q, v = scene.initial_state()
-        for run in pn.rollout(scene, [q, q], [v, v], 3.0, several="continue", threads=2):
+        for run in pn.rollout(scene, [q, q], [v, v], 3.0, several="continue", jobs=2):
             assert run.events == single.events
             np.testing.assert_array_equal(run.q, single.q)

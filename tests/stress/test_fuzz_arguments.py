@@ -173,7 +173,7 @@ def test_rollout(scene, examples):
     q, v = scene.initial_state()
     good = {
         "scene": [scene], "q": [np.array([q, q])], "v": [np.array([v, v])], "method": ["dop853", "dopri5"],
-        "threads": [1, 2], "parameters": [{"crank_joint": {"mass": [1.0, 2.0]}}],
+        "jobs": [1, 2, -1], "parameters": [{"crank_joint": {"mass": [1.0, 2.0]}}],
     }  # fmt: skip
 
     def check(data):

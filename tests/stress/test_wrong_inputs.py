@@ -131,7 +131,7 @@ RUNS = {
     "interval": ("checkpoint_interval", lambda g: pn.simulate(g.scene, 1.0, checkpoint_interval=NAN)),
     "rows of states": ("q", lambda g: pn.rollout(g.scene, g.q, g.v, 1.0)),
     "unequal numbers of states": ("q", lambda g: pn.rollout(g.scene, [g.q], [g.v, g.v], 1.0)),
-    "threads": ("threads", lambda g: pn.rollout(g.scene, [g.q], [g.v], 1.0, threads=0)),
+    "jobs": ("jobs", lambda g: pn.rollout(g.scene, [g.q], [g.v], 1.0, jobs=0)),
     "failures": ("failures", lambda g: pn.rollout(g.scene, [g.q], [g.v], 1.0, failures="skip")),
     "parameters": ("parameters", lambda g: pn.rollout(g.scene, [g.q], [g.v], 1.0, parameters=[1.0])),
     "method of SciPy": ("method", lambda g: pn.rollout(g.scene, [g.q], [g.v], 1.0, method="Radau")),
