@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from pin_nonideal.errors import InputError, LoadingError
+from pin_nonideal.atomic_files import check_writable, file_path
+from pin_nonideal.errors import InputError, LoadingError, short_repr
 from pin_nonideal.loading.load import load
 from pin_nonideal.loading.yaml.robot import check_keys
 from pin_nonideal.loading.yaml.subset import plain_yaml
@@ -81,6 +82,8 @@ def replay_file(options: argparse.Namespace) -> int:
     Raises:
         InputError: there is a number and no folder, or a folder and no number, or no robot.
     """
+    if options.page is not None:
+        check_writable(file_path("PAGE.html", options.page), "the replay")
     scene = "source" if options.robot is None else load(options.robot)
     path, number = Path(options.run), options.number
     if path.is_dir() != (number is not None):
@@ -123,15 +126,15 @@ def describe_robot(scene: Scene, as_json: bool) -> int:
     return 0
 
 
-def rest_robot(scene: Scene, q0: Any, as_json: bool) -> int:
+def rest_robot(scene: Scene, q: Any, as_json: bool) -> int:
     """Print a state of rest.
 
     Args:
         scene: scene of the robot.
-        q0: start configuration by joint name, or None.
+        q: start configuration by joint name, or None.
         as_json: whether to print JSON, for programs.
     """
-    found = equilibrium(scene, q0)
+    found = equilibrium(scene, q)
     places = compiled_scene(scene).joints
     values = {p.name: found.q[p.q_first : p.q_first + p.nq].tolist() for p in places}
     if as_json:
@@ -199,7 +202,7 @@ def _sweep_table(path: Path) -> Table:
             raise LoadingError(f'"{path}" needs the key "{key}"')
     for key in ("parameters", "grid", "samples", "options"):
         if not isinstance(table.get(key) or {}, dict):
-            raise LoadingError(f'"{path}": {key} must be a table; got {table[key]!r}')
+            raise LoadingError(f'"{path}": {key} must be a table; got {short_repr(table[key])}')
     return table
 
 

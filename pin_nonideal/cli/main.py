@@ -117,7 +117,7 @@ def _parser() -> argparse.ArgumentParser:
         "--checkpoint", type=Path, metavar="FILE", help="file with the state of the run, for `resume`"
     )
     _add_start(run)
-    run.add_argument("--v0", **_start("velocity"))
+    run.add_argument("--v", **_start("velocity"))
     _add_writers(run)
     run.set_defaults(command=run_robot)
 
@@ -168,7 +168,8 @@ def _parser() -> argparse.ArgumentParser:
     picture.add_argument(
         "--robot", metavar="NAME_OR_PATH", help="robot of the run (default: the name in the file)"
     )
-    picture.add_argument("--size", default="960x540", metavar="WxH", help="pixels (default: 960x540)")
+    picture.add_argument("--width", type=int, default=960, help="of the picture [pixels] (default: 960)")
+    picture.add_argument("--height", type=int, default=540, help="of the picture [pixels] (default: 540)")
     picture.add_argument("--seconds", type=float, default=6.0, help="length of a video [s] (default: 6)")
     picture.add_argument("--fps", type=float, default=25.0, help="pictures a second (default: 25)")
     picture.add_argument("--time", type=float, metavar="S", help="time of a still picture [s]")
@@ -211,7 +212,7 @@ def _start(what: str) -> Table:
 
 
 def _add_start(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--q0", **_start("configuration"))
+    parser.add_argument("--q", **_start("configuration"))
 
 
 def _add_writers(parser: argparse.ArgumentParser) -> None:
@@ -225,7 +226,7 @@ def _add_writers(parser: argparse.ArgumentParser) -> None:
 
 def _equilibrium(options: argparse.Namespace) -> int:
     scene = pn.load(options.robot, **parameters(options.settings))
-    return rest_robot(scene, named_values(options.q0, "--q0"), options.json)
+    return rest_robot(scene, named_values(options.q, "--q"), options.json)
 
 
 def _complete(options: argparse.Namespace) -> int:
@@ -259,12 +260,8 @@ def _render(options: argparse.Namespace) -> int:
     if run.scene is None:
         scene = pn.load(options.robot or run.name, **parameters(options.settings))
         run = replace(run, scene=scene)
-    try:
-        width, height = (int(x) for x in options.size.split("x"))
-    except ValueError:
-        raise InputError(f'--size needs WxH, for example 960x540; got "{options.size}"') from None
-    settings = {"width": width, "height": height, "seconds": options.seconds, "fps": options.fps}
-    print(f"wrote {render(run, options.out, **settings, time=options.time)}")
+    keys = ("width", "height", "seconds", "fps", "time")
+    print(f"wrote {render(run, options.out, **{key: getattr(options, key) for key in keys})}")
     return 0
 
 

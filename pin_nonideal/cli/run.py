@@ -30,7 +30,7 @@ def run_robot(options: argparse.Namespace) -> int:
         options: options of `run`.
     """
     writers = _writers(options)
-    q, v = named_values(options.q0, "--q0"), named_values(options.v0, "--v0")
+    q, v = named_values(options.q, "--q"), named_values(options.v, "--v")
     scene = pn.load(options.robot, **parameters(options.settings))
     settings = _simulation_settings(options)
     return _finished(lambda: pn.simulate(scene, options.duration, q=q, v=v, **settings), options, writers)

@@ -146,7 +146,20 @@ class CompiledScene:
         """Return the parts of the scene that errors of its runs name."""
         said = self.said
         sources = ("the actuation", _quoted("force", said.forces), _quoted("law", said.laws))
-        return Circumstances(self.explicit_only, sources)
+        taken: set[str] = set()
+        unique_names(said.constraints, taken)
+        names = unique_names(said.contacts, taken)
+        pairs = {
+            name: _frames_of(c) for name, c in zip(names, said.contacts, strict=True) if any(_frames_of(c))
+        }
+        return Circumstances(self.explicit_only, sources, pairs)
+
+
+def _frames_of(contact: Any) -> tuple[str, str]:
+    """Return the frames of a contact, empty for the world or if it has none."""
+    first = getattr(contact, "frame", None) or getattr(contact, "frame1", None)
+    second = getattr(contact, "plane", None) or getattr(contact, "frame2", None)
+    return (str(first or ""), str(second or ""))
 
 
 def _quoted(kind: str, descriptions: Sequence[Any]) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import EffortLimits, HoldPosition, SampledControl, Table
 from pin_nonideal.description.forces import JointSpring, SpringDamper, UserForce, Wrench
-from pin_nonideal.errors import InputError
+from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.states.parsing import named_configuration, named_joint_samples, named_joint_values
 from pin_nonideal.types import Array, Model
 from pin_nonideal.validation import by_name
@@ -32,7 +32,7 @@ def lower_force(f: object, out: core.Builder, where: Resolution) -> None:
     Raises:
         InputError, UnknownNameError: a frame or joint does not exist or does not fit.
     """
-    raise InputError(f"a force must be SpringDamper, JointSpring, Wrench or UserForce; got {f!r}")
+    raise InputError(f"a force must be SpringDamper, JointSpring, Wrench or UserForce; got {short_repr(f)}")
 
 
 @lower_force.register

@@ -19,7 +19,7 @@ import pinocchio as pin
 
 from pin_nonideal.atomic_files import file_path
 from pin_nonideal.description.laws import static_ratio as ratio_of_static
-from pin_nonideal.errors import InputError, LoadingError
+from pin_nonideal.errors import InputError, LoadingError, short_repr
 from pin_nonideal.validation import fraction, label, nonnegative, optional_text, positive, text
 
 from .manifold import Place, manifold
@@ -106,7 +106,9 @@ def geometry_contacts(
         ("collision_model", collision_model, pin.GeometryModel),
     ):
         if not isinstance(value, kind):
-            raise InputError(f"geometry_contacts: {what} must be a pinocchio.{kind.__name__}; got {value!r}")
+            raise InputError(
+                f"geometry_contacts: {what} must be a pinocchio.{kind.__name__}; got {short_repr(value)}"
+            )
     mu = nonnegative("geometry_contacts: mu", mu)
     static_ratio = ratio_of_static("geometry_contacts", static_ratio)
     restitution = fraction("geometry_contacts: restitution", restitution)

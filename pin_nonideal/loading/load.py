@@ -13,7 +13,7 @@ import numpy as np
 
 from pin_nonideal.compilation.contacts import has_stops
 from pin_nonideal.description.contacts import JointLimit
-from pin_nonideal.errors import InputError, LoadingError, nearest
+from pin_nonideal.errors import InputError, LoadingError, nearest, short_repr
 from pin_nonideal.loading.library.example_robots import example_names, example_robot
 from pin_nonideal.loading.library.generators import GENERATORS
 from pin_nonideal.loading.urdf.loop_tolerance import relaxed
@@ -87,7 +87,18 @@ def load(
     """
     text = os.fspath(name) if isinstance(name, (str, os.PathLike)) else None
     if not isinstance(text, str) or not text or "\0" in text:
-        raise InputError(f"name must be the name of a robot or a path; got {name!r}")
+        raise InputError(f"name must be the name of a robot or a path; got {short_repr(name)}")
+    try:
+        Path(text).expanduser().is_dir()
+    except (
+        OSError,
+        RuntimeError,
+        ValueError,
+    ) as error:  # too long, or of an unknown user
+        raise InputError(
+            f"name must be the name of a robot or a path; got {short_repr(name)}: "
+            f"{getattr(error, 'strerror', None) or error}"
+        ) from None
     found = _find(name, text, parameters)
     arguments = scene_arguments(found.robot, found.table, found.name, merge=found.merge, start=q0, speed=v0)
     given = dict(parameters)
@@ -255,7 +266,7 @@ def _file_options(parameters: Table, name: str) -> tuple[Table, bool]:
     check_parameters(parameters, FILE_PARAMETERS, name)
     for key in ("free_flyer", "merge_ball_joints"):
         if not isinstance(parameters.get(key, False), bool):
-            raise InputError(f"{key} must be True or False; got {parameters[key]!r}")
+            raise InputError(f"{key} must be True or False; got {short_repr(parameters[key])}")
     options = {k: v for k, v in parameters.items() if k != "merge_ball_joints"}
     if isinstance(options.get("package_dirs"), (str, Path)):
         options["package_dirs"] = [options["package_dirs"]]
@@ -263,7 +274,7 @@ def _file_options(parameters: Table, name: str) -> tuple[Table, bool]:
         options["density"] = positive("density", options["density"])
     folders = sequence("package_dirs", options.get("package_dirs", []))
     if not all(isinstance(folder, (str, Path)) for folder in folders):
-        raise InputError(f"package_dirs must be folders; got {options['package_dirs']!r}")
+        raise InputError(f"package_dirs must be folders; got {short_repr(options['package_dirs'])}")
     return options, parameters.get("merge_ball_joints", True)
 
 
@@ -301,7 +312,8 @@ def _load_folder(folder: Path, parameters: Table) -> Found:
     entry = table.get("model") or {}
     if not isinstance(entry, dict):
         raise LoadingError(
-            f'"{yaml_path}": model must be a table with keys out of {", ".join(MODEL_KEYS)}; got {entry!r}'
+            f'"{yaml_path}": model must be a table with keys out of {", ".join(MODEL_KEYS)}; '
+            f"got {short_repr(entry)}"
         )
     check_keys(entry, MODEL_KEYS, f'"{yaml_path}": model')
     entry = {key: value for key, value in entry.items() if value is not None}
@@ -339,7 +351,9 @@ def _from_urdf(folder: Path, entry: Table, table: Table, parameters: Table, name
 def _flag(entry: Table, key: str, name: str) -> bool:
     value = entry.get(key, False)
     if not isinstance(value, bool):
-        raise LoadingError(f'robot.yaml of "{name}": model: {key} must be true or false; got {value!r}')
+        raise LoadingError(
+            f'robot.yaml of "{name}": model: {key} must be true or false; got {short_repr(value)}'
+        )
     return value
 
 
@@ -350,7 +364,7 @@ def _generated(entry: Table, table: Table, parameters: Table, name: str, path: P
         raise LoadingError(f'"{path}": no generator "{key}"{nearest(key, GENERATORS)}')
     defaults = entry.get("parameters") or {}
     if not isinstance(defaults, dict):
-        raise LoadingError(f'"{path}": model: parameters must be a table; got {defaults!r}')
+        raise LoadingError(f'"{path}": model: parameters must be a table; got {short_repr(defaults)}')
     generator: Callable[..., RobotFile] = GENERATORS[key]
     known = tuple(generator.__kwdefaults__ or ())
     check_keys(defaults, known, f'"{path}": model: parameters')

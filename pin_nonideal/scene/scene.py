@@ -22,6 +22,7 @@ from pin_nonideal.description.laws import Law
 from pin_nonideal.equation import Solution
 from pin_nonideal.errors import InputError
 from pin_nonideal.geometry.from_model import GeometryContact, with_geometry
+from pin_nonideal.html_tables import names, table
 from pin_nonideal.states.held import Held
 from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
 from pin_nonideal.states.report import ProjectionReport
@@ -200,6 +201,21 @@ class Scene:
             f'<Scene "{self.name}": nv {self.model.nv}, {len(self.constraints)} constraints, '
             f"{len(self.laws)} laws, {len(self.contacts)} contacts>"
         )
+
+    def _repr_html_(self) -> str:
+        joints = [str(name) for name in self.model.names[1:]]
+        actuation = type(self.actuation).__name__ if self.actuation is not None else "none"
+        contacts = set(self.contact_names)
+        rows = [
+            ("joints", names(joints)),
+            ("degrees of freedom", self.model.nv),
+            ("constraints", names([name for name in self.constraint_slices if name not in contacts])),
+            ("contacts", names(self.contact_names)),
+            ("laws", names(self.law_names)),
+            ("forces", len(self.forces)),
+            ("actuation", "a function" if actuation == "function" else actuation),
+        ]
+        return table(f'Scene "{self.name}"', rows)
 
     # --- states ---------------------------------------------------------------------------------------------
 

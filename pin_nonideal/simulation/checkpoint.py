@@ -25,7 +25,7 @@ from pin_nonideal.compilation.resolver import Resolution
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError, LoadingError, OutputError
 from pin_nonideal.scene.scene import Scene, compiled_scene, scene_origin
-from pin_nonideal.trajectory.file import UNREADABLE
+from pin_nonideal.trajectory.file import UNREADABLE, reason_of
 from pin_nonideal.types import Table
 from pin_nonideal.validation import nonnegative
 from pin_nonideal.version import __version__
@@ -159,7 +159,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         raise
     except UNREADABLE as error:
         raise LoadingError(
-            f'cannot read a checkpoint from "{path}": {type(error).__name__}: {error}; '
+            f'cannot read a checkpoint from "{path}": {reason_of(error)}; '
             "it must be a file that simulate(..., checkpoint=path) wrote"
         ) from error
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.errors import FrictionConvergenceError, InputError
+from pin_nonideal.errors import FrictionConvergenceError, InputError, short_repr
 from pin_nonideal.scene.scene import Scene
 from pin_nonideal.states.parsing import (
     joint_named,
@@ -112,7 +112,7 @@ def _driven(scene: Scene, actuated: Sequence[str] | None) -> list[int]:
     if actuated is None:
         return list(range(scene.model.nv))
     if isinstance(actuated, str):
-        raise InputError(f"inverse_dynamics: actuated must be a list of joints; got {actuated!r}")
+        raise InputError(f"inverse_dynamics: actuated must be a list of joints; got {short_repr(actuated)}")
     joints = [
         joint_named(scene.model, name, "inverse_dynamics: actuated")
         for name in sequence("actuated", actuated)
@@ -123,7 +123,9 @@ def _driven(scene: Scene, actuated: Sequence[str] | None) -> list[int]:
 def _bounds(scene: Scene, bounds: Any, dofs: list[int]) -> tuple[Array, Array]:
     """Least and largest torque of each actuated degree of freedom."""
     if not isinstance(bounds, (tuple, list)) or len(bounds) != 2:
-        raise InputError(f"inverse_dynamics: bounds must be a pair (least, largest); got {bounds!r}")
+        raise InputError(
+            f"inverse_dynamics: bounds must be a pair (least, largest); got {short_repr(bounds)}"
+        )
 
     def bound(k: int, others: float) -> Array:
         given, what = bounds[k], f"bounds[{k}]"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pin_nonideal.errors import InputError
+from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.types import Table
 from pin_nonideal.validation import array, choice, count
 
@@ -32,7 +32,7 @@ def sweep_grid(**axes: Iterable[Any]) -> list[Table]:
             or not isinstance(values, Iterable)
             or getattr(values, "ndim", 1) == 0
         ):
-            raise InputError(f"sweep_grid: {name} must be a list of values; got {values!r}")
+            raise InputError(f"sweep_grid: {name} must be a list of values; got {short_repr(values)}")
     listed = [[_plain(value) for value in values] for values in axes.values()]
     return [dict(zip(axes, point, strict=True)) for point in itertools.product(*listed)]
 

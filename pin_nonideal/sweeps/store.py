@@ -14,15 +14,17 @@ from typing import Any
 import numpy as np
 
 from pin_nonideal.atomic_files import file_path
-from pin_nonideal.errors import InputError, LoadingError, OutputError, RunError
+from pin_nonideal.errors import InputError, LoadingError, OutputError, RunError, short_repr
+from pin_nonideal.html_tables import table
 from pin_nonideal.scene.scene import Scene
-from pin_nonideal.trajectory.file import read_from
+from pin_nonideal.trajectory.file import read_from, reason_of
 from pin_nonideal.trajectory.trajectory import Trajectory, restored
 from pin_nonideal.types import Table
 
 from .pack import SUFFIX, archive_of, runs_in
 
 FORMAT = 2
+ROWS_SHOWN = 20  # runs in the table of a notebook
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
 
@@ -48,16 +50,24 @@ class Sweep(Sequence[Trajectory]):
             with (self.folder / "index.jsonl").open(encoding="utf-8") as lines:
                 self._header = json.loads(next(lines))
                 if self._header["format"] != FORMAT:
-                    raise ValueError(f"format {self._header['format']} instead of {FORMAT}")
+                    raise LoadingError(
+                        f'"{self.folder}" holds no sweep of this version: its format is '
+                        f"{short_repr(self._header['format'])} instead of {FORMAT}; finish it with the "
+                        "version that began it"
+                    )
                 self.records: list[Table | None] = [None] * int(self._header["runs"])
                 self._places: list[tuple[str, int, int] | None] = [None] * len(self.records)
                 for line in lines:
                     if line.endswith("\n"):  # not cut off by a kill
                         self._take(json.loads(line))
             self._unlisted = list(self._found())
+        except LoadingError:
+            raise
         except (OSError, ValueError, LookupError, TypeError, StopIteration) as error:
+            absent = isinstance(error, FileNotFoundError)
+            reason = "there is no index.jsonl in it" if absent else reason_of(error)
             raise LoadingError(
-                f'"{self.folder}" holds no sweep: {type(error).__name__}: {error}; it must be a folder that '
+                f'"{self.folder}" holds no sweep: {reason}; it must be a folder that '
                 "sweep(..., store=folder) made"
             ) from error
 
@@ -117,6 +127,21 @@ class Sweep(Sequence[Trajectory]):
         done = len(self) - len(self.missing)
         return f"sweep in {self.folder}: {done} of {len(self)} runs, {len(self.failures)} of them failed"
 
+    def _repr_html_(self) -> str:
+        numbers = ("t_end", "steps", "violation", "wall_s")
+        rows: list[list[object]] = []
+        for k, record in enumerate(self.records[:ROWS_SHOWN]):
+            if record is None:
+                rows.append([k, "", "missing"])
+                continue
+            said = ", ".join(f"{name}={short_repr(x)}" for name, x in record["parameters"].items())
+            shown = [f"{record[key]:.6g}" if record.get(key) is not None else "" for key in numbers]
+            rows.append([k, said, record["error"] or "done", *shown])
+        if len(self) > ROWS_SHOWN:
+            rows.append(["...", f"{len(self) - ROWS_SHOWN} more", ""])
+        title = str(self)
+        return table(title[0].upper() + title[1:], rows, ("run", "parameters", "outcome", *numbers))
+
     @property
     def missing(self) -> list[int]:
         """Runs that are not done."""
@@ -136,7 +161,7 @@ class Sweep(Sequence[Trajectory]):
         """
         done = [(k, r) for k, r in enumerate(self.records) if r is not None]
         names = sorted({key for _, r in done for key, x in r.items() if isinstance(x, (int, float))})
-        table: Table = {}
+        found: Table = {}
         for name in names:
             runs, values = zip(
                 *((k, r[name]) for k, r in done if isinstance(r.get(name), (int, float))), strict=True
@@ -144,9 +169,9 @@ class Sweep(Sequence[Trajectory]):
             x = np.array(values, dtype=float)
             levels = {level: float(np.quantile(x, level)) for level in QUANTILES}
             worst = int(runs[int(np.argmax(x))])
-            table[name] = {"mean": float(x.mean()), "std": float(x.std()), "count": len(x)}
-            table[name] |= {"quantiles": levels, "worst": worst}
-        return table
+            found[name] = {"mean": float(x.mean()), "std": float(x.std()), "count": len(x)}
+            found[name] |= {"quantiles": levels, "worst": worst}
+        return found
 
 
 def opened_store(folder: Path, digest: str, runs: int) -> list[int]:
@@ -162,6 +187,8 @@ def opened_store(folder: Path, digest: str, runs: int) -> list[int]:
         OutputError: it cannot be written.
     """
     index = folder / "index.jsonl"
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f'cannot write the sweep to "{folder}": it is a file; name a folder')
     if index.exists():
         held = Sweep(folder)
         if held._header.get("digest") != digest or held._header.get("format") != FORMAT:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import pickle
 import sys
@@ -19,8 +20,11 @@ from pin_nonideal.errors import (
     RunError,
     RunInterrupted,
     UserFunctionError,
+    nearest,
+    short_repr,
 )
 from pin_nonideal.scene.scene import Scene
+from pin_nonideal.simulation.options import check_values
 from pin_nonideal.simulation.simulate import simulate
 from pin_nonideal.trajectory.file import to_bytes
 from pin_nonideal.trajectory.trajectory import Trajectory
@@ -33,6 +37,8 @@ from .store import Sweep, digest_of, failed_run, note, opened_store, record_of
 MOST_JOBS = 100_000  # also of negative numbers: -n leaves n - 1 processors free
 # Runs that a worker takes at once: enough that handing them over costs little, few enough to share evenly.
 MOST_AT_ONCE, SHARES = 200, 16
+# Arguments of `simulate` that are no options of a sweep.
+UNLIKE = ("scene", "duration", "progress", "checkpoint_interval")
 
 
 def sweep(
@@ -44,7 +50,7 @@ def sweep(
     store: str | os.PathLike[str] | None = None,
     failures: str = "raise",
     measure: Callable[[Trajectory], Mapping[str, float]] | None = None,
-    show: bool | None = None,
+    progress: bool | None = None,
     **options: Any,
 ) -> list[Any] | Sweep:
     """Simulates `make(**p)` for each p of `parameters`, in parallel.
@@ -65,7 +71,7 @@ def sweep(
         failures: "raise" stops at the first run that fails; "keep" goes on, and the error stands in its place
             (its `trajectory` has the samples before), in a store beside those samples.
         measure: run -> numbers by name, taken where the run is; they go into the index of a store.
-        show: progress bar on standard error; None shows it on a terminal only.
+        progress: progress bar on standard error; None shows it on a terminal only.
         options: passed to `simulate`.
 
     Returns:
@@ -82,7 +88,9 @@ def sweep(
     table = sequence("sweep: parameters", parameters)
     for entry in table:
         if not isinstance(entry, Mapping) or not all(isinstance(key, str) for key in entry):
-            raise InputError(f"sweep: parameters must hold mappings of keyword arguments; got {entry!r}")
+            raise InputError(
+                f"sweep: parameters must hold mappings of keyword arguments; got {short_repr(entry)}"
+            )
     length = positive("sweep: duration", duration)
     if jobs is not None and count("sweep: jobs", jobs, least=-MOST_JOBS, most=MOST_JOBS) == 0:
         raise InputError("sweep: jobs must not be zero; leave it out for joblib's choice")
@@ -93,14 +101,16 @@ def sweep(
         function("sweep: measure", measure, "(run) -> numbers by name")
         if store is None:
             raise InputError("sweep: measure writes into the index of a store; name one, or measure the runs")
-    options.setdefault("progress", False)
+    choice("sweep: progress", progress, (True, False, None))
+    _check_options(length, options)
+    options["progress"] = False  # of each run
     folder = None if store is None else file_path("sweep: store", store)
     numbers = list(range(len(table)))
     if folder is not None:
         numbers = opened_store(folder, digest_of(make, table, length, options), len(table))
     work = _Work(make, length, options, folder, keep, measure)
     found: list[Any] = [None] * (len(table) if folder is None else 0)
-    for part in _carried(work, [(k, dict(table[k])) for k in numbers], jobs, show):
+    for part in _carried(work, [(k, dict(table[k])) for k in numbers], jobs, progress):
         for k, result in part:
             if isinstance(result, PinNonidealError) and not (keep and folder is None):
                 raise result
@@ -111,8 +121,21 @@ def sweep(
     return found if folder is None else Sweep(folder)
 
 
+def _check_options(duration: float, options: Table) -> None:
+    """Check the options of `simulate`, as far as they do not depend on the scene.
+
+    Raises:
+        InputError: `simulate` has no such option, or refuses its value.
+    """
+    known = [name for name in inspect.signature(simulate).parameters if name not in UNLIKE]
+    for name in options:
+        if name not in known:
+            raise InputError(f'sweep: `simulate` has no option "{name}"{nearest(name, known)}')
+    check_values(duration, **options)
+
+
 def _carried(
-    work: _Work, runs: list[Any], jobs: int | None, show: bool | None
+    work: _Work, runs: list[Any], jobs: int | None, progress: bool | None
 ) -> Iterator[list[tuple[int, Any]]]:
     """Results by parts as they come in, from joblib's workers."""
     from joblib import Parallel, delayed
@@ -126,7 +149,7 @@ def _carried(
     parts = [runs[i : i + size] for i in range(0, len(runs), size)]
     lazy = getattr(backend, "supports_return_generator", False)
     parallel = Parallel(n_jobs=jobs, batch_size=1, return_as="generator_unordered" if lazy else "list")
-    shown = sys.stderr.isatty() if show is None else choice("sweep: show", show, (True, False, None))
+    shown = sys.stderr.isatty() if progress is None else progress
     try:
         with tqdm(total=len(runs), unit="run", disable=not shown) as bar:
             for part in parallel(delayed(work)(each) for each in parts):
@@ -204,14 +227,16 @@ class _Work:
             raise
         except Exception as error:
             raise UserFunctionError(
-                f"sweep: make raised {type(error).__name__}: {error}; it was called with {entry!r}"
+                f"sweep: make raised {type(error).__name__}: {error}; it was called with {short_repr(entry)}"
             ) from error
         if not isinstance(scene, Scene):
-            raise UserFunctionError(f"sweep: make must return a Scene; got {scene!r} for {entry!r}")
+            raise UserFunctionError(
+                f"sweep: make must return a Scene; got {short_repr(scene)} for {short_repr(entry)}"
+            )
         return scene
 
     def _measured(self, run: Trajectory) -> Table:
         found = named(self.measure, "sweep: measure")(run)
         if not isinstance(found, Mapping):
-            raise UserFunctionError(f"sweep: measure must return numbers by name; got {found!r}")
+            raise UserFunctionError(f"sweep: measure must return numbers by name; got {short_repr(found)}")
         return {str(name): number(f'sweep: measure: "{name}"', x) for name, x in found.items()}

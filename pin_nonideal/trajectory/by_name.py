@@ -10,13 +10,14 @@ from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.states.joint_layout import CIRCLES
 from pin_nonideal.states.kinematics import frame_motion
 from pin_nonideal.types import Array
-from pin_nonideal.validation import choice
+from pin_nonideal.validation import choice, text
 
 from .records import FrameRecord, JointRecord, LawRecord, angles
 
 
 def joint_record(run: Any, name: str) -> JointRecord:
     """Record of one joint, see `Trajectory.joint`."""
+    name = text("joint: name", name)
     floating = [place for place in run.joints if place.kind == "JointModelFreeFlyer"]
     known = {"base": floating[0]} if len(floating) == 1 else {}
     known |= {place.name: place for place in run.joints}
@@ -36,6 +37,7 @@ def joint_record(run: Any, name: str) -> JointRecord:
 
 def frame_record(run: Any, name: str) -> FrameRecord:
     """Record of one frame, see `Trajectory.frame`."""
+    name = text("frame: name", name)
     if run.scene is None:
         raise InputError(f'frame("{name}") needs the scene of the run, which this one has lost')
     model = run.scene.model
@@ -47,6 +49,7 @@ def frame_record(run: Any, name: str) -> FrameRecord:
 
 def force_of(run: Any, name: str) -> Array:
     """Force of one constraint or contact, see `Trajectory.force`."""
+    name = text("force: name", name)
     if name not in run.rows:
         raise UnknownNameError(f'no constraint or contact "{name}" in this run{nearest(name, run.rows)}')
     first, end, contact = run.rows[name]
@@ -61,14 +64,15 @@ def force_of(run: Any, name: str) -> Array:
 
 def law_record(run: Any, name: str) -> LawRecord:
     """Record of one law, see `Trajectory.law`."""
+    name = text("law: name", name)
     if name not in run.law_names:
         raise UnknownNameError(f'no law "{name}" in this run{nearest(name, run.law_names)}')
     index, force, power = run.law_names.index(name), None, None
-    if run.law_forces is not None:
+    if run.law_forces:
         force = np.zeros(run.v.shape)
         force[:, run.law_dofs[index]] = run.law_forces[name]
         power = np.einsum("ij,ij->i", force, run.v)
-    if run.power is not None:  # after three columns of the scene
+    if run.power:  # after three columns of the scene
         power = list(run.power.values())[len(run.power) - len(run.law_names) + index]
     own = [e for e, law in enumerate(run.element_laws) if law == index]
     columns = own[0] if len(own) == 1 else own
@@ -79,7 +83,8 @@ def law_record(run: Any, name: str) -> LawRecord:
 
 def reaction_of(run: Any, name: str, axes: str) -> Array:
     """Wrench of a joint, anchor or contact, see `Trajectory.reaction`."""
-    if run.reactions is None:
+    name = text("reaction: name", name)
+    if not run.reactions.recorded:
         raise InputError(f'reaction("{name}") needs a run with record="reactions"')
     if name not in run.reactions:
         raise UnknownNameError(f'no joint, anchor or contact "{name}"{nearest(name, run.reactions)}')

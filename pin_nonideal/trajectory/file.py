@@ -82,7 +82,7 @@ def _arrays(run: Any) -> Table:
     arrays |= {key: getattr(run, key) for key in OPTIONAL if getattr(run, key) is not None}
     if run.closed is not None:
         arrays["closed"] = run.closed.astype(np.int8)
-    tables = {group: getattr(run, group) for group in GROUPS}
+    tables = {group: vars(run)[group] for group in GROUPS}
     for group, table in tables.items():
         arrays |= {f"{group}/{i}": x for i, x in enumerate((table or {}).values())}
     header = {
@@ -170,9 +170,24 @@ def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
         raise
     except UNREADABLE as error:
         raise LoadingError(
-            f'cannot read a trajectory from "{source}": {type(error).__name__}: {error}; '
+            f'cannot read a trajectory from "{source}": {reason_of(error)}; '
             "it must be an .npz file written by Trajectory.save"
         ) from error
+
+
+def reason_of(error: Exception) -> str:
+    """Return in words why a file cannot be read, in place of the words of NumPy, zip archives and JSON.
+
+    Args:
+        error: one of `UNREADABLE`.
+    """
+    if isinstance(error, FileNotFoundError):
+        return "there is no such file"
+    if isinstance(error, IsADirectoryError):
+        return "it is a folder"
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return "its content is damaged or of another kind"
 
 
 def fits(scene: Scene, joints: Sequence[JointPlace], rows: Table) -> bool:
@@ -184,6 +199,21 @@ def fits(scene: Scene, joints: Sequence[JointPlace], rows: Table) -> bool:
         rows: of the run.
     """
     return compiled_scene(scene).joints == list(joints) and compiled_scene(scene).rows == rows
+
+
+def described(joints: Sequence[JointPlace], rows: Table) -> str:
+    """Return the joints, constraints and contacts of a run in words.
+
+    Args:
+        joints: of the run.
+        rows: of the run.
+    """
+    named = [place.name for place in joints]
+    return f"the joints {_few(named)} and " + (f"the rows of {_few(list(rows))}" if rows else "no rows")
+
+
+def _few(names: Sequence[str]) -> str:
+    return ", ".join(f'"{name}"' for name in names[:4]) + (", ..." if len(names) > 4 else "")
 
 
 def scene_again(origin: Any, joints: Sequence[JointPlace], rows: Table, notes: list[str]) -> Scene | None:

@@ -29,7 +29,7 @@ def summary(run: Any) -> str:
             f"  limited by rounding: {s.limited_by_rounding} of {s.steps} steps; accelerations are known "
             f"to {s.rounding:.0e} of the largest"
         )
-    if run.energy is not None and len(run.t):
+    if run.energy and len(run.t):
         at_end = {k: x[-1] for k, x in run.energy.items() if k != "balance"}
         shown = ", ".join(f"{k} {x:.6g}" for k, x in at_end.items() if x != 0.0 or len(at_end) <= FEW)
         lines.append(f"  energy [J]: {shown}; balance {np.abs(run.energy['balance']).max():.1e}")

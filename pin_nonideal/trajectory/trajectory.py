@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,23 +14,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pin_nonideal.errors import InputError
-from pin_nonideal.lazy_fields import MadeLater
+from pin_nonideal.errors import InputError, short_repr
+from pin_nonideal.html_tables import table
 from pin_nonideal.scene.scene import Scene
 from pin_nonideal.states.joint_layout import JointPlace
 from pin_nonideal.types import Array, Table
 from pin_nonideal.validation import array
+from pin_nonideal.validation import count as whole_number
 
 from .by_name import force_of, frame_record, joint_record, law_record, reaction_of
-from .columns import columns
+from .columns import columns, units
 from .dense_output import DenseOutput
+from .groups import RECORD_OF, GroupField
+from .lazy_fields import MadeLater
 from .records import Event, FrameRecord, JointRecord, LawRecord, Sample, Stats, UserEventRecord
 from .summary import summary
+
+# A line of the summary: its heading, with a unit or not, and the rest from ": " or the first digit on.
+SUMMARY_LINE = re.compile(r"([a-z]+(?: [a-z]+)*(?: \[J\])?)(?:: +| +(?=\d))(.*)")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(MadeLater):
-    """Samples of a run; what was not recorded is None.
+    """Samples of a run; what was not recorded is None or an empty table.
 
     Attributes:
         t: times [s], (nt,).
@@ -137,11 +144,18 @@ class Trajectory(MadeLater):
     def __str__(self) -> str:
         return summary(self)
 
+    def _repr_html_(self) -> str:
+        first, *lines = summary(self).split("\n")
+        parts = [SUMMARY_LINE.fullmatch(line.strip()) for line in lines]
+        rows = [found.groups() if found else (line,) for found, line in zip(parts, lines, strict=True)]
+        return table(f"Trajectory {first}", rows)
+
     def columns(self) -> dict[str, Array]:
         """All that was recorded as named columns, (nt,) each: "t", "crank.q", "crank.v", "loop.lam.0", ...
 
         The names are those of joints, constraints, laws and ledgers, then of the field, then the number
-        within it; what belongs to no joint goes by its field alone.
+        within it; what belongs to no joint goes by its field alone.  A space in a name becomes "_"; two names
+        that become equal are told apart by "_2", "_3", ...
         """
         return columns(self)
 
@@ -222,6 +236,10 @@ class Trajectory(MadeLater):
     def to_dataframe(self) -> Any:
         """The `columns` as a pandas.DataFrame, one row a sample, with the time as its index.
 
+        Returns:
+            The frame; `frame.attrs["units"]` has the unit of each column and of the index, such as "rad/s".
+            A unit is "1" for numbers without one, as in quaternions, and empty if the run does not know it.
+
         Raises:
             InputError: pandas is not installed.
         """
@@ -232,14 +250,20 @@ class Trajectory(MadeLater):
                 f"to_dataframe needs pandas, which cannot be imported ({error}); pip install pandas, or take "
                 "run.columns()"
             ) from None
-        return pandas.DataFrame(self.columns()).set_index("t")
+        frame = pandas.DataFrame(self.columns()).set_index("t")
+        frame.attrs["units"] = units(self)
+        return frame
 
     def first(self, count: int) -> Trajectory:
         """The first samples of a run.
 
         Args:
-            count: how many.
+            count: how many, at most all.
+
+        Raises:
+            InputError: `count` is no number of samples.
         """
+        count = whole_number("first: count", count, most=len(self.t))
         last = float(self.t[count - 1]) if count else -np.inf
         events = [e for e in self.events if e.time <= last]
         return dataclasses.replace(self.samples(slice(count)), events=events)
@@ -249,7 +273,17 @@ class Trajectory(MadeLater):
 
         Args:
             chosen: mask (nt,), indices or slice of samples.
+
+        Raises:
+            InputError: `chosen` is none of these, or an index lies outside.
         """
+        try:
+            np.arange(len(self.t))[chosen]
+        except (IndexError, TypeError, ValueError):
+            raise InputError(
+                f"samples: chosen must be a mask, indices or a slice of {len(self.t)} samples"
+                f"; got {short_repr(chosen)}"
+            ) from None
 
         def cut(value: Any, key: str) -> Any:
             if isinstance(value, dict) and key != "rows":
@@ -281,7 +315,7 @@ class Trajectory(MadeLater):
             raise InputError("at(t) needs the scene of the run, which this one has lost")
         times = array("at: t", t, (None,) if np.ndim(t) else ())
         run = Trajectory(**self.dense.at(self.scene, times.reshape(-1)))
-        if len(run) and run.energy is not None and self.energy is not None:
+        if len(run) and run.energy and self.energy:
             # The ledger balances from the start of the run on.
             run.energy["balance"] += run.energy["total"][0] - self.energy["total"][0]
         return run if np.ndim(t) else Sample(**run.samples(0).__dict__)
@@ -333,6 +367,9 @@ for _field in dataclasses.fields(Trajectory):
     elif _field.default_factory is not dataclasses.MISSING and _field.name != "stats":
         _MAKERS[_field.name] = _field.default_factory
 
+for _name in RECORD_OF:
+    setattr(Trajectory, _name, GroupField(_name))
+
 
 def with_defaults(fields: Table) -> Table:
     """All fields of a Trajectory but its counters: those given, and of all others the defaults."""
@@ -353,12 +390,16 @@ def restored(fields: Table, origin: Any, path: Any, scene: Scene | str | None) -
         InputError: the scene is not the one of the run.
         LoadingError: the scene cannot be loaded again.
     """
-    from .file import fits, scene_again
+    from .file import described, fits, scene_again
 
     run = Trajectory(**fields)
     if scene == "source":
         return dataclasses.replace(run, scene=scene_again(origin, run.joints, run.rows, run.notes))
-    if scene is not None and not (isinstance(scene, Scene) and fits(scene, run.joints, run.rows)):
-        name = scene.name if isinstance(scene, Scene) else scene
-        raise InputError(f'Trajectory.load: the scene "{name}" is not the one of the run in "{path}"')
+    if not (scene is None or isinstance(scene, Scene)):
+        raise InputError(f'Trajectory.load: scene must be a Scene, "source" or None; got {short_repr(scene)}')
+    if scene is not None and not fits(scene, run.joints, run.rows):
+        raise InputError(
+            f'Trajectory.load: the scene "{scene.name}" is not the one of the run in "{path}", which has '
+            f"{described(run.joints, run.rows)}; pass the scene that was simulated, or scene=None"
+        )
     return dataclasses.replace(run, scene=scene)

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pin_nonideal.atomic_files import file_path, whole_file
-from pin_nonideal.errors import InputError, OutputError
+from pin_nonideal.atomic_files import check_writable, file_path, whole_file
+from pin_nonideal.errors import InputError, OutputError, short_repr
 from pin_nonideal.visualization.page.figure_styles import Style
 from pin_nonideal.visualization.page.mode_timeline import bands_of, opens
 from pin_nonideal.visualization.page.signals import Plot, plots_of, several, wanted
@@ -60,7 +60,7 @@ def plot(
         names: names of several runs; their numbers when None.
 
     Returns:
-        The matplotlib figure, to be changed, shown or saved.
+        The matplotlib figure, to be changed, shown or saved.  A notebook shows it as the result of a cell.
 
     Raises:
         InputError: something asked for was not recorded, `what` is empty or no list of plots, `ax` is given
@@ -71,9 +71,15 @@ def plot(
     import matplotlib as mpl
 
     runs, labels = several(run, names, "a figure")
+    target = None if path is None else file_path("plot: path", path)
+    if target is not None:
+        picture_format(target)
+        check_writable(target, "the figure")
     look = Style(columns, style)
     if title is not None and not isinstance(title, str):
-        raise InputError(f"plot: title must be a string or None; got {title!r}")
+        raise InputError(f"plot: title must be a string or None; got {short_repr(title)}")
+    if ax is not None and not (hasattr(ax, "plot") and hasattr(ax, "figure")):
+        raise InputError(f"plot: ax must be axes of matplotlib; got {short_repr(ax)}")
     drawn = _asked(runs, usual(runs) if what is None else what)
     if ax is not None and len(drawn) != 1:
         raise InputError(f"plot: ax takes one plot; what asks for {len(drawn)}")
@@ -85,8 +91,8 @@ def plot(
             ax.set_title(heading)
         elif heading:
             figure.suptitle(heading, fontsize=12, fontweight="bold", x=0.01, ha="left")
-        if path is not None:
-            _save(figure, file_path("plot: path", path))
+        if target is not None:
+            _save(figure, target)
     return figure
 
 
@@ -137,13 +143,14 @@ def _figure(
     runs: Sequence[Trajectory], labels: Sequence[str], drawn: list[Drawn], look: Style, ax: Axes | None
 ) -> Figure:
     """All plots, those over time with one axis of time."""
-    from matplotlib.figure import Figure  # no pyplot: a program that draws to files needs no window system
+    # No pyplot: a program that draws to files needs no window system.
+    from .notebook_figure import NotebookFigure
 
     if ax is not None:
         figure, axes = ax.figure, [ax]
     else:
         heights = [_height(kind, parts, look) for kind, parts in drawn]
-        figure = Figure(figsize=(look.width, sum(heights) + 0.7), layout="constrained")
+        figure = NotebookFigure(figsize=(look.width, sum(heights) + 0.7), layout="constrained")
         axes = list(figure.subplots(len(drawn), 1, squeeze=False, height_ratios=heights)[:, 0])
     timed = [place for place, (kind, _) in zip(axes, drawn, strict=True) if kind != "relation"]
     for place in timed[1:]:

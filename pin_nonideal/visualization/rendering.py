@@ -13,7 +13,7 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from pin_nonideal.atomic_files import file_path, whole_file
+from pin_nonideal.atomic_files import check_writable, file_path, whole_file
 from pin_nonideal.errors import InputError, OutputError
 from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.validation import count, number, positive
@@ -78,13 +78,20 @@ def render(
     ending = target.suffix.lower()
     if ending not in ENDINGS:
         raise OutputError(f'render: "{target}" must end in one of {", ".join(ENDINGS)}')
+    check_writable(target, "the picture")
     size = [
         count(f"render: {what}", x, least=1, most=LARGEST)
         for what, x in (("width", width), ("height", height))
     ]
     seconds, fps = positive("render: seconds", seconds), positive("render: fps", fps)
     encoder = _ffmpeg(ending) if ending in CODECS else ""
+    if not len(run):
+        raise InputError("render: run must have samples; got an empty one")
     start, length = float(run.t[0]), float(run.t[-1] - run.t[0])
+    if time is not None and not start <= number("render: time", time) <= start + length:
+        raise InputError(
+            f"render: time must lie in the run, from {start:g} to {start + length:g} s; got {time:g}"
+        )
     if fps < LEAST_FPS:
         raise InputError(f"render: fps must be at least {LEAST_FPS}; got {fps:g}")
     if seconds * fps > MOST_PICTURES:
@@ -94,7 +101,7 @@ def render(
     frames = max(2, round(seconds * fps))
     times = [start + length * k / (frames - 1) for k in range(frames)]
     if ending == ".png":
-        times = [start + 0.25 * length if time is None else number("render: time", time)]
+        times = [start + 0.25 * length if time is None else float(time)]
     if ending in CODECS:
         size = [x + x % 2 for x in size]  # both codecs halve the colors
     page: ReplayPage = replay(run, forces=forces)

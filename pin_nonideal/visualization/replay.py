@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING, Any
 
 import pinocchio as pin
 
-from pin_nonideal.atomic_files import file_path, whole_file
-from pin_nonideal.errors import InputError, OutputError
+from pin_nonideal.atomic_files import check_writable, file_path, whole_file
+from pin_nonideal.errors import InputError, OutputError, short_repr
 from pin_nonideal.validation import choice, positive
 from pin_nonideal.visualization.page.meshcat_window import show
 from pin_nonideal.visualization.page.payload import packed_runs
-from pin_nonideal.visualization.page.signals import Chosen, several
+from pin_nonideal.visualization.page.signals import Chosen, plots_of, several
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
@@ -139,22 +139,31 @@ def replay(
     """
     fps = None if fps is None else positive("replay: fps", fps)
     if title is not None and not isinstance(title, str):
-        raise InputError(f"replay: title must be a string or None; got {title!r}")
+        raise InputError(f"replay: title must be a string or None; got {short_repr(title)}")
     choice("replay: compress", compress, (True, False))
     choice("replay: forces", forces, (True, False))
+    target = None if path is None else file_path("replay: path", path)
     runs, labels = several(run, names, "a replay")
     if viewer is not None:
         if path is not None or len(runs) > 1:
             raise InputError("replay: viewer takes one run and no path")
+        if not all(hasattr(viewer, name) for name in ("window", "set_animation", "__getitem__")):
+            raise InputError(f"replay: viewer must be a meshcat.Visualizer; got {short_repr(viewer)}")
         return show(runs[0], viewer, runs[0].name or "robot", forces)
+    if target is not None:
+        check_writable(target, "the replay")
+    if plots is not None:
+        for one in runs:
+            plots_of(one, plots)
+    viewer_library()
     packed = packed_runs(runs, labels, fps, title or runs[0].name, plots, forces)
     page = ReplayPage(_page(packed, title or runs[0].name, compress))
-    return page if path is None else page.save(path)
+    return page if target is None else page.save(target)
 
 
 def _page(content: bytes, title: str, compress: bool) -> str:
     """The whole page around the packed runs."""
-    library, notices = _viewer_library()
+    library, notices = viewer_library()
     folder = Path(__file__).parent / "page" / "assets"
 
     def packed(plain: bytes) -> str:
@@ -178,8 +187,12 @@ def _page(content: bytes, title: str, compress: bool) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found.group(1)], asset("page.html"))
 
 
-def _viewer_library() -> tuple[bytes, str]:
-    """Meshcat's bundled viewer, found without importing meshcat, and the notices that must go with it."""
+def viewer_library() -> tuple[bytes, str]:
+    """Meshcat's bundled viewer, found without importing meshcat, and the notices that must go with it.
+
+    Raises:
+        OutputError: the package meshcat is missing, or its files cannot be read.
+    """
     found = importlib.util.find_spec("meshcat")
     if found is None or not found.submodule_search_locations:
         raise OutputError("a replay needs the package meshcat, which is missing: pip install meshcat")

@@ -52,7 +52,7 @@ class TestRun:
         run = pn.Trajectory.load(path)
         assert run.a is not None
         assert run.F_ideal is not None
-        assert run.energy is None
+        assert not run.energy
 
     def test_fixed_step_method(self, tmp_path: Path) -> None:
         path = tmp_path / "run.npz"
@@ -71,7 +71,7 @@ class TestRun:
         assert plot.read_bytes().startswith(b"\x89PNG")
         run = pn.Trajectory.load(save)
         assert run.F_ideal is not None
-        assert run.energy is not None
+        assert run.energy
         out = capsys.readouterr().out
         assert [f"wrote {path}" in out for path in (html, plot, save)] == [True, True, True]
 

@@ -92,7 +92,7 @@ notes: [built for a test]
 gravity: [0, 0, -1.62]
 constraints:
   - PointAnchor: {frame1: hand, frame2: wall, axes: xz, name: loop}
-  - PrescribedMotion: {joint: shoulder, function: {sinusoid: {amplitude: 1e-1, frequency: 2.0}}}
+  - PrescribedMotion: {joint: shoulder, function: {sinusoid: {amplitude: 1e-1, omega: 2.0}}}
   - Distance: {frame1: hand, frame2: wall, length: {polynomial: {coefficients: [1.0, 0.5]}}, name: rope}
 laws:
   - JointFriction: {joint: elbow, mu: 0.1, radius: 0.02}

@@ -98,7 +98,7 @@ GAP = {
 BOX = {"size": [[0.01, 0.02, 0.03]], "frame2": ["universe"]}
 CAN = {"length": [0.01], "below": [0.01], "frame2": ["universe"], "xyz": [(0.0, 0.0, -9.0)]}
 GOOD_TIMES = {
-    "value": [0.1], "coefficients": [[1.0, 2.0]], "amplitude": [0.1], "frequency": [2.0],
+    "value": [0.1], "coefficients": [[1.0, 2.0]], "amplitude": [0.1], "omega": [2.0],
     "times": [[0.0, 1.0, 2.0]], "values": [[0.0, 1.0, 0.5]],
 }  # fmt: skip
 
@@ -173,7 +173,7 @@ def test_rollout(scene, examples):
     q, v = scene.initial_state()
     good = {
         "scene": [scene], "q": [np.array([q, q])], "v": [np.array([v, v])], "method": ["dop853", "dopri5"],
-        "threads": [1, 2], "parameters": [{"crank_joint": {"mass": [1.0, 2.0]}}],
+        "jobs": [1, 2, -1], "parameters": [{"crank_joint": {"mass": [1.0, 2.0]}}],
     }  # fmt: skip
 
     def check(data):
@@ -300,8 +300,8 @@ STATICS = [pn.equilibrium, pn.inverse_dynamics, pn.rest]
 def test_statics(function, scene, examples):
     q, v = scene.initial_state()
     good = {
-        "scene": [scene], "q": [q, None], "v": [v], "a": [scene.acceleration(q, v)],
-        "q0": [q, {"crank_joint": 1.0}], "tau": [np.ones(3), {"crank_joint": 0.1}], "t": [0.0], "starts": [1],
+        "scene": [scene], "q": [q, None, {"crank_joint": 1.0}], "v": [v], "a": [scene.acceleration(q, v)],
+        "tau": [np.ones(3), {"crank_joint": 0.1}], "t": [0.0], "starts": [1],
         "actuated": [["crank_joint"]], "bounds": [(-10.0, 10.0)],
     }  # fmt: skip
     if function is pn.inverse_dynamics:

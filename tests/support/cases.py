@@ -230,7 +230,7 @@ def carried_function(f: Any, maps: Maps, unit: float) -> Any:
     if isinstance(f, Constant):
         return Constant(unit * f.value)
     if isinstance(f, Sinusoid):
-        w = f.frequency / T
+        w = f.omega / T
         return Sinusoid(unit * f.amplitude, w, f.phase - w * later, unit * f.offset)
     if isinstance(f, Polynomial):
         line = np.polynomial.Polynomial([-later / T, 1.0 / T])

@@ -157,7 +157,7 @@ def test_a_store_of_another_form_is_refused(tmp_path):
     pn.sweep(pendulum, GRID[:1], 0.1, jobs=1, store=tmp_path)
     index = tmp_path / "index.jsonl"
     index.write_text(index.read_text().replace('"format": 2', '"format": 1'))
-    with refuses("holds no sweep: ValueError: format 1 instead of 2", pn.LoadingError):
+    with refuses("holds no sweep of this version: its format is 1 instead of 2", pn.LoadingError):
         pn.sweep(pendulum, GRID[:1], 0.1, jobs=1, store=tmp_path)
 
 
@@ -197,7 +197,7 @@ def test_what_a_store_refuses(tmp_path):
     (tmp_path / "full" / "thesis.tex").write_text("")
     with refuses("must be empty or hold this sweep; it holds other files", pn.InputError):
         pn.sweep(pendulum, GRID[:1], 0.1, jobs=1, store=tmp_path / "full")
-    with refuses(f'"{tmp_path}" holds no sweep: FileNotFoundError', pn.LoadingError):
+    with refuses(f'"{tmp_path}" holds no sweep: there is no index.jsonl in it', pn.LoadingError):
         pn.Sweep(tmp_path)
     with refuses("sweep: failures must be one of 'raise', 'keep'; got 'ignore'", pn.InputError):
         pn.sweep(pendulum, GRID, 0.1, failures="ignore")

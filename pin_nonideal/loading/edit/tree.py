@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.description.constraints import JointCoupling
-from pin_nonideal.errors import LoadingError
+from pin_nonideal.errors import LoadingError, short_repr
 from pin_nonideal.loading.urdf.geometry_sources import Shapes
 from pin_nonideal.loading.urdf.reader import RobotFile
 from pin_nonideal.loading.urdf.xml import listed
@@ -83,11 +83,13 @@ def place_base(robot: RobotFile, table: Table, where: str) -> None:
         return
     where = f"{where}: model: base"
     if not isinstance(entry, dict):
-        raise LoadingError(f"{where} must be a table with the keys xyz, rpy; got {entry!r}")
+        raise LoadingError(f"{where} must be a table with the keys xyz, rpy; got {short_repr(entry)}")
     check_keys(entry, ("xyz", "rpy"), where)
     xyz, rpy = (np.array(vector(entry.get(k, [0, 0, 0]), 3, f"{where}: {k}")) for k in ("xyz", "rpy"))
     if np.abs([*xyz, *rpy]).max() > FARTHEST:
-        raise LoadingError(f"{where}: xyz and rpy must be at most {FARTHEST:g} (m, rad); got {entry!r}")
+        raise LoadingError(
+            f"{where}: xyz and rpy must be at most {FARTHEST:g} (m, rad); got {short_repr(entry)}"
+        )
     base, model = pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz), robot.model
     for j in range(1, model.njoints):
         if model.parents[j] == 0:
@@ -126,7 +128,7 @@ def lock(
     entry = table.get("model") or {}
     locked = entry.get("locked") or []
     if not isinstance(locked, list):
-        raise LoadingError(f"{where}: model: locked must be a list of joint names; got {locked!r}")
+        raise LoadingError(f"{where}: model: locked must be a list of joint names; got {short_repr(locked)}")
     if not locked:
         return q0, v0
     indices = [joint_index(robot.model, n, f"{where}: model: locked") for n in locked]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.errors import InputError, UnknownNameError, nearest, short_repr
 from pin_nonideal.types import Array
 from pin_nonideal.validation import array, number
 
@@ -126,7 +126,7 @@ class Actuators:
             except (TypeError, ValueError):
                 ctrl = np.full(m.nu, np.nan)
             if not np.isfinite(ctrl).all():
-                raise InputError(f"ctrl must return {m.nu} finite numbers; got {given!r}")
+                raise InputError(f"ctrl must return {m.nu} finite numbers; got {short_repr(given)}")
         if self._clamp:
             low, high = m.actuator_ctrlrange.T
             ctrl = np.where(m.actuator_ctrllimited, np.clip(ctrl, low, high), ctrl)

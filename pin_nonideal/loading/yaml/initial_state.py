@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pin_nonideal.errors import InputError, LoadingError, UnknownNameError, nearest
+from pin_nonideal.errors import InputError, LoadingError, UnknownNameError, nearest, short_repr
 from pin_nonideal.loading.urdf.reader import RobotFile
 from pin_nonideal.states.held import Held
 from pin_nonideal.states.joint_order import order_words, tell_order
@@ -83,12 +83,14 @@ def initial_state(
         return q0, v0
     where = f"{where}: initial"
     if not isinstance(initial, dict):
-        raise LoadingError(f"{where} must be a table with the keys q, v, reference; got {initial!r}")
+        raise LoadingError(
+            f"{where} must be a table with the keys q, v, reference; got {short_repr(initial)}"
+        )
     check_keys(initial, ("q", "v", "reference"), where)
     for key in ("q", "v"):
         if not isinstance(initial.get(key) or {}, (list, dict)):
             raise LoadingError(
-                f"{where}: {key} must be a table by joint name or a full list; got {initial[key]!r}"
+                f"{where}: {key} must be a table by joint name or a full list; got {short_repr(initial[key])}"
             )
         words = order_words(model) if isinstance(initial.get(key), list) else None
         if words is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pin_nonideal.description.actuation import HoldPosition
-from pin_nonideal.errors import InputError, LoadingError, nearest
+from pin_nonideal.errors import InputError, LoadingError, nearest, short_repr
 from pin_nonideal.types import Model
 from pin_nonideal.validation import nonnegative, number
 
@@ -34,7 +34,7 @@ def actuation_of(model: Model, entry: Any, motors: Sequence[str], where: str) ->
     kind, values = one_entry(entry, where)
     if kind == "torques":
         if not isinstance(values, dict):
-            raise LoadingError(f"{where}: torques must be a table by joint name; got {values!r}")
+            raise LoadingError(f"{where}: torques must be a table by joint name; got {short_repr(values)}")
         return _by_joint(model, values, f"{where}: torques", signed=True)
     if kind in ("SampledControl", "function"):
         raise LoadingError(

@@ -13,7 +13,7 @@ from typing import Any, get_args
 
 from pin_nonideal.description import actuation, constraints, contacts, forces, laws
 from pin_nonideal.description import time_functions as timefunctions
-from pin_nonideal.errors import InputError, LoadingError, nearest
+from pin_nonideal.errors import InputError, LoadingError, nearest, short_repr
 from pin_nonideal.geometry.from_model import GeometryContact
 from pin_nonideal.types import Table
 from pin_nonideal.validation import number
@@ -86,7 +86,7 @@ def _check_numbers(value: Any, where: str) -> None:
         _check_numbers(part, f"{where}: {key}")
     kinds = {type(x) for x in value} if isinstance(value, list) else set()
     if bool in kinds and kinds & {int, float}:
-        raise LoadingError(f"{where} must hold numbers; got {value!r}")
+        raise LoadingError(f"{where} must hold numbers; got {short_repr(value)}")
 
 
 def _kind(value: object) -> str:
@@ -137,7 +137,7 @@ def build(kind: type, values: Any, where: str) -> Any:
 
 
 def time_function(table: Table, where: str) -> Any:
-    """`{sinusoid: {amplitude: 1, frequency: 2}}` and its like.
+    """`{sinusoid: {amplitude: 1, omega: 2}}` and its like.
 
     Raises:
         LoadingError: not one known function with its arguments.
@@ -156,7 +156,8 @@ def one_entry(table: Any, where: str) -> tuple[str, Any]:
     """
     if not isinstance(table, dict) or len(table) != 1:
         raise LoadingError(
-            f"{where} must be a table with one key, the kind, such as {{PointAnchor: {{...}}}}; got {table!r}"
+            f"{where} must be a table with one key, the kind, such as {{PointAnchor: {{...}}}}; "
+            f"got {short_repr(table)}"
         )
     key, value = next(iter(table.items()))
     return str(key), value
@@ -196,7 +197,7 @@ def strings(table: Table, key: str, where: str) -> list[str]:
     if value is None:
         return []
     if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
-        raise LoadingError(f"{where}: {key} must be a list of names; got {value!r}")
+        raise LoadingError(f"{where}: {key} must be a list of names; got {short_repr(value)}")
     return value
 
 
@@ -239,10 +240,10 @@ def loops(table: Table, where: str) -> list[Any]:
     for i, (pair, kind) in enumerate(zip(pairs, types, strict=True)):
         place = f"{where}: closed_loop[{i}]"
         if not isinstance(pair, list) or len(pair) != 2:
-            raise LoadingError(f"{place} must be a pair of frame names; got {pair!r}")
+            raise LoadingError(f"{place} must be a pair of frame names; got {short_repr(pair)}")
         arguments = {"frame1": pair[0], "frame2": pair[1], "name": f"{pair[0]}-{pair[1]}"}
         if not isinstance(kind, str) or kind.lower() not in ("3d", "6d"):
-            raise LoadingError(f'{where}: type[{i}] must be "3d" or "6d"; got {kind!r}')
+            raise LoadingError(f'{where}: type[{i}] must be "3d" or "6d"; got {short_repr(kind)}')
         anchor = constraints.PointAnchor if kind.lower() == "3d" else constraints.FrameAnchor
         result.append(build(anchor, arguments, place))
     return result
@@ -270,7 +271,7 @@ def pitches(table: Table, where: str) -> dict[str, float]:
     """
     given = (table.get("model") or {}).get("helical") or {}
     if not isinstance(given, dict):
-        raise LoadingError(f"{where}: model: helical must be a table by joint name; got {given!r}")
+        raise LoadingError(f"{where}: model: helical must be a table by joint name; got {short_repr(given)}")
     result = {}
     for joint, value in given.items():
         what = f'{where}: model: helical: pitch of "{joint}"'

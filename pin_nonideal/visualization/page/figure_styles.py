@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pin_nonideal.errors import InputError
+from pin_nonideal.errors import InputError, nearest, short_repr
 from pin_nonideal.validation import choice
 
 from .style import CURVES
@@ -37,19 +37,39 @@ PAPER: dict[str, Any] = {
 }
 
 
+def _checked(style: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings that matplotlib knows.
+
+    Raises:
+        InputError: matplotlib has no setting of a name, or refuses its value.
+    """
+    from matplotlib import RcParams, rcParams
+
+    for key, value in style.items():
+        if key not in rcParams:
+            raise InputError(f'plot: style: matplotlib has no setting "{key}"{nearest(str(key), rcParams)}')
+        try:
+            RcParams({key: value})
+        except (ValueError, TypeError) as error:
+            raise InputError(f"plot: style: {error}") from None
+    return dict(style)
+
+
 class Style:
     """The settings of one figure."""
 
     def __init__(self, columns: int | None, style: str | Mapping[str, Any] | None) -> None:
         choice("plot: columns", columns, (None, 1, 2))
         if not (style is None or isinstance(style, (str, Mapping))):
-            raise InputError(f'plot: style must be "screen", "paper" or matplotlib settings; got {style!r}')
+            raise InputError(
+                f'plot: style must be "screen", "paper" or matplotlib settings; got {short_repr(style)}'
+            )
         self.print = columns is not None if style is None else style == "paper"
         if isinstance(style, str):
             choice("plot: style", style, STYLES)
         self.settings = dict(PAPER if self.print else SCREEN)
         if isinstance(style, Mapping):
-            self.settings |= dict(style)
+            self.settings |= _checked(style)
         self.width = WIDTHS[columns]
         self.height = RATIOS[columns] * self.width
 

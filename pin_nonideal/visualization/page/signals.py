@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
-from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.errors import InputError, UnknownNameError, nearest, short_repr
 from pin_nonideal.types import Array
 from pin_nonideal.validation import sequence
 
@@ -82,7 +82,7 @@ def wanted(what: str, chosen: Any) -> list[Any]:
             isinstance(item, str) or (pair and isinstance(item[0], str) and isinstance(item[1], Mapping))
         ):
             raise InputError(
-                f"{what} must hold names, and pairs of a title and curves by label; got {item!r}"
+                f"{what} must hold names, and pairs of a title and curves by label; got {short_repr(item)}"
             )
     return items
 
@@ -118,8 +118,8 @@ def usual_plots(run: Trajectory) -> list[str]:
 
 
 def _recorded(run: Trajectory, name: str) -> bool:
-    if name in ("energy", "work"):
-        return bool(run.energy)
+    if name in ("energy", "work", "power"):
+        return bool(getattr(run, name.replace("work", "energy"), None))
     if name == "violation":
         return bool(run.scene.constraint_slices)
     if name == "reactions":
@@ -128,7 +128,7 @@ def _recorded(run: Trajectory, name: str) -> bool:
         return run.lam is not None and bool(run.scene.contacts)
     if name == "gaps":
         return opens(run)
-    if name in ("a", "tau", "power"):
+    if name in ("a", "tau"):
         return getattr(run, name, None) is not None
     return True
 
@@ -203,7 +203,7 @@ def _given(run: Trajectory, title: str, curves: Mapping[str, Array]) -> Plot:
         except ValueError:  # lists of unequal length
             given = np.asarray(None)
         if given.dtype.kind not in "fiub":
-            raise InputError(f"{where} must hold numbers; got {curve!r}")
+            raise InputError(f"{where} must hold numbers; got {short_repr(curve)}")
         values[str(label)] = given.astype(np.float64)
         if given.shape != (len(run.t),):
             raise InputError(

@@ -112,9 +112,9 @@ def _frictions(run: Trajectory, name: str, over_load: bool) -> list[Relation]:
         )
     if not known:
         raise InputError(f'plot "{kind}" needs a law in a joint of one degree of freedom, and here is none')
-    if run.law_forces is None:
+    if not run.law_forces:
         raise InputError(f'plot "{kind}" must be recorded: pass record=("laws",) to simulate')
-    if over_load and run.reactions is None:
+    if over_load and not run.reactions:
         raise InputError('plot "load" must be recorded: pass record=("laws", "reactions") to simulate')
     chosen = [name] if name else sorted(known, key=lambda law: -_spread(run, known[law]))[:MAX_CURVES]
     by_unit: dict[str, Relation] = {}
