@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.errors import InputError
@@ -12,7 +13,7 @@ from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.held import Held, settled
 from pin_nonideal.states.reference_motion import ReferenceMotion
 from pin_nonideal.states.rows import DEPENDENT, holonomic_rows, rows_at
-from pin_nonideal.states.scales import coordinate
+from pin_nonideal.states.scales import coordinate, slides
 from pin_nonideal.types import Array
 
 from .inverse_dynamics import inverse_dynamics
@@ -22,6 +23,8 @@ Mask = NDArray[np.bool_]
 
 # Velocities of a coordinate below this part of the admitted ones depend on the coordinates chosen before.
 INDEPENDENT = 1e-6
+LONGEST = 0.1  # move of a given coordinate between two closures, in rad or relative to the scene's length
+LOG_ROUNDING = 1e-3  # largest move of a named coordinate, in rad or relative to the scene's length
 CLOSED = 1e-9  # residual of a reference on the constraints, relative to the scene's length or 1 m
 
 
@@ -40,6 +43,7 @@ class ClosedReference:
         driven: names of the driven joints.
         dofs: mask of their degrees of freedom, (nv,).
         who: words for messages.
+        by_name: whether the coordinates are given by name, so that all of them must be kept, up to rounding.
 
     Raises:
         InputError: the given coordinates do not determine the motion, or no configuration on the constraints
@@ -56,6 +60,7 @@ class ClosedReference:
         driven: list[str],
         dofs: Mask,
         who: str,
+        by_name: bool = True,
     ) -> None:
         self._scene, self._driven, self._who = scene, driven, who
         compiled = compiled_scene(scene)
@@ -66,10 +71,12 @@ class ClosedReference:
         basis = AtRest(scene, still, float(times[0]), start).free(start)
         self._free = ~self._independent(basis, [given & dofs, given])
         on = np.array(q)
-        before = start
-        for k, t in enumerate(times.tolist()):
-            guess = np.where(self._kept(given), q[k], before)
-            on[k] = before = self._settled(guess, t)
+        on[0] = self._settled(start, float(times[0]))
+        unit = np.where(slides(scene.model), compiled.projection.length or 1.0, 1.0)
+        for k in range(1, len(on)):
+            on[k] = self._followed(on[k - 1], q[k], given, times[k - 1 : k + 1], unit)
+        if by_name:
+            self._require_kept(on, q, times, given, unit)
         on_rates = None if v is None else np.array(v)
         if on_rates is not None:
             for k, t in enumerate(times.tolist()):
@@ -90,14 +97,43 @@ class ClosedReference:
         """Return the torques of the driven joints for a motion on the constraints, (nv,)."""
         return inverse_dynamics(self._scene, q, v, a, self._driven, t=t).tau
 
-    def _kept(self, given: Mask) -> Mask:
-        """Return the mask of configuration values that belong to given coordinates, (nq,)."""
+    def _followed(self, before: Array, q: Array, given: Mask, times: Array, unit: Array) -> Array:
+        """Return a sample on the constraints, followed from the sample before it in short moves, (nq,).
+
+        Args:
+            before: the sample before it, on the constraints, (nq,).
+            q: the sample, (nq,).
+            given: mask of its given coordinates, (nv,).
+            times: times of both samples [s].
+            unit: unit displacement of each coordinate, (nv,).
+        """
         model = self._scene.model
-        kept = np.zeros(model.nq, dtype=bool)
-        for j in range(1, model.njoints):
-            if given[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]].any():
-                kept[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]] = True
-        return kept
+
+        def way() -> Array:
+            return np.where(given, pin.difference(model, before, q), 0.0)
+
+        count = max(1, int(np.ceil(np.abs(way() / unit).max(initial=0.0) / LONGEST)))
+        for left in range(count, 0, -1):
+            t = float(times[1] - (left - 1) / count * (times[1] - times[0]))
+            before = self._settled(pin.integrate(model, before, way() / left), t)
+        return before
+
+    def _require_kept(self, on: Array, q: Array, times: Array, given: Mask, unit: Array) -> None:
+        """Check that given coordinates keep their values, up to the rounding of a log.
+
+        Raises:
+            InputError: a given coordinate has moved farther.
+        """
+        model = self._scene.model
+        for t, now, asked in zip(times.tolist(), on, q, strict=True):
+            away = np.where(given, np.abs(pin.difference(model, asked, now)) / unit, 0.0)
+            worst = int(np.argmax(away))
+            if away[worst] > LOG_ROUNDING:
+                raise InputError(
+                    f'{self._who}: q of "{coordinate(model, worst)}" cannot be kept together with the other '
+                    f"named joints at t = {t:g} s, since the constraints move it by {away[worst]:.2g}; name "
+                    "as many joints as the constraints leave free, or give consistent values"
+                )
 
     def _independent(self, basis: Array, groups: list[Mask]) -> Mask:
         """Return the mask of coordinates that determine the motion, (nv,), from the first groups first."""

@@ -54,8 +54,9 @@ class TrackTrajectory(SceneDrive):
     - "constrained": torques by which the driven joints move the mechanism along the reference, by
       `inverse_dynamics` with the constraints, laws and forces of the scene, without its contacts. The
       reference is put onto the constraints: it keeps as many coordinates as these leave free, driven ones
-      first, and the others follow, also the joints that q does not name. The constraints must hold
-      positions. Forces that the driven joints cannot supply are left out in the sense of least squares.
+      first, and the others follow, also the joints that q does not name. Named coordinates beyond this
+      number must agree with the constraints up to rounding (1e-3 rad). The constraints must hold positions.
+      Forces that the driven joints cannot supply are left out in the sense of least squares.
 
     Args:
         times: increasing times [s], shape (nt,) with nt >= 1.
@@ -131,7 +132,7 @@ class TrackTrajectory(SceneDrive):
         names = [place.name for place in joint_places(model) if driven[place.v_first]]
 
         def reference() -> ClosedReference:
-            return ClosedReference(scene, times, q, v, given, names, driven, who)
+            return ClosedReference(scene, times, q, v, given, names, driven, who, by_name(self.q) is not None)
 
         return _ConstrainedTracking(model, reference, kp, kd), driven
 

@@ -158,6 +158,18 @@ def test_drives_of_different_kinds_add():
     np.testing.assert_allclose(several.q[-1], one.q[-1], rtol=0.0, atol=1e-9)
 
 
+def test_jumps_beside_a_spring_are_found_by_the_error_control():
+    """Steps do not end at the times of a table beside a spring, and the tolerance holds all the same."""
+    table = pn.Table(TIMES, {"elbow": VALUES[:, 1]}, interpolation="hold")
+    tight = {"rtol": 1e-10, "atol": 1e-11}
+    whole = run([SHOULDER, table], **tight)
+    t, q, v = 0.0, np.zeros(2), np.zeros(2)
+    for tau, stop in zip(VALUES[:, 1], [*TIMES[1:], END], strict=True):
+        piece = run([SHOULDER, {"elbow": tau}], duration=stop - t, q=q, v=v, t0=t, **tight)
+        t, q, v = stop, piece.q[-1], piece.v[-1]
+    np.testing.assert_allclose(whole.q[-1], q, rtol=0.0, atol=1e-7)
+
+
 def test_limits_of_one_drive_apply_to_its_joints():
     drives = [pn.EffortLimits(SHOULDER, effort=1.0), {"elbow": 3.0}]
     tau = run(drives, record="tau").tau

@@ -12,6 +12,7 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 import pin_nonideal as pn
 from pin_nonideal.states.reference_motion import ReferenceMotion
+from pin_nonideal.statics.closed_reference import ClosedReference
 
 TIMES = np.array([0.0, 0.1, 0.25, 0.3, 0.45, 0.6])
 TIGHT = {"rtol": 1e-10, "atol": 1e-12, "progress": False}
@@ -280,6 +281,14 @@ def test_scenes_are_described_copied_and_pickled():
         np.testing.assert_array_equal(pn.simulate(other, 0.1, progress=False).q, expected)
 
 
+def test_a_checkpoint_continues_a_run(tmp_path):
+    scene = pn.Scene(arm(), actuation=pn.TrackTrajectory(TIMES, Q, **GAINS, period=0.01), q0=Q[0])
+    whole = pn.simulate(scene, 0.2, progress=False)
+    pn.simulate(scene, 0.2, checkpoint=tmp_path / "run", progress=False)
+    again = pn.resume(tmp_path / "run", scene=scene)
+    np.testing.assert_array_equal(again.q[-1], whole.q[-1])
+
+
 def test_runs_of_a_batch_and_methods_of_scipy():
     scene = pn.Scene(arm(), actuation=pn.TrackTrajectory(TIMES, Q, **GAINS), q0=Q[0])
     q = np.array([Q[0], Q[0] + 0.1])
@@ -289,6 +298,9 @@ def test_runs_of_a_batch_and_methods_of_scipy():
         np.testing.assert_array_equal(run.q[-1], alone.q[-1])
     with pytest.raises(pn.InputError, match="is more than other numbers"):
         pn.rollout(scene, None, None, 0.1, parameters={"actuation": {"kp": [1.0, 2.0]}})
+    masses = pn.rollout(scene, None, None, 0.1, parameters={"rod": {"mass": [1.0, 2.0]}})
+    np.testing.assert_allclose(masses[0].q[-1], pn.simulate(scene, 0.1, progress=False).q[-1], atol=1e-9)
+    assert np.abs(masses[0].q[-1] - masses[1].q[-1]).max() > 1e-4
     near = pn.simulate(scene, 0.2, method="LSODA", progress=False)
     np.testing.assert_allclose(near.q[-1], pn.simulate(scene, 0.2, progress=False).q[-1], atol=1e-6)
     held = pn.Scene(arm(), actuation=pn.TrackTrajectory(TIMES, Q, **GAINS, period=0.01))
@@ -344,6 +356,23 @@ def test_a_whole_configuration_is_put_onto_the_loop(four_bar):
     np.testing.assert_allclose(run.q[:, 0], CRANK_SPLINE(run.t), rtol=0.0, atol=1e-7)
 
 
+def test_samples_far_apart_stay_in_their_way_of_assembly(four_bar):
+    """Between samples more than 0.7 rad apart, the loop is followed and does not snap through."""
+    times = np.linspace(0.0, 3.0, 10)
+    crank = 1.0 + 2.2 * times
+    scene = four_bar.replace(actuation=None, laws=())
+    q = np.tile(scene.project({"crank_joint": 1.0}, np.zeros(3))[0], (10, 1))
+    q[:, 0] = crank
+    crank_only = np.array([True, False, False])
+    reference = ClosedReference(scene, times, q, None, crank_only, ["crank_joint"], crank_only, "log")
+    signs = set()
+    for t in np.linspace(0.0, 3.0, 301):
+        now = reference(t)[0]
+        np.testing.assert_allclose(now[0], 1.0 + 2.2 * t, rtol=0.0, atol=1e-12)
+        signs.add(np.sign(np.linalg.det(scene.jacobian("loop", now)[:, 1:])))
+    assert len(signs) == 1
+
+
 def test_two_motors_share_a_loop(four_bar):
     """More motors than freedoms: the reference keeps the crank, and both motors together move the loop."""
     closed = np.array([four_bar.project({"crank_joint": angle}, {"crank_joint": 0.0})[0] for angle in CRANK])
@@ -358,6 +387,38 @@ def test_two_motors_share_a_loop(four_bar):
     kept = 0 if abs(solution.a[0] - CRANK_SPLINE(0.1, 2)) < 1e-5 else 2
     expected = CRANK_SPLINE if kept == 0 else CubicSpline(TIMES, closed[:, 2])
     np.testing.assert_allclose(solution.a[kept], expected(0.1, 2), rtol=1e-5)
+
+
+def test_three_motors_of_a_delta_follow_their_references():
+    robot = pn.load("delta")
+    model, q0 = robot.model, robot.initial_state()[0]
+    motors = ["motor0", "motor1", "motor2"]
+    values = [model.idx_qs[model.getJointId(name)] for name in motors]
+    dofs = [model.idx_vs[model.getJointId(name)] for name in motors]
+    pace = dict(zip(motors, (0.2, 0.4, 0.6), strict=True))
+    start = dict(zip(motors, q0[values], strict=True))
+    drive = pn.TrackTrajectory(
+        TIMES,
+        {name: start[name] + pace[name] * TIMES**2 for name in motors},
+        {name: 2.0 * pace[name] * TIMES for name in motors},
+        **NO_GAINS,
+        feedforward="constrained",
+    )
+    scene = robot.replace(actuation=drive, laws=())
+    still = np.zeros(model.nv)
+    run = pn.simulate(scene, 0.2, q=q0, v=still, record="tau", rtol=1e-9, progress=False)
+    for name, value in zip(motors, values, strict=True):
+        expected = start[name] + pace[name] * run.t**2
+        np.testing.assert_allclose(run.q[:, value], expected, rtol=0.0, atol=1e-6)
+    assert not np.delete(run.tau, dofs, axis=1).any()
+
+
+def test_named_coordinates_that_the_constraints_do_not_admit_together_are_an_error():
+    robot = pn.load("five_bar")  # a constraint drives motor1
+    q = {"motor1": 2.2 + 0.0 * TIMES, "motor2": 0.9 + TIMES}
+    drive = pn.TrackTrajectory(TIMES, q, **GAINS, feedforward="constrained")
+    with pytest.raises((pn.InputError, pn.RunError), match=r'q of "motor1" cannot be kept .* at t = 0.1 s'):
+        pn.simulate(robot.replace(actuation=drive), 0.1, progress=False)
 
 
 def test_a_reference_that_leaves_the_loop_stops_the_run(four_bar):
