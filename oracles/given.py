@@ -38,6 +38,8 @@ def torque(actuation, scene, q, v, t):
         kp, kd = (_gain(model, k) for k in (actuation.kp, actuation.kd))
         goal = scene.q0 if actuation.q is None else np.asarray(actuation.q)
         return kp * _difference(model, q, goal, kp) - kd * v
+    if isinstance(actuation, pn.Table) and actuation.interpolation == "hold":
+        return np.asarray(actuation.values)[max(np.searchsorted(actuation.times, t, side="right") - 1, 0)]
     if isinstance(actuation, pn.Table):
         return np.array([np.interp(t, actuation.times, column) for column in np.transpose(actuation.values)])
     if isinstance(actuation, pn.SampledControl):

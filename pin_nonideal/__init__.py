@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from .statics.equilibrium import Equilibrium, equilibrium
     from .statics.inverse_dynamics import InverseDynamics, inverse_dynamics
     from .statics.static_feasibility import Rest, rest
+    from .statics.track_trajectory import TrackTrajectory
     from .sweeps.grid import sweep_grid, sweep_samples
     from .sweeps.store import Sweep
     from .sweeps.sweep import sweep
@@ -88,6 +89,7 @@ _LATER = {
     "inverse_dynamics": "statics.inverse_dynamics",
     "Rest": "statics.static_feasibility",
     "rest": "statics.static_feasibility",
+    "TrackTrajectory": "statics.track_trajectory",
     "sweep_grid": "sweeps.grid",
     "sweep_samples": "sweeps.grid",
     "Sweep": "sweeps.store",
@@ -145,6 +147,7 @@ __all__ = [
     "Stepper",
     "StiffnessError",
     "Sweep",
+    "TrackTrajectory",
     "Trajectory",
     "UnknownNameError",
     "UserFunctionError",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.actuation import SampledControl, asked_by
+from pin_nonideal.description.actuation import switching_drives
 from pin_nonideal.description.constraints import UserConstraint
 from pin_nonideal.errors import InputError, RunError
 from pin_nonideal.states.held import NOTHING_HELD, Held
@@ -32,7 +32,6 @@ class CompiledScene:
         model: pinocchio.Model.
         q0: configuration at which `frame2=None` and lengths left out are read, (nq,).
         said: descriptions of the scene.
-        tolerance: residual that a vanishing row may have [m or rad].
         is_start: whether q0 was given as a start, so that user functions may be called there.
 
     Raises:
@@ -57,9 +56,7 @@ class CompiledScene:
         unchecked: whether derivatives of user functions are still unchecked.
     """
 
-    def __init__(
-        self, model: Model, q0: Array, said: Descriptions, tolerance: float, is_start: bool = True
-    ) -> None:
+    def __init__(self, model: Model, q0: Array, said: Descriptions, is_start: bool = True) -> None:
         self.model, self.q0, self.said = model, q0, said
         try:
             builder = core.Builder(model, core.Provider[said.terms])
@@ -92,7 +89,7 @@ class CompiledScene:
             stand_in = core.Builder(model, core.Provider[said.terms])
             lower(plain, stand_in, where)
             sampled = stand_in.finish()
-        self.dropped, copies = idle_rows(model, q0, self.program, sampled, tolerance)
+        self.dropped, copies = idle_rows(model, q0, self.program, sampled, said.assembly_tolerance)
         if self.dropped:
             idle = {(name, row) for name, row, _ in self.dropped}
             for block, c in enumerate(self.program.constraints):
@@ -138,8 +135,8 @@ class CompiledScene:
         """Message on a part of the scene that no implicit method supports, or empty."""
         if self.opening_names:
             return f'no implicit method here opens and closes contacts such as "{self.opening_names[0]}" yet'
-        if isinstance(asked_by(self.said.actuation), SampledControl):
-            return "no implicit method here holds the torques of a SampledControl yet"
+        if switching := switching_drives(self.said.actuation):
+            return f"no implicit method here holds the torques of a {type(switching[0]).__name__} yet"
         return ""
 
     def _circumstances(self) -> Circumstances:

@@ -275,9 +275,11 @@ class _Again:
 
 
 def _same(a: Any, b: Any) -> bool:
-    """Check if two arguments are equal; any two functions count as equal."""
+    """Check if two arguments are equal; any two functions count as equal unless their sources differ."""
     if isinstance(a, (tuple, list)):
         return isinstance(b, (tuple, list)) and len(a) == len(b) and all(map(_same, a, b))
     if isinstance(a, np.ndarray):
         return bool(np.array_equal(a, b))
-    return callable(a) and callable(b) if callable(a) else bool(a == b)
+    if callable(a) and callable(b):
+        return getattr(a, "source", None) is getattr(b, "source", None)
+    return not callable(a) and bool(a == b)

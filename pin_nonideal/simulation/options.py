@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.actuation import SampledControl, asked_by
+from pin_nonideal.description.actuation import sampled_drives
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene.evaluation import SEVERAL
 from pin_nonideal.scene.scene import Scene, compiled_scene
@@ -364,8 +364,8 @@ def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, fl
     end = max(abs(t0), abs(t0 + duration))
     spacing = float(np.spacing(end))
     named = {f"simulate: {key}": value for key, value in {"duration": duration, **lengths}.items()}
-    control = asked_by(scene.actuation)
-    if isinstance(control, SampledControl):
+    controls = sampled_drives(scene.actuation)
+    for control in controls:
         named[f"{label(control)}: period"] = control.period
     for what, value in named.items():
         if not value >= LEAST_SPACINGS * spacing:  # true for an infinite end as well
@@ -379,9 +379,10 @@ def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, fl
             f"simulate: {key} must leave at most {MOST_SAMPLES:g} samples; {lengths[key]:g} s leaves "
             f"{duration / lengths[key]:.2g}; set a longer {'output_dt' if key == 'dt' else key}"
         )
-    if isinstance(control, SampledControl) and duration / control.period > MOST_SAMPLES:
-        raise InputError(
-            f"{label(control)}: period must leave at most {MOST_SAMPLES:g} calls in a run; "
-            f"{control.period:g} s leaves {duration / control.period:.2g}; "
-            "set a longer period"
-        )
+    for control in controls:
+        if duration / control.period > MOST_SAMPLES:
+            raise InputError(
+                f"{label(control)}: period must leave at most {MOST_SAMPLES:g} calls in a run; "
+                f"{control.period:g} s leaves {duration / control.period:.2g}; "
+                "set a longer period"
+            )

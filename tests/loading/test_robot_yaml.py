@@ -141,6 +141,27 @@ def test_torques_by_joint_name(tmp_path):
     np.testing.assert_array_equal(scene.actuation, [0.0, -0.5])
 
 
+def test_a_list_of_drives_by_joint_name(tmp_path):
+    drives = """
+actuation:
+  - torques: {elbow: -0.5}
+  - Table: {times: [0.0, 1.0], values: {shoulder: [1.0, 2.0]}, interpolation: hold}
+"""
+    torques, table = pn.load(folder(tmp_path, drives)).actuation
+    assert torques == {"elbow": -0.5}
+    assert table.interpolation == "hold"
+    np.testing.assert_array_equal(table.values["shoulder"], [1.0, 2.0])
+    held = """
+actuation:
+  - torques: {elbow: 1.0}
+  - HoldPosition: {kp: {shoulder: 5.0}, kd: {shoulder: 0.5}}
+"""
+    assert pn.load(folder(tmp_path, held)).actuation[1].kp == {"shoulder": 5.0}
+    both = "actuation:\n  - torques: {elbow: 1.0}\n  - HoldPosition: {kp: 5.0, kd: 0.5}\n"
+    with pytest.raises(pn.PinNonidealError, match=r'"elbow" is commanded by drive 0 \(constant torques\)'):
+        pn.load(folder(tmp_path, both))
+
+
 def test_angles_of_continuous_joints_and_quaternions(tmp_path):
     text = robot(link("base"), link("wheel"), joint("spin", "base", "wheel", kind="continuous"))
     yaml = "model: {free_flyer: true}\ninitial:\n  q: {spin: 0.5, root_joint: [0, 0, 1, 0, 0, 0, 1.0001]}\n"
