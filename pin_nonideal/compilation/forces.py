@@ -17,6 +17,7 @@ from pin_nonideal.types import Array, Model
 from pin_nonideal.validation import by_name
 
 from .callbacks import checked
+from .delay import DelayedTorque
 from .resolver import Resolution, words
 
 
@@ -84,8 +85,11 @@ def lower_actuation(u: Any, out: core.Builder, where: Resolution) -> None:
         least, most = _efforts(u, model)
         out.limit_effort(least=least, most=most)
     elif isinstance(u, SampledControl):
-        who = f"{words(u)}: function"
-        out.set_sampled_torque(checked(_torques_of(u.function, model, who), who, (nv,)), u.period)
+        if u.delay_in_samples:  # runs have their own delayed torques, see `delayed_torque`
+            initial = initial_torque(u, model)
+            out.set_sampled_torque(lambda t, q, v: initial, u.period)
+        else:
+            out.set_sampled_torque(_sampled_torque(u, model), u.period)
     elif isinstance(u, HoldPosition):
         q = where.q0 if u.q is None else named_configuration(model, u.q, where.q0, f"{words(u)}: q")
         kp, kd = _gains(u, "kp", model), _gains(u, "kd", model)
@@ -98,6 +102,36 @@ def lower_actuation(u: Any, out: core.Builder, where: Resolution) -> None:
         out.set_torque_function(checked(_torques_of(u, model, "actuation"), "actuation", (nv,)))
     else:
         out.set_constant_torque(tau=named_joint_values(model, u, "actuation"))
+
+
+def delayed_torque(u: SampledControl, model: Model, t0: float, by_thread: bool) -> DelayedTorque:
+    """Return the delayed torques of one run, or of the runs of a rollout.
+
+    Args:
+        u: a sampled control with a delay.
+        model: pinocchio.Model.
+        t0: start time of the runs [s].
+        by_thread: whether runs go on in several threads at once, each run in one thread.
+    """
+    function, initial = _sampled_torque(u, model), initial_torque(u, model)
+    return DelayedTorque(function, u.delay_in_samples, initial, t0, by_thread)
+
+
+def _sampled_torque(u: SampledControl, model: Model) -> Callable[..., Any]:
+    who = f"{words(u)}: function"
+    return checked(_torques_of(u.function, model, who), who, (model.nv,))
+
+
+def initial_torque(u: SampledControl, model: Model) -> Array:
+    """Return the torque before the first delayed one arrives, (nv,).
+
+    Args:
+        u: a sampled control.
+        model: pinocchio.Model.
+    """
+    if u.initial is None:
+        return np.zeros(model.nv)
+    return np.ascontiguousarray(named_joint_values(model, u.initial, f"{words(u)}: initial"))
 
 
 def _torques_of(function: Callable[..., Any], model: Model, who: str) -> Callable[..., Any]:

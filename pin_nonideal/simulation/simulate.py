@@ -131,11 +131,12 @@ def simulate(
     choice("simulate: progress", progress, (True, False, None))
     between = asked_callback(callback, scene.model.nv)
     _check_together(method, asked, callback, checkpoint)
+    program, delayed = compiled_scene(scene).program_of_runs(options.t0)
     saver = None
     if checkpoint is not None:
         from .checkpoint import Saver
 
-        saver = Saver(checkpoint, scene, options, checkpoint_interval, notes=notes)
+        saver = Saver(checkpoint, scene, options, checkpoint_interval, notes=notes, delayed=delayed)
     hints: list[str] = []
     explicit_only = compiled_scene(scene).explicit_only
 
@@ -158,6 +159,7 @@ def simulate(
                 q0,
                 v0,
                 options,
+                program,
                 tick=tick,
                 save=saver,
                 save_interval=saver.interval if saver else 0.0,
