@@ -410,6 +410,7 @@ def test_the_public_names_are_all_drawn():
         "Equilibrium",
         "Event",
         "FrameRecord",
+        "HoldingTorque",
         "InverseDynamics",
         "JointRecord",
     }
