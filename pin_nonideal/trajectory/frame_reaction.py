@@ -27,6 +27,8 @@ from pin_nonideal.types import Array, Model
 
 # Largest part of the forces on a body by which they may miss its recorded reaction.
 AGREES = 1e-6
+# Part of the weight of the mechanism by which they may miss it where forces cancel, as in free fall.
+CANCELS = 1e-9
 # Smallest eigenvalue of the inertia that frames leave to their body, relative to the inertia of the body.
 LEFT_OVER = -1e-9
 CARRIERS = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
@@ -121,7 +123,7 @@ def frame_reaction(run: Any, name: str, index: int) -> Array:
 def _balance(run: Any, k: int, motions: BodyMotions, part: Part) -> tuple[pin.Force, float]:
     """Return the wrench that a part receives, in the joint frame, and the sum of the sizes of its terms."""
     velocity, acceleration = motions.velocity(part.joint), motions.acceleration(part.joint)
-    terms = [part.inertia * acceleration + velocity.cross(part.inertia * velocity)]
+    terms = [part.inertia * acceleration, velocity.cross(part.inertia * velocity)]
     to_body = motions.placement(part.joint)
     for child in part.children:
         wrench = run.reactions[str(run.scene.model.names[child])][k, 6:]
@@ -140,7 +142,10 @@ def _require_recorded(run: Any, k: int, motions: BodyMotions, body: Part, who: s
     found, size = _balance(run, k, motions, body)
     recorded = run.reactions[name][k, :6]
     missed = float(np.abs(found.vector - recorded).max())
-    if missed > AGREES * (size + float(np.abs(recorded).max())):
+    model = run.scene.model
+    whole = sum(Y.mass for Y in model.inertias) * float(np.linalg.norm(model.gravity.linear))
+    whole += max(float(np.abs(wrench[k]).max()) for wrench in run.reactions.values())
+    if missed > AGREES * (size + float(np.abs(recorded).max())) + CANCELS * whole:
         raise InputError(
             f"{who}: masses and gravity of the run must be those of its scene; the loads on the body of "
             f'joint "{name}" miss its recorded reaction by {missed:.2g} (N or N m) at t = {run.t[k]:.4g} s; '
@@ -233,6 +238,8 @@ def _inertia_beyond(model: Model, index: int, who: str) -> pin.Inertia:
             f'the whole body of joint "{model.names[frame.parentJoint]}"; make the frame a fixed joint with '
             "a link"
         )
+    if frame.parentJoint == 0:  # the world has no inertia of its own
+        return total
     body = model.inertias[frame.parentJoint].toPseudoInertia().toMatrix()
     left = np.linalg.eigvalsh(body - total.toPseudoInertia().toMatrix())
     if left[0] < LEFT_OVER * float(np.abs(body).max()):

@@ -376,6 +376,52 @@ def test_joints_that_were_locked():
         run.reaction("flange")
 
 
+def test_joints_that_a_robot_file_locks():
+    """The fingers of this arm are locked: each keeps its place behind the hand and its own inertia."""
+    locked, whole = pn.load("panda_friction"), pn.load("panda").model
+    fixed = locked.model
+    hand = fixed.frames[fixed.getFrameId("panda_hand")].placement
+    q, fingers = pin.neutral(whole), []
+    q[:7] = locked.q0
+    for name in ("panda_finger_joint1", "panda_finger_joint2"):
+        index = whole.getJointId(name)
+        own = fixed.frames[fixed.getFrameId(name)]
+        assert fixed.frames[own.parentFrame].name == "panda_hand"
+        np.testing.assert_allclose(own.inertia.matrix(), whole.inertias[index].matrix(), atol=1e-15)
+        at_hand = whole.frames[whole.getFrameId("panda_hand")].placement
+        rest = (at_hand.inverse() * whole.jointPlacements[index]).inverse() * (hand.inverse() * own.placement)
+        q[whole.idx_qs[index]] = np.linalg.norm(rest.translation)
+        fingers.append(pn.PrescribedMotion(name, pn.constant(q[whole.idx_qs[index]])))
+    options = {"record": "reactions", "output_dt": 0.01, **TIGHT}
+    merged = pn.simulate(pn.Scene(fixed, q0=locked.q0), 0.03, **options)
+    held = pn.simulate(pn.Scene(whole, constraints=fingers, q0=q), 0.03, **options)
+    for name in ("panda_hand_joint", "panda_finger_joint1", "panda_joint7"):
+        wanted = held.reaction(name, "world")
+        error = np.abs(merged.reaction(name, "world") - wanted).max()
+        assert error <= 1e-8 * np.abs(held.reaction("panda_joint1")).max(), name
+
+
+@pytest.mark.parametrize("name", ["solo12_dropped", "panda_settling", "panda_friction"])
+def test_every_fixed_joint_of_a_robot(name):
+    """Also in free fall, where all forces cancel, and on a turned mount."""
+    scene = pn.load(name)
+    run = pn.simulate(scene, 0.02, output_dt=0.01, record="reactions")
+    fixed = [f for f in list(scene.model.frames)[1:] if f.type == pin.FrameType.FIXED_JOINT]
+    assert fixed
+    for one in fixed:
+        assert np.isfinite(run.reaction(one.name)).all()
+
+
+def test_a_turned_mount_carries_the_weight():
+    scene = pn.load("panda_settling")
+    run = pn.simulate(scene, 0.01, record="reactions")
+    base, first = (run.reaction(name, "world") for name in ("panda_link0", "panda_joint1"))
+    lift = 9.81 * scene.model.frames[scene.model.getFrameId("panda_link0")].inertia.mass
+    np.testing.assert_allclose(
+        base[:, :3] - first[:, :3], np.tile([0.0, 0.0, lift], (len(run), 1)), atol=1e-9
+    )
+
+
 def test_shapes_know_their_links():
     """Contacts of collision shapes name the moving joint; the shape tells on which link it is."""
     import coal
