@@ -43,6 +43,8 @@ def torque(actuation, scene, q, v, t):
     if isinstance(actuation, pn.Table):
         return np.array([np.interp(t, actuation.times, column) for column in np.transpose(actuation.values)])
     if isinstance(actuation, pn.SampledControl):
+        if actuation.delay_in_samples:  # a single state has no earlier samples
+            return np.zeros(model.nv) if actuation.initial is None else np.array(actuation.initial)
         return np.asarray(actuation.function(t, q, v), dtype=float)
     return np.asarray(actuation(t, q, v) if callable(actuation) else actuation, dtype=float)
 

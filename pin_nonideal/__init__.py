@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from .simulation.rollout import rollout
     from .simulation.rollout_arrays import RunArrays
     from .statics.equilibrium import Equilibrium, equilibrium
+    from .statics.holding import HoldingTorque
     from .statics.inverse_dynamics import InverseDynamics, inverse_dynamics
     from .statics.static_feasibility import Rest, rest
     from .statics.track_trajectory import TrackTrajectory
@@ -85,6 +86,7 @@ _LATER = {
     "replay": "visualization.replay",
     "Equilibrium": "statics.equilibrium",
     "equilibrium": "statics.equilibrium",
+    "HoldingTorque": "statics.holding",
     "InverseDynamics": "statics.inverse_dynamics",
     "inverse_dynamics": "statics.inverse_dynamics",
     "Rest": "statics.static_feasibility",
@@ -121,6 +123,7 @@ __all__ = [
     "FrictionConvergenceError",
     "FrictionParadoxError",
     "GeometryContact",
+    "HoldingTorque",
     "ImpactEnergyError",
     "InconsistentConstraintsError",
     "InputError",

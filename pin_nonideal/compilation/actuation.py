@@ -31,6 +31,7 @@ from pin_nonideal.types import Array, Model
 from pin_nonideal.validation import by_name, label
 
 from .callbacks import checked
+from .delay import DelayedTorque
 from .resolver import Resolution, words
 
 Mask = NDArray[np.bool_]
@@ -120,8 +121,10 @@ def _lowered(u: Any, where: Resolution, said: Any, who: str) -> tuple[Part, Mask
     """Return the torques of one drive, and the mask of the degrees of freedom that it commands, (nv,)."""
     model, everything = where.model, np.ones(where.model.nv, dtype=bool)
     if isinstance(u, SampledControl):
-        what = f"{words(u)}: function"
-        return Called(checked(_torques_of(u.function, model, what), what, (model.nv,)), u.period), everything
+        if u.delay_in_samples:  # runs have their own delayed torques, see `delayed_torque`
+            initial = initial_torque(u, model)
+            return Called(lambda t, q, v: initial, u.period), everything
+        return Called(_sampled_torque(u, model), u.period), everything
     if isinstance(u, SceneDrive):
         function, acts = u.bound(model, where.q0, said)
         return Called(_Identified(checked(function, words(u), (model.nv,)), u), u.period), acts
@@ -139,6 +142,36 @@ def _lowered(u: Any, where: Resolution, said: Any, who: str) -> tuple[Part, Mask
     if callable(u):
         return Called(checked(_torques_of(u, model, who), who, (model.nv,)), None), everything
     return Constant(named_joint_values(model, u, who)), commanded(model, u)
+
+
+def delayed_torque(u: SampledControl, model: Model, t0: float, by_thread: bool) -> DelayedTorque:
+    """Return the delayed torques of one run, or of the runs of a rollout.
+
+    Args:
+        u: a sampled control with a delay.
+        model: pinocchio.Model.
+        t0: start time of the runs [s].
+        by_thread: whether runs go on in several threads at once, each run in one thread.
+    """
+    function, initial = _sampled_torque(u, model), initial_torque(u, model)
+    return DelayedTorque(function, u.delay_in_samples, initial, t0, by_thread)
+
+
+def _sampled_torque(u: SampledControl, model: Model) -> Callable[..., Any]:
+    who = f"{words(u)}: function"
+    return checked(_torques_of(u.function, model, who), who, (model.nv,))
+
+
+def initial_torque(u: SampledControl, model: Model) -> Array:
+    """Return the torque before the first delayed one arrives, (nv,).
+
+    Args:
+        u: a sampled control.
+        model: pinocchio.Model.
+    """
+    if u.initial is None:
+        return np.zeros(model.nv)
+    return np.ascontiguousarray(named_joint_values(model, u.initial, f"{words(u)}: initial"))
 
 
 class _Identified:

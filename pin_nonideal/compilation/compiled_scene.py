@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from typing import Any
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.actuation import switching_drives
+from pin_nonideal.description.actuation import SampledControl, delayed_control, switching_drives
 from pin_nonideal.description.constraints import UserConstraint
 from pin_nonideal.errors import InputError, RunError
 from pin_nonideal.states.held import NOTHING_HELD, Held
@@ -16,8 +17,10 @@ from pin_nonideal.states.report import ProjectionReport
 from pin_nonideal.states.rows import row_slices
 from pin_nonideal.types import Array, Model
 
+from .actuation import delayed_torque
 from .analysis import check_user_functions, has_rates, idle_rows, without_functions
 from .constraints import anchor_frames
+from .delay import DelayedTorque
 from .error_context import Circumstances, named_failure
 from .lowering import Descriptions, lower
 from .resolver import Resolution, unique_names
@@ -100,6 +103,29 @@ class CompiledScene:
             self.program = builder.finish()
         idle_names = {name for name, _, _ in self.dropped}
         self.projection = Projection(model, self.program, q0, idle_names, is_start or plain is None)
+        control = delayed_control(said.actuation)
+        self._delayed: tuple[SampledControl, core.Builder] | None = None
+        if control is not None:
+            self._delayed, self._building = (control, builder), threading.Lock()
+
+    def program_of_runs(
+        self, t0: float, by_thread: bool = False
+    ) -> tuple[core.Program, DelayedTorque | None]:
+        """Return the program of a new run, and its delayed torques or None without a delay.
+
+        Delayed torques belong to one run, so a scene with a delay needs a program per run.
+
+        Args:
+            t0: start time of the run [s].
+            by_thread: whether the program serves runs in several threads, each run in one thread.
+        """
+        if self._delayed is None:
+            return self.program, None
+        control, builder = self._delayed
+        delayed = delayed_torque(control, self.model, t0, by_thread)
+        with self._building:
+            builder.set_sampled_torque(delayed, control.period)
+            return builder.finish(), delayed
 
     def check_functions(self, q: Array, v: Array, t: float) -> None:
         """Check the derivatives of user functions once, at the first known start.

@@ -7,6 +7,7 @@ name, also those of functions.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from typing import Any
@@ -16,7 +17,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from pin_nonideal.errors import InputError
 from pin_nonideal.types import Array, State
-from pin_nonideal.validation import array, by_name, choice, function, label, optional_text, positive
+from pin_nonideal.validation import (
+    array,
+    by_name,
+    choice,
+    count,
+    function,
+    label,
+    nonnegative,
+    optional_text,
+    positive,
+)
 
 from .scene_drive import SceneDrive
 
@@ -27,6 +38,8 @@ __all__ = [
     "Table",
 ]
 
+MOST_DELAY = 1_000_000_000  # samples
+WHOLE = 1e-9  # a delay this part of a period above a whole number of periods is rounded down
 Gain = float | Sequence[float] | NDArray[np.float64] | Mapping[str, ArrayLike]
 
 
@@ -34,14 +47,30 @@ Gain = float | Sequence[float] | NDArray[np.float64] | Mapping[str, ArrayLike]
 class SampledControl:
     """A controller in discrete time: its torque is held between samples, and steps end at every sample.
 
+    A delay stands for sensors, buses and computing time. With a delay of d samples, the torque
+    tau(t) = function(t_(k-d), q(t_(k-d)), v(t_(k-d))) acts for t_k <= t < t_(k+1), t_k = t0 + k period. The
+    torque `initial` acts for the first d samples. Each run starts without earlier samples: each call of
+    `simulate`, each run of a `rollout`, and each `Stepper.reset`. Single states and steps
+    (`Scene.acceleration`, `Scene.solve`, `Scene.step`) have no earlier samples, so `initial` acts there.
+    Torques that replace the actuation, as those of `Stepper.step` and of a callback, act without delay.
+
     Args:
         function: (t, q, v) -> tau, shape (nv,), called once per period.
         period: sample period [s].
+        delay: delay of the torque [s], not negative. It is rounded up to a whole number of periods.
+        delay_samples: delay as a number of samples instead.
+        initial: torque before the first delayed torque [N m or N], (nv,) or by joint name; None for zero.
         name: used in messages and results.
+
+    Raises:
+        InputError: an argument does not fit, or both delays are given.
     """
 
     function: Callable[..., object]
     period: float
+    delay: float = 0.0
+    delay_samples: int = 0
+    initial: State | None = None
     name: str | None = None
 
     def __post_init__(self) -> None:
@@ -49,6 +78,28 @@ class SampledControl:
         who = label(self)
         function(f"{who}: function", self.function, "(t, q, v) -> tau")
         object.__setattr__(self, "period", positive(f"{who}: period", self.period))
+        object.__setattr__(self, "delay", nonnegative(f"{who}: delay", self.delay))
+        samples = count(f"{who}: delay_samples", self.delay_samples, most=MOST_DELAY)
+        object.__setattr__(self, "delay_samples", samples)
+        if self.delay and samples:
+            raise InputError(
+                f"{who}: the delay must be given once; got delay={self.delay:g} s and "
+                f"delay_samples={samples}; leave one of them out"
+            )
+        if self.delay / self.period > MOST_DELAY:
+            raise InputError(
+                f"{who}: delay must be at most {MOST_DELAY:g} periods; got {self.delay:g} s with a period of "
+                f"{self.period:g} s"
+            )
+        if self.initial is not None:
+            named = by_name(self.initial)
+            torques = array(f"{who}: initial", self.initial, (None,)).tolist() if named is None else []
+            object.__setattr__(self, "initial", tuple(torques) if named is None else named)
+
+    @property
+    def delay_in_samples(self) -> int:
+        """Delay as a number of samples; a delay in seconds is rounded up."""
+        return self.delay_samples or math.ceil(self.delay / self.period - WHOLE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,6 +334,16 @@ def sampled_drives(actuation: Any) -> list[Any]:
     """
     kinds = (SampledControl, SceneDrive)
     return [d for d in requesting_drives(actuation) if isinstance(d, kinds) and d.period is not None]
+
+
+def delayed_control(actuation: Any) -> SampledControl | None:
+    """Return the sampled control with a delay, or None; it commands all joints, so there is one at most.
+
+    Args:
+        actuation: the actuation of a scene, as returned by `given_actuation`.
+    """
+    controls = (d for d in requesting_drives(actuation) if isinstance(d, SampledControl))
+    return next((d for d in controls if d.delay_in_samples), None)
 
 
 def switching_drives(actuation: Any) -> list[Any]:

@@ -161,7 +161,7 @@ def run_options(
         dt=lengths.get("dt", 0.0),
         output_dt=lengths.get("output_dt", 0.0),
         max_steps=_most_steps(max_steps),
-        a="a" in groups,
+        a="a" in groups or "reactions" in groups,  # wrenches of fixed joints need accelerations
         forces="forces" in groups,
         energy="energy" in groups,
         power="power" in groups,

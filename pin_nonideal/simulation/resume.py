@@ -66,11 +66,14 @@ def resume(
     refuse_other_scene(held, scene, source)
     options = held.options
     interval = held.interval if checkpoint_interval is None else checkpoint_interval
-    saver = Saver(source, scene, options, interval, held.wall_s, held.notes)
+    program, delayed = compiled_scene(scene).program_of_runs(options.t0)
+    if delayed is not None:
+        delayed.pending = held.delayed
+    saver = Saver(source, scene, options, interval, held.wall_s, held.notes, delayed)
     begin = time.perf_counter()
     try:
         with progress_bar(progress, options) as tick:
-            runner = compiled_scene(scene).program.runner()
+            runner = program.runner()
             outcome = runner.resume(held.state, options, tick=tick, save=saver, save_interval=saver.interval)
     except ValueError as error:
         raise LoadingError(f'"{source}" is damaged: {error}') from error

@@ -205,7 +205,8 @@ def _run(
     if not numbers.names and (parts := stepped_apart(scene, options)):
         outcomes = roll_apart(scene, parts, *started, options, threads)
     else:
-        outcomes = core.rollout(compiled.program, *started, options, threads, numbers.names, values)
+        program = compiled.program_of_runs(options.t0, by_thread=True)[0]
+        outcomes = core.rollout(program, *started, options, threads, numbers.names, values)
     wall = time.perf_counter() - begin
     for i, outcome in zip(going, outcomes, strict=True):
         if outcome is None:  # an interrupt ended all runs before this one started

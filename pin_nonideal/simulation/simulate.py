@@ -74,8 +74,9 @@ def simulate(
         max_steps: maximum number of steps. None sets no limit, except that a stiff scene stops as soon as an
             explicit method would need 100,000 more steps.
         max_wall: maximum wall time [s]; no limit when None.
-        record: any of "a", "tau", "forces" (which include "laws" and "tau"), "laws", "reactions", "energy",
-            "power", "dense" (interpolants of the steps, for `run.at`), or names of fields that they fill.
+        record: any of "a", "tau", "forces" (which include "laws" and "tau"), "laws", "reactions" (which
+            include "a"), "energy", "power", "dense" (interpolants of the steps, for `run.at`), or names of
+            fields that they fill.
         events: functions (t, q, v) -> number whose zeros are events, as in SciPy's solve_ivp. A function may
             have the attributes `terminal` (True, or the number of events that ends the run) and `direction`
             (positive for rising zeros only, negative for falling ones). A step ends at each event, with the
@@ -134,11 +135,12 @@ def simulate(
     for given, told in ((q, moved), (v, followed)):
         if told and given is not None and not isinstance(given, Mapping):
             warnings.warn(f"simulate: {told[0]}", RuntimeWarning, stacklevel=2)
+    program, delayed = compiled_scene(scene).program_of_runs(options.t0)
     saver = None
     if checkpoint is not None:
         from .checkpoint import Saver
 
-        saver = Saver(checkpoint, scene, options, checkpoint_interval, notes=notes)
+        saver = Saver(checkpoint, scene, options, checkpoint_interval, notes=notes, delayed=delayed)
     hints: list[str] = []
     explicit_only = compiled_scene(scene).explicit_only
 
@@ -161,6 +163,7 @@ def simulate(
                 q0,
                 v0,
                 options,
+                program,
                 tick=tick,
                 save=saver,
                 save_interval=saver.interval if saver else 0.0,

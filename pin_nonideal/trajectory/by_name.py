@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.states.joint_layout import CIRCLES
@@ -12,6 +13,7 @@ from pin_nonideal.states.kinematics import frame_motion
 from pin_nonideal.types import Array
 from pin_nonideal.validation import choice, text
 
+from .frame_reaction import carrier_of, frame_reaction
 from .records import FrameRecord, JointRecord, LawRecord, angles
 
 
@@ -86,8 +88,28 @@ def reaction_of(run: Any, name: str, axes: str) -> Array:
     name = text("reaction: name", name)
     if not run.reactions.recorded:
         raise InputError(f'reaction("{name}") needs a run with record="reactions"')
-    if name not in run.reactions:
-        raise UnknownNameError(f'no joint, anchor or contact "{name}"{nearest(name, run.reactions)}')
     begin = 6 * ("own", "world").index(choice("reaction: axes", axes, ("own", "world")))
-    wrench: Array = run.reactions[name][:, begin : begin + 6]
+    wrench: Array = _wrenches(run, name)[:, begin : begin + 6]
     return wrench
+
+
+def _wrenches(run: Any, name: str) -> Array:
+    """Wrenches of a joint, anchor or contact as recorded, or those through a fixed joint or frame."""
+    if name in run.reactions:
+        recorded: Array = run.reactions[name]
+        return recorded
+    model = None if run.scene is None else run.scene.model
+    if model is None or name == "universe" or not model.existFrame(name):
+        frames = [] if model is None else [str(f.name) for f in model.frames][1:]
+        known = [*run.reactions, *frames]
+        lost = (
+            "" if model is not None else "; fixed joints need the scene of the run, which this one has lost"
+        )
+        raise UnknownNameError(f'no joint, frame, anchor or contact "{name}"{nearest(name, known)}{lost}')
+    index = carrier_of(model, name)
+    if model.frames[index].type == pin.FrameType.JOINT:
+        of_joint: Array = run.reactions[str(model.frames[index].name)]
+        return of_joint
+    if run.a is None:
+        raise InputError(f'reaction("{name}") of a fixed joint needs a run with record=("a", "reactions")')
+    return frame_reaction(run, name, index)

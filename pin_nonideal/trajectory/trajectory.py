@@ -223,12 +223,20 @@ class Trajectory(MadeLater):
         friction of the joint.  That of an anchor or contact is exerted on the body of frame1, about the
         origin of frame1; it contains the friction of its laws.
 
+        The wrench through a fixed joint, or through a link, is exerted on the part beyond it, about its
+        origin: the rate of momentum of that part minus its weight and minus all other forces on it.  It is
+        computed from the inertias that Pinocchio keeps in the frames of fixed joints.  A fixed joint whose
+        link has no inertia there is massless.  The name of a link stands for the joint that carries it.
+
         Args:
-            name: of a joint of the model, or of an anchor or contact, which goes before a joint of its name.
+            name: of a joint of the model, fixed ones and links too, or of an anchor or contact, which goes
+                before a joint of its name.
             axes: "own", the joint frame's or those of frame2, or "world".
 
         Raises:
-            InputError: the run did not record "reactions", or `axes` is neither.
+            InputError: the run did not record "reactions", or `axes` is neither; for a fixed joint or link
+                also: the model does not tell the inertia beyond it, the scene does not tell on which side of
+                it a joint, constraint, contact or force acts, or the run has other masses than its scene.
             UnknownNameError: nothing of that name carries a wrench.
         """
         return reaction_of(self, name, axes)

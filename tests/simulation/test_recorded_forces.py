@@ -297,7 +297,7 @@ def test_unknown_names():
     run = pn.simulate(SCENES["arm"](), 0.01, record="reactions")
     with refuses('no law "elbov" in this run; nearest: "elbow"', UnknownNameError):
         run.law("elbov")
-    with refuses('no joint, anchor or contact "asside"; nearest: "aside"', UnknownNameError):
+    with refuses('no joint, frame, anchor or contact "asside"; nearest: "aside"', UnknownNameError):
         run.reaction("asside")
     with refuses("reaction: axes must be one of 'own', 'world'; got 'local'", InputError):
         run.reaction("aside", axes="local")

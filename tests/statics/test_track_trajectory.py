@@ -292,7 +292,7 @@ def test_a_checkpoint_continues_a_run(tmp_path):
 def test_runs_of_a_batch_and_methods_of_scipy():
     scene = pn.Scene(arm(), actuation=pn.TrackTrajectory(TIMES, Q, **GAINS), q0=Q[0])
     q = np.array([Q[0], Q[0] + 0.1])
-    runs = pn.rollout(scene, q, np.zeros((2, 3)), 0.2, threads=2)
+    runs = pn.rollout(scene, q, np.zeros((2, 3)), 0.2, jobs=2)
     for start, run in zip(q, runs, strict=True):
         alone = pn.simulate(scene, 0.2, q=start, v=np.zeros(3), progress=False)
         np.testing.assert_array_equal(run.q[-1], alone.q[-1])

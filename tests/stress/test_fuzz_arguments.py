@@ -93,6 +93,7 @@ GOOD = {
     "segment1": [((0.0, 0.0, 0.0), (0.0, 0.0, 0.1))], "segment2": [((0.0, 0.0, 0.0), (0.1, 0.0, 0.1))],
     "geometry1": ["ball"], "geometry2": ["ground"], "mu": [0.3], "restitution": [0.5], "lower": [-50.0],
     "semiaxes": [(0.1, 0.1, 0.0)], "points": [np.vstack([np.zeros(3), 0.01 * np.eye(3)])], "below": [0.1],
+    "delay": [0.015], "delay_samples": [2], "initial": [np.ones(3)],
     "rim": [0.01], "solid1": [(0.01, 0.01, 0.01)], "solid2": [(0.0, 0.02, 0.02)],
 }  # fmt: skip
 ROW = {"function": [lambda *_: (np.zeros((1, 3)), [0.0])], "size": [1]}
@@ -419,6 +420,7 @@ def test_the_public_names_are_all_drawn():
         "Equilibrium",
         "Event",
         "FrameRecord",
+        "HoldingTorque",
         "InverseDynamics",
         "JointRecord",
     }

@@ -391,7 +391,11 @@ class Carrier:
             return replace(given, actuation=replace_case(self, inner).actuation(model), effort=effort)
         if isinstance(given, SampledControl):
             return replace(
-                given, function=self.function(given, "function"), period=maps.units.T * given.period
+                given,
+                function=self.function(given, "function"),
+                period=maps.units.T * given.period,
+                delay=maps.units.T * given.delay,
+                initial=None if given.initial is None else maps.force(np.asarray(given.initial)),
             )
         if isinstance(given, Table):
             return replace(

@@ -13,12 +13,14 @@ from itertools import takewhile
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from pin_nonideal.errors import LoadingError
 from pin_nonideal.types import Array, GeometryModel, JointModel, Model, Placement
 
 # Links between the axes of a ball joint carry at most this part of the mass behind them.
 MASSLESS = 1e-6
+ROUNDING = 1e-9  # part of a body's mass below which the mass that its links leave is rounding
 # Axes meet and are perpendicular to this accuracy [m, and cosine]: exporters print about ten digits.
 ALIGNED = 1e-7
 
@@ -214,7 +216,42 @@ def edit_joints(
     copies = [_move_geometry(model, new, geometry, place) for geometry in geometries]
     fixed = [new.getJointId(n) for n, kind in types.items() if kind == "FIXED"]
     if fixed:
-        new, copies = pin.buildReducedModel(new, copies, fixed, pin.neutral(new))
+        new, copies = reduced_model(new, copies, fixed, pin.neutral(new))
+    return new, list(copies)
+
+
+def reduced_model(
+    model: Model, geometries: Sequence[GeometryModel], joints: Sequence[int], q: NDArray[np.float64]
+) -> tuple[Model, list[GeometryModel]]:
+    """Return a model and its geometries with some joints fixed, by `pinocchio.buildReducedModel`.
+
+    Pinocchio makes the frame of such a joint its own parent, and gives it the inertia of the whole body of
+    the joint. Here the frame keeps its parent and has the inertia of its own link, as in a URDF.
+
+    Args:
+        model: pinocchio.Model.
+        geometries: pinocchio.GeometryModels.
+        joints: indices of the joints to fix.
+        q: configuration at which they are fixed, (nq,).
+    """
+    new, copies = pin.buildReducedModel(model, list(geometries), list(joints), q)
+    joint_kind = pin.FrameType.JOINT
+    for j in joints:
+        name = str(model.names[j])
+        if not (model.existFrame(name, joint_kind) and new.existFrame(name, pin.FrameType.FIXED_JOINT)):
+            continue
+        parent = model.frames[model.frames[model.getFrameId(name, joint_kind)].parentFrame]
+        fixed = new.frames[new.getFrameId(name, pin.FrameType.FIXED_JOINT)]
+        kinds = (parent.type, pin.FrameType.FIXED_JOINT)  # the parent may have been fixed as well
+        found = [new.getFrameId(parent.name, kind) for kind in kinds if new.existFrame(parent.name, kind)]
+        if found:
+            fixed.parentFrame = found[0]
+        own = model.inertias[j].toDynamicParameters()
+        for frame in model.frames:
+            if frame.parentJoint == j and frame.inertia.mass > 0.0:
+                own = own - frame.placement.act(frame.inertia).toDynamicParameters()
+        massive = own[0] > ROUNDING * model.inertias[j].mass
+        fixed.inertia = pin.Inertia.FromDynamicParameters(own) if massive else pin.Inertia.Zero()
     return new, list(copies)
 
 

@@ -18,7 +18,7 @@ from pin_nonideal.loading.yaml.initial_state import joint_index, vector
 from pin_nonideal.loading.yaml.robot import check_keys, joint_types, names_in, pitches
 from pin_nonideal.types import GeometryModel, Model, Table
 
-from .model import ball_chains, edit_joints
+from .model import ball_chains, edit_joints, reduced_model
 
 # Beyond this a base loses a tenth of a micrometer to floating-point numbers [m or rad].
 FARTHEST = 1e9
@@ -194,7 +194,7 @@ def _reduced(
     none = [np.zeros(0)]
     q = np.concatenate([q0[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]] for j in kept] or none)
     v = np.concatenate([v0[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] for j in kept] or none)
-    _exchange(robot, lambda geometries: pin.buildReducedModel(model, geometries, indices, q0))
+    _exchange(robot, lambda geometries: reduced_model(model, geometries, indices, q0))
     return q, v
 
 
