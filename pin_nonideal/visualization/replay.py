@@ -16,6 +16,7 @@ import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,9 +25,9 @@ import pinocchio as pin
 from pin_nonideal.atomic_files import file_path, whole_file
 from pin_nonideal.errors import InputError, OutputError
 from pin_nonideal.validation import choice, positive
-from pin_nonideal.visualization.page.meshcat_window import show
-from pin_nonideal.visualization.page.payload import packed_runs
+from pin_nonideal.visualization.page.payload import STAGES, packed_runs
 from pin_nonideal.visualization.page.signals import Chosen, several
+from pin_nonideal.visualization.progress import stages
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
@@ -107,6 +108,7 @@ def replay(
     compress: bool = True,
     forces: bool = True,
     viewer: Any = None,
+    progress: bool | None = None,
 ) -> Any:
     """Writes a run as one HTML file that replays it offline, or shows it in a notebook.
 
@@ -127,6 +129,8 @@ def replay(
         forces: False for a page without arrows of forces.
         viewer: a `meshcat.Visualizer` whose window is open: it is filled with robot, animation and arrows of
             forces, and nothing is written.
+        progress: progress bar on standard error where the page takes longer than a second; None shows it on a
+            terminal only.
 
     Returns:
         The path of the file, or the page, a `ReplayPage`; with `viewer` Pinocchio's MeshcatVisualizer.
@@ -142,13 +146,19 @@ def replay(
         raise InputError(f"replay: title must be a string or None; got {title!r}")
     choice("replay: compress", compress, (True, False))
     choice("replay: forces", forces, (True, False))
+    choice("replay: progress", progress, (True, False, None))
     runs, labels = several(run, names, "a replay")
     if viewer is not None:
         if path is not None or len(runs) > 1:
             raise InputError("replay: viewer takes one run and no path")
+        from pin_nonideal.visualization.page.meshcat_window import show
+
         return show(runs[0], viewer, runs[0].name or "robot", forces)
-    packed = packed_runs(runs, labels, fps, title or runs[0].name, plots, forces)
-    page = ReplayPage(_page(packed, title or runs[0].name, compress))
+    heading = title or runs[0].name
+    with stages(progress, len(runs) + len(STAGES) + 1) as stage:
+        packed = packed_runs(runs, labels, fps, heading, plots, forces, stage)
+        stage("page")
+        page = ReplayPage(_page(packed, heading, compress))
     return page if path is None else page.save(path)
 
 
@@ -156,10 +166,6 @@ def _page(content: bytes, title: str, compress: bool) -> str:
     """The whole page around the packed runs."""
     library, notices = _viewer_library()
     folder = Path(__file__).parent / "page" / "assets"
-
-    def packed(plain: bytes) -> str:
-        stored = gzip.compress(plain, COMPRESSION, mtime=0) if compress else plain
-        return base64.b64encode(stored).decode()
 
     def asset(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8")
@@ -169,13 +175,24 @@ def _page(content: bytes, title: str, compress: bool) -> str:
         "generator": f"pin_nonideal with Pinocchio {pin.__version__}",
         "style": asset("style.css"),
         "notices": html.escape(notices),
-        "library": packed(library),
-        "payload": packed(content),
+        "library": _packed(library, compress),
+        "payload": _stored(content, compress),
         "zipped": "true" if compress else "false",
         "boot": "\n".join(asset(name) for name in BOOT),
-        "scripts": packed("\n".join(['"use strict";', *(asset(name) for name in SCRIPTS)]).encode()),
+        "scripts": _packed(
+            "\n".join(['"use strict";', *(asset(name) for name in SCRIPTS)]).encode(), compress
+        ),
     }
     return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found.group(1)], asset("page.html"))
+
+
+def _stored(plain: bytes, compress: bool) -> str:
+    """Bytes as a page carries them."""
+    return base64.b64encode(gzip.compress(plain, COMPRESSION, mtime=0) if compress else plain).decode()
+
+
+# What every page carries is compressed once.
+_packed = lru_cache(maxsize=4)(_stored)
 
 
 def _viewer_library() -> tuple[bytes, str]:

@@ -156,8 +156,10 @@ def _corners(motion: Motion, visual: Visual) -> list[Array]:
     center, half = visual.shape.half_extent()
     if not half.any():
         return []
-    signs = product((-1.0, 1.0), repeat=3)
-    return [motion.point(visual.joint, visual.placement.act(center + half * np.array(s))) for s in signs]
+    corners = center + half * np.array(list(product((-1.0, 1.0), repeat=3)))
+    local = corners @ visual.placement.rotation.T + visual.placement.translation
+    world = np.einsum("nij,kj->kni", motion.rotation(visual.joint), local) + motion.poses[:, visual.joint, :3]
+    return list(world)
 
 
 def _diagonal(points: Array) -> float:
@@ -170,8 +172,8 @@ def _outermost(points: Array) -> Array:
     cloud = points.reshape(-1, 3)
     grid = np.array(list(product((-1.0, -0.5, 0.0, 0.5, 1.0), repeat=3)))
     shell = grid[np.abs(grid).max(axis=1) == 1.0]
-    reach = cloud @ (shell / np.linalg.norm(shell, axis=1, keepdims=True)).T
-    return np.asarray(cloud[np.unique(np.argmax(reach, axis=0))])
+    reach = (shell / np.linalg.norm(shell, axis=1, keepdims=True)) @ cloud.T
+    return np.asarray(cloud[np.unique(np.argmax(reach, axis=1))])
 
 
 def _direction(points: Array, up: Array, aslant: float) -> Array:

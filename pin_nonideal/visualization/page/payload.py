@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from pin_nonideal.scene.scene import Scene
     from pin_nonideal.trajectory.trajectory import Trajectory
 
+# Stages of the work on a page, after the motion of each run.
+STAGES = ("shapes", "forces", "curves")
 # Of so many runs curves are plotted; all of them are drawn.
 MOST_PLOTTED = 8
 
@@ -45,6 +47,7 @@ def packed_runs(
     title: str,
     plots: Chosen | None,
     forces: bool,
+    stage: Callable[[str], object] = len,
 ) -> bytes:
     """Everything that the page shows of a run, and of others as ghosts beside it.
 
@@ -55,12 +58,17 @@ def packed_runs(
         title: heading of the page.
         plots: what is plotted, as `signals.plots_of` takes it.
         forces: whether arrows of forces are shown.
+        stage: called with the name of each stage as it begins: "motion" once a run, and `STAGES`.
     """
     run, payload = runs[0], Payload()
     scene, marks = run.scene, marks_of(run.scene)
-    motions = [sample(one, fps, share=len(runs)) for one in runs]
+    motions = []
+    for one in runs:
+        stage("motion")
+        motions.append(sample(one, fps, share=len(runs)))
     model, known = scene.model, [between(*pair) for pair in zip(runs, motions, strict=True)][:MOST_PLOTTED]
     finer, motion = known[0]
+    stage("shapes")
     ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
     visuals, bare = _drawn(scene, motion, ends)
     visuals = visuals + touched_of(finer, motion, visuals, upward(model))
@@ -68,10 +76,12 @@ def packed_runs(
     shapes = Shapes(payload)
     looking = view(scene, motion, visuals, ends, np.vstack([np.zeros((0, 3)), *(g.points for g in guides)]))
     drawn = shapes.add(visuals)
+    stage("forces")
     touches = touches_of(finer, motion)
     arrows = arrows_of(finer, motion, touches, given_arrows(finer, motion, marks)) if forces else []
     for number, spacing in treads(motion, visuals, _sliding_axes(model)).items():
         drawn[number]["wrap"] = spacing
+    stage("curves")
     header = {
         "title": title,
         "subtitle": _subtitle(run),

@@ -100,7 +100,7 @@ def collisions_of(scene: Scene) -> list[Visual]:
     if scene.collision_model is None:
         return []
     found, room = [], TRIANGLES
-    for visual in visuals_of(scene.collision_model):
+    for visual in visuals_of(scene.collision_model, TRIANGLES):
         if visual.shape.kind != "plane" and len(visual.shape.triangles) <= room:
             room -= len(visual.shape.triangles)
             found.append(visual)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.types import Array
@@ -57,12 +58,21 @@ class Plot:
         if count <= 2 * intervals:
             return self
         starts = np.linspace(0, count, intervals, endpoint=False).astype(int)
-        kept = {0, count - 1}
+        kept = np.zeros(count, dtype=bool)
+        kept[[0, -1]] = True
         for values in self.curves.values():
-            for start, piece in zip(starts, np.split(values, starts[1:]), strict=True):
-                kept.update((int(start + np.argmin(piece)), int(start + np.argmax(piece))))
-        index = np.array(sorted(kept))
+            for extreme in (np.minimum, np.maximum):
+                kept[_first_of(values, extreme.reduceat(values, starts), starts)] = True
+        index = np.flatnonzero(kept)
         return replace(self, t=self.t[index], curves={k: v[index] for k, v in self.curves.items()})
+
+
+def _first_of(values: Array, wanted: Array, starts: NDArray[np.intp]) -> NDArray[np.intp]:
+    """First place of a value in each interval; that of the first NaN where it is NaN."""
+    piece = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(values))))
+    places = np.flatnonzero((values == wanted[piece]) | np.isnan(values))
+    _, first = np.unique(piece[places], return_index=True)
+    return np.asarray(places[first])
 
 
 def wanted(what: str, chosen: Any) -> list[Any]:
