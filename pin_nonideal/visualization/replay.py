@@ -49,6 +49,7 @@ SCRIPTS = (
     "stage.js",
     "axes.js",
     "plots.js",
+    "relations.js",
     "bands.js",
     "timeline.js",
     "table.js",
@@ -123,8 +124,10 @@ def replay(
             together where it is fast.
         title: heading of the page; the scene's name when None.
         plots: what is plotted: "energy", "work", "power", "violation", "reactions", "contacts", "gaps",
-            "tau", "q", "v", "a", names of joints, or pairs of a title "what [unit]" and curves by label,
-            (nt,) each. None: energy, gaps, violation, reactions and q, as far as the run has them.
+            "tau", "F_nonideal" (friction in joints), "q", "v", "a", names of joints, or pairs of a title
+            "what [unit]" and curves by label, (nt,) each; of one quantity over another "phase",
+            "phase JOINT", "friction", "friction LAW", "load" and "load LAW", as for `plot`. None: of a driven
+            robot tau and F_nonideal, then energy, gaps, violation, reactions and q, as far as recorded.
         compress: False for a page that also opens in browsers older than 2023, three times as large.
         forces: False for a page without arrows of forces.
         viewer: a `meshcat.Visualizer` whose window is open: it is filled with robot, animation and arrows of

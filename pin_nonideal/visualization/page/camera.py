@@ -69,21 +69,18 @@ def view(
     clouds += [(joint, coarse.point(joint, local)) for joint, local in marks]
     clouds += [(v.joint, cloud) for v in visuals if v.joint for cloud in _corners(coarse, v)]
     clouds = clouds or [(0, np.zeros((len(coarse.times), 3)))]
-    size = max(_diagonal(np.array([cloud[0] for _, cloud in clouds])), motion.size)
+    size = _diagonal(np.array([cloud[0] for _, cloud in clouds]))
+    # A particle is as large as its path; what goes far, or is far from the origin, is as large as drawn.
+    if motion.size <= FAR * size or not any(v.joint for v in visuals):
+        size = max(size, motion.size)
     stays, follow = _traveling(model.njoints, clouds, size)
     if not all(stays):
         size = _diagonal(np.array([cloud[0] for joint, cloud in clouds if stays[joint]]))
     points = np.array([cloud for joint, cloud in clouds if stays[joint]])
-    reach = 1.5 * _diagonal(points)
-    # A large floor would make all that moves on it small.
-    still = [v for v in visuals if v.joint == 0 and np.linalg.norm(v.shape.half_extent()[1]) < reach]
-    fixed = np.array([cloud for v in still for cloud in _corners(coarse, v)]).reshape(
-        -1, len(coarse.times), 3
-    )
     if follow:
         points = points - center_of_mass(model, coarse, stays)[None]
-    elif len(fixed):
-        points = np.vstack([points, fixed])
+    else:
+        points = np.vstack([points, *_still(coarse, visuals, points)])
     beside = points if follow else np.vstack([points.reshape(-1, 3), shown])
     return View(
         up=up,
@@ -125,6 +122,25 @@ def link_length(model: pin.Model, marks: list[tuple[int, Array]], size: float) -
     return min(float(np.median(real)) * 2.0, size) if real else size
 
 
+def _still(motion: Motion, visuals: list[Visual], points: Array) -> list[Array]:
+    """Corners of what stands still, (8, n, 3) each, as far as what moves keeps half of the view.
+
+    A large floor would make all that moves on it small.
+    """
+    least, most = points.reshape(-1, 3).min(axis=0), points.reshape(-1, 3).max(axis=0)
+    room, found = 2.0 * float(np.linalg.norm(most - least)), []
+    for visual in (v for v in visuals if v.joint == 0):
+        corners = np.array(_corners(motion, visual))
+        if not len(corners):
+            continue
+        low = np.minimum(least, corners[:, 0].min(axis=0))
+        high = np.maximum(most, corners[:, 0].max(axis=0))
+        if np.linalg.norm(high - low) <= room:
+            least, most = low, high
+            found.append(corners)
+    return found
+
+
 def _traveling(njoints: int, clouds: list[tuple[int, Array]], size: float) -> tuple[list[bool], bool]:
     """Which joints stay in view, and whether the camera must follow."""
     travel = np.zeros(njoints)
@@ -134,7 +150,9 @@ def _traveling(njoints: int, clouds: list[tuple[int, Array]], size: float) -> tu
     if not far[1:].any():
         return [True] * njoints, False
     if np.count_nonzero(far[1:]) * 2 <= njoints - 1:
-        return [not gone for gone in far], False
+        near = [cloud for joint, cloud in clouds if not far[joint]]
+        if _diagonal(np.array(near)) > 1e-6 * size:
+            return [not gone for gone in far], False
     return [True] + [bool(gone) for gone in far[1:]], True
 
 
