@@ -84,8 +84,8 @@ def packed_runs(
     for number, spacing in treads(motion, visuals, _sliding_axes(model)).items():
         drawn[number]["wrap"] = spacing
     stage("curves")
-    items = wanted("plots", usual_plots(run) if plots is None else plots)
-    curves = [item for item in items if not is_asked(run, item)]
+    items = [] if plots is None else wanted("plots", plots)
+    curves = None if plots is None else [item for item in items if not is_asked(run, item)]
     signals = signals_of(run, finer)
     rounding = rounding_of((signal.unit, signal.values) for signal in signals)
     header = {
@@ -152,9 +152,9 @@ def _other(payload: Payload, shapes: Shapes, run: Trajectory, motion: Motion, na
     }
 
 
-def _curves(run: Trajectory, finer: Trajectory, items: list[Any]) -> list[Plot]:
+def _curves(run: Trajectory, finer: Trajectory, chosen: list[Any] | None) -> list[Plot]:
     """Plots of a run as it is between its samples, but for curves that were given at them."""
-    dense = getattr(run, "dense", None) is not None
+    dense, items = getattr(run, "dense", None) is not None, usual_plots(run) if chosen is None else chosen
     smooth = {"q", "v", "energy", "gaps", *run.scene.model.names}  # all else runs straight between samples
     return [
         plot
@@ -168,7 +168,7 @@ def _plots(
     runs: Sequence[Trajectory],
     finer: Sequence[Trajectory],
     names: Sequence[str],
-    items: list[Any],
+    items: list[Any] | None,
     rounding: dict[str, float],
 ) -> list[Table]:
     """Plots of the first run, with the curves of the others that have the same."""
