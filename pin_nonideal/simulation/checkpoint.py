@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from pin_nonideal.atomic_files import file_path, whole_file
-from pin_nonideal.compilation.delay import DelayedTorque
 from pin_nonideal.compilation.actuation import initial_torque
+from pin_nonideal.compilation.delay import DelayedTorque
 from pin_nonideal.compilation.lowering import lower
 from pin_nonideal.compilation.resolver import Resolution
 from pin_nonideal.core_loader import core

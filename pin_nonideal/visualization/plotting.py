@@ -47,11 +47,12 @@ def plot(
     Args:
         run: what `simulate` returned, or a list of several.
         path: file to write, in the format that its ending names (.png, .pdf, .svg); None writes none.
-        what: over time "q", "v", "a", "tau", "energy", "work", "power", "violation", "reactions", "contacts",
-            "gaps" (of contacts that open), "modes", names of joints, or pairs of a title "what [unit]" and
-            curves by label, (nt,) each; of one over another "phase", "phase JOINT" (velocity over position),
-            "friction", "friction LAW" (over slip velocity, with its limit) and "load", "load LAW" (friction
-            over what the bearing carries).  None: what suits the scene, as far as the run has it.
+        what: over time "q", "v", "a", "tau", "F_nonideal", "energy", "work", "power", "violation",
+            "reactions", "contacts", "gaps" (of contacts that open), "modes", names of joints, or pairs of a
+            title "what [unit]" and curves by label, (nt,) each; of one over another "phase", "phase JOINT"
+            (velocity over position), "friction", "friction LAW" (over slip velocity, with its limit) and
+            "load", "load LAW" (friction over what the bearing carries).  None: what suits the scene, as far
+            as the run has it.
         ax: matplotlib axes to draw one plot into, in place of a figure of its own.
         columns: 1 or 2 columns of a printed page, 85 or 176 mm wide; None for a screen.
         title: heading; None for the scene's name on a screen and none in print, "" for none.

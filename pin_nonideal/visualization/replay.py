@@ -16,6 +16,7 @@ import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,9 +25,11 @@ import pinocchio as pin
 from pin_nonideal.atomic_files import check_writable, file_path, whole_file
 from pin_nonideal.errors import InputError, OutputError, short_repr
 from pin_nonideal.validation import choice, positive
-from pin_nonideal.visualization.page.meshcat_window import show
-from pin_nonideal.visualization.page.payload import packed_runs
-from pin_nonideal.visualization.page.signals import Chosen, plots_of, several
+from pin_nonideal.visualization.page.payload import STAGES, packed_runs
+from pin_nonideal.visualization.page.relations import is_asked
+from pin_nonideal.visualization.page.signals import Chosen, plots_of, several, wanted
+from pin_nonideal.visualization.page.xy_plots import relations_of
+from pin_nonideal.visualization.progress import stages
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
@@ -48,6 +51,7 @@ SCRIPTS = (
     "stage.js",
     "axes.js",
     "plots.js",
+    "relations.js",
     "bands.js",
     "timeline.js",
     "table.js",
@@ -107,6 +111,7 @@ def replay(
     compress: bool = True,
     forces: bool = True,
     viewer: Any = None,
+    progress: bool | None = None,
 ) -> Any:
     """Writes a run as one HTML file that replays it offline, or shows it in a notebook.
 
@@ -121,12 +126,16 @@ def replay(
             together where it is fast.
         title: heading of the page; the scene's name when None.
         plots: what is plotted: "energy", "work", "power", "violation", "reactions", "contacts", "gaps",
-            "tau", "q", "v", "a", names of joints, or pairs of a title "what [unit]" and curves by label,
-            (nt,) each. None: energy, gaps, violation, reactions and q, as far as the run has them.
+            "tau", "F_nonideal" (friction in joints), "q", "v", "a", names of joints, or pairs of a title
+            "what [unit]" and curves by label, (nt,) each; of one quantity over another "phase",
+            "phase JOINT", "friction", "friction LAW", "load" and "load LAW", as for `plot`. None: of a driven
+            robot tau and F_nonideal, then energy, gaps, violation, reactions and q, as far as recorded.
         compress: False for a page that also opens in browsers older than 2023, three times as large.
         forces: False for a page without arrows of forces.
         viewer: a `meshcat.Visualizer` whose window is open: it is filled with robot, animation and arrows of
             forces, and nothing is written.
+        progress: progress bar on standard error where the page takes longer than a second; None shows it on a
+            terminal only.
 
     Returns:
         The path of the file, or the page, a `ReplayPage`; with `viewer` Pinocchio's MeshcatVisualizer.
@@ -142,6 +151,7 @@ def replay(
         raise InputError(f"replay: title must be a string or None; got {short_repr(title)}")
     choice("replay: compress", compress, (True, False))
     choice("replay: forces", forces, (True, False))
+    choice("replay: progress", progress, (True, False, None))
     target = None if path is None else file_path("replay: path", path)
     runs, labels = several(run, names, "a replay")
     if viewer is not None:
@@ -149,26 +159,36 @@ def replay(
             raise InputError("replay: viewer takes one run and no path")
         if not all(hasattr(viewer, name) for name in ("window", "set_animation", "__getitem__")):
             raise InputError(f"replay: viewer must be a meshcat.Visualizer; got {short_repr(viewer)}")
+        from pin_nonideal.visualization.page.meshcat_window import show
+
         return show(runs[0], viewer, runs[0].name or "robot", forces)
     if target is not None:
         check_writable(target, "the replay")
     if plots is not None:
-        for one in runs:
-            plots_of(one, plots)
+        _check_plots(runs, plots)
     viewer_library()
-    packed = packed_runs(runs, labels, fps, title or runs[0].name, plots, forces)
-    page = ReplayPage(_page(packed, title or runs[0].name, compress))
+    heading = title or runs[0].name
+    with stages(progress, len(runs) + len(STAGES) + 1) as stage:
+        packed = packed_runs(runs, labels, fps, heading, plots, forces, stage)
+        stage("page")
+        page = ReplayPage(_page(packed, heading, compress))
     return page if target is None else page.save(target)
+
+
+def _check_plots(runs: Sequence[Trajectory], plots: Chosen) -> None:
+    """Check the chosen plots before work on the page begins."""
+    items = wanted("plots", plots)
+    relations = [item for item in items if is_asked(runs[0], item)]
+    for run in runs:
+        plots_of(run, [item for item in items if item not in relations])
+    for item in relations:
+        relations_of(runs[0], item)
 
 
 def _page(content: bytes, title: str, compress: bool) -> str:
     """The whole page around the packed runs."""
     library, notices = viewer_library()
     folder = Path(__file__).parent / "page" / "assets"
-
-    def packed(plain: bytes) -> str:
-        stored = gzip.compress(plain, COMPRESSION, mtime=0) if compress else plain
-        return base64.b64encode(stored).decode()
 
     def asset(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8")
@@ -178,17 +198,28 @@ def _page(content: bytes, title: str, compress: bool) -> str:
         "generator": f"pin_nonideal with Pinocchio {pin.__version__}",
         "style": asset("style.css"),
         "notices": html.escape(notices),
-        "library": packed(library),
-        "payload": packed(content),
+        "library": _packed(library, compress),
+        "payload": _stored(content, compress),
         "zipped": "true" if compress else "false",
         "boot": "\n".join(asset(name) for name in BOOT),
-        "scripts": packed("\n".join(['"use strict";', *(asset(name) for name in SCRIPTS)]).encode()),
+        "scripts": _packed(
+            "\n".join(['"use strict";', *(asset(name) for name in SCRIPTS)]).encode(), compress
+        ),
     }
     return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found.group(1)], asset("page.html"))
 
 
+def _stored(plain: bytes, compress: bool) -> str:
+    """Return bytes in the encoding of the page."""
+    return base64.b64encode(gzip.compress(plain, COMPRESSION, mtime=0) if compress else plain).decode()
+
+
+# The parts that all pages share are compressed once.
+_packed = lru_cache(maxsize=4)(_stored)
+
+
 def viewer_library() -> tuple[bytes, str]:
-    """Meshcat's bundled viewer, found without importing meshcat, and the notices that must go with it.
+    """Return meshcat's bundled viewer, found without importing meshcat, and its license notices.
 
     Raises:
         OutputError: the package meshcat is missing, or its files cannot be read.

@@ -155,6 +155,29 @@ def test_the_camera_follows_what_travels_far() -> None:
     assert not seen(run_of(model, np.linspace(0.0, 1.0, 9), lambda t: np.array([0.1 * t, t]))).follow
 
 
+def test_a_cart_is_followed_however_far_it_goes() -> None:
+    """A body is as large as it is drawn, not as its path."""
+    run = run_of(
+        jointed(pin.JointModelPX(), lever=0.0), np.linspace(0.0, 50.0, 9), lambda t: np.array([20.0 * t])
+    )
+    box = Visual("box", 1, pin.SE3.Identity(), Shape("box", (0.5, 0.3, 0.2)), (1.0,) * 4)
+    found = view(run.scene, sample(run, 30.0), [box], [], NOTHING)
+    assert found.follow
+    assert found.size == pytest.approx(np.linalg.norm([0.5, 0.3, 0.2]))
+    assert np.abs(found.outline).max() < 1.0
+
+
+def test_what_stands_still_leaves_half_of_the_view_to_what_moves() -> None:
+    run = four_bar()
+    motion, drawn = sample(run, 30.0), sticks(run.scene.model, [], 1.0)
+    alone = view(run.scene, motion, drawn, [], NOTHING).outline
+    tile, white = Shape("box", (0.5, 0.5, 0.01)), (1.0,) * 4
+    places = [pin.SE3(np.eye(3), np.array([0.5 * k, 0.0, 0.0])) for k in range(20)]
+    plates = [Visual("plate", 0, place, tile, white) for place in places]
+    beside = view(run.scene, motion, [*drawn, *plates], [], NOTHING).outline
+    assert np.ptp(beside[:, 0]) <= 2.0 * np.linalg.norm(np.ptp(alone, axis=0))
+
+
 def test_a_large_floor_does_not_push_the_robot_away() -> None:
     run = four_bar()
     motion, drawn = sample(run, 30.0), sticks(run.scene.model, [], 1.0)

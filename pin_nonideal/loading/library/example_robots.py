@@ -88,8 +88,14 @@ def _drawn_later(robots_loader: Any, name: str) -> tuple[RobotFile, Path]:
 
 def _example_shapes(model: Model, file: str, packages: str, srdf: str | None) -> tuple[Any, Any]:
     """Drawn and colliding shapes of a robot of example-robot-data, with the pairs of its SRDF."""
+    import coal
+
     kinds = (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION)
-    visual, collision = (pin.buildGeomFromUrdf(model, file, kind, package_dirs=[packages]) for kind in kinds)
+    loader = coal.CachedMeshLoader()  # most robots collide with the meshes that are drawn
+    visual, collision = (
+        pin.buildGeomFromUrdf(model, file, kind, package_dirs=[packages], mesh_loader=loader)
+        for kind in kinds
+    )
     if srdf is not None:
         collision.addAllCollisionPairs()
         pin.removeCollisionPairs(model, collision, srdf, False)

@@ -69,21 +69,18 @@ def view(
     clouds += [(joint, coarse.point(joint, local)) for joint, local in marks]
     clouds += [(v.joint, cloud) for v in visuals if v.joint for cloud in _corners(coarse, v)]
     clouds = clouds or [(0, np.zeros((len(coarse.times), 3)))]
-    size = max(_diagonal(np.array([cloud[0] for _, cloud in clouds])), motion.size)
+    size = _diagonal(np.array([cloud[0] for _, cloud in clouds]))
+    # A particle is as large as its path; what goes far, or is far from the origin, is as large as drawn.
+    if motion.size <= FAR * size or not any(v.joint for v in visuals):
+        size = max(size, motion.size)
     stays, follow = _traveling(model.njoints, clouds, size)
     if not all(stays):
         size = _diagonal(np.array([cloud[0] for joint, cloud in clouds if stays[joint]]))
     points = np.array([cloud for joint, cloud in clouds if stays[joint]])
-    reach = 1.5 * _diagonal(points)
-    # A large floor would make all that moves on it small.
-    still = [v for v in visuals if v.joint == 0 and np.linalg.norm(v.shape.half_extent()[1]) < reach]
-    fixed = np.array([cloud for v in still for cloud in _corners(coarse, v)]).reshape(
-        -1, len(coarse.times), 3
-    )
     if follow:
         points = points - center_of_mass(model, coarse, stays)[None]
-    elif len(fixed):
-        points = np.vstack([points, fixed])
+    else:
+        points = np.vstack([points, *_still(coarse, visuals, points)])
     beside = points if follow else np.vstack([points.reshape(-1, 3), shown])
     return View(
         up=up,
@@ -125,6 +122,25 @@ def link_length(model: pin.Model, marks: list[tuple[int, Array]], size: float) -
     return min(float(np.median(real)) * 2.0, size) if real else size
 
 
+def _still(motion: Motion, visuals: list[Visual], points: Array) -> list[Array]:
+    """Corners of what stands still, (8, n, 3) each, as far as what moves keeps half of the view.
+
+    A large floor would make all that moves on it small.
+    """
+    least, most = points.reshape(-1, 3).min(axis=0), points.reshape(-1, 3).max(axis=0)
+    room, found = 2.0 * float(np.linalg.norm(most - least)), []
+    for visual in (v for v in visuals if v.joint == 0):
+        corners = np.array(_corners(motion, visual))
+        if not len(corners):
+            continue
+        low = np.minimum(least, corners[:, 0].min(axis=0))
+        high = np.maximum(most, corners[:, 0].max(axis=0))
+        if np.linalg.norm(high - low) <= room:
+            least, most = low, high
+            found.append(corners)
+    return found
+
+
 def _traveling(njoints: int, clouds: list[tuple[int, Array]], size: float) -> tuple[list[bool], bool]:
     """Which joints stay in view, and whether the camera must follow."""
     travel = np.zeros(njoints)
@@ -134,7 +150,9 @@ def _traveling(njoints: int, clouds: list[tuple[int, Array]], size: float) -> tu
     if not far[1:].any():
         return [True] * njoints, False
     if np.count_nonzero(far[1:]) * 2 <= njoints - 1:
-        return [not gone for gone in far], False
+        near = [cloud for joint, cloud in clouds if not far[joint]]
+        if _diagonal(np.array(near)) > 1e-6 * size:
+            return [not gone for gone in far], False
     return [True] + [bool(gone) for gone in far[1:]], True
 
 
@@ -156,8 +174,10 @@ def _corners(motion: Motion, visual: Visual) -> list[Array]:
     center, half = visual.shape.half_extent()
     if not half.any():
         return []
-    signs = product((-1.0, 1.0), repeat=3)
-    return [motion.point(visual.joint, visual.placement.act(center + half * np.array(s))) for s in signs]
+    corners = center + half * np.array(list(product((-1.0, 1.0), repeat=3)))
+    local = corners @ visual.placement.rotation.T + visual.placement.translation
+    world = np.einsum("nij,kj->kni", motion.rotation(visual.joint), local) + motion.poses[:, visual.joint, :3]
+    return list(world)
 
 
 def _diagonal(points: Array) -> float:
@@ -170,8 +190,8 @@ def _outermost(points: Array) -> Array:
     cloud = points.reshape(-1, 3)
     grid = np.array(list(product((-1.0, -0.5, 0.0, 0.5, 1.0), repeat=3)))
     shell = grid[np.abs(grid).max(axis=1) == 1.0]
-    reach = cloud @ (shell / np.linalg.norm(shell, axis=1, keepdims=True)).T
-    return np.asarray(cloud[np.unique(np.argmax(reach, axis=0))])
+    reach = (shell / np.linalg.norm(shell, axis=1, keepdims=True)) @ cloud.T
+    return np.asarray(cloud[np.unique(np.argmax(reach, axis=1))])
 
 
 def _direction(points: Array, up: Array, aslant: float) -> Array:

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 # A force below this part of the largest one is rounding and gets no arrow; moments are measured by the
 # largest moment and by the largest force at the length of a link.
 SMALLEST = 1e-9
+# Joints of several degrees of freedom whose directions of motion stay the same in their own frame.
+STEADY = ("JointModelFreeFlyer", "JointModelSpherical", "JointModelTranslation")
 
 
 @dataclass(frozen=True)
@@ -260,10 +262,15 @@ def _slides(model: pin.Model, joint: int) -> bool:
 def _wrench(model: pin.Model, motion: Motion, kind: str, joint: int, force: Array) -> list[Arrow]:
     """The least force and moment S^T w = tau along the motions of a joint of several degrees of freedom."""
     item, name = model.joints[joint], str(model.names[joint])
-    data, local = item.createData(), np.empty((len(force), 6))
-    for k, row in enumerate(force[:, item.idx_v : item.idx_v + item.nv]):
-        item.calc(data, motion.q[k])
-        local[k] = np.linalg.pinv(np.asarray(data.S)).T @ row
+    data, own = item.createData(), force[:, item.idx_v : item.idx_v + item.nv]
+    item.calc(data, motion.q[0])
+    if item.shortname() in STEADY:
+        local = own @ np.linalg.pinv(np.asarray(data.S))
+    else:
+        local = np.empty((len(force), 6))
+        for k, row in enumerate(own):
+            item.calc(data, motion.q[k])
+            local[k] = np.linalg.pinv(np.asarray(data.S)).T @ row
     turn = motion.rotation(joint)
     linear, angular = (np.einsum("nij,nj->ni", turn, part) for part in np.hsplit(local, 2))
     place = motion.poses[:, joint, :3]

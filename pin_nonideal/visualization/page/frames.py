@@ -9,9 +9,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pin_nonideal.errors import InputError, PinNonidealError
+from pin_nonideal.errors import InputError
 from pin_nonideal.types import Array
 
+from .between_samples import Cubics
 from .joint_tracks import Tracks, halfway, turned
 
 if TYPE_CHECKING:
@@ -128,7 +129,7 @@ class _Frames:
         # Ghosts by the dozen have fewer frames each.
         self.least = max(LEAST_FRAMES // max(share // 4, 1), 60)
         self.most = MOST_NUMBERS // share
-        self.run, self.t = run, np.asarray(run.t, dtype=np.float64)
+        self.run, self.t, self.cubics = run, np.asarray(run.t, dtype=np.float64), Cubics(run)
         self.tracks = Tracks(run.scene.model)
         start = self.tracks.placements(self.tracks.coordinates(run.q[:1]))[0]
         self.size, self.link = _sizes(run.scene.model, start)
@@ -210,33 +211,16 @@ class _Frames:
         return np.where(inside, k0, (k0 + k1 + 1) // 2), part
 
     def _configurations(self, before: NDArray[np.int64], part: Array) -> Array:
-        if self.dense:
-            found, inner = self.run.q[np.where(part < 1.0, before, before + 1)], (part > 0.0) & (part < 1.0)
-            if inner.any():
-                length = self.t[before[inner] + 1] - self.t[before[inner]]
-                found[inner] = self.run.at(self.t[before[inner]] + part[inner] * length).q
+        found, inner = self.run.q[np.where(part < 1.0, before, before + 1)], (part > 0.0) & (part < 1.0)
+        if not inner.any():
             return np.asarray(found)
-        each = [self._configuration(int(k), float(s)) for k, s in zip(before, part, strict=True)]
-        return np.array(each).reshape(-1, self.run.q.shape[1])
-
-    def _configuration(self, k: int, s: float) -> Array:
-        """Configuration at the part s between samples k and k + 1, its loops closed."""
-        run = self.run
-        if s in (0.0, 1.0) or len(self.t) == 1:
-            return np.asarray(run.q[k if s < 1.0 else k + 1])
-        q = np.asarray(pin.integrate(run.scene.model, run.q[k], cubic(run, k, s)[0]))
-        project = getattr(run.scene, "project", None)
-        if project is None or not run.scene.constraint_slices:
-            return q
-        t = float(self.t[k] + s * (self.t[k + 1] - self.t[k]))
-        try:
-            closed, _ = project(q, (1.0 - s) * run.v[k] + s * run.v[k + 1], t)
-        except PinNonidealError:
-            self.told[k] = False
-            return q
-        if np.abs(pin.difference(run.scene.model, q, closed)).max(initial=0.0) > TOLD * min(1.0, self.size):
-            self.told[k] = False
-        return np.asarray(closed)
+        k, s = before[inner], part[inner]
+        if self.dense:
+            found[inner] = self.run.at(self.t[k] + s * (self.t[k + 1] - self.t[k])).q
+            return np.asarray(found)
+        found[inner], moved = self.cubics.closed(k, s, self.size, CLOSE * self.link)
+        self.told[k[~(moved <= TOLD * min(1.0, self.size))]] = False
+        return np.asarray(found)
 
     def motion(self) -> Motion:
         poses = self.tracks.placements(self.rows)
@@ -247,31 +231,6 @@ class _Frames:
         if len(self.told):
             held = ~self.told[np.minimum(self.before[:-1], len(self.told) - 1)]
         return Motion(self.times(), poses, self.before, self.part, self.q, self.rows, held, self.size)
-
-
-def cubic(run: Trajectory, k: int, s: float) -> tuple[Array, Array]:
-    """What leads from sample k to the part s before the next, (nv,), and its rate in time, (nv,).
-
-    The cubic with the q and v of both samples at its ends runs in the tangent space at sample k, where the
-    rate at k + 1 is d difference/d q_1 times v.
-
-    Args:
-        run: the run.
-        k: sample.
-        s: part of the way to the next, 0 to 1.
-    """
-    model = run.scene.model
-    q0, q1, v0, v1 = run.q[k], run.q[k + 1], run.v[k], run.v[k + 1]
-    h = run.t[k + 1] - run.t[k]
-    step = pin.difference(model, q0, q1)
-    for joint in model.joints:
-        if joint.nq == 2 and joint.nv == 1:  # a continuous joint may turn more than once in a long step
-            i = joint.idx_v
-            step[i] += 2.0 * np.pi * np.round((h * (v0[i] + v1[i]) / 2.0 - step[i]) / (2.0 * np.pi))
-    end_rate = pin.dDifference(model, q0, q1, pin.ARG1) @ v1
-    xi = h * s * (1.0 - s) ** 2 * v0 + s * s * (3.0 - 2.0 * s) * step - h * s * s * (1.0 - s) * end_rate
-    rate = (1.0 - s) * (1.0 - 3.0 * s) * v0 + 6.0 * s * (1.0 - s) / h * step - s * (2.0 - 3.0 * s) * end_rate
-    return np.asarray(xi), np.asarray(rate)
 
 
 def _told(run: Trajectory, size: float) -> NDArray[np.bool_]:

@@ -170,9 +170,11 @@ def _after(first: Array, second: Array) -> Array:
 
 def turned(quaternions: Array, vectors: Array) -> Array:
     """Vectors (n, 3) turned by quaternions x, y, z, w, (n, 4)."""
-    axis, w = quaternions[:, :3], quaternions[:, 3:]
-    once = 2.0 * np.cross(axis, vectors)
-    return np.asarray(vectors + w * once + np.cross(axis, once))
+    x, y, z, w = quaternions.T
+    a, b, c = vectors.T
+    u, v, t = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)  # 2 axis x vector
+    turns = (a + w * u + y * t - z * v, b + w * v + z * u - x * t, c + w * t + x * v - y * u)
+    return np.stack(turns, axis=-1)
 
 
 def _product(a: Array, b: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from pin_nonideal.types import Array, Table
 
 from .applied_forces import given_arrows
 from .binary import Payload, Shapes
+from .body_overlays import collisions_of, inertia_box
 from .camera import link_length, treads, upward, view
 from .constraint_curves import Guide, guides_of
 from .contact_points import touches_of, touching_marks
@@ -23,8 +24,9 @@ from .friction_glyphs import Element, elements_of
 from .joint_tracks import Tracks
 from .markers import Mark, marks_of
 from .mode_timeline import bands_of
+from .relations import is_asked, stored_relations
 from .resampling import between
-from .signal_list import collisions_of, inertia_box, signals_of
+from .signal_list import Signal, rounding_of, signals_of, without_rounding
 from .signals import Chosen, Plot, plots_of, usual_plots, wanted
 from .stick_figure import sticks
 from .style import table
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
     from pin_nonideal.scene.scene import Scene
     from pin_nonideal.trajectory.trajectory import Trajectory
 
+# Stages of the work on a page, after the motion of each run.
+STAGES = ("shapes", "forces", "curves")
 # Of so many runs curves are plotted; all of them are drawn.
 MOST_PLOTTED = 8
 
@@ -45,6 +49,7 @@ def packed_runs(
     title: str,
     plots: Chosen | None,
     forces: bool,
+    stage: Callable[[str], object] = len,
 ) -> bytes:
     """Everything that the page shows of a run, and of others as ghosts beside it.
 
@@ -55,12 +60,17 @@ def packed_runs(
         title: heading of the page.
         plots: what is plotted, as `signals.plots_of` takes it.
         forces: whether arrows of forces are shown.
+        stage: called with the name of each stage as it begins: "motion" once a run, and `STAGES`.
     """
     run, payload = runs[0], Payload()
     scene, marks = run.scene, marks_of(run.scene)
-    motions = [sample(one, fps, share=len(runs)) for one in runs]
+    motions = []
+    for one in runs:
+        stage("motion")
+        motions.append(sample(one, fps, share=len(runs)))
     model, known = scene.model, [between(*pair) for pair in zip(runs, motions, strict=True)][:MOST_PLOTTED]
     finer, motion = known[0]
+    stage("shapes")
     ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
     visuals, bare = _drawn(scene, motion, ends)
     visuals = visuals + touched_of(finer, motion, visuals, upward(model))
@@ -68,10 +78,16 @@ def packed_runs(
     shapes = Shapes(payload)
     looking = view(scene, motion, visuals, ends, np.vstack([np.zeros((0, 3)), *(g.points for g in guides)]))
     drawn = shapes.add(visuals)
+    stage("forces")
     touches = touches_of(finer, motion)
     arrows = arrows_of(finer, motion, touches, given_arrows(finer, motion, marks)) if forces else []
     for number, spacing in treads(motion, visuals, _sliding_axes(model)).items():
         drawn[number]["wrap"] = spacing
+    stage("curves")
+    items = [] if plots is None else wanted("plots", plots)
+    curves = None if plots is None else [item for item in items if not is_asked(run, item)]
+    signals = signals_of(run, finer)
+    rounding = rounding_of((signal.unit, signal.values) for signal in signals)
     header = {
         "title": title,
         "subtitle": _subtitle(run),
@@ -92,7 +108,7 @@ def packed_runs(
         "guides": [_stored_guide(payload, guide) for guide in guides],
         "trails": [{"joint": j, "point": point} for j, point in _trails(model, guides, bare)],
         "arrows": [_stored_arrow(payload, motion, arrow) for arrow in arrows],
-        "plots": _plots(payload, runs, [one for one, _ in known], names, plots),
+        "plots": _plots(payload, runs, [one for one, _ in known], names, curves, rounding),
         "events": _events(payload, run),
         "modes": _modes(payload, run),
         "elements": [
@@ -101,10 +117,8 @@ def packed_runs(
         ],
         "view": _plain(looking),
         "collisions": shapes.add(collisions_of(scene)),
-        "signals": [
-            {"label": s.label, "unit": s.unit, "t": payload.add(s.t, "f8"), "values": payload.add(s.values)}
-            for s in signals_of(run, finer)
-        ],
+        "signals": [_stored_signal(payload, signal, rounding) for signal in signals],
+        "relations": stored_relations(payload, run, finer, [x for x in items if is_asked(run, x)]),
     }
     header["shapes"] = shapes.stored
     return payload.bytes(header)
@@ -138,12 +152,9 @@ def _other(payload: Payload, shapes: Shapes, run: Trajectory, motion: Motion, na
     }
 
 
-def _curves(run: Trajectory, finer: Trajectory, chosen: Chosen | None) -> list[Plot]:
+def _curves(run: Trajectory, finer: Trajectory, chosen: list[Any] | None) -> list[Plot]:
     """Plots of a run as it is between its samples, but for curves that were given at them."""
-    dense, items = (
-        getattr(run, "dense", None) is not None,
-        wanted("plots", usual_plots(run) if chosen is None else chosen),
-    )
+    dense, items = getattr(run, "dense", None) is not None, usual_plots(run) if chosen is None else chosen
     smooth = {"q", "v", "energy", "gaps", *run.scene.model.names}  # all else runs straight between samples
     return [
         plot
@@ -157,10 +168,12 @@ def _plots(
     runs: Sequence[Trajectory],
     finer: Sequence[Trajectory],
     names: Sequence[str],
-    chosen: Chosen | None,
+    items: list[Any] | None,
+    rounding: dict[str, float],
 ) -> list[Table]:
     """Plots of the first run, with the curves of the others that have the same."""
-    each = [[plot.thinned() for plot in _curves(*pair, chosen)] for pair in zip(runs, finer, strict=False)]
+    pairs = zip(runs, finer, strict=False)
+    each = [[_told(plot.thinned(), rounding) for plot in _curves(*pair, items)] for pair in pairs]
     found = []
     for plot in each[0]:
         stored = _stored_plot(payload, plot)
@@ -172,6 +185,26 @@ def _plots(
                     stored["curves"] += _compared(payload, plot, other, number, names[number])
         found.append(stored)
     return found
+
+
+def _told(plot: Plot, rounding: dict[str, float]) -> Plot:
+    """A plot with zero in place of rounding; on a logarithmic axis rounding is what is shown."""
+    if plot.log:
+        return plot
+    least = rounding_of((plot.unit, values) for values in plot.curves.values())
+    level = max(rounding.get(plot.unit, 0.0), least.get(plot.unit, 0.0))
+    return replace(plot, curves={k: without_rounding(v, level) for k, v in plot.curves.items()})
+
+
+def _stored_signal(payload: Payload, signal: Signal, rounding: dict[str, float]) -> Table:
+    return {
+        "label": signal.label,
+        "unit": signal.unit,
+        "section": signal.section,
+        "words": signal.words,
+        "t": payload.add(signal.t, "f8"),
+        "values": payload.add(without_rounding(signal.values, rounding[signal.unit])),
+    }
 
 
 def _compared(payload: Payload, plot: Plot, other: Plot, number: int, name: str) -> list[Table]:

@@ -6,12 +6,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
+from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.types import Array
 
-from .frames import LEAST_FRAMES, Motion, cubic
+from .between_samples import Cubics
+from .frames import LEAST_FRAMES, Motion
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
@@ -64,9 +65,11 @@ def between(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
     if dense is not None:
         values["v"][inner] = dense.v
     elif values.get("energy") and hasattr(run.scene, "energies"):
-        for k in inner:
-            for name, value in run.scene.energies(values["q"][k], values["v"][k]).items():
-                values["energy"][name][k] = value
+        runner, q, v = compiled_scene(run.scene).program.runner(), values["q"], values["v"]
+        stored = np.array([runner.energies(q[k], v[k]) for k in inner]).reshape(-1, 2)
+        every = zip(("kinetic", "potential", "total"), [*stored.T, stored.sum(axis=1)], strict=True)
+        for name, energy in every:
+            values["energy"][name][inner] = energy
     found = type(run).__new__(type(run))  # not copied, for a copy drops a scene that does not travel
     vars(found).update(values)
     count = len(motion.times)
@@ -76,9 +79,5 @@ def between(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
 def _velocities(run: Trajectory, motion: Motion, inner: NDArray[np.intp]) -> Array:
     """Velocities of the cubic at the frames between samples, those of the samples at the others, (n, nv)."""
     found = motion.of(run.v)
-    for frame in inner:
-        k, s = int(motion.before[frame]), float(motion.part[frame])
-        xi, rate = cubic(run, k, s)
-        turn = pin.dIntegrate(run.scene.model, run.q[k], xi, pin.ArgumentPosition.ARG1)
-        found[frame] = turn @ rate
+    found[inner] = Cubics(run).velocities(motion.before[inner], motion.part[inner])
     return found

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from pin_nonideal.errors import InputError, UnknownNameError, nearest, short_repr
 from pin_nonideal.types import Array
@@ -28,6 +29,7 @@ Chosen = str | Sequence[str | tuple[str, Mapping[str, Array]]]
 MAX_CURVES = 8
 # A plot of the replay keeps the extremes of every curve in so many intervals of time.
 INTERVALS = 600
+RATES_AND_FORCES = ("tau", "F_nonideal", "q", "v", "a")
 STORED_ENERGY = ("kinetic", "potential", "total")
 
 
@@ -57,12 +59,21 @@ class Plot:
         if count <= 2 * intervals:
             return self
         starts = np.linspace(0, count, intervals, endpoint=False).astype(int)
-        kept = {0, count - 1}
+        kept = np.zeros(count, dtype=bool)
+        kept[[0, -1]] = True
         for values in self.curves.values():
-            for start, piece in zip(starts, np.split(values, starts[1:]), strict=True):
-                kept.update((int(start + np.argmin(piece)), int(start + np.argmax(piece))))
-        index = np.array(sorted(kept))
+            for extreme in (np.minimum, np.maximum):
+                kept[_first_of(values, extreme.reduceat(values, starts), starts)] = True
+        index = np.flatnonzero(kept)
         return replace(self, t=self.t[index], curves={k: v[index] for k, v in self.curves.items()})
+
+
+def _first_of(values: Array, wanted: Array, starts: NDArray[np.intp]) -> NDArray[np.intp]:
+    """First place of a value in each interval; that of the first NaN where it is NaN."""
+    piece = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(values))))
+    places = np.flatnonzero((values == wanted[piece]) | np.isnan(values))
+    _, first = np.unique(piece[places], return_index=True)
+    return np.asarray(places[first])
 
 
 def wanted(what: str, chosen: Any) -> list[Any]:
@@ -93,9 +104,10 @@ def plots_of(run: Trajectory, chosen: Chosen | None) -> list[Plot]:
     Args:
         run: the run.
         chosen: "energy", "work", "power", "violation", "reactions", "contacts" (normal forces), "gaps" (of
-            contacts that open), "tau", "q", "v", "a", the name of a joint (its position and its velocity), or
-            a pair of a title "what [unit]" and curves by label, (nt,) each. None: energy, gaps, violation,
-            reactions and q, as far as the run has them.
+            contacts that open), "tau", "F_nonideal" (of joints), "q", "v", "a", the name of a joint (its
+            position and its velocity), or a pair of a title "what [unit]" and curves by label, (nt,) each.
+            None: of a driven run tau and F_nonideal, then energy, gaps, violation, reactions and q, as far as
+            the run has them.
 
     Raises:
         UnknownNameError: no plot and no joint has that name.
@@ -114,7 +126,11 @@ def usual_plots(run: Trajectory) -> list[str]:
     Args:
         run: the run.
     """
-    return [name for name in ("energy", "gaps", "violation", "reactions", "q") if _recorded(run, name)]
+    driven = getattr(run, "tau", None) is not None and bool(np.any(run.tau))
+    first = ("tau", "F_nonideal") if driven else ()
+    return [
+        name for name in (*first, "energy", "gaps", "violation", "reactions", "q") if _recorded(run, name)
+    ]
 
 
 def _recorded(run: Trajectory, name: str) -> bool:
@@ -128,6 +144,8 @@ def _recorded(run: Trajectory, name: str) -> bool:
         return run.lam is not None and bool(run.scene.contacts)
     if name == "gaps":
         return opens(run)
+    if name == "F_nonideal":
+        return run.F_nonideal is not None and bool(np.any(run.F_nonideal))
     if name in ("a", "tau"):
         return getattr(run, name, None) is not None
     return True
@@ -136,7 +154,7 @@ def _recorded(run: Trajectory, name: str) -> bool:
 def _plot(run: Trajectory, name: str) -> list[Plot]:
     """The plots of one name."""
     model, t = run.scene.model, np.asarray(run.t)
-    names = ("energy", "work", "power", "violation", "reactions", "contacts", "gaps", "tau", "q", "v", "a")
+    names = ("energy", "work", "power", "violation", "reactions", "contacts", "gaps", *RATES_AND_FORCES)
     joints = [str(joint) for joint in model.names[1:]]
     if name not in names and name not in joints:
         raise UnknownNameError(f'no plot and no joint "{name}"{nearest(name, [*names, *joints])}')
@@ -147,8 +165,10 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
             raise InputError('plot "contacts" needs a contact, and this scene has none')
         if name == "gaps":
             raise InputError('plot "gaps" needs a contact that opens, and this run has none')
+        if name == "F_nonideal" and run.F_nonideal is not None:
+            raise InputError('plot "F_nonideal" needs a nonideal force, and this run has none')
         record = {"a": "a", "tau": "tau", "power": "power"}.get(name, "energy")
-        record = "forces" if name in ("reactions", "contacts") else record
+        record = "forces" if name in ("reactions", "contacts", "F_nonideal") else record
         raise InputError(f'plot "{name}" must be recorded: pass record=("{record}",) to simulate')
     energy = run.energy or {}
     if name == "energy":
@@ -170,7 +190,9 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
         times, gaps = gaps_of(run)
         return [Plot("Gaps", "m, rad", times, _largest(gaps), note=left_out(len(gaps)))]
     if name == "tau":
-        return _torques(model, t, np.asarray(run.tau))
+        return _in_joints("Actuation", model, t, np.asarray(run.tau))
+    if name == "F_nonideal":
+        return _in_joints("Friction, F_nonideal", model, t, np.asarray(run.F_nonideal))
     if name == "q":
         return _by_unit("Position", t, positions(model, run.q))
     if name == "v":
@@ -182,14 +204,14 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
     return _by_unit(name, t, place) + _by_unit(f"{name}, velocity", t, rate)
 
 
-def _torques(model: pin.Model, t: Array, tau: Array) -> list[Plot]:
-    """Torques and forces of the actuation in joints of one degree of freedom."""
+def _in_joints(title: str, model: pin.Model, t: Array, tau: Array) -> list[Plot]:
+    """Torques and forces in joints of one degree of freedom."""
     found = []
     for joint in range(1, model.njoints):
         if model.joints[joint].nv == 1:
             name, unit = str(model.names[joint]), "N m" if joint_axis(model, joint)[1] else "N"
             found.append(Coordinate(name, name, unit, tau[:, model.joints[joint].idx_v]))
-    return _by_unit("Actuation", t, found)
+    return _by_unit(title, t, found)
 
 
 def _given(run: Trajectory, title: str, curves: Mapping[str, Array]) -> Plot:

@@ -41,7 +41,7 @@ FORCES = {
     "given": "#57534e",
 }
 MARKS = {"anchor": "#d97706", "rod": "#d97706", "spring": "#64748b", "contact": "#475569", "guide": "#a8763e"}
-CURVES = ("#1d4ed8", "#b45309", "#0f766e", "#be123c", "#6d28d9", "#4d7c0f", "#0369a1", "#57534e")
+CURVES = ("#1d4ed8", "#b45309", "#0f766e", "#be123c", "#6d28d9", "#4d7c0f", "#c026d3", "#57534e")
 
 
 def event_color(kind: str) -> str:

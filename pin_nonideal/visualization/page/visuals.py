@@ -92,10 +92,17 @@ class Visual:
     color: Color
 
 
-def visuals_of(geometry_model: pin.GeometryModel) -> list[Visual]:
-    """One visual for each object of a geometry model."""
+def visuals_of(geometry_model: pin.GeometryModel, most: int | None = None) -> list[Visual]:
+    """One visual for each object of a geometry model.
+
+    Args:
+        geometry_model: the shapes.
+        most: triangles of an object; one with more is left out.  None for any number.
+    """
     visuals = []
     for item in geometry_model.geometryObjects:
+        if most is not None and getattr(item.geometry, "num_tris", 0) > most:
+            continue
         shape, offset = shape_of(item.geometry, None if item.overrideMaterial else item.meshPath)
         red, green, blue, opacity = (float(value) for value in item.meshColor)
         color = (red, green, blue, opacity)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 KINDS = ("phase", "friction", "load")
+# Of so many joints and laws a page carries relations.
+MOST = 16
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,24 @@ class Relation:
     curves: dict[str, tuple[Array, Array]]
     bounds: dict[str, tuple[Array, Array]] = field(default_factory=dict)
     note: str = ""
+
+
+def available(run: Trajectory) -> list[str]:
+    """Names of the relations that a run has, one joint or law each, those that move most of each kind.
+
+    Args:
+        run: the run.
+    """
+    model = run.scene.model
+    joints = [joint for joint in range(1, model.njoints) if model.joints[joint].nv == 1]
+    joints = sorted(joints, key=lambda joint: -_spread(run, joint))[:MOST]
+    found = []
+    if run.law_forces:
+        known = friction_joints(run)
+        laws = sorted(known, key=lambda law: -_spread(run, known[law]))[:MOST]
+        kinds = ("friction", "load") if run.reactions else ("friction",)
+        found = [f"{kind} {law}" for kind in kinds for law in laws if law in run.law_forces]
+    return found + [f"phase {model.names[joint]}" for joint in sorted(joints)]
 
 
 def is_relation(item: Any) -> bool:

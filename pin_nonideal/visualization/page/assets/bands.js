@@ -2,6 +2,8 @@
 
 const OPEN = 2; // the mode of a contact without a force
 const BAND = 13; // height of a band with its gap [pixels]
+// Where the bar of a mode begins below the top of its band, and how tall it is: slip + is above, slip - below, stick between them.
+const SHAPES = { 1: [0, 0.5], [-1]: [0.5, 0.5], 0: [0.3, 0.4], 2: [0.45, 0.1], 3: [0, 1] };
 
 class Bands {
   constructor(run, span, canvas, tip, seek, hover) {
@@ -61,8 +63,8 @@ class Bands {
     const first = lastBelow(band.starts, axis.span.start);
     for (let k = first; k < band.starts.length && (k === first || band.starts[k] <= axis.span.end); k++) {
       const from = Math.max(axis.x(band.starts[k]), axis.left), to = Math.min(axis.x(k + 1 < band.starts.length ? band.starts[k + 1] : this.end), axis.right);
-      const { color } = this.look(band.modes[k]);
-      if (to - from >= 1.5) { c.fillStyle = color; c.fillRect(from, top + 1, to - from, tall); continue; }
+      const { color } = this.look(band.modes[k]), [rise, part] = SHAPES[band.modes[k]] || [0, 1];
+      if (to - from >= 1.5) { c.fillStyle = color; c.fillRect(from, top + 1 + rise * tall, to - from, part * tall); continue; }
       const column = Math.floor((from + to) / 2), own = shares.get(column) || new Map();
       own.set(color, (own.get(color) || 0) + Math.max(to - from, 1e-4));
       shares.set(column, own);

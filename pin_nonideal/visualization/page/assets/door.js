@@ -20,6 +20,7 @@ function door(player) {
     onScreen: (place) => player.stage.onScreen(new player.stage.THREE.Vector3(...place)),
     box: () => player.stage.box(),
     show: (what, shown) => player.stage.show(what, shown),
+    get looks() { return player.plots.map((plot) => plot.curves.map(({ color, dash }) => `${color} ${dash}`)); },
     get margin() { return player.timeline.axis.left; },
     get address() { return player.address.text(); },
     get gap() { return player.stage.marks.gap(); },

@@ -2,6 +2,7 @@
 
 const ICONS = { play: "M7 4.5v15l13-7.5z", pause: "M6 5h4v14H6zM14 5h4v14h-4z" };
 const SPEEDS = Array.from({ length: 27 }, (_, i) => Number(`${[1, 2, 5][i % 3]}e${Math.floor(i / 3) - 4}`)).slice(0, 25);
+const LEAST_CURVE = 100; // height of a curve [pixels]
 const PLAYED = [5, 15]; // a run is played in so many seconds
 const element = (id) => document.getElementById(id);
 
@@ -57,14 +58,15 @@ class Player {
     element("run-list").open = run.others.length < 8;
     element("run-list").querySelector("summary").textContent = `${run.others.length + 1} runs`;
     if (!run.events.times.length) for (const id of ["event-back", "event-forth"]) element(id).hidden = true;
-    const legend = element("legend"), entry = ({ color, name }, title) => {
+    const legend = element("legend"), entry = ({ color, name }, title, shape) => {
       const item = legend.appendChild(document.createElement("span")), swatch = item.appendChild(document.createElement("i"));
       swatch.style.background = color;
+      if (shape) swatch.style.clipPath = `inset(${100 * shape[0]}% 0 ${100 * (1 - shape[0] - shape[1])}% 0)`;
       item.append(name);
       item.title = title || name;
     };
     const modes = new Set(run.modes.flatMap((band) => [...new Set(band.modes)]));
-    for (const mode of [1, -1, 0, 3, 2]) if (modes.has(mode)) entry(mode === OPEN ? { ...run.looks.modes[mode], color: "var(--open)" } : run.looks.modes[mode]);
+    for (const mode of [1, -1, 0, 3, 2]) if (modes.has(mode)) entry(mode === OPEN ? { ...run.looks.modes[mode], color: "var(--open)" } : run.looks.modes[mode], null, SHAPES[mode]);
     for (const kind of run.events.kinds) { const look = run.looks.events[kind] || run.looks.events.other; entry({ color: look.color, name: `▾ ${kind}` }, look.means); }
   }
 
@@ -120,6 +122,7 @@ class Player {
       this.stage.arrows.scale = 4 ** Number(e.target.value);
       this.seek(this.time);
     });
+    this.listenToSplitter();
     window.addEventListener("keydown", (e) => this.key(e));
     new ResizeObserver(() => this.resize()).observe(element("stage"));
     window.addEventListener("resize", () => this.resize());
@@ -244,16 +247,56 @@ class Player {
     }
   }
 
+  /** A height of the plots by hand [pixels], or null for that of the style. */
+  setDock(height) {
+    const dock = element("dock"), room = document.querySelector("main").clientHeight, least = 120;
+    this.dock = height === null ? null : Math.max(least, Math.min(room - 140, height));
+    dock.style.flexBasis = this.dock === null ? "" : `${this.dock}px`;
+    dock.style.maxHeight = this.dock === null ? "" : "none";
+    element("splitter").setAttribute("aria-valuenow", String(Math.round((100 * dock.offsetHeight) / Math.max(room, 1))));
+    this.resize();
+  }
+
+  listenToSplitter() {
+    const splitter = element("splitter");
+    for (const [name, value] of [["aria-valuemin", 0], ["aria-valuemax", 100], ["aria-valuenow", 50]]) splitter.setAttribute(name, String(value));
+    splitter.addEventListener("pointerdown", (event) => splitter.setPointerCapture(event.pointerId));
+    splitter.addEventListener("pointermove", (event) => { if (event.buttons & 1) this.setDock(innerHeight - event.clientY + splitter.offsetHeight / 2); });
+    splitter.addEventListener("dblclick", () => this.setDock(null));
+    splitter.addEventListener("keydown", (event) => {
+      const by = { ArrowUp: 24, ArrowDown: -24 }[event.key];
+      if (!by) return;
+      event.preventDefault(); event.stopPropagation();
+      this.setDock(element("dock").offsetHeight + by);
+    });
+  }
+
+  /** The height of curves: of the style, or what a dock by hand leaves for a single row of plots. */
+  fitPlots() {
+    const plots = element("plots"), last = this.plots[this.plots.length - 1];
+    plots.style.removeProperty("--tall");
+    if (!this.dock || !last || last.box.offsetTop !== this.plots[0].box.offsetTop) return;
+    const more = plots.clientHeight - last.box.offsetTop + plots.offsetTop - last.box.offsetHeight;
+    plots.style.setProperty("--tall", `${Math.max(LEAST_CURVE, last.canvas.clientHeight + more)}px`);
+  }
+
   resize() {
     const box = element("forces"), { clientWidth: width, clientHeight: height } = element("stage"), narrow = width < 640, folded = box.classList.contains("off");
     // The view is framed between what lies over it: the heading, the buttons, and beside the table of forces where there is room.
     const taken = (card, side, room) => (card[side] ? card[side] + room : 0);
+    // The panel begins below the heading and ends above the buttons where they are under it.
+    const heading = element("heading"), beside = narrow || box.hidden ? 0 : box.offsetWidth;
+    heading.style.maxWidth = beside ? `min(60%, ${Math.max(width - beside - 36, 200)}px)` : "";
+    const tools = element("tools"), panel = element("panel"), under = tools.offsetLeft < panel.offsetLeft + panel.offsetWidth;
+    panel.style.top = `${height < 330 && element("runs").hidden ? 8 : heading.offsetTop + heading.offsetHeight + 8}px`;
+    panel.style.bottom = under ? `${tools.offsetHeight + 16}px` : "";
     const below = taken(element("tools"), "offsetHeight", 12) + (narrow && folded ? taken(box, "offsetHeight", 6) : 0);
     this.stage.covered = {
       right: folded || narrow ? 0 : Math.min(taken(box, "offsetWidth", 12) / Math.max(width, 1), 0.4),
       top: Math.min(taken(element("heading"), "offsetHeight", 14) / Math.max(height, 1), 0.35), bottom: Math.min(below / Math.max(height, 1), 0.3),
     };
     this.stage.resize();
+    this.fitPlots();
     this.resizePlots();
   }
 

@@ -1,6 +1,20 @@
 // Plots on canvas: one axis each, a cursor at the shown time, a reading at the pointer.
 
-const DASHES = [[5, 3], [2, 2], [8, 3, 2, 3], [10, 4], [3, 5], [8, 2, 2, 2, 2, 2], [1, 3]]; // of the second run and those after it
+const DASHES = [[5, 3], [2, 2], [8, 3, 2, 3], [10, 4], [3, 5], [8, 2, 2, 2, 2, 2], [1, 3]]; // of the second run or of the ninth curve, and so on
+
+/** A color and dash that no curve of a plot has yet: first the colors, then each of them dashed. */
+function freeLook(curves, colors) {
+  const taken = new Set(curves.map((curve) => `${curve.color} ${curve.dash}`));
+  for (const dash of [[], ...DASHES]) for (const color of colors) if (!taken.has(`${color} ${dash}`)) return { color, dash };
+  return { color: colors[curves.length % colors.length], dash: [] };
+}
+
+/** Writes a text into an element, without its middle where there is no room for all of it. */
+function fitText(box, text) {
+  box.textContent = text;
+  for (let kept = text.length - 1; kept > 3 && box.scrollWidth > box.clientWidth; kept--)
+    box.textContent = `${text.slice(0, Math.ceil(kept / 2))}…${text.slice(text.length - Math.floor(kept / 2))}`;
+}
 
 /** A dashed line as a background; a whole one without dashes. */
 function stroke(dash, color) {
@@ -13,48 +27,73 @@ class Plot {
   /** seek(t) and hover(t or null) tell the page what the pointer does. */
   constructor(plot, span, parent, colors, seek, hover) {
     Object.assign(this, plot, { logarithmic: plot.log });
-    const first = this.curves.filter((curve) => !curve.run);
-    this.curves.forEach((curve, i) => {
+    this.colors = colors;
+    const first = this.curves.filter((curve) => !curve.run), looks = [];
+    this.curves.forEach((curve) => {
       curve.base = curve.run ? first.find((own) => own.label === curve.of) : null;
       // A plot of one curve tells runs apart by colors, one of several by dashes.
-      const color = !curve.base ? colors[i % colors.length] : first.length > 1 ? curve.base.color : colors[curve.run % colors.length];
-      Object.assign(curve, { color, shown: true, t: curve.t || plot.t, dash: curve.run ? DASHES[(curve.run - 1) % DASHES.length] : [], plain: curve.values });
+      const apart = curve.base && first.length > 1 && first.length <= colors.length;
+      const look = apart ? { color: curve.base.color, dash: DASHES[(curve.run - 1) % DASHES.length] } : freeLook(looks, colors);
+      looks.push(look);
+      Object.assign(curve, look, { shown: true, t: curve.t || plot.t, plain: curve.values });
     });
+    this.makeBox(parent);
+    for (const curve of this.curves) this.addToLegend(curve);
+    this.background = document.createElement("canvas");
+    this.listen(span, seek, hover);
+  }
+
+  listen(span, seek, hover) { this.axis = new TimeAxis(span, this.canvas, seek, (t) => hover(t)); }
+
+  /** Words after the title. */
+  about() { return `[${this.unit}]`; }
+
+  makeBox(parent) {
     this.box = document.createElement("div");
     const heading = document.createElement("h2"), unit = document.createElement("span");
     this.box.className = "plot";
     heading.textContent = `${this.title} `;
-    unit.textContent = `[${this.unit}]${this.note ? ` · ${this.note}` : ""}`;
+    unit.textContent = `${this.about()}${this.note ? ` · ${this.note}` : ""}`;
     heading.append(unit);
+    heading.title = heading.textContent;
     this.heading = heading;
     this.legend = document.createElement("ul");
     this.canvas = document.createElement("canvas");
     this.canvas.setAttribute("role", "img");
-    this.canvas.setAttribute("aria-label", `${this.title} over time`);
-    this.box.append(heading, this.legend, this.canvas);
+    this.canvas.setAttribute("aria-label", `${this.title} ${this.about()}`);
+    const inner = this.box.appendChild(document.createElement("div"));
+    inner.append(heading, this.canvas, this.legend);
     parent.append(this.box);
-    this.addLegend();
-    this.background = document.createElement("canvas");
-    this.axis = new TimeAxis(span, this.canvas, seek, (t) => hover(t));
   }
 
-  addLegend() {
-    for (const curve of this.curves) {
-      const item = document.createElement("li"), button = document.createElement("button");
-      curve.button = button;
-      button.title = "show or hide the curve";
-      button.setAttribute("aria-pressed", "true");
-      curve.reading = document.createElement("b");
-      button.append(`${curve.label} `, curve.reading);
-      button.addEventListener("click", () => {
-        curve.shown = !curve.shown;
-        item.classList.toggle("off", !curve.shown);
-        button.setAttribute("aria-pressed", String(curve.shown));
-        this.resize();
-      });
-      item.append(button);
-      this.legend.append(item);
-    }
+  addToLegend(curve) {
+    const item = document.createElement("li"), button = item.appendChild(document.createElement("button")), name = document.createElement("span");
+    Object.assign(curve, { item, button, reading: document.createElement("b") });
+    name.textContent = curve.label;
+    curve.name = name;
+    button.title = `${curve.label}: show or hide the curve`;
+    button.setAttribute("aria-pressed", "true");
+    button.append(name, " ", curve.reading);
+    button.addEventListener("click", () => {
+      curve.shown = !curve.shown;
+      item.classList.toggle("off", !curve.shown);
+      button.setAttribute("aria-pressed", String(curve.shown));
+      this.resize();
+    });
+    this.legend.append(item);
+  }
+
+  /** Takes a curve in, in a look of its own. */
+  add(curve) {
+    Object.assign(curve, freeLook(this.curves, this.colors), { base: null, shown: true, plain: curve.values });
+    this.curves.push(curve);
+    this.addToLegend(curve);
+    return curve;
+  }
+
+  remove(curve) {
+    this.curves.splice(this.curves.indexOf(curve), 1);
+    curve.item.remove();
   }
 
   /** Curves of other runs as their differences from the first run, which is hidden then; or as they are. */
@@ -96,6 +135,7 @@ class Plot {
 
   resize() {
     if (!this.canvas.clientWidth) return;
+    for (const { name, label } of this.curves) fitText(name, label);
     this.scale();
     for (const curve of this.curves) {
       curve.button.style.setProperty("--swatch", onPaper(curve.color));
