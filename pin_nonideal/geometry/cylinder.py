@@ -1,4 +1,4 @@
-"""Cylinders and cones: their faces, sides and rims, what stands back from these, and what touches them."""
+"""Geometry of cylinders and cones: faces, rims and side, and their contacts with spheres and capsules."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ from pin_nonideal.validation import Vector3
 
 from .shapes import Shape
 
-# Part of the least edge to which boxes and hulls are rounded where nothing else is said, and part of its
-# radius by which the rim of a cylinder stands back behind its face.
+# Default rounding of boxes and hulls, relative to the shortest edge, and default inset of a cylinder's rims,
+# relative to its radius.
 LEAST_ROUNDING = 1e-3
-# What carries a cylinder that stands on its face: so many points on this part of its radius.  The rim takes
-# over from the tilt at which it is as low as they are, 0.03 rad.
+# Number of points that support a cylinder on its face, and the radius of their circle relative to the radius
+# of the face. From a tilt of 0.03 rad on, the rim is lower than these points.
 FACE_POINTS, FACE_CIRCLE = 8, 0.97
-# Part of the rounding of edges, or of how far rims stand back, by which the side of a cylinder does from its
-# rims and from where corners find it: no two places touch at one, and what lies along it lies on both rims.
+# Inset of the side of a cylinder, relative to the rounding of edges or to the inset of rims. It keeps the
+# side apart from rims and corners, so that no two contacts coincide and a line along the side touches both
+# rims.
 PASSED_ON = 0.01
 
 
 def standing_back(who: str, shape: Shape, rounding: float | None) -> float:
-    """How far the rims of a cylinder or cone stand back behind its faces [m]."""
+    """Return the distance by which the rims of a cylinder or cone lie behind its faces [m]."""
     assert shape.ends is not None
     half, *radii = shape.ends
     back = LEAST_ROUNDING * max(radii) if rounding is None else rounding
@@ -40,27 +41,27 @@ def standing_back(who: str, shape: Shape, rounding: float | None) -> float:
 
 
 def faces(shape: Shape) -> list[tuple[float, float]]:
-    """Where the faces of a cylinder or cone are on its axis, and their radii."""
+    """Return the axial coordinate [m] and the radius [m] of each face of a cylinder or cone."""
     assert shape.ends is not None
     half, below, above = shape.ends
     return [(end, radius) for end, radius in ((-half, below), (half, above)) if radius > 0.0]
 
 
 def face_points(shape: Shape, end: float, radius: float, most: float = np.inf) -> list[Vector3]:
-    """What carries a face, around it, on a circle of that radius at the most."""
+    """Return the points that support a face, on a circle of at most the given radius."""
     turns = 2.0 * np.pi / FACE_POINTS * np.arange(FACE_POINTS)
     ways = [min(FACE_CIRCLE * radius, most) * np.array([np.cos(turn), np.sin(turn)]) for turn in turns]
     return [at_place(shape, x, y, end) for x, y in ways]
 
 
 def at_place(shape: Shape, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """A place given in the shape's own axes, its axis along z."""
+    """Transform a point from the axes of the shape, whose axis of revolution is z, to the frame of its joint."""
     a, b, c = shape.place.act(np.array([x, y, z])).tolist()
     return a, b, c
 
 
 def on_revolved(at: Array, radius: float, frame: str, solid: Shape, more: dict[str, Any]) -> CylinderContact:
-    """A sphere, or a rounded corner, on a cylinder or cone."""
+    """Return the contact of a sphere, or of a rounded corner, with a cylinder or cone."""
     assert solid.ends is not None
     half, below, above = solid.ends
     return CylinderContact(
@@ -80,25 +81,25 @@ def on_revolved(at: Array, radius: float, frame: str, solid: Shape, more: dict[s
 def line_on_revolved(
     line: Segment, radius: float, frame: str, solid: Shape, more: dict[str, Any]
 ) -> CylinderContact:
-    """A capsule, or a rounded edge, on a cylinder or cone."""
+    """Return the contact of a capsule, or of a rounded edge, with a cylinder or cone."""
     return replace(on_revolved(np.array(line[0]), radius, frame, solid, more), end=line[1])
 
 
 def heights(solid: Shape, back: float) -> tuple[float, float]:
-    """Where on its axis the faces of a cylinder or cone are when they stand back; a tip does not."""
+    """Return the axial coordinates of the ends of a cylinder or cone with inset faces; a tip has no inset."""
     assert solid.ends is not None
     half, below, above = solid.ends
     return -half + back * (below > 0.0), half - back * (above > 0.0)
 
 
 def side_of(solid: Shape, back: float, by: float) -> Shape:
-    """A cylinder or cone whose faces stand back, and whose side does by that much where it is widest."""
+    """Return a cylinder or cone with inset faces, and with its largest radius reduced by the given length."""
     assert solid.ends is not None
     return between(solid, *heights(solid, back), 1.0 - by / max(solid.ends[1:]))
 
 
 def slices(solid: Shape, back: float) -> list[Shape]:
-    """Its rims where its faces stand back, thin slices of it."""
+    """Return thin slices of a cylinder or cone at its inset rims."""
     assert solid.ends is not None
     low, high = heights(solid, back)
     _, below, above = solid.ends
@@ -108,7 +109,7 @@ def slices(solid: Shape, back: float) -> list[Shape]:
 
 
 def between(solid: Shape, low: float, high: float, part: float) -> Shape:
-    """A part of the radii of a cylinder or cone, between two places on its axis."""
+    """Return the part of a cylinder or cone between two axial coordinates, with scaled radii."""
     assert solid.ends is not None
     half, below, above = solid.ends
     first, last = (part * (below * (half - z) + above * (half + z)) / (2.0 * half) for z in (low, high))

@@ -1,9 +1,9 @@
-"""Two cylinders or cones as the contacts of their analytic manifold.
+"""Contacts of two cylinders or cones: their analytic manifold.
 
-Each is modelled with its rims and tip rounded, faces and side where they are.  What touches at one point does
-so with a rim or tip of one, or with both sides crosswise.  What lies along a line or on a face needs more:
-the rims carry two sides along each other, the points of a face what it stands on and the chords between them
-the side that it lies on, or where two faces overlap the rest of what they share.
+Rims and tips are rounded. Faces and sides keep their positions. A contact at a single point involves a rim or
+a tip of one shape, or both sides crosswise. Contacts along a line or on a face need more points. The rims
+support two sides that lie along each other. The points of a face support it on another face, and the chords
+between these points support a side on that face. Chords of both faces support two overlapping faces.
 """
 
 from __future__ import annotations
@@ -34,27 +34,27 @@ from .cylinder import (
 )
 from .shapes import Shape
 
-# Part of the largest ball inside a cylinder or cone that rims may be rounded to: its faces stand back by as
-# much, and something has to be left.
+# Maximum rounding of rims, relative to the radius of the largest inscribed ball. The inset of the faces
+# equals the rounding, so a larger value would leave no core.
 MOST_ROUNDING = 0.4
-# Radii of rounding between a rim and the points that carry its face, at the least.
+# Minimum distance between a rim and the support points of its face, in radii of rounding.
 WITHIN_RIM = 2.0
 
 
 def two_revolved(
     who: str, first: Shape, second: Shape, rounding: float | None, more: dict[str, Any]
 ) -> list[CylinderContact | CapsuleContact | RevolvedContact]:
-    """The contacts of two cylinders or cones.
+    """Return the contacts of two cylinders or cones.
 
     Args:
-        who: words for messages.
-        first: one of them.
-        second: the other.
-        rounding: radius to which rims are rounded, and by which they stand back [m]; None for the default.
-        more: mu, static_ratio and restitution of each.
+        who: prefix of error messages.
+        first: first shape.
+        second: second shape, on another body.
+        rounding: radius of the rounded rims, equal to their inset [m]; None for the default.
+        more: mu, static_ratio and restitution of each contact.
 
     Raises:
-        InputError: the rounding does not fit.
+        InputError: the rounding is too large.
     """
     ball = min(_ball(first), _ball(second))
     by = LEAST_ROUNDING * ball if rounding is None else rounding
@@ -90,7 +90,7 @@ def two_revolved(
 
 
 def _ball(solid: Shape) -> float:
-    """Radius of the largest ball inside [m]."""
+    """Return the radius of the largest inscribed ball [m]."""
     assert solid.ends is not None
     half, below, above = solid.ends
     if below > 0.0 < above:
@@ -100,7 +100,7 @@ def _ball(solid: Shape) -> float:
 
 
 def _core(solid: Shape, by: float) -> Shape:
-    """All places inside that are at least so far from faces and side; of a cone's its tip too."""
+    """Return the part of a solid that is at least the given depth below faces and side; it keeps its tip."""
     assert solid.ends is not None
     half, below, above = solid.ends
     slant = float(np.hypot(2.0 * half, below - above)) / (2.0 * half)
@@ -118,7 +118,7 @@ def _core(solid: Shape, by: float) -> Shape:
 
 
 def _rims(solid: Shape, by: float) -> list[Shape]:
-    """The rims that stand back behind their faces, as disks with the rounding around them."""
+    """Return the inset rims of a cylinder or cone as disks of thickness zero, without the rounding."""
     core = _core(between(solid, *heights(solid, by), 1.0), by)
     disks = []
     for end, radius in faces(core):
@@ -128,7 +128,7 @@ def _rims(solid: Shape, by: float) -> list[Shape]:
 
 
 def _rings(solid: Shape, by: float, depth: float = 0.0) -> list[list[Vector3]]:
-    """The points that carry each face, that deep under it."""
+    """Return the support points of each face, at a depth below the face [m]."""
     return [
         face_points(solid, end - float(np.copysign(depth, end)), radius, radius - WITHIN_RIM * by)
         for end, radius in faces(solid)
@@ -140,7 +140,7 @@ def _chords(ring: list[Vector3]) -> list[Segment]:
 
 
 def _pair(first: Shape, second: Shape, by: float, more: dict[str, Any]) -> RevolvedContact:
-    """Two of them, or a rim and one, with the rounding around both."""
+    """Return the contact of two cylinders, cones or disks that are rounded by the same radius."""
     places: dict[str, Any] = {}
     for number, solid in ((1, first), (2, second)):
         assert solid.ends is not None

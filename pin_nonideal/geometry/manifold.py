@@ -1,4 +1,4 @@
-"""Pairs of shapes as the contacts of their analytic manifold: a place for each way in which they touch."""
+"""Analytic contact manifolds of pairs of shapes: one contact for each pair of features that can touch."""
 
 from __future__ import annotations
 
@@ -52,25 +52,26 @@ Place = (
     | RevolvedContact
 )
 
-# Places of one pair beyond which it is refused: rows of all of them take room by the square of their number.
+# Maximum number of contacts of one pair. The rows of all contacts need memory proportional to the square of
+# their number.
 MOST_PLACES = 1000
 
 
 def manifold(
     who: str, first: Shape, second: Shape, rounding: float | None, base: str, more: dict[str, Any]
 ) -> list[Place]:
-    """The contacts of one pair of shapes.
+    """Return the contacts of one pair of shapes.
 
     Args:
-        who: words for messages.
-        first: one shape.
-        second: another one, on another body.
-        rounding: radius to which edges are rounded where edges meet edges [m]; None for the default.
-        base: name of all; several are numbered.
-        more: mu, static_ratio and restitution of each.
+        who: prefix of error messages.
+        first: first shape.
+        second: second shape, on another body.
+        rounding: radius of edges that can touch edges [m]; None for the default.
+        base: name of the contacts; several contacts are numbered.
+        more: mu, static_ratio and restitution of each contact.
 
     Raises:
-        InputError: no contacts are known for the pair, they are too many, or the rounding does not fit.
+        InputError: the pair has no manifold, the contacts are too many, or the rounding is too large.
     """
     if first.normal is not None:
         first, second = second, first
@@ -105,7 +106,7 @@ def manifold(
 def _on_half_space(
     who: str, shape: Shape, ground: Shape, rounding: float | None, more: dict[str, Any]
 ) -> Iterator[Place]:
-    """Any shape over a half-space: its corners and ends, points of its faces and its rims."""
+    """Yield the contacts of a shape with a half-space: corners, ends, points of faces, and rims."""
     assert ground.normal is not None
     level: dict[str, Any] = {
         "plane": None if ground.frame == "universe" else ground.frame,
@@ -132,11 +133,11 @@ def _on_half_space(
 def _revolved_manifold(
     who: str, other: Shape, solid: Shape, rounding: float | None, more: dict[str, Any]
 ) -> list[Place]:
-    """A capsule, box or convex mesh with a cylinder or cone.
+    """Return the contacts of a capsule, box or convex mesh with a cylinder or cone.
 
-    Corners, and a capsule's ends, on the whole solid; edges, and its middle line, on a side that stands back
-    a little from these, on the rims and on the chords between the points that carry the faces; those points
-    and the tip on the faces of a box or mesh, and rims on its faces and edges.
+    Corners, and the ends of a capsule, touch the whole solid. Edges, and the segment of a capsule, touch the
+    slightly inset side, the rims and the chords between the support points of the faces. These support points
+    and the tip touch the faces of a box or mesh. The rims touch its faces and edges.
     """
     back = standing_back(who, solid, rounding)
     radius = _edge_radius(who, [other], rounding) if other.solid else other.radius
@@ -172,7 +173,7 @@ def _revolved_manifold(
 def _solid_manifold(
     who: str, first: Shape, solid: Shape, rounding: float | None, more: dict[str, Any]
 ) -> list[Place]:
-    """A box or convex mesh with a sphere, a capsule or another one: corners on faces, then edges on edges."""
+    """Return the contacts of a box or convex mesh with a sphere, a capsule, a box or a convex mesh."""
     r2 = _edge_radius(who, [first, solid], rounding) if first.solid else 0.0
     r1 = r2 if first.solid else first.radius
     cores = _core(who, first, r1), _core(who, solid, r2)
@@ -192,7 +193,7 @@ def _solid_manifold(
 
 
 def _edge_radius(who: str, shapes: list[Shape], rounding: float | None) -> float:
-    """To which the edges of boxes and meshes are rounded [m]."""
+    """Return the radius of the rounded edges of boxes and meshes [m]."""
     edge = min(_least_edge(shape) for shape in shapes if shape.solid)
     radius = LEAST_ROUNDING * edge if rounding is None else rounding
     if not 2.0 * radius < edge:
@@ -217,7 +218,7 @@ def _rows(points: Array) -> tuple[Vector3, ...]:
 def _on_solid(
     ball: Shape, at: Array, target: Shape, core: Array, radius: float, rounding: float, more: dict[str, Any]
 ) -> BoxContact | HullContact:
-    """A sphere or a point on a box or a mesh with these corners, both rounded."""
+    """Return the contact of a sphere or a point with a rounded box or mesh with these corners."""
     if target.half is not None:
         return _on_box(ball, at, target, radius, rounding, more)
     offset = tuple(at.tolist())
@@ -243,7 +244,7 @@ def _least_edge(shape: Shape) -> float:
 
 
 def _core(who: str, shape: Shape, radius: float) -> Array:
-    """The corners of a solid less a radius on all sides; of others the points that the radius is around."""
+    """Return the corners of a solid shrunk by a radius, or the points of a sphere or capsule."""
     if not shape.solid:
         return np.unique(shape.points, axis=0)
     if shape.half is None:
@@ -253,7 +254,7 @@ def _core(who: str, shape: Shape, radius: float) -> Array:
 
 
 def _edges(shape: Shape, points: Array) -> list[Segment]:
-    """The edges of a solid with these corners, or the one of a capsule."""
+    """Return the edges of a solid with these corners, or the segment of a capsule."""
     if not shape.solid:
         return [_segment(points)] if len(points) == 2 else []
     if shape.half is None:
