@@ -55,7 +55,7 @@ def face_points(shape: Shape, end: float, radius: float, most: float = np.inf) -
 
 
 def at_place(shape: Shape, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Transform a point from the axes of the shape, whose axis of revolution is z, to the frame of its joint."""
+    """Transform a point from the shape's axes, with its axis of revolution as z, to the joint's frame."""
     a, b, c = shape.place.act(np.array([x, y, z])).tolist()
     return a, b, c
 

@@ -1,4 +1,4 @@
-"""Runs of a sweep in a folder: files that hold them, and an index of what became of each."""
+"""Runs of a sweep in a folder: files of runs, and an index with the result of each run."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
 
 class Sweep(Sequence[Trajectory]):
-    """Runs of a sweep that are kept in a folder, read one at a time when asked for.
+    """Runs of a sweep in a folder; each run is read from its file on access.
 
     Args:
-        folder: that `sweep(..., store=folder)` filled.
+        folder: folder that `sweep(..., store=folder)` filled.
 
     Attributes:
-        folder: see above.
-        records: of each run, in order: its `parameters`, `error` (what stopped it, or None), `t_end`,
-            `steps`, `evaluations`, `violation` (largest), `wall_s`, and what `measure` gave; None of a run
-            that is missing.
+        folder: path of the folder.
+        records: entry of each run, in order, or None for a missing run. The keys are `parameters`, `error`
+            (the message of the error that stopped the run, or None), `t_end`, `steps`, `evaluations`,
+            `violation` (maximum over the run), `wall_s`, and the results of `measure`.
 
     Raises:
-        LoadingError: there is no sweep in it.
+        LoadingError: the folder holds no sweep.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
@@ -52,7 +52,7 @@ class Sweep(Sequence[Trajectory]):
                 self.records: list[Table | None] = [None] * int(self._header["runs"])
                 self._places: list[tuple[str, int, int] | None] = [None] * len(self.records)
                 for line in lines:
-                    if line.endswith("\n"):  # not cut off by a kill
+                    if line.endswith("\n"):  # complete: no kill truncated the line
                         self._take(json.loads(line))
             self._unlisted = list(self._found())
         except (OSError, ValueError, LookupError, TypeError, StopIteration) as error:
@@ -67,7 +67,7 @@ class Sweep(Sequence[Trajectory]):
         self.records[k], self._places[k] = record, (str(name), int(at), int(size))
 
     def _found(self) -> Iterator[Table]:
-        """Runs that were done before a kill and did not come into the index."""
+        """Yield runs that were written before a kill but are missing in the index."""
         ends: dict[str, int] = {}
         for place in self._places:
             if place is not None:
@@ -87,14 +87,14 @@ class Sweep(Sequence[Trajectory]):
         return self.load(k, scene=None)
 
     def load(self, k: int, scene: Scene | str | None = "source") -> Trajectory:
-        """One run, with its scene where that can be had.
+        """Return one run, with its scene if the scene is available.
 
         Args:
             k: number of the run.
-            scene: as in `Trajectory.load`.
+            scene: scene of the run, as in `Trajectory.load`.
 
         Raises:
-            InputError: the scene is not the one of the run.
+            InputError: the scene is not the scene of the run.
             LoadingError: the run is missing, failed before its first sample, or its file is damaged.
         """
         k = range(len(self))[k]
@@ -119,20 +119,20 @@ class Sweep(Sequence[Trajectory]):
 
     @property
     def missing(self) -> list[int]:
-        """Runs that are not done."""
+        """Return the numbers of the runs that are not complete."""
         return [k for k, record in enumerate(self.records) if record is None]
 
     @property
     def failures(self) -> dict[int, str]:
-        """What stopped the runs that failed."""
+        """Return the error messages of the failed runs, by number of the run."""
         return {k: r["error"] for k, r in enumerate(self.records) if r is not None and r["error"] is not None}
 
     def summary(self) -> Table:
-        """Over all runs that are done, without reading them: mean, deviation and quantiles of each number.
+        """Return mean, deviation and quantiles of each number over all complete runs, from the index alone.
 
         Returns:
-            By name of the number ("violation", "steps", ..., and those of `measure`): "mean", "std", "count",
-            "quantiles" (by level) and "worst" (the run with the largest one).
+            By name of the number ("violation", "steps", ..., and the results of `measure`): "mean", "std",
+            "count", "quantiles" (by level) and "worst" (the run with the largest value).
         """
         done = [(k, r) for k, r in enumerate(self.records) if r is not None]
         names = sorted({key for _, r in done for key, x in r.items() if isinstance(x, (int, float))})
@@ -150,16 +150,16 @@ class Sweep(Sequence[Trajectory]):
 
 
 def opened_store(folder: Path, digest: str, runs: int) -> list[int]:
-    """Begins a sweep in a folder, or goes on with it; the runs that are missing.
+    """Start or continue a sweep in a folder, and return the numbers of the missing runs.
 
     Args:
-        folder: of the sweep.
-        digest: of all that decides it.
-        runs: how many there are.
+        folder: folder of the sweep.
+        digest: digest of all inputs of the sweep.
+        runs: number of runs.
 
     Raises:
         InputError: the folder holds another sweep.
-        OutputError: it cannot be written.
+        OutputError: the folder cannot be written.
     """
     index = folder / "index.jsonl"
     if index.exists():
@@ -186,14 +186,14 @@ def opened_store(folder: Path, digest: str, runs: int) -> list[int]:
 
 
 def note(folder: Path, records: Sequence[Table]) -> None:
-    """Adds what became of some runs to the index.
+    """Append the results of some runs to the index.
 
     Args:
-        folder: of the sweep.
-        records: of the runs, each with its number as "run".
+        folder: folder of the sweep.
+        records: entries of the runs, each with the number of the run as "run".
 
     Raises:
-        OutputError: it cannot be written.
+        OutputError: the index cannot be written.
     """
     index = folder / "index.jsonl"
     try:
@@ -205,7 +205,7 @@ def note(folder: Path, records: Sequence[Table]) -> None:
 
 
 def _end_after_whole_line(stream: Any) -> None:
-    """Goes to the end, without the part of a line that a kill left behind."""
+    """Move to the end of a stream, and remove an incomplete last line."""
     stream.seek(0, os.SEEK_END)
     size = stream.tell()
     stream.seek(max(0, size - 1))
@@ -220,14 +220,14 @@ def _end_after_whole_line(stream: Any) -> None:
 def record_of(
     k: int, parameters: Mapping[str, Any], run: Trajectory | None, error: str | None, more: Table
 ) -> Table:
-    """What the index tells of a run.
+    """Return the index entry of a run.
 
     Args:
-        k: its number.
-        parameters: its own.
-        run: its trajectory, or None where there is none.
-        error: what stopped it, or None.
-        more: what `measure` gave.
+        k: number of the run.
+        parameters: parameters of the run.
+        run: trajectory of the run, or None if it failed before the first sample.
+        error: message of the error that stopped the run, or None.
+        more: results of `measure`.
     """
     record: Table = {
         "run": k,
@@ -243,20 +243,20 @@ def record_of(
 
 
 def digest_of(make: Any, parameters: Sequence[Mapping[str, Any]], duration: float, options: Table) -> str:
-    """Of all that decides a sweep, as far as it has a name.
+    """Return the digest of the inputs of a sweep that have a reproducible representation.
 
     Args:
-        make: what builds its scenes.
-        parameters: of its runs.
-        duration: of each [s].
-        options: of `simulate`.
+        make: function that builds the scenes.
+        parameters: parameters of the runs.
+        duration: duration of each run [s].
+        options: options of `simulate`.
     """
     said = [_said(make), [dict(p) for p in parameters], duration, sorted(options.items())]
     return hashlib.sha256(json.dumps(said, default=_said).encode()).hexdigest()
 
 
 def _said(value: Any) -> Any:
-    """What decides a value that JSON does not know: the same in every process."""
+    """Return a representation that is equal in all processes, for a value that JSON cannot encode."""
     if isinstance(value, partial):
         return [_said(value.func), value.args, value.keywords]
     if isinstance(value, (np.ndarray, np.generic)):
@@ -265,17 +265,17 @@ def _said(value: Any) -> Any:
         return f"{value.__module__}.{value.__qualname__}"
     if " at 0x" not in (told := repr(value)):
         return told
-    try:  # an address tells nothing in another process
+    try:  # an address differs between processes
         return [type(value).__qualname__, json.dumps(vars(value), default=_said)]
     except (TypeError, ValueError, RecursionError):
         return type(value).__qualname__
 
 
 def failed_run(error: RunError) -> Trajectory | None:
-    """What a run had computed when it failed, or None.
+    """Return the samples before the failure of a run, or None.
 
     Args:
-        error: what it raised.
+        error: error that the run raised.
     """
     found = error.trajectory
     return found if isinstance(found, Trajectory) else None

@@ -1,4 +1,4 @@
-"""Many runs of scenes that differ: joblib carries them in threads, processes, or on a cluster (Dask, Ray)."""
+"""Parallel runs of many scenes by joblib: in threads, in processes, or on a cluster (Dask, Ray)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ from .pack import Pack
 from .store import Sweep, digest_of, failed_run, note, opened_store, record_of
 
 MOST_JOBS = 100_000  # also of negative numbers: -n leaves n - 1 processors free
-# Runs that a worker takes at once: enough that handing them over costs little, few enough to share evenly.
+# Maximum number of runs in one task of a worker, and number of tasks for each worker. Large tasks reduce the
+# overhead; many tasks balance the load.
 MOST_AT_ONCE, SHARES = 200, 16
 
 
@@ -47,36 +48,39 @@ def sweep(
     show: bool | None = None,
     **options: Any,
 ) -> list[Any] | Sweep:
-    """Simulates `make(**p)` for each p of `parameters`, in parallel.
+    """Simulate `make(**p)` for each p of `parameters`, in parallel.
 
-    The backend is joblib's: processes by default, or what `joblib.parallel_config` chooses around the call
-    ("threading", "dask", "ray").  For many states of one scene use `rollout`, which needs no processes.
-    `sweep_grid` and `sweep_samples` make parameters.
+    The backend is joblib's: processes by default, or the backend that `joblib.parallel_config` selects around
+    the call ("threading", "dask", "ray"). For many states of one scene use `rollout`, which needs no
+    processes. `sweep_grid` and `sweep_samples` create parameters.
 
-    With `store` every run is in a file as soon as it is done, and the memory that a sweep takes does not grow
-    with its trajectories.  The same call on the same folder goes on after a kill with what is missing.
+    With `store` each run is written to a file when it ends, and the memory of a sweep does not grow with its
+    trajectories. After a kill, the same call with the same folder computes the missing runs only.
 
     Args:
-        make: builds a scene from one entry of `parameters`; for processes it must be a function of a module.
-        parameters: keyword arguments, one mapping a run.
-        duration: length of time [s].
-        jobs: number of parallel jobs; joblib's choice when None, all processors when -1, all but one when -2.
-        store: folder for the runs, new or of this very sweep; None keeps them in memory.
-        failures: "raise" stops at the first run that fails; "keep" goes on, and the error stands in its place
-            (its `trajectory` has the samples before), in a store beside those samples.
-        measure: run -> numbers by name, taken where the run is; they go into the index of a store.
+        make: function that builds a scene from one entry of `parameters`; for processes it must be a function
+            of a module.
+        parameters: keyword arguments of `make`, one mapping for each run.
+        duration: duration of each run [s].
+        jobs: number of parallel jobs; None selects joblib's default, -1 all processors, -2 all but one.
+        store: folder of the runs, new or from the same sweep; None keeps the runs in memory.
+        failures: "raise" stops at the first failed run. "keep" continues and returns the error in place of
+            the run; its `trajectory` has the samples before the failure. A store keeps the message and those
+            samples.
+        measure: function run -> numbers by name, called in the worker; the numbers are stored in the index of
+            a store.
         show: progress bar on standard error; None shows it on a terminal only.
-        options: passed to `simulate`.
+        options: options of `simulate`.
 
     Returns:
-        Without a store one Trajectory a run, in order, without their scenes, which `make` makes again; with
-        one a `Sweep`, which reads them one at a time.
+        Without a store, one Trajectory for each run, in order and without scenes, which `make` can build
+        again. With a store, a `Sweep`, which reads the runs on access.
 
     Raises:
-        InputError: `make` cannot be called or sent to a process, `parameters` holds no mappings, `jobs` is no
-            number of jobs, or the store is that of another sweep.
-        OutputError: the store cannot be written; what is done stays.
-        RunError: a run stopped early; `index` tells which.
+        InputError: `make` cannot be called or sent to a process, `parameters` holds no mappings, `jobs` is
+            not a number of jobs, or the store holds another sweep.
+        OutputError: the store cannot be written; completed runs stay in it.
+        RunError: a run stopped early; `index` is its number.
     """
     function("sweep: make", make, "(**parameters) -> Scene")
     table = sequence("sweep: parameters", parameters)
@@ -114,7 +118,7 @@ def sweep(
 def _carried(
     work: _Work, runs: list[Any], jobs: int | None, show: bool | None
 ) -> Iterator[list[tuple[int, Any]]]:
-    """Results by parts as they come in, from joblib's workers."""
+    """Yield the results of joblib's workers by task, in order of completion."""
     from joblib import Parallel, delayed
     from joblib.parallel import get_active_backend
     from tqdm import tqdm
@@ -139,22 +143,22 @@ def _carried(
 
 
 def _unsendable(work: _Work, runs: list[Any]) -> str:
-    """Says what of a sweep another process cannot have, and why."""
+    """Return a message that names the first part of a sweep that cannot be serialized, and the reason."""
     try:
         import cloudpickle
-    except ImportError:  # joblib before 1.6 brings its own
+    except ImportError:  # joblib before 1.6 includes a copy
         from joblib.externals import cloudpickle
     parts = [("make", work.make), ("measure", work.measure), *work.options.items()]
     for name, value in [*parts, *((f"parameters[{k}]", entry) for k, entry in runs)]:
         try:
             cloudpickle.dumps(value)
-        except Exception as error:  # whatever the object's own methods raise
+        except Exception as error:  # any error of the object's own methods
             return f"{name} must be such that another process can have it; {type(error).__name__}: {error}"
     return "what a run leaves must be such that another process can have it; give it a store"
 
 
 class _Work:
-    """What a worker does with its part of the runs."""
+    """Task of a worker: simulates some of the runs."""
 
     def __init__(
         self, make: Any, duration: float, options: Table, folder: Path | None, keep: bool, measure: Any
@@ -163,19 +167,19 @@ class _Work:
         self.folder, self.keep, self.measure = folder, keep, measure
 
     def __call__(self, runs: list[tuple[int, Table]]) -> list[tuple[int, Any]]:
-        """Numbers of the runs with their trajectories, their records in the store, or what stopped them."""
+        """Return the number of each run with its trajectory, its record in the store, or its error."""
         if self.folder is None:
             return [(k, self._bare(k, entry)) for k, entry in runs]
         with Pack(self.folder, runs[0][0]) as pack:
             return [(k, self._kept(k, entry, pack)) for k, entry in runs]
 
     def _bare(self, k: int, entry: Table) -> Any:
-        """The trajectory of a run without its scene, or what stopped it."""
+        """Return the trajectory of a run without its scene, or the error that stopped the run."""
         run, stopped = self._one(k, entry)
         return stopped or replace(run, scene=None)
 
     def _kept(self, k: int, entry: Table, pack: Pack) -> Any:
-        """The record of a run that stands in the store, or what stopped it where that stops all."""
+        """Return the record of a run in the store, or its error if an error stops the sweep."""
         run, stopped = self._one(k, entry)
         if stopped is not None and not self.keep:
             return stopped
@@ -184,7 +188,7 @@ class _Work:
         return pack.add(record_of(k, entry, run, error, more), b"" if run is None else to_bytes(run))
 
     def _one(self, k: int, entry: Table) -> Any:
-        """A run, and what stopped it."""
+        """Return a run and the error that stopped it; either can be None."""
         try:
             return simulate(self._scene(entry), self.duration, **self.options), None
         except (RunInterrupted, OutputError):
