@@ -1,4 +1,4 @@
-"""What the command line does beside `run`: resume, replay, sweep, equilibrium, info, completion."""
+"""Commands of the command line besides `run`: resume, replay, sweep, equilibrium, info, completion."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ SWEEP_KEYS = ("robot", "parameters", "duration", "grid", "samples", "options", "
 
 
 def plain_value(text: str) -> Any:
-    """A whole number, a number, true or false; anything else is text.
+    """Convert a word to an integer, a number or a truth value if possible; otherwise return it as text.
 
     Args:
-        text: a word of the command line.
+        text: word of the command line.
     """
     for kind in (int, float):
         try:
@@ -41,14 +41,14 @@ def plain_value(text: str) -> Any:
 
 
 def named_values(words: Sequence[str], option: str) -> dict[str, Any] | None:
-    """JOINT=NUMBER[,NUMBER...] and JOINT.PIECE=... as a table by joint name; None of no words.
+    """Return JOINT=NUMBER[,NUMBER...] and JOINT.PIECE=... as a table by joint name, or None without words.
 
     Args:
-        words: of the command line.
-        option: its name, for messages.
+        words: words of the command line.
+        option: name of the option, for messages.
 
     Raises:
-        InputError: a word is something else.
+        InputError: a word has another form.
     """
     table: dict[str, Any] = {}
     for word in words:
@@ -72,14 +72,14 @@ def named_values(words: Sequence[str], option: str) -> dict[str, Any] | None:
 
 
 def replay_file(options: argparse.Namespace) -> int:
-    """Writes the replay of a saved run.
+    """Write the replay of a saved run.
 
     Args:
-        options: run and page, paths; number of the run where that is a sweep's folder; robot, whose scene it
-            is, or None.
+        options: run and page, paths; number of the run if the path is the folder of a sweep; robot, name or
+            path of the run's robot, or None.
 
     Raises:
-        InputError: there is a number and no folder, or a folder and no number, or no robot.
+        InputError: a number is given without a folder, a folder without a number, or the robot is unknown.
     """
     scene = "source" if options.robot is None else load(options.robot)
     path, number = Path(options.run), options.number
@@ -105,11 +105,11 @@ def replay_file(options: argparse.Namespace) -> int:
 
 
 def describe_robot(scene: Scene, as_json: bool) -> int:
-    """Prints what a robot is made of.
+    """Print the description of a robot.
 
     Args:
-        scene: the robot's.
-        as_json: as JSON, for programs.
+        scene: scene of the robot.
+        as_json: print JSON for programs.
     """
     if not as_json:
         print(scene.report())
@@ -124,12 +124,12 @@ def describe_robot(scene: Scene, as_json: bool) -> int:
 
 
 def rest_robot(scene: Scene, q0: Any, as_json: bool) -> int:
-    """Prints a state of rest.
+    """Print an equilibrium of a robot.
 
     Args:
-        scene: the robot's.
-        q0: where to start, or None.
-        as_json: as JSON, for programs.
+        scene: scene of the robot.
+        q0: initial guess, or None.
+        as_json: print JSON for programs.
     """
     found = equilibrium(scene, q0)
     places = compiled_scene(scene).joints
@@ -149,7 +149,7 @@ def rest_robot(scene: Scene, q0: Any, as_json: bool) -> int:
 
 
 def sweep_file(options: argparse.Namespace) -> int:
-    """Runs the sweep that a YAML file describes.
+    """Run the sweep that a YAML file describes.
 
     Args:
         options: file, a path; jobs, a number or None.
@@ -179,13 +179,13 @@ def sweep_file(options: argparse.Namespace) -> int:
 
 
 class _Robot:
-    """Loads a robot with the parameters of one run; of a module, so that other processes have it."""
+    """Loader of a robot with the parameters of one run; defined in a module, so that it can be serialized."""
 
     def __init__(self, robot: str, fixed: Mapping[str, Any]) -> None:
         self.robot, self.fixed = robot, dict(fixed)
 
     def __call__(self, **parameters: Any) -> Scene:
-        """The robot's scene."""
+        """Return the scene of the robot."""
         return load(self.robot, **{**self.fixed, **parameters})
 
 
@@ -204,7 +204,7 @@ def _sweep_table(path: Path) -> Table:
 
 
 def _points(table: Table, path: Path) -> list[Table]:
-    """Parameters of the runs: a grid, or samples {n: .., kind: .., ranges: {name: [least, largest]}}."""
+    """Return the parameters of the runs: a grid, or samples {n: .., kind: .., ranges: {name: [min, max]}}."""
     if bool(table.get("grid")) == bool(table.get("samples")):
         raise LoadingError(f'"{path}" must have one of the keys grid and samples')
     if table.get("grid"):
@@ -216,12 +216,12 @@ def _points(table: Table, path: Path) -> list[Table]:
 
 
 def completion(parser: argparse.ArgumentParser, shell: str, robots: Sequence[str]) -> str:
-    """A script that completes commands, options and names of robots in a shell.
+    """Return a script that completes commands, options and names of robots in a shell.
 
     Args:
-        parser: of the command line.
+        parser: parser of the command line.
         shell: "bash", "zsh" or "fish".
-        robots: names that complete as well.
+        robots: names of robots that are also completed.
     """
     actions = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
     commands = {name: _options(sub) for name, sub in actions[0].choices.items()}
@@ -252,9 +252,9 @@ def _options(parser: argparse.ArgumentParser) -> list[str]:
 
 
 def events_told(run: Trajectory) -> str:
-    """The events of a run, a line each.
+    """Return the events of a run as text, one line for each event.
 
     Args:
-        run: the run.
+        run: trajectory of the run.
     """
     return "\n".join(f"{e.time:.9g} s  {e.kind}  {e.element}" for e in run.events) or "no events"

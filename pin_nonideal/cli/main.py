@@ -1,7 +1,7 @@
-"""The command `pin-nonideal`: run robots, resume, replay and sweep, describe them, find where they rest.
+"""Command line `pin-nonideal`: runs, resumes, replays and sweeps robots, and computes equilibria.
 
-Exit codes: 0 done; 2 an error of the package, told in one line on standard error; 130 interrupted by Ctrl-C.
-What a run had computed when it failed or was interrupted is written to the files asked for all the same.
+Exit codes: 0 success; 2 an error of the package, printed as one line on standard error; 130 interrupted by
+Ctrl-C. After a failure or an interruption, the samples up to that time are written to the requested files.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from .commands import (
 from .run import parameters, resume_run, run_robot
 
 EXIT_ERROR = 2
-EXIT_UNREAD = 141  # 128 and the number of SIGPIPE, as shells show it
+EXIT_UNREAD = 141  # 128 + SIGPIPE, as shells report it
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 
 
@@ -41,10 +41,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
     Args:
-        arguments: the words after the command's name; those of the process when None.
+        arguments: words after the name of the command; None selects those of the process.
 
     Returns:
-        The exit code.
+        Exit code.
     """
     options, rest = _parser().parse_known_args(arguments)
     if rest and options.command is not _bench:
@@ -52,7 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options.rest = rest
     try:
         code = int(options.command(options))
-        if sys.stdout is not None:  # which a shell may have closed
+        if sys.stdout is not None:  # the shell may have closed the output
             sys.stdout.flush()
         return code
     except RunInterrupted as error:
@@ -61,20 +61,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("pin-nonideal: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
-    except BrokenPipeError:  # the reader of the output, such as `head`, has had enough
+    except BrokenPipeError:  # the reader of the output, such as `head`, has closed the pipe
         _print_no_more()
         return EXIT_UNREAD
     except PinNonidealError as error:
         print(f"pin-nonideal: error: {error}", file=sys.stderr)
         return EXIT_ERROR
-    except OSError as error:  # a disk that is full, or a terminal that went away
+    except OSError as error:  # a full disk, or a closed terminal
         print(f"pin-nonideal: error: cannot print: {error.strerror or error}", file=sys.stderr)
         _print_no_more()
         return EXIT_ERROR
 
 
 def _print_no_more() -> None:
-    """Leaves what could not be printed to nobody, so that the interpreter does not try again at its end."""
+    """Redirect standard output to the null device, so that the interpreter does not flush it at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -190,7 +190,7 @@ def _add_robot(parser: argparse.ArgumentParser) -> None:
 
 
 def _start(what: str) -> Table:
-    """An option that gives a state by joint name."""
+    """Return the settings of an option that gives a state by joint name."""
     return {
         "action": "append",
         "default": [],
@@ -250,7 +250,7 @@ def _render(options: argparse.Namespace) -> int:
 
 
 def _bench(options: argparse.Namespace) -> int:
-    """Run the folder `benchmarks` of the checkout: benchmarks are no part of the installed package."""
+    """Run the folder `benchmarks` of the checkout; the installed package does not contain benchmarks."""
     places = [Path.cwd(), Path(__file__).resolve().parent.parent.parent]
     for place in places:
         folder = place / "benchmarks"

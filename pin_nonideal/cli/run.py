@@ -1,4 +1,4 @@
-"""The commands that run: `run` and `resume`, what they ask of a run, and the files that they write of it."""
+"""Commands `run` and `resume`: their settings of a run, and the files that they write."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from .commands import events_told, named_values, plain_value
 
 Writer = tuple[Path, Callable[[Trajectory, Path], Path]]
 
-# Samples when pictures are asked for: so many a second of simulated time, within these bounds over a run.
+# Sampling rate of pictures per second of simulated time, and the bounds of the number of samples of a run.
 PICTURE_RATE, PICTURE_SAMPLES = 60.0, (1200, 20_000)
 
 
 def run_robot(options: argparse.Namespace) -> int:
-    """Simulates a robot and writes what was asked for.
+    """Simulate a robot and write the requested files.
 
     Args:
-        options: of `run`.
+        options: options of `run`.
     """
     writers = _writers(options)
     q, v = named_values(options.q0, "--q0"), named_values(options.v0, "--v0")
@@ -37,20 +37,21 @@ def run_robot(options: argparse.Namespace) -> int:
 
 
 def resume_run(options: argparse.Namespace) -> int:
-    """Goes on with a run and writes what was asked for.
+    """Resume a run from its checkpoint and write the requested files.
 
     Args:
-        options: of `resume`.
+        options: options of `resume`.
     """
     writers = _writers(options)
     return _finished(lambda: pn.resume(options.file), options, writers)
 
 
 def _finished(run: Callable[[], Trajectory], options: argparse.Namespace, writers: list[Writer]) -> int:
-    """Runs, prints and writes; what a run had computed when it stopped is written all the same."""
+    """Run, print and write; after a failure, write the samples before it."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # the run's notes say the same, and are printed
+            # the printed notes of the run contain the same messages
+            warnings.simplefilter("ignore", RuntimeWarning)
             done = run()
     except RunError as error:
         if error.trajectory is not None:
@@ -72,7 +73,7 @@ def _told(run: Trajectory, options: argparse.Namespace, writers: list[Writer]) -
 
 
 def _simulation_settings(options: argparse.Namespace) -> Table:
-    """Keyword arguments of `simulate`: what was given on the command line, and the defaults of pictures."""
+    """Return keyword arguments of `simulate`: options of the command line, and defaults for pictures."""
     keys = ("method", "rtol", "atol", "dt", "output_dt", "several", "checkpoint")
     given = {key: getattr(options, key) for key in keys}
     settings = {key: value for key, value in given.items() if value is not None}
@@ -90,7 +91,7 @@ def _simulation_settings(options: argparse.Namespace) -> Table:
 
 
 def _writers(options: argparse.Namespace) -> list[Writer]:
-    """Files to write and what writes them; they are checked now, because a run may take long."""
+    """Return the files to write and their writers; the paths are checked before a possibly long run."""
     if options.plot is not None:
         picture_format(options.plot)
     asked: list[tuple[Path | None, Callable[[Trajectory, Path], Path]]] = [
@@ -122,13 +123,13 @@ def _write_figure(run: Trajectory, path: Path) -> Path:
 
 
 def parameters(settings: Sequence[str]) -> Table:
-    """KEY=VALUE words as keyword arguments.
+    """Return words of the form KEY=VALUE as keyword arguments.
 
     Args:
-        settings: the words.
+        settings: words of the command line.
 
     Raises:
-        InputError: one of them has another form.
+        InputError: a word has another form.
     """
     parameters: Table = {}
     for word in settings:
