@@ -16,7 +16,7 @@ from .records import FrameRecord, JointRecord, LawRecord, angles
 
 
 def joint_record(run: Any, name: str) -> JointRecord:
-    """Record of one joint, see `Trajectory.joint`."""
+    """Return the record of one joint; see `Trajectory.joint`."""
     floating = [place for place in run.joints if place.kind == "JointModelFreeFlyer"]
     known = {"base": floating[0]} if len(floating) == 1 else {}
     known |= {place.name: place for place in run.joints}
@@ -35,7 +35,7 @@ def joint_record(run: Any, name: str) -> JointRecord:
 
 
 def frame_record(run: Any, name: str) -> FrameRecord:
-    """Record of one frame, see `Trajectory.frame`."""
+    """Return the record of one frame; see `Trajectory.frame`."""
     if run.scene is None:
         raise InputError(f'frame("{name}") needs the scene of the run, which this one has lost')
     model = run.scene.model
@@ -46,7 +46,7 @@ def frame_record(run: Any, name: str) -> FrameRecord:
 
 
 def force_of(run: Any, name: str) -> Array:
-    """Force of one constraint or contact, see `Trajectory.force`."""
+    """Return the force of one constraint or contact; see `Trajectory.force`."""
     if name not in run.rows:
         raise UnknownNameError(f'no constraint or contact "{name}" in this run{nearest(name, run.rows)}')
     first, end, contact = run.rows[name]
@@ -60,7 +60,7 @@ def force_of(run: Any, name: str) -> Array:
 
 
 def law_record(run: Any, name: str) -> LawRecord:
-    """Record of one law, see `Trajectory.law`."""
+    """Return the record of one law; see `Trajectory.law`."""
     if name not in run.law_names:
         raise UnknownNameError(f'no law "{name}" in this run{nearest(name, run.law_names)}')
     index, force, power = run.law_names.index(name), None, None
@@ -78,7 +78,7 @@ def law_record(run: Any, name: str) -> LawRecord:
 
 
 def reaction_of(run: Any, name: str, axes: str) -> Array:
-    """Wrench of a joint, anchor or contact, see `Trajectory.reaction`."""
+    """Return the wrench of a joint, anchor or contact; see `Trajectory.reaction`."""
     if run.reactions is None:
         raise InputError(f'reaction("{name}") needs a run with record="reactions"')
     if name not in run.reactions:

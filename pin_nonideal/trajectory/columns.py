@@ -1,4 +1,4 @@
-"""A trajectory as a table of named columns."""
+"""Trajectories as tables of named columns."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from pin_nonideal.types import Array
 
 
 def columns(run: Any) -> dict[str, Array]:
-    """All that was recorded as named columns, (nt,) each.
+    """Return all recorded values as named columns, (nt,) each.
 
     Args:
-        run: the Trajectory.
+        run: trajectory of the run.
     """
     table: dict[str, Array] = {"t": run.t}
     for place in run.joints:
@@ -41,7 +41,7 @@ def columns(run: Any) -> dict[str, Array]:
 
 
 def _by_dof(run: Any) -> Iterator[tuple[str, Array]]:
-    """Fields with a column for each degree of freedom."""
+    """Yield the fields that have a column for each degree of freedom."""
     for field in ("F_ideal", "F_nonideal"):
         if getattr(run, field) is not None:
             yield field, getattr(run, field)
@@ -52,7 +52,7 @@ def _by_dof(run: Any) -> Iterator[tuple[str, Array]]:
 
 
 def _numbered(name: str, values: Array | None) -> dict[str, Array]:
-    """One column under the name itself, several under the name and their number; none of nothing."""
+    """Return one column under the given name, several columns under numbered names, or no column for None."""
     if values is None or values.ndim == 1:
         return {} if values is None else {name: values}
     return {f"{name}.{k}": values[:, k] for k in range(values.shape[1])}

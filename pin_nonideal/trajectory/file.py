@@ -1,4 +1,4 @@
-"""Files of trajectories: one NumPy archive without pickles, a header in JSON and an array a field."""
+"""Files of trajectories: one NumPy archive without pickles, with a JSON header and an array per field."""
 
 from __future__ import annotations
 
@@ -26,37 +26,37 @@ from .npz import npz_bytes
 from .records import LEDGER, Event, Stats, UserEventRecord
 
 FORMAT = 1
-# Up to this size [bytes] a file is packed, in less than a tenth of a second; of motions with all their digits
-# that would save a tenth of the room, and take ten to thirty times as long as writing them.
+# Files up to this size [bytes] are compressed, in less than a tenth of a second. Compression of
+# full-precision motions would save a tenth of the size and take ten to thirty times as long as writing.
 PACKED_BYTES = 1_000_000
-# What NumPy, zip archives and JSON raise on files that are damaged or something else.
+# Errors of NumPy, zip archives and JSON for damaged files or files of another format.
 UNREADABLE: tuple[type[Exception], ...] = (OSError, ValueError, LookupError, TypeError, AttributeError)
 UNREADABLE += (EOFError, RuntimeError, tokenize.TokenError, zipfile.BadZipFile, zlib.error)
 REQUIRED = ("t", "q", "v", "violation", "violation_rate")
 OPTIONAL = ("a", "tau", "F_ideal", "F_nonideal", "lam", "lam_ideal", "z", "modes", "closed", "limits")
-# By name, with one row or number a sample: of these a file holds a table, or nothing.
+# Fields by name, with one row or number for each sample; a file has a table for each, or None.
 GROUPS = ("energy", "power", "law_forces", "reactions", "contact_forces")
 DENSE = ("times", "states", "modes", "directions", "sought", "torque", "moved")
 LISTS = ("element_names", "element_laws", "law_names", "law_dofs")
 
 
 def write(run: Any, path: str | os.PathLike[str]) -> Path:
-    """Writes all arrays of a Trajectory to one .npz file, whole or not at all.
+    """Write all arrays of a Trajectory to one .npz file, completely or not at all.
 
     Args:
-        run: the Trajectory.
-        path: file name; ".npz" is appended when it is missing.
+        run: trajectory of the run.
+        path: file name; ".npz" is appended if it is missing.
 
     Returns:
-        The path written.
+        Path of the written file.
 
     Raises:
-        InputError: `path` is no name of a file.
+        InputError: `path` is not the name of a file.
         OutputError: the file cannot be written.
     """
     target = file_path("Trajectory.save: path", path)
     if target.suffix != ".npz":
-        mode_of(target, "the trajectory")  # /dev/null is no beginning of a name
+        mode_of(target, "the trajectory")  # "/dev/null" must not become "/dev/null.npz"
         target = target.with_name(target.name + ".npz")
     arrays = _arrays(run)
     size = sum(np.asarray(x).nbytes for x in arrays.values())
@@ -66,18 +66,18 @@ def write(run: Any, path: str | os.PathLike[str]) -> Path:
 
 
 def to_bytes(run: Any) -> bytes:
-    """What `write` writes, not compressed, for one of very many runs.
+    """Return the content of the file that `write` writes, without compression, for a large number of runs.
 
     Args:
-        run: the Trajectory.
+        run: trajectory of the run.
     """
     arrays = _arrays(run)
-    arrays["header"] = np.array(str(arrays["header"]).encode())  # JSON in ASCII, a quarter of the room
+    arrays["header"] = np.array(str(arrays["header"]).encode())  # JSON in ASCII needs a quarter of the space
     return npz_bytes(arrays)
 
 
 def _arrays(run: Any) -> Table:
-    """All arrays of a trajectory, the header among them, by their names in a file."""
+    """Return all arrays of a trajectory and its header, by their names in a file."""
     arrays: Table = {key: getattr(run, key) for key in REQUIRED}
     arrays |= {key: getattr(run, key) for key in OPTIONAL if getattr(run, key) is not None}
     if run.closed is not None:
@@ -106,28 +106,28 @@ def _arrays(run: Any) -> Table:
 
 
 def read(path: str | os.PathLike[str]) -> tuple[Table, Table | None]:
-    """Fields of the Trajectory in a file, and what its scene was loaded from; nothing in it is executed.
+    """Return the fields of the Trajectory in a file, and the origin of its scene; no content is executed.
 
     Args:
         path: file name.
 
     Raises:
-        InputError: `path` is no name of a file.
-        LoadingError: the file is missing, truncated, or no trajectory.
+        InputError: `path` is not the name of a file.
+        LoadingError: the file is missing, truncated, or not a trajectory.
     """
     source = file_path("Trajectory.load: path", path)
     return read_from(source, source)
 
 
 def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
-    """The same of an open file.
+    """Return the fields and the origin of the scene from an open file; see `read`.
 
     Args:
-        stream: the file, or its name.
-        source: its name, for messages.
+        stream: open file, or file name.
+        source: file name, for messages.
 
     Raises:
-        LoadingError: it is truncated, or no trajectory.
+        LoadingError: the file is truncated, or not a trajectory.
     """
     try:
         with np.load(stream, allow_pickle=False) as file:
@@ -142,7 +142,7 @@ def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
         _check_arrays(arrays, source)
         fields: Table = {key: arrays.get(key) for key in (*REQUIRED, *OPTIONAL)}
         for group in GROUPS:
-            if header.get(group) is not None:  # files of earlier versions have fewer
+            if header.get(group) is not None:  # files of earlier versions have fewer groups
                 if group == "energy":
                     _check_ledger(header[group], source)
                 fields[group] = {name: arrays[f"{group}/{i}"] for i, name in enumerate(header[group])}
@@ -176,24 +176,24 @@ def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
 
 
 def fits(scene: Scene, joints: Sequence[JointPlace], rows: Table) -> bool:
-    """Whether a scene has the joints and rows of a run.
+    """Check if a scene has the joints and rows of a run.
 
     Args:
-        scene: the scene.
-        joints: of the run.
-        rows: of the run.
+        scene: scene to compare.
+        joints: joints of the run.
+        rows: rows of the run.
     """
     return compiled_scene(scene).joints == list(joints) and compiled_scene(scene).rows == rows
 
 
 def scene_again(origin: Any, joints: Sequence[JointPlace], rows: Table, notes: list[str]) -> Scene | None:
-    """The scene of a saved run, loaded again; None, with a note, where that is not the same any more.
+    """Reload the scene of a saved run; return None and add a note if the scene is missing or has changed.
 
     Args:
         origin: name and parameters of `load`, or None.
-        joints: of the run.
-        rows: of the run.
-        notes: of the run; may grow.
+        joints: joints of the run.
+        rows: rows of the run.
+        notes: notes of the run; may grow.
     """
     if origin is None:
         return None
@@ -209,7 +209,7 @@ def scene_again(origin: Any, joints: Sequence[JointPlace], rows: Table, notes: l
 
 
 def _listed(e: Event) -> list[Any]:
-    """An event as a file holds it."""
+    """Return an event as a list for the header of a file."""
     if e.impulse is None or e.v_minus is None or e.v_plus is None:
         return [e.time, e.kind, e.element]
     vectors = [x.tolist() for x in (e.impulse, e.v_minus, e.v_plus)]
@@ -217,7 +217,7 @@ def _listed(e: Event) -> list[Any]:
 
 
 def _event(t: float, kind: str, element: str, change: float = 0.0, *vectors: Sequence[float]) -> Event:
-    """An event as a file gives it."""
+    """Return an event from its list in the header of a file."""
     if not vectors:
         return Event(float(t), str(kind), str(element))
     impulse, before, after = (np.array(x, dtype=float) for x in vectors)
@@ -225,7 +225,7 @@ def _event(t: float, kind: str, element: str, change: float = 0.0, *vectors: Seq
 
 
 def _loose(run: Any) -> Table:
-    """Arrays that have no row for each sample, by name."""
+    """Return the arrays without a row for each sample, by name."""
     found: Table = {} if run.grid is None else {"grid": run.grid.astype(np.int8)}
     for k, record in enumerate(run.user_events):
         found |= {f"event/{k}/{key}": getattr(record, key) for key in ("t", "q", "v")}
@@ -235,7 +235,7 @@ def _loose(run: Any) -> Table:
 
 
 def _from_loose(loose: Table, header: Table, samples: int) -> Table:
-    """Fields made of them; what does not fit raises one of `UNREADABLE`."""
+    """Return the fields that consist of such arrays; invalid arrays raise an error listed in `UNREADABLE`."""
     fields: Table = {}
     if "loose/grid" in loose:
         fields["grid"] = loose["loose/grid"].astype(bool).reshape(samples)
@@ -249,7 +249,7 @@ def _from_loose(loose: Table, header: Table, samples: int) -> Table:
         dense = {key: loose[f"loose/dense/{key}"] for key in DENSE if key != "sought"}
         if "loose/dense/sought" in loose:
             dense["sought"] = loose["loose/dense/sought"]
-        else:  # a file of an earlier version holds the directions of each step's end
+        else:  # files of earlier versions have directions at the end of each step only
             points = dense["states"].shape[1]
             dense["directions"] = np.repeat(dense["directions"][:, None], points, axis=1)
             dense["sought"] = np.zeros_like(dense["modes"])
@@ -259,10 +259,10 @@ def _from_loose(loose: Table, header: Table, samples: int) -> Table:
 
 
 def _check_ledger(names: Sequence[str], source: Path) -> None:
-    """Raises unless the ledger has the columns that every ledger has.
+    """Check that the energy ledger has its required columns.
 
     Raises:
-        LoadingError: one is missing.
+        LoadingError: a column is missing.
     """
     missing = [name for name in LEDGER if name not in names]
     if missing:
@@ -270,10 +270,10 @@ def _check_ledger(names: Sequence[str], source: Path) -> None:
 
 
 def _check_arrays(arrays: Table, source: Path) -> None:
-    """Raises unless every array holds numbers and has a row for each sample.
+    """Check that every array holds numbers and has a row for each sample.
 
     Raises:
-        LoadingError: one does not.
+        LoadingError: an array is invalid.
     """
     rows = arrays["t"].shape[:1]
     t = arrays["t"]

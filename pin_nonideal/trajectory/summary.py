@@ -1,4 +1,4 @@
-"""A run in a few lines: its length, counters, energies and events, as `print` shows it."""
+"""Summary of a run, as `print` shows it: duration, counters, energies and events."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-# Terms of the energy that are all shown; of more those that are not zero.
+# If there are more energy terms than this, only nonzero terms are shown.
 FEW = 20
 
 
 def summary(run: Any) -> str:
-    """The lines.
+    """Return the summary of a run, a line for each kind of data.
 
     Args:
-        run: the Trajectory.
+        run: trajectory of the run.
     """
     s = run.stats
     span = f"{run.t[0]:g} to {run.t[-1]:g} s" if len(run.t) else "empty"
