@@ -18,7 +18,7 @@ from pin_nonideal.types import Model
 
 
 def example_names() -> Sequence[str]:
-    """Names of example-robot-data, none where it is not installed."""
+    """Return the names of example-robot-data, or an empty tuple if it is not installed."""
     try:
         from example_robot_data import robots_loader
     except ImportError:
@@ -27,11 +27,11 @@ def example_names() -> Sequence[str]:
 
 
 def example_robot(name: str, others: list[str]) -> RobotFile:
-    """A robot of example-robot-data, with its reference posture.
+    """Return a robot of example-robot-data, with its reference posture.
 
     Raises:
-        UnknownNameError: neither this package nor example-robot-data has it.
-        LoadingError: example-robot-data has it but cannot load it.
+        UnknownNameError: neither this package nor example-robot-data has the robot.
+        LoadingError: example-robot-data has the robot but cannot load it.
     """
     try:
         from example_robot_data import robots_loader
@@ -44,7 +44,7 @@ def example_robot(name: str, others: list[str]) -> RobotFile:
         raise UnknownNameError(f'no robot "{name}"{nearest(name, [*others, *robots_loader.ROBOTS])}')
     try:
         robot, path = _drawn_later(robots_loader, name)
-    except Exception as error:  # the loaders raise whatever their parsers raise
+    except Exception as error:  # any error of the loaders' parsers
         raise LoadingError(
             f'example-robot-data cannot load "{name}": {" ".join(str(error).split())}'
         ) from error
@@ -58,9 +58,9 @@ def example_robot(name: str, others: list[str]) -> RobotFile:
 
 
 def _drawn_later(robots_loader: Any, name: str) -> tuple[RobotFile, Path]:
-    """What a loader of example-robot-data makes, without the meshes until something asks for them; its file.
+    """Return a robot of example-robot-data, whose meshes are read on first use, and the path of its file.
 
-    A loader that edits what it read is left to its own ways, meshes and all.
+    If the class of the robot has its own `__init__`, it also loads the meshes.
     """
     kind = robots_loader.ROBOTS[name]
     if kind.__init__ is not robots_loader.RobotLoader.__init__ or not kind.urdf_filename:
@@ -87,7 +87,7 @@ def _drawn_later(robots_loader: Any, name: str) -> tuple[RobotFile, Path]:
 
 
 def _example_shapes(model: Model, file: str, packages: str, srdf: str | None) -> tuple[Any, Any]:
-    """Drawn and colliding shapes of a robot of example-robot-data, with the pairs of its SRDF."""
+    """Return visual and collision shapes of a robot of example-robot-data, with the pairs of its SRDF."""
     kinds = (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION)
     visual, collision = (pin.buildGeomFromUrdf(model, file, kind, package_dirs=[packages]) for kind in kinds)
     if srdf is not None:

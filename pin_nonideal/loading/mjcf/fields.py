@@ -1,6 +1,7 @@
-"""Every field of MuJoCo's compiled model: carried over, told, or without effect on the motion.
+"""Fields of MuJoCo's compiled model: converted, reported, or without effect on the motion.
 
-The lists are the whole of mjModel and mjOption of the version named in `compile`; a test holds them to it.
+The lists contain all fields of mjModel and mjOption of the version that `compile` requires; a test checks
+them.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ actuator_ctrlspec actuator_actnum actuator_lengthrange actuator_acc0 sensor_plug
 plugin_attradr plugin_stateadr plugin_statenum key_mpos key_mquat key_plastic nflex nplugin nmocap nplastic
 flg_adhesion flg_surfacevel nsensor
 """
-# Families by the beginning of their names: of flexes, told as a whole, or drawn or measured only.
+# Prefixes of fields: of flexes, which are reported as a whole, and of fields for display or measurement only.
 FLEX = ("flex_", "flexedge_", "nflex", "efm0", "efmC", "nefm")
 IDLE = """
 cam light mat mesh skin tex text tuple numeric sensor bvh oct vis stat hfield name names paths key_time
@@ -42,7 +43,7 @@ nhistory geom_rgba geom_group geom_matid geom_user geom_castshadow site_type sit
 site_matid site_user site_dataid tendon_rgba tendon_group tendon_matid tendon_user tendon_width body_user
 jnt_user jnt_group actuator_user signature
 """
-# What MuJoCo computes from the rest: sizes of its buffers, sparsity, bounds, values at the reference pose.
+# Values that MuJoCo computes from other fields: buffer sizes, sparsity, bounds, values at the reference pose.
 DERIVED = """
 B_colind B_rowadr B_rownnz D_colind D_diag D_rowadr D_rownnz M_colind M_rowadr M_rownnz mapD2M mapM2D mapM2M
 nB nC nD nJfe nJmom nJten nM narena nbuffer nconmax nemax njmax nuserdata npolygonmax ntree body_rootid
@@ -62,6 +63,6 @@ ls_iterations noslip_iterations ccd_iterations sdf_initpoints sdf_iterations
 
 
 def known(field: str) -> bool:
-    """Whether a field of mjModel stands on one of the lists."""
+    """Check if a field of mjModel is in one of the lists."""
     listed = {*CARRIED.split(), *TOLD.split(), *DERIVED.split()}
     return field in listed or field.startswith((*FLEX, *IDLE.split()))

@@ -1,6 +1,6 @@
 """MJCF files (MuJoCo's XML): MuJoCo compiles them, and the compiled model becomes a scene.
 
-What is carried over is exact; what cannot be carried is a note or an error (`told`).
+The conversion is exact; unsupported features give a note or an error (`unsupported`).
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ from .unsupported import Told, tell
 
 
 def read_mjcf(path: Path, *, allow: Collection[str] = (), ctrl: Control = None) -> RobotFile:
-    """Reads an MJCF file.
+    """Read an MJCF file.
 
     Args:
-        path: the file.
-        allow: what may be left out although it moves the robot, out of `fields.ALLOWED`.
-        ctrl: controls of the actuators, as `Actuators.set_control` takes them.
+        path: path of the file.
+        allow: active features that may be ignored, from `unsupported.ALLOWED`.
+        ctrl: controls of the actuators, as in `Actuators.set_control`.
 
     Raises:
-        LoadingError: MuJoCo refuses the file, or it states something active that cannot be carried.
+        LoadingError: MuJoCo rejects the file, or the file has an active unsupported feature.
         InputError, UnknownNameError: the controls do not fit the actuators.
     """
     mujoco = mujoco_module(path)
@@ -66,13 +66,13 @@ def read_mjcf(path: Path, *, allow: Collection[str] = (), ctrl: Control = None) 
 
 
 def translate(mujoco: Any, compiled: Any, name: str, told: Told) -> tuple[RobotFile, Tree]:
-    """A compiled model as a robot.
+    """Return a compiled model as a robot.
 
     Args:
-        mujoco: the Python package.
+        mujoco: Python package.
         compiled: mujoco.MjModel.
-        name: name of a model that has none.
-        told: receives what is not carried over.
+        name: name of a model without a name.
+        told: receives the unsupported features.
     """
     flags, off = int(compiled.opt.disableflags), mujoco.mjtDisableBit
     springs, dampers = not flags & off.mjDSBL_SPRING, not flags & off.mjDSBL_DAMPER
@@ -85,7 +85,7 @@ def translate(mujoco: Any, compiled: Any, name: str, told: Told) -> tuple[RobotF
     robot.laws = [*joint_resistance(tree, dampers=dampers, friction=friction), *laws]
     robot.forces = [*(joint_springs(tree) if springs else ()), *forces, *floating_armature(tree)]
     through_drives = None
-    if springs or dampers:  # MuJoCo leaves out all passive forces where both are switched off
+    if springs or dampers:  # MuJoCo disables all passive forces if both flags are set
         compensation, through_drives = gravity_compensation(tree)
         robot.forces += compensation
         robot.laws += fluid_forces(tree)
@@ -114,13 +114,13 @@ def _actuators(
 
 
 def _apply_key(actuators: Actuators | None, compiled: Any, key: int, ctrl: Control) -> None:
-    """Sets the activations of a keyframe, and its controls where the user gave none."""
+    """Set the activations of a keyframe, and its controls if the user gave none."""
     if actuators is not None:
         actuators.set_control(compiled.key_ctrl[key] if ctrl is None else ctrl, compiled.key_act[key])
 
 
 def _with_meshes(path: Path, notes: list[str]) -> tuple[Tree, frozenset[int]]:
-    """The file read anew, meshes included, which nothing but its shapes needs; and what was not found."""
+    """Compile the file again with its meshes, which only the shapes need, and return the missing ones too."""
     compiled = compile_mjcf(path, meshes=True)
     notes += compiled.notes
     return build_tree(mujoco_module(path), compiled.model, path.stem), compiled.absent

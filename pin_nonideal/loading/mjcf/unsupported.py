@@ -1,4 +1,4 @@
-"""What a scene does not carry of a compiled MJCF model: notes, and errors for what is active."""
+"""Unsupported features of a compiled MJCF model: notes, and errors for active features."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from .transmissions import TENDON as BY_TENDON
 from .tree import BALL, GROUND, Tree, actuator_share
 
 ALLOWED = ("actuator", "flex", "fluid", "muscle", "plasticity", "plugin", "tendon")
-MUSCLE = 2  # of MuJoCo's mjtGain and mjtBias
+MUSCLE = 2  # MuJoCo's mjtGain and mjtBias
 
 
 class Told:
-    """What a scene does not carry of a compiled model: notes, and errors where it is active.
+    """Collected unsupported features of a compiled model: notes, and errors for active features.
 
     Args:
-        where: words for messages.
-        allow: what may be left out although it is active, out of `ALLOWED`.
+        where: prefix of error messages.
+        allow: active features that may be ignored, from `ALLOWED`.
         notes: receives the notes.
     """
 
@@ -38,21 +38,21 @@ class Told:
         self._active: list[tuple[str, str]] = []
 
     def active(self, key: str, what: str) -> None:
-        """Something that moves the robot and cannot be carried."""
+        """Report an unsupported feature that affects the motion."""
         if key in self._allow:
             self.notes.append(f"left out, as allowed: {what}")
         else:
             self._active.append((key, what))
 
     def note(self, text: str) -> None:
-        """Something that does not move the robot now, or that differs in kind."""
+        """Report a feature that does not affect the motion at present, or that differs in kind."""
         self.notes.append(text)
 
     def require(self) -> None:
-        """Raises when something active was found.
+        """Raise an error if an active feature is unsupported.
 
         Raises:
-            LoadingError: names all of it.
+            LoadingError: an active feature is unsupported; the message lists all of them.
         """
         if self._active:
             keys = tuple(dict.fromkeys(key for key, _ in self._active))
@@ -64,13 +64,13 @@ class Told:
 
 
 def tell(mujoco: Any, tree: Tree, tendons: list[Tendon | None], told: Told) -> None:
-    """Notes and errors for everything that is not carried over.
+    """Report all unsupported features of a compiled model.
 
     Args:
-        mujoco: the Python package.
-        tree: the compiled model and its tree.
-        tendons: from `read_tendons`.
-        told: receives them.
+        mujoco: Python package.
+        tree: compiled model and its tree.
+        tendons: tendons from `read_tendons`.
+        told: receives the features.
     """
     _tell_actuators(tree, tendons, told)
     _tell_tendons(tree, tendons, told)

@@ -1,4 +1,4 @@
-"""What does not move a robot is no reason to refuse its file: it is mended or left out, and told."""
+"""Repair of URDF files: parts that do not affect the motion are corrected or removed, with a note."""
 
 from __future__ import annotations
 
@@ -12,25 +12,26 @@ from .unread_tags import tell_unread
 from .validation import SHAPES
 from .xml import listed
 
-# Tags of URDF that the robot's own elements may hold; what other tools add is left out.
+# URDF tags of elements in <robot>; other elements belong to other tools and are removed.
 ROBOT = ("link", "joint", "material", "transmission")
-VERSION = "1.1"  # of URDF; Pinocchio's parser forgets capsules and quaternions where a file states none
-WORLD = "world"  # link that many files attach to and do not declare
-INFINITE = ("inf", "-inf", "+inf", "infinity", "-infinity", "+infinity")  # bounds that are none
-LEFT_OUT = "{"  # tags of a namespace begin so
-# Principal moments below this part of the mass times (1 m)^2 are rounding.
+VERSION = "1.1"  # version of URDF; without it, Pinocchio's parser ignores capsules and quaternions
+WORLD = "world"  # link that many files use without declaring it
+INFINITE = ("inf", "-inf", "+inf", "infinity", "-infinity", "+infinity")  # limits without a bound
+LEFT_OUT = "{"  # beginning of tags with a namespace
+# Maximum rounding error of principal moments, relative to the mass times (1 m)^2.
 LEAST_INERTIA = 1e-12
-UNBALANCED = 1e-2  # part by which a principal moment may exceed the sum of the others: files round them
+# tolerance by which a principal moment may exceed the sum of the others, since files round them
+UNBALANCED = 1e-2
 
 
 def tidy(root: ElementTree.Element) -> list[str]:
-    """Mends what is cosmetic in a URDF file.
+    """Correct defects of a URDF file that do not affect the motion.
 
     Args:
-        root: the `<robot>` element; changed.
+        root: `<robot>` element; modified.
 
     Returns:
-        Notes on what was done.
+        Notes on the corrections.
     """
     notes = [*_foreign(root), *_stray_shapes(root), *tell_unread(root), *_world(root)]
     root.set("version", VERSION)
@@ -53,7 +54,7 @@ def tidy(root: ElementTree.Element) -> list[str]:
 
 
 def _foreign(root: ElementTree.Element) -> list[str]:
-    """Leaves out elements of other tools and of other namespaces."""
+    """Remove elements of other tools and of other namespaces."""
     found: dict[str, None] = {}
     for element in list(root):
         if element.tag not in ROBOT:
@@ -71,7 +72,7 @@ def _foreign(root: ElementTree.Element) -> list[str]:
 
 
 def _stray_shapes(root: ElementTree.Element) -> list[str]:
-    """Leaves out of a `<geometry>` what stands beside its shape."""
+    """Remove elements of a `<geometry>` other than its shape."""
     lost: dict[str, None] = {}
     for link in root.findall("link"):
         for geometry in (g for kind in ("visual", "collision") for g in link.findall(f"{kind}/geometry")):
@@ -84,7 +85,7 @@ def _stray_shapes(root: ElementTree.Element) -> list[str]:
 
 
 def _world(root: ElementTree.Element) -> list[str]:
-    """Declares the link "world" where joints hang on it and the file forgot it."""
+    """Declare the link "world" if joints use it and the file does not declare it."""
     declared = {link.get("name") for link in root.findall("link")}
     named = {e.get("link") for joint in root.findall("joint") for e in joint.findall("parent")}
     if WORLD in declared or WORLD not in named or not declared:
@@ -115,7 +116,7 @@ def _colors(root: ElementTree.Element) -> list[str]:
 
 
 def _undefined_materials(root: ElementTree.Element) -> list[str]:
-    """Materials that are named and nowhere defined lose their mention; the shape keeps its own color."""
+    """Remove references to undefined materials; the shapes keep their own colors."""
     defined = {m.get("name") for m in root.iter("material") if len(m)}
     lost = []
     for link in root.findall("link"):
@@ -138,7 +139,7 @@ def _undefined_materials(root: ElementTree.Element) -> list[str]:
 
 
 def _sizeless(shape: ElementTree.Element) -> bool:
-    """Whether a shape has a dimension of zero, or none at all."""
+    """Check if a shape has a dimension of zero, or no geometry."""
     geometry = shape.find("geometry")
     if geometry is None or not len(geometry):
         return True
@@ -154,14 +155,14 @@ def _sizeless(shape: ElementTree.Element) -> bool:
 
 
 def _uniform_scale(shape: ElementTree.Element) -> None:
-    """A scale of one number stands for three."""
+    """Expand a scale of one number to three."""
     mesh = shape.find("geometry/mesh")
     if mesh is not None and len((mesh.get("scale") or "").split()) == 1:
         mesh.set("scale", " ".join([str(mesh.get("scale"))] * 3))
 
 
 def _inertias(root: ElementTree.Element) -> list[str]:
-    """Principal moments that miss zero by rounding are zero; those that no body has are told."""
+    """Set principal moments to zero if they are negative by rounding, and note unphysical ones."""
     keys, rounded, unbalanced = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), [], []
     for link in root.findall("link"):
         element, mass = link.find("inertial/inertia"), link.find("inertial/mass")
@@ -195,7 +196,7 @@ def _inertias(root: ElementTree.Element) -> list[str]:
 
 
 def _limits(root: ElementTree.Element) -> list[str]:
-    """Limits play no part in the motion: what is missing or turned around in them is mended."""
+    """Correct missing or reversed joint limits, which do not affect the motion."""
     mended = []
     for joint in root.findall("joint"):
         kind, limit = joint.get("type"), joint.find("limit")

@@ -1,4 +1,4 @@
-"""Actuation as a robot.yaml table states it: torques and gains by joint name."""
+"""Actuation of a robot.yaml table: torques and gains by joint name."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from .robot import ACTUATION, build, one_entry
 
 
 def actuation_of(model: Model, entry: Any, motors: Sequence[str], where: str) -> Any:
-    """Torques from the table: `torques` by joint name, HoldPosition or Table.
+    """Return the actuation of a table: `torques` by joint name, HoldPosition or Table.
 
     Args:
         model: pinocchio.Model.
-        entry: of the table, None for no actuation.
-        motors: names of the joints that are driven; of all when there are none.
-        where: names the entry in messages.
+        entry: entry of the table, None for no actuation.
+        motors: names of actuated joints; empty for all joints.
+        where: prefix of error messages that names the entry.
 
     Raises:
-        LoadingError: the entry is of no known kind, or a value is refused.
+        LoadingError: the kind of the entry is unknown, or a value is invalid.
     """
     if entry is None:
         return None
@@ -50,7 +50,7 @@ def actuation_of(model: Model, entry: Any, motors: Sequence[str], where: str) ->
 
 
 def _gain(model: Model, gain: Any, motors: Sequence[str], where: str) -> Any:
-    """A gain by joint name, or one number for the motors (for all joints when no motor is named)."""
+    """Return a gain by joint name, or one number for all actuated joints (all joints if none is named)."""
     if isinstance(gain, dict):
         return _by_joint(model, gain, where, signed=False)
     if motors and not isinstance(gain, list):
@@ -59,7 +59,7 @@ def _gain(model: Model, gain: Any, motors: Sequence[str], where: str) -> Any:
 
 
 def _by_joint(model: Model, table: Mapping[Any, Any], where: str, *, signed: bool) -> NDArray[np.float64]:
-    """An array of shape (nv,) from values by joint name."""
+    """Return an array (nv,) from values by joint name."""
     result = np.zeros(model.nv)
     for name, value in table.items():
         j = joint_index(model, name, where)
