@@ -1,4 +1,4 @@
-"""A replay page in a browser without a window, asked through the browser's debugging door."""
+"""Replay page in a headless browser, controlled through the browser's debugging interface."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ FLAGS = (
     "--enable-unsafe-swiftshader",
     "--remote-debugging-port=0",
 )
-READY = 60.0  # until the browser listens, the page is drawn, and it answers [s]
+READY = 60.0  # time limit for the browser to start, to draw the page, and to answer [s]
 
 
 @asynccontextmanager
 async def opened(folder: Path, address: str, size: list[int]) -> AsyncIterator[Any]:
-    """A page in a browser without a window, as a function that evaluates expressions there.
+    """Open a page in a headless browser, and yield a function that evaluates expressions in it.
 
     Args:
-        folder: for the browser's files, gone after it.
-        address: of the page.
+        folder: folder for the browser's temporary files.
+        address: address of the page.
         size: width and height of the window [pixels].
 
     Raises:
-        OutputError: there is no browser, or the page cannot be shown.
+        OutputError: no browser is found, or the page cannot be displayed.
     """
     from tornado.websocket import websocket_connect
 
@@ -107,7 +107,7 @@ async def opened(folder: Path, address: str, size: list[int]) -> AsyncIterator[A
 
 
 async def _listening(file: Path, process: subprocess.Popen[bytes]) -> tuple[int, str]:
-    """Port and path at which a browser that just started listens."""
+    """Return the port and path at which a starting browser listens."""
     for _ in range(int(READY / 0.05)):
         if file.is_file():
             lines = file.read_text(encoding="utf-8").split()

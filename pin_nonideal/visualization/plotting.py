@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 EVENT_STYLES = ((0, ()), (0, (4, 2)), (0, (1, 2)), (0, (4, 2, 1, 2)))
-# More events than this are drawn so thin that the curves stay visible; beyond the next, as their density.
+# Number of events above which their lines become thin, and above which they are drawn as a density.
 CROWD, CLOUD = 40, 400
-HATCHES = {1: "////", -1: "\\\\\\\\", 0: "", 2: "....", 3: "xxxx"}  # of modes in print
+HATCHES = {1: "////", -1: "\\\\\\\\", 0: "", 2: "....", 3: "xxxx"}  # hatches of modes in print
 
 
 def plot(
@@ -42,31 +42,32 @@ def plot(
     style: str | Mapping[str, Any] | None = None,
     names: Sequence[str] | None = None,
 ) -> Figure:
-    """Draws a run, or several in the same axes, one plot below the other, with the events marked.
+    """Draw a run, or several in the same axes, one plot below the other, with the events marked.
 
     Args:
-        run: what `simulate` returned, or a list of several.
-        path: file to write, in the format that its ending names (.png, .pdf, .svg); None writes none.
-        what: over time "q", "v", "a", "tau", "energy", "work", "power", "violation", "reactions", "contacts",
-            "gaps" (of contacts that open), "modes", names of joints, or pairs of a title "what [unit]" and
-            curves by label, (nt,) each; of one over another "phase", "phase JOINT" (velocity over position),
-            "friction", "friction LAW" (over slip velocity, with its limit) and "load", "load LAW" (friction
-            over what the bearing carries).  None: what suits the scene, as far as the run has it.
-        ax: matplotlib axes to draw one plot into, in place of a figure of its own.
+        run: trajectory of `simulate`, or a list of several.
+        path: file to write, in the format of its suffix (.png, .pdf, .svg); None writes no file.
+        what: names of plots. Over time: "q", "v", "a", "tau", "energy", "work", "power", "violation",
+            "reactions", "contacts", "gaps" (of unilateral contacts), "modes", names of joints, or pairs of a
+            title "name [unit]" and curves by label, (nt,) each. Quantities over each other: "phase", "phase
+            JOINT" (velocity over position), "friction", "friction LAW" (over slip velocity, with its limit),
+            "load", "load LAW" (friction over the load of the bearing). None selects plots by the scene and
+            the recorded fields.
+        ax: matplotlib axes for one plot, instead of a new figure.
         columns: 1 or 2 columns of a printed page, 85 or 176 mm wide; None for a screen.
-        title: heading; None for the scene's name on a screen and none in print, "" for none.
-        style: "screen", "paper" (dashes and markers that survive gray, text that stays text in .svg and .pdf)
-            or matplotlib settings by name; None: "paper" with `columns`, else "screen".
-        names: names of several runs; their numbers when None.
+        title: heading; None for the name of the scene on a screen and no heading in print, "" for no heading.
+        style: "screen", "paper" (dashes and markers for grayscale print, editable text in .svg and .pdf) or
+            matplotlib settings by name. None selects "paper" if `columns` is given, else "screen".
+        names: names of several runs; None for their numbers.
 
     Returns:
-        The matplotlib figure, to be changed, shown or saved.
+        Matplotlib figure, which can be changed, shown or saved.
 
     Raises:
-        InputError: something asked for was not recorded, `what` is empty or no list of plots, `ax` is given
-            for several plots, or `columns`, `style`, `title` or `names` are none of the above.
-        UnknownNameError: a name in `what` is none of the above.
-        OutputError: the file cannot be written, or matplotlib has no such format.
+        InputError: a requested field was not recorded, `what` is empty or not a list of plots, `ax` is given
+            for several plots, or `columns`, `style`, `title` or `names` are invalid.
+        UnknownNameError: a name in `what` is unknown.
+        OutputError: the file cannot be written, or matplotlib does not support its format.
     """
     import matplotlib as mpl
 
@@ -91,10 +92,10 @@ def plot(
 
 
 def usual(runs: Sequence[Trajectory]) -> list[str]:
-    """What suits a scene, as far as its runs have it.
+    """Return the default plots of a scene for which its runs have recorded fields.
 
     Args:
-        runs: of one scene.
+        runs: runs of one scene.
     """
     first = runs[0]
     found = ["q", "v", *(["energy"] if first.energy else [])]
@@ -113,7 +114,7 @@ Drawn = tuple[str, list[Any]]
 
 
 def _asked(runs: Sequence[Trajectory], what: Any) -> list[Drawn]:
-    """Each plot as its kind and what each run gives to it."""
+    """Return each plot as its kind and its data of each run."""
     items = wanted("plot: what", what)
     if not items:
         raise InputError("plot: what must name at least one plot; got none")
@@ -136,8 +137,8 @@ def _asked(runs: Sequence[Trajectory], what: Any) -> list[Drawn]:
 def _figure(
     runs: Sequence[Trajectory], labels: Sequence[str], drawn: list[Drawn], look: Style, ax: Axes | None
 ) -> Figure:
-    """All plots, those over time with one axis of time."""
-    from matplotlib.figure import Figure  # no pyplot: a program that draws to files needs no window system
+    """Return the figure with all plots; plots over time share the time axis."""
+    from matplotlib.figure import Figure  # no pyplot, because drawing to files needs no window system
 
     if ax is not None:
         figure, axes = ax.figure, [ax]
@@ -168,20 +169,20 @@ def _figure(
 
 
 def _height(kind: str, parts: list[Any], look: Style) -> float:
-    """Height of a plot [inch]."""
+    """Return the height of a plot [inch]."""
     if kind == "modes":
         return 0.4 + 0.22 * len(bands_of(parts[0]))
     return look.height if kind == "time" else min(1.4 * look.height, 0.75 * look.width)
 
 
 def _limits(runs: Sequence[Trajectory]) -> tuple[float, float]:
-    """First and last time [s], apart also for a run of one sample."""
+    """Return the limits of the time axis [s], distinct also for a run of one sample."""
     first, last = min(float(run.t[0]) for run in runs), max(float(run.t[-1]) for run in runs)
     return (first, last) if last > first else (first - 0.5, first + 0.5)
 
 
 def _draw_plot(axes: Axes, parts: Sequence[Plot], labels: Sequence[str], look: Style) -> None:
-    """Curves over time, of all runs."""
+    """Draw curves over time, of all runs."""
     for number, item in enumerate(parts):
         for index, (label, values) in enumerate(item.curves.items()):
             shown = np.where(values > 0.0, values, np.nan) if item.log else values
@@ -195,7 +196,7 @@ def _draw_plot(axes: Axes, parts: Sequence[Plot], labels: Sequence[str], look: S
 
 
 def _draw_relation(axes: Axes, parts: Sequence[Relation], labels: Sequence[str], look: Style) -> None:
-    """One quantity over another, of all runs, and what the law allows as points."""
+    """Draw one quantity over another, of all runs, and the limits of the law as points."""
     for number, item in enumerate(parts):
         for index, (label, (x, y)) in enumerate(item.curves.items()):
             name = label if len(parts) == 1 else f"{label}, {labels[number]}"
@@ -222,13 +223,13 @@ def _finish(axes: Axes, look: Style) -> None:
 
 
 def _mark_events(axes: Axes, run: Trajectory, look: Style, legend: bool) -> None:
-    """A vertical line at each event, its style by the kind of event; of a cloud of them the density."""
+    """Mark each event by a vertical line whose style shows its kind, or many events by their density."""
     kinds = list(dict.fromkeys(str(event.kind) for event in run.events))
     if len(run.events) > CLOUD:
         counts, edges = np.histogram([float(event.time) for event in run.events], bins=200)
         shade = counts / counts.max()
         colors = [(0.58, 0.64, 0.72, 0.6 * s) for s in shade]
-        low = axes.get_xaxis_transform()  # at the foot of the plot
+        low = axes.get_xaxis_transform()  # at the bottom of the plot
         axes.vlines((edges[1:] + edges[:-1]) / 2.0, 0.0, 0.06, colors, transform=low, lw=1.5)
         if legend:
             axes.plot([], [], color="#94a3b8", lw=3.0, label=f"{len(run.events)} events, by density")
@@ -246,7 +247,7 @@ def _mark_events(axes: Axes, run: Trajectory, look: Style, legend: bool) -> None
 
 
 def _draw_modes(axes: Axes, run: Trajectory, look: Style) -> None:
-    """A band for each element, colored by its mode."""
+    """Draw a band for each element, colored by its mode."""
     names, bands = [list(column) for column in zip(*bands_of(run), strict=True)]
     present = [mode for mode in MODES if any(piece[2] == mode for pieces in bands for piece in pieces)]
     for row, pieces in enumerate(bands):
@@ -272,13 +273,13 @@ def _print_mode(mode: int) -> dict[str, Any]:
 
 
 def picture_format(path: Path) -> str:
-    """The format that the ending of a file names.
+    """Return the format of a file by its suffix.
 
     Args:
-        path: the file.
+        path: path of the file.
 
     Raises:
-        OutputError: matplotlib writes no such format.
+        OutputError: matplotlib does not support the format.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -291,7 +292,7 @@ def picture_format(path: Path) -> str:
 
 
 def _save(figure: Figure, path: Path) -> None:
-    """The figure as a file, whole or not at all."""
+    """Write the figure to a file, completely or not at all."""
     picture = io.BytesIO()
     figure.savefig(picture, format=picture_format(path), dpi=160)
     with whole_file(path, "the figure") as stream:

@@ -1,4 +1,4 @@
-"""Arrows of what acts where it is said: springs, wrenches and drag."""
+"""Arrows of applied forces at their points of action: springs, wrenches and drag."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 
 def given_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]:
-    """Arrows of the springs, wrenches and laws of drag of a scene, where they act.
+    """Return the arrows of the springs, wrenches and drag laws of a scene, at their points of action.
 
     Args:
-        run: the run.
-        motion: its motion.
-        marks: of the scene, for the ends of springs.
+        run: run of the replay.
+        motion: motion of the run.
+        marks: marks of the scene, for the ends of springs.
     """
     ends = {mark.name: mark for mark in marks if mark.kind == "spring"}
     found: list[Arrow] = []
@@ -60,7 +60,7 @@ def given_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arr
 
 
 def _spring(run: Trajectory, motion: Motion, item: SpringDamper, mark: Mark) -> Arrow:
-    """The force on the body of its first frame."""
+    """Return the arrow of the force on the body of the spring's first frame."""
     first, second = motion.point(mark.joint1, mark.point1), motion.point(mark.joint2, mark.point2)
     length = np.linalg.norm(first - second, axis=1, keepdims=True)
     way = np.divide(first - second, length, out=np.zeros_like(first), where=length > 0.0)
@@ -83,7 +83,7 @@ def _wrench(run: Trajectory, motion: Motion, item: Wrench) -> list[Arrow]:
 
 
 def _velocity(run: Trajectory, motion: Motion, joint: int, point: Array) -> Array:
-    """Velocity of a point that a joint carries at each frame, in world axes [m/s], (n, 3)."""
+    """Return the velocity of a point on a joint at each frame, in world axes [m/s], (n, 3)."""
     if not joint:
         return np.zeros((len(motion.times), 3))
     model, v = run.scene.model, motion.of(run.v)

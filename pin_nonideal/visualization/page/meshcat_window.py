@@ -1,4 +1,4 @@
-"""A run in a meshcat window that is already open: robot, animation and arrows of forces."""
+"""Replay in an open meshcat window: robot, animation and force arrows."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from .style import FORCES
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-RATE = 30  # pictures a second that an animation is stored at
-LONGEST = 20.0  # a longer or shorter run is played in this time [s] at most
+RATE = 30  # frames per second of the stored animation
+LONGEST = 20.0  # maximum duration of the animation [s]
 
 
 def show(run: Trajectory, viewer: Any, name: str, forces: bool) -> Any:
-    """Fills a `meshcat.Visualizer` with a run.
+    """Show a run in a `meshcat.Visualizer`.
 
     Args:
-        run: the run.
-        viewer: the window.
-        name: of the robot in the window's tree.
+        run: run of the replay.
+        viewer: open window.
+        name: name of the robot in the window's tree.
         forces: whether arrows are drawn.
 
     Returns:
-        The pinocchio.visualize.MeshcatVisualizer.
+        Robot in the window, a pinocchio.visualize.MeshcatVisualizer.
     """
     import meshcat.animation
     from pinocchio.visualize import MeshcatVisualizer
@@ -49,7 +49,7 @@ def show(run: Trajectory, viewer: Any, name: str, forces: bool) -> Any:
     animation = meshcat.animation.Animation(default_framerate=RATE)
     for frame in range(len(motion.times)):
         with animation.at_frame(viewer, frame) as keyed:
-            shown.viewer = keyed  # Pinocchio's own placements, written into the animation
+            shown.viewer = keyed  # writes Pinocchio's placements into the animation
             shown.display(motion.q[frame])
             for number, arrow in enumerate(arrows):
                 _place(keyed[name]["forces"][str(number)], arrow, motion, frame, scale)
@@ -60,7 +60,7 @@ def show(run: Trajectory, viewer: Any, name: str, forces: bool) -> Any:
 
 
 def _add_arrows(root: Any, arrows: list[Arrow], reach: float) -> float:
-    """Adds arrows of length one along y; returns the length of a newton [m]."""
+    """Add arrows of length one along y, and return the drawn length of one newton [m]."""
     import meshcat.geometry as shapes
 
     largest = max((arrow.largest() for arrow in arrows), default=1.0) or 1.0
@@ -81,7 +81,7 @@ def _moved(along: float) -> Array:
 
 
 def _place(node: Any, arrow: Arrow, motion: Motion, frame: int, scale: float) -> None:
-    """Turns y into a force and stretches it; a force of zero is drawn as a point."""
+    """Rotate y to the direction of a force and scale it; a zero force is drawn as a point."""
     force, place = arrow.values[frame], np.eye(4)
     size = float(np.linalg.norm(force))
     if size > 0.0:

@@ -1,4 +1,4 @@
-"""What a replay page carries of a run: one header in JSON and the typed arrays that it refers to."""
+"""Data of a replay page: a JSON header and the typed arrays that it refers to."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from pin_nonideal.scene.scene import Scene
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-# Of so many runs curves are plotted; all of them are drawn.
+# Maximum number of runs with plotted curves; all runs are drawn.
 MOST_PLOTTED = 8
 
 
@@ -46,15 +46,15 @@ def packed_runs(
     plots: Chosen | None,
     forces: bool,
 ) -> bytes:
-    """Everything that the page shows of a run, and of others as ghosts beside it.
+    """Return the data of a page that shows a run, and other runs as ghosts beside it.
 
     Args:
-        runs: the run, and those that it is compared with.
-        names: of the runs.
-        fps: frames a second of simulated time; None for frames chosen by the motion.
+        runs: main run, and the runs to compare.
+        names: names of the runs.
+        fps: frames per second of simulated time; None for frames by the motion.
         title: heading of the page.
-        plots: what is plotted, as `signals.plots_of` takes it.
-        forces: whether arrows of forces are shown.
+        plots: plots, as in `signals.plots_of`.
+        forces: whether force arrows are shown.
     """
     run, payload = runs[0], Payload()
     scene, marks = run.scene, marks_of(run.scene)
@@ -111,7 +111,7 @@ def packed_runs(
 
 
 def _drawn(scene: Scene, motion: Motion, ends: list[tuple[int, Array]]) -> tuple[list[Visual], bool]:
-    """What is drawn of a scene, for want of others its shapes for collisions, and whether it has none."""
+    """Return the visuals of a scene or else its collision shapes, and whether it has neither."""
     visuals = visuals_of(scene.visual_model) if scene.visual_model is not None else []
     visuals = visuals or [_colored(shape) for shape in collisions_of(scene)]
     if visuals:
@@ -120,12 +120,12 @@ def _drawn(scene: Scene, motion: Motion, ends: list[tuple[int, Array]]) -> tuple
 
 
 def _colored(visual: Visual) -> Visual:
-    """A shape for collisions, which seldom has a color, in that of its link."""
+    """Return a collision shape, which seldom has a color, in the color of its link."""
     return replace(visual, color=LINK_COLORS[visual.joint % len(LINK_COLORS)])
 
 
 def _other(payload: Payload, shapes: Shapes, run: Trajectory, motion: Motion, name: str) -> Table:
-    """A run as a ghost: its motion and its bodies."""
+    """Return a run as a ghost: its motion and its bodies."""
     marks = marks_of(run.scene)
     ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
     visuals, _ = _drawn(run.scene, motion, ends)
@@ -139,12 +139,12 @@ def _other(payload: Payload, shapes: Shapes, run: Trajectory, motion: Motion, na
 
 
 def _curves(run: Trajectory, finer: Trajectory, chosen: Chosen | None) -> list[Plot]:
-    """Plots of a run as it is between its samples, but for curves that were given at them."""
+    """Return the plots of a run with interpolated curves; curves of the user have the samples of the run."""
     dense, items = (
         getattr(run, "dense", None) is not None,
         wanted("plots", usual_plots(run) if chosen is None else chosen),
     )
-    smooth = {"q", "v", "energy", "gaps", *run.scene.model.names}  # all else runs straight between samples
+    smooth = {"q", "v", "energy", "gaps", *run.scene.model.names}  # other curves are linear between samples
     return [
         plot
         for item in items
@@ -159,7 +159,7 @@ def _plots(
     names: Sequence[str],
     chosen: Chosen | None,
 ) -> list[Table]:
-    """Plots of the first run, with the curves of the others that have the same."""
+    """Return the plots of the first run, with corresponding curves of the other runs."""
     each = [[plot.thinned() for plot in _curves(*pair, chosen)] for pair in zip(runs, finer, strict=False)]
     found = []
     for plot in each[0]:
@@ -175,7 +175,7 @@ def _plots(
 
 
 def _compared(payload: Payload, plot: Plot, other: Plot, number: int, name: str) -> list[Table]:
-    """Curves of another run that the first has as well."""
+    """Return the curves of another run that the first run also has."""
     t, common = payload.add(other.t, "f8"), {k: v for k, v in other.curves.items() if k in plot.curves}
     return [
         {"label": f"{k}, {name}", "run": number, "of": k, "t": t, "values": payload.curve(v)}
@@ -189,12 +189,12 @@ def _sliding_axes(model: pin.Model) -> dict[int, Array]:
 
 
 def _joints(payload: Payload, model: pin.Model, motion: Motion) -> list[Table]:
-    """How each joint moves, the world first; coordinates that never change once."""
+    """Return the coordinates of each joint, starting with the world; constant coordinates are stored once."""
     found: list[Table] = [{"name": str(model.names[0])}]
     for number, track in Tracks(model).moving():
         values = motion.coordinates[:, track.columns]
         still = np.array_equal(values, np.broadcast_to(values[0], values.shape))
-        exact = float(np.abs(values).max(initial=0.0)) > 16.0  # beyond it 32 bits are too few
+        exact = float(np.abs(values).max(initial=0.0)) > 16.0  # larger values need more than 32 bits
         found.append(
             {
                 "name": str(model.names[number]),
@@ -212,7 +212,7 @@ def _joints(payload: Payload, model: pin.Model, motion: Motion) -> list[Table]:
 
 
 def _trails(model: pin.Model, guides: list[Guide], bare: bool) -> list[tuple[int, list[float]]]:
-    """Points whose paths are drawn: those on guides, and the ends of a model without shapes."""
+    """Return the points with drawn paths: points on guides, and the ends of a model without shapes."""
     found = {guide.joint: guide.point.tolist() for guide in guides}
     for joint in range(1, model.njoints) if bare else ():
         if not len(model.children[joint]):
@@ -233,7 +233,7 @@ def _stored_plot(payload: Payload, plot: Plot) -> Table:
 
 
 def _events(payload: Payload, run: Trajectory) -> Table:
-    """Times of the events with their kinds and elements by number."""
+    """Return the times of the events with indices of their kinds and elements."""
     kinds = sorted({str(event.kind) for event in run.events})
     elements = sorted({str(event.element) for event in run.events})
     return {
@@ -248,18 +248,18 @@ def _events(payload: Payload, run: Trajectory) -> Table:
 
 
 def _impulse(event: Any) -> Array:
-    """Impulse of an impact, in the directions of the contact; zero of other events."""
+    """Return the impulse of an impact, in the directions of the contact; zero for other events."""
     given = getattr(event, "impulse", None)
     return np.zeros(3) if given is None else np.asarray(given, dtype=float)
 
 
 def _plain(item: Any) -> Table:
-    """The fields of a dataclass, arrays as lists."""
+    """Return the fields of a dataclass, with arrays as lists."""
     return {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in vars(item).items()}
 
 
 def _stored_arrow(payload: Payload, motion: Motion, arrow: Arrow) -> Table:
-    """An arrow whose place is one that its joint carries, one for all frames where it stays there."""
+    """Return an arrow with its origin in the frame of its joint, stored once if it is constant."""
     stored = _plain(arrow)
     stored["values"] = payload.add(arrow.values)
     if arrow.origin is not None:
@@ -268,7 +268,7 @@ def _stored_arrow(payload: Payload, motion: Motion, arrow: Arrow) -> Table:
 
 
 def _once(vectors: Array, size: float) -> Array:
-    """Vectors at all frames, (n, 3), or the one that they all are, (1, 3)."""
+    """Return vectors at all frames, (n, 3), or one vector, (1, 3), if they are constant."""
     return vectors[:1] if np.abs(vectors - vectors[0]).max() < 1e-9 * size else vectors
 
 
@@ -298,7 +298,7 @@ def _stored_guide(payload: Payload, guide: Guide) -> Table:
 
 
 def _modes(payload: Payload, run: Trajectory) -> list[Table]:
-    """Bands of the elements that stick or slip: starts and modes of their pieces, and the end of the last."""
+    """Return the mode bands of the elements: start and mode of each interval."""
     found = []
     for name, pieces in bands_of(run):
         starts, modes = [piece[0] for piece in pieces], [piece[2] for piece in pieces]
@@ -320,7 +320,7 @@ def _counted(count: int, word: str) -> str:
 
 
 def _above(value: float) -> str:
-    """A value rounded up to two digits."""
+    """Return a value rounded up to two digits."""
     if not value > 0.0:
         return "1e-16"
     power = 10.0 ** (np.floor(np.log10(value)) - 1.0)
@@ -328,7 +328,7 @@ def _above(value: float) -> str:
 
 
 def _facts(run: Trajectory, motion: Motion) -> list[tuple[str, str]]:
-    """What the help dialog tells of a run."""
+    """Return the data of a run for the help dialog."""
     model = run.scene.model
     frames = f"{len(motion.times)} frames"
     if motion.held.any():

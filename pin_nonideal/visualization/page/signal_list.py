@@ -1,4 +1,4 @@
-"""What a reader of a replay may choose to see: signals to plot, boxes of inertia, collision shapes."""
+"""Optional content of a replay: signals to plot, boxes of inertia, collision shapes."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ if TYPE_CHECKING:
     from pin_nonideal.scene.scene import Scene
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-# Points of all signals together, at least and at most so many of each.
+# Number of points of all signals, and minimum and maximum number of points of one signal.
 POINTS, LEAST, MOST = 120_000, 100, 800
-# Collision shapes with more triangles are not carried.
+# Maximum number of triangles of collision shapes on a page.
 TRIANGLES = 20_000
 
 
 @dataclass(frozen=True)
 class Signal:
-    """A curve that can be plotted.
+    """Curve that can be plotted.
 
     Attributes:
-        label: its name.
-        unit: its unit.
+        label: name of the curve.
+        unit: unit of the curve.
         t: times [s], (k,).
-        values: (k,).
+        values: values of the curve, (k,).
     """
 
     label: str
@@ -43,13 +43,13 @@ class Signal:
 
 
 def signals_of(run: Trajectory, finer: Trajectory) -> list[Signal]:
-    """All numbers of a run that can be plotted one by one, thinned so that extremes stay.
+    """Return all scalars of a run that can be plotted, thinned with their extremes.
 
     Args:
-        run: the run.
-        finer: the same with more samples, for what does not run straight between those of the run.
+        run: run of the replay.
+        finer: the same run with more samples, for curves that are not linear between samples.
     """
-    model, found, smooth = run.scene.model, [], []  # found: what runs straight between samples
+    model, found, smooth = run.scene.model, [], []  # found: curves that are linear between samples
     if getattr(run, "dense", None) is not None:
         run = finer
     for item in positions(model, finer.q):
@@ -84,7 +84,7 @@ def _thinned(label: str, unit: str, values: Array, t: Array, points: int) -> Sig
 
 
 def inertia_box(inertia: pin.Inertia) -> Table:
-    """The even box of the same mass and inertia: edges [m] and orientation (x, y, z, w) in its frame."""
+    """Return the homogeneous box of equal mass and inertia: edges [m] and orientation (x, y, z, w)."""
     moments, axes = np.linalg.eigh(np.asarray(inertia.inertia))
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] *= -1.0
@@ -96,7 +96,7 @@ def inertia_box(inertia: pin.Inertia) -> Table:
 
 
 def collisions_of(scene: Scene) -> list[Visual]:
-    """Collision shapes, without those of too many triangles in all."""
+    """Return the collision shapes up to the maximum total number of triangles."""
     if scene.collision_model is None:
         return []
     found, room = [], TRIANGLES

@@ -1,4 +1,4 @@
-// The start of the page, and what scripts and tests may use: window.replay.
+// Start of the page, and its interface for scripts and tests: window.replay.
 
 function door(player) {
   return {
