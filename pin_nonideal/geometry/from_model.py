@@ -22,7 +22,7 @@ from pin_nonideal.description.laws import static_ratio as ratio_of_static
 from pin_nonideal.errors import InputError, LoadingError
 from pin_nonideal.validation import fraction, label, nonnegative, optional_text, positive, text
 
-from .manifold import Place, manifold
+from .manifold import ManifoldContact, manifold
 from .shapes import shape_of
 
 __all__ = ["GeometryContact", "geometry_contacts"]
@@ -83,7 +83,7 @@ def geometry_contacts(
     mu: float = 0.0,
     static_ratio: float = 1.0,
     restitution: float = 0.0,
-) -> list[Place]:
+) -> list[ManifoldContact]:
     """Return the contacts of the pairs of a collision model.
 
     Args:
@@ -130,7 +130,7 @@ def geometry_contacts(
     return found
 
 
-def with_geometry(contacts: Iterable[Any], model: pin.Model, geometry: Any) -> tuple[Any, ...]:
+def expand_geometry_contacts(contacts: Iterable[Any], model: pin.Model, geometry: Any) -> tuple[Any, ...]:
     """Return contacts in which each `GeometryContact` is replaced by the contacts of its manifold.
 
     Args:
@@ -141,17 +141,17 @@ def with_geometry(contacts: Iterable[Any], model: pin.Model, geometry: Any) -> t
     Raises:
         InputError, UnknownNameError: a geometry does not exist, or the pair has no analytic manifold.
     """
-    given = tuple(contacts)
-    if not any(isinstance(c, GeometryContact) for c in given):
-        return given
+    items = tuple(contacts)
+    if not any(isinstance(c, GeometryContact) for c in items):
+        return items
     shapes = geometry() if callable(geometry) else geometry
     if shapes is None:
         raise InputError("a GeometryContact needs the scene's collision_model; pass one, or use PointContact")
-    nested = [_manifold(c, model, shapes) if isinstance(c, GeometryContact) else [c] for c in given]
+    nested = [_manifold(c, model, shapes) if isinstance(c, GeometryContact) else [c] for c in items]
     return tuple(c for several in nested for c in several)
 
 
-def _manifold(c: GeometryContact, model: pin.Model, geometry: pin.GeometryModel) -> list[Place]:
+def _manifold(c: GeometryContact, model: pin.Model, geometry: pin.GeometryModel) -> list[ManifoldContact]:
     """Return the contacts of one pair of shapes."""
     who = label(c)
     first, second = (shape_of(who, name, model, geometry) for name in (c.geometry1, c.geometry2))
@@ -159,5 +159,5 @@ def _manifold(c: GeometryContact, model: pin.Model, geometry: pin.GeometryModel)
         raise InputError(f"{who}: both geometries are on the same body, which cannot touch itself")
     ground, thing = (first, second) if first.normal is not None else (second, first)
     base = c.name or f"{thing.name} on {ground.name}"
-    more = {"mu": c.mu, "static_ratio": c.static_ratio, "restitution": c.restitution}
-    return manifold(who, first, second, c.rounding, base, more)
+    options = {"mu": c.mu, "static_ratio": c.static_ratio, "restitution": c.restitution}
+    return manifold(who, first, second, c.rounding, base, options)
