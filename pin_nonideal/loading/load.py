@@ -16,11 +16,11 @@ from pin_nonideal.description.contacts import JointLimit
 from pin_nonideal.errors import InputError, LoadingError, nearest
 from pin_nonideal.loading.library.example_robots import example_names, example_robot
 from pin_nonideal.loading.library.generators import GENERATORS
-from pin_nonideal.loading.urdf.loop_tolerance import relaxed
+from pin_nonideal.loading.urdf.loop_tolerance import remove_dependent_rows
 from pin_nonideal.loading.urdf.reader import RobotFile, read_urdf
 from pin_nonideal.loading.urdf.xml import listed
 from pin_nonideal.loading.yaml.assembly import scene_arguments
-from pin_nonideal.loading.yaml.initial_state import Start, held_start
+from pin_nonideal.loading.yaml.initial_state import Start, held_entries
 from pin_nonideal.loading.yaml.robot import MODEL_KEYS, check_keys, optional_string, read_yaml
 from pin_nonideal.scene.scene import Scene, with_origin
 from pin_nonideal.states.held import Held
@@ -28,7 +28,7 @@ from pin_nonideal.types import Table
 from pin_nonideal.validation import choice, flag, positive, sequence
 
 FILE_PARAMETERS = ("free_flyer", "package_dirs", "merge_ball_joints", "density")
-ASSEMBLY = 1e-6  # accuracy of the loop frames in CAD exports [m or rad], with a margin
+ASSEMBLY_TOLERANCE = 1e-6  # accuracy of the loop frames in CAD exports [m or rad], with a margin
 MJCF_PARAMETERS = ("allow", "ctrl")
 URDF, MJCF = (".urdf", ".xacro"), (".xml", ".mjcf")  # suffixes, in lower or upper case
 
@@ -39,7 +39,7 @@ def load(
     terms: str = "core",
     q0: Start = None,
     v0: Start = None,
-    assembly_tolerance: float = ASSEMBLY,
+    assembly_tolerance: float = ASSEMBLY_TOLERANCE,
     limits: bool = False,
     **parameters: Any,
 ) -> Scene:
@@ -95,23 +95,23 @@ def load(
     for key, state in (("q0", q0), ("v0", v0)):
         if state is not None:
             given[key] = state if isinstance(state, (str, Mapping)) else np.asarray(state).tolist()
-    if assembly_tolerance != ASSEMBLY:
+    if assembly_tolerance != ASSEMBLY_TOLERANCE:
         given["assembly_tolerance"] = assembly_tolerance
     if flag("load: limits", limits):
         given["limits"] = True
-    _use_limits(arguments, limits)
+    _add_limits(arguments, limits)
     arguments["terms"] = terms
     scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
-    parts = relaxed(scene, assembly_tolerance)
+    parts = remove_dependent_rows(scene, assembly_tolerance)
     if parts is not None:
         arguments.update(model=parts.model, constraints=parts.constraints, q0=parts.q)
         arguments["notes"] = (*scene.notes, parts.note)
         scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
-    held = held_start(found.robot, found.table, q0, v0)
+    held = held_entries(found.robot, found.table, q0, v0)
     return _with_origin(scene, _origin(text, given), found, held)
 
 
-def _use_limits(arguments: Table, used: bool) -> None:
+def _add_limits(arguments: Table, used: bool) -> None:
     """Add stops to the joints with position limits, or a note that such limits exist."""
     model = arguments["model"]
     single = [(i, j.idx_q) for i, j in enumerate(model.joints) if i and j.nq == j.nv == 1]
@@ -129,7 +129,7 @@ def _use_limits(arguments: Table, used: bool) -> None:
         arguments["notes"] = (*arguments.get("notes", ()), note)
 
 
-def load_again(origin: Table) -> Scene:
+def load_from_origin(origin: Table) -> Scene:
     """Load the scene of an origin again, as `load` created it.
 
     Args:
@@ -139,7 +139,7 @@ def load_again(origin: Table) -> Scene:
 
 
 @dataclass(frozen=True)
-class ShapesOf:
+class ShapeReader:
     """Function that reads the shapes of a loaded robot again, in a process that does not have them.
 
     Attributes:
@@ -152,22 +152,22 @@ class ShapesOf:
 
     def __call__(self) -> Any:
         """Return the shapes."""
-        return getattr(load_again(self.origin), self.kind)
+        return getattr(load_from_origin(self.origin), self.kind)
 
 
-def _with_origin(scene: Scene, origin: Table | None, found: Found, held: Held) -> Scene:
+def _with_origin(scene: Scene, origin: Table | None, found: LoadedRobot, held: Held) -> Scene:
     """Return the scene with its origin, the name and parameters of the call of `load`."""
     sources = None
     if origin is not None:
         kinds = {"visual_model": found.robot.visual, "collision_model": found.robot.collision}
         visual, collision = (
-            ShapesOf(origin, kind) if shapes is not None else None for kind, shapes in kinds.items()
+            ShapeReader(origin, kind) if shapes is not None else None for kind, shapes in kinds.items()
         )
         sources = visual, collision
     return with_origin(scene, origin, shapes=sources, friction=found.robot.contact_friction, held=held)
 
 
-class Found(NamedTuple):
+class LoadedRobot(NamedTuple):
     """Content of a robot's file and of its robot.yaml.
 
     Attributes:
@@ -199,20 +199,20 @@ def _origin(text: str, parameters: Table) -> Table | None:
         return None
 
 
-def _find(name: str | os.PathLike[str], text: str, parameters: Table) -> Found:
+def _find(name: str | os.PathLike[str], text: str, parameters: Table) -> LoadedRobot:
     path = Path(text).expanduser()
     folders = robot_folders()
     if text in folders:
-        return _noting_folder(_load_folder(folders[text], parameters), path)
+        return _note_folder(_load_folder(folders[text], parameters), path)
     if path.is_dir() and (text not in example_names() or os.sep in text or isinstance(name, Path)):
         return _load_folder(path, parameters)
     if path.is_file() or path.suffix.lower() in (*URDF, *MJCF) or isinstance(name, Path) or os.sep in text:
         return _load_file(path, parameters)
     check_parameters(parameters, (), text)
-    return _noting_folder(Found(example_robot(text, list(folders)), {}, text), path)
+    return _note_folder(LoadedRobot(example_robot(text, list(folders)), {}, text), path)
 
 
-def _noting_folder(found: Found, path: Path) -> Found:
+def _note_folder(found: LoadedRobot, path: Path) -> LoadedRobot:
     """Add a note to a robot found by its name, if a file or folder of that name exists too."""
     if path.exists():
         found.robot.notes.append(
@@ -266,7 +266,7 @@ def _file_options(parameters: Table, name: str) -> tuple[Table, bool]:
     return options, parameters.get("merge_ball_joints", True)
 
 
-def _load_mjcf(path: Path, parameters: Table) -> Found:
+def _load_mjcf(path: Path, parameters: Table) -> LoadedRobot:
     # Imported on use, since most programs load no MJCF file.
     from pin_nonideal.loading.mjcf.reader import read_mjcf
     from pin_nonideal.loading.mjcf.unsupported import ALLOWED
@@ -276,15 +276,15 @@ def _load_mjcf(path: Path, parameters: Table) -> Found:
     allow = (allow,) if isinstance(allow, str) else tuple(sequence("allow", allow))
     for key in allow:
         choice("allow", key, ALLOWED)
-    return Found(read_mjcf(path, **{**parameters, "allow": allow}), {}, path.stem)
+    return LoadedRobot(read_mjcf(path, **{**parameters, "allow": allow}), {}, path.stem)
 
 
-def _load_file(path: Path, parameters: Table) -> Found:
+def _load_file(path: Path, parameters: Table) -> LoadedRobot:
     if not path.is_file():
         raise LoadingError(f'no file or folder "{path}"; give a path that exists, or the name of a robot')
     if path.suffix.lower() in URDF:
         options, merge = _file_options(parameters, path.name)
-        return Found(read_urdf(path, **options), {}, path.stem, merge)
+        return LoadedRobot(read_urdf(path, **options), {}, path.stem, merge)
     if path.suffix.lower() in MJCF:
         return _load_mjcf(path, parameters)
     raise LoadingError(
@@ -292,7 +292,7 @@ def _load_file(path: Path, parameters: Table) -> Found:
     )
 
 
-def _load_folder(folder: Path, parameters: Table) -> Found:
+def _load_folder(folder: Path, parameters: Table) -> LoadedRobot:
     """Load a folder with robot.yaml, robot.urdf, or both."""
     name = folder.resolve().name
     yaml_path = folder / "robot.yaml"
@@ -317,11 +317,11 @@ def _load_folder(folder: Path, parameters: Table) -> Found:
     if "example_robot_data" in entry:
         check_parameters(parameters, (), name)
         robot = example_robot(entry["example_robot_data"], [])
-        return Found(robot, table, name)
+        return LoadedRobot(robot, table, name)
     return _from_urdf(folder, entry, table, parameters, name)
 
 
-def _from_urdf(folder: Path, entry: Table, table: Table, parameters: Table, name: str) -> Found:
+def _from_urdf(folder: Path, entry: Table, table: Table, parameters: Table, name: str) -> LoadedRobot:
     urdf = folder / entry.get("urdf", "robot.urdf")
     if not urdf.resolve().is_relative_to(folder.resolve()):
         raise LoadingError(f'model: urdf must lie in the folder "{folder}"; got "{entry["urdf"]}"')
@@ -332,7 +332,7 @@ def _from_urdf(folder: Path, entry: Table, table: Table, parameters: Table, name
         raise LoadingError(f'"{folder}" must hold a {urdf.name}; there is none{hint}')
     options, merge = _file_options(parameters, name)
     options.setdefault("free_flyer", _flag(entry, "free_flyer", name))
-    return Found(read_urdf(urdf, **options), table, name, merge)
+    return LoadedRobot(read_urdf(urdf, **options), table, name, merge)
 
 
 def _flag(entry: Table, key: str, name: str) -> bool:
@@ -342,7 +342,7 @@ def _flag(entry: Table, key: str, name: str) -> bool:
     return value
 
 
-def _generated(entry: Table, table: Table, parameters: Table, name: str, path: Path) -> Found:
+def _generated(entry: Table, table: Table, parameters: Table, name: str, path: Path) -> LoadedRobot:
     """Return a robot that a function of this package builds from parameters."""
     key = entry["generator"]
     if key not in GENERATORS:
@@ -354,4 +354,4 @@ def _generated(entry: Table, table: Table, parameters: Table, name: str, path: P
     known = tuple(generator.__kwdefaults__ or ())
     check_keys(defaults, known, f'"{path}": model: parameters')
     check_parameters(parameters, known, name)
-    return Found(generator(**{**defaults, **parameters}), table, name, True)
+    return LoadedRobot(generator(**{**defaults, **parameters}), table, name, True)

@@ -16,7 +16,7 @@ import numpy as np
 
 from pin_nonideal.atomic_files import file_path, mode_of, whole_file
 from pin_nonideal.errors import LoadingError, PinNonidealError
-from pin_nonideal.loading.load import load_again
+from pin_nonideal.loading.load import load_from_origin
 from pin_nonideal.scene.scene import Scene, compiled_scene, scene_origin
 from pin_nonideal.states.joint_layout import JointPlace
 from pin_nonideal.types import Table
@@ -198,7 +198,7 @@ def scene_again(origin: Any, joints: Sequence[JointPlace], rows: Table, notes: l
     if origin is None:
         return None
     try:
-        scene = load_again(origin)
+        scene = load_from_origin(origin)
     except (PinNonidealError, OSError, ValueError, LookupError, TypeError, AttributeError) as error:
         notes.append(f"the scene of the run cannot be loaded again: {error}")
         return None

@@ -18,9 +18,9 @@ from pin_nonideal.errors import LoadingError
 from pin_nonideal.types import Array, GeometryModel, JointModel, Model, Placement
 
 # Maximum mass of the links between the axes of a ball joint, relative to the mass that the joint carries.
-MASSLESS = 1e-6
+MAX_LINK_MASS = 1e-6
 # Tolerance for intersecting [m] and perpendicular [cosine] axes; exporters print about ten digits.
-ALIGNED = 1e-7
+AXIS_TOLERANCE = 1e-7
 
 UNIVERSAL = {
     "CARDAN": "XY",
@@ -78,7 +78,7 @@ def ball_chains(model: Model, keep: Collection[str] = ()) -> list[BallChain]:
         if names_at[a] & set(keep) or names_at[b] & set(keep) or model.names[c] in keep:
             continue
         carried = sum(model.inertias[k].mass for k in model.subtrees[c])
-        if max(model.inertias[a].mass, model.inertias[b].mass) > MASSLESS * carried:
+        if max(model.inertias[a].mass, model.inertias[b].mass) > MAX_LINK_MASS * carried:
             continue
         center = _common_point(model, a, b, c)
         if center is not None:
@@ -130,13 +130,13 @@ def _common_point(model: Model, a: int, b: int, c: int) -> Array | None:
             revolute_axis(model, c),
         ]
     )
-    if abs(axes[0] @ axes[1]) > ALIGNED or abs(axes[1] @ axes[2]) > ALIGNED:
+    if abs(axes[0] @ axes[1]) > AXIS_TOLERANCE or abs(axes[1] @ axes[2]) > AXIS_TOLERANCE:
         return None
     origins = np.array([a_in_c.translation, b_in_c.translation, np.zeros(3)])
     across = [np.eye(3) - np.outer(u, u) for u in axes]
     point = np.linalg.solve(sum(across), sum(p @ o for p, o in zip(across, origins, strict=True)))
     gap = max(float(np.linalg.norm(p @ (point - o))) for p, o in zip(across, origins, strict=True))
-    return point if gap <= ALIGNED else None
+    return point if gap <= AXIS_TOLERANCE else None
 
 
 def _ball_name(model: Model, joints: tuple[int, int, int]) -> str:

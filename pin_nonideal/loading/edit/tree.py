@@ -21,7 +21,7 @@ from pin_nonideal.types import GeometryModel, Model, Table
 from .model import ball_chains, edit_joints
 
 # Maximum coordinate of a base [m or rad]; beyond it, floating-point rounding exceeds a tenth of a micrometer.
-FARTHEST = 1e9
+MAX_COORDINATE = 1e9
 
 
 def exchange_joints(robot: RobotFile, table: Table, where: str, notes: list[str], merge: bool) -> None:
@@ -86,8 +86,8 @@ def place_base(robot: RobotFile, table: Table, where: str) -> None:
         raise LoadingError(f"{where} must be a table with the keys xyz, rpy; got {entry!r}")
     check_keys(entry, ("xyz", "rpy"), where)
     xyz, rpy = (np.array(vector(entry.get(k, [0, 0, 0]), 3, f"{where}: {k}")) for k in ("xyz", "rpy"))
-    if np.abs([*xyz, *rpy]).max() > FARTHEST:
-        raise LoadingError(f"{where}: xyz and rpy must be at most {FARTHEST:g} (m, rad); got {entry!r}")
+    if np.abs([*xyz, *rpy]).max() > MAX_COORDINATE:
+        raise LoadingError(f"{where}: xyz and rpy must be at most {MAX_COORDINATE:g} (m, rad); got {entry!r}")
     base, model = pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz), robot.model
     for j in range(1, model.njoints):
         if model.parents[j] == 0:
@@ -133,7 +133,7 @@ def lock(
     return _reduced(robot, indices, q0, v0)
 
 
-def fix_idle(
+def fix_massless(
     robot: RobotFile, named: set[str], q0: NDArray[np.float64], v0: NDArray[np.float64], notes: list[str]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Fix the joints that move no inertia, unless a loop or another joint depends on them.
@@ -149,7 +149,7 @@ def fix_idle(
         Configuration and velocity of the remaining joints.
     """
     model = robot.model
-    idle = [j for j in range(1, model.njoints) if _moves_nothing(model, j)]
+    idle = [j for j in range(1, model.njoints) if _moves_no_inertia(model, j)]
     idle = [j for j in idle if not names_on(model, j) & named]
     leaders = {c.joint2 for c in robot.constraints if isinstance(c, JointCoupling)}
     names = {model.names[j] for j in idle}
@@ -164,7 +164,7 @@ def fix_idle(
     return _reduced(robot, idle, q0, v0)
 
 
-def _moves_nothing(model: Model, joint: int) -> bool:
+def _moves_no_inertia(model: Model, joint: int) -> bool:
     """Check if no link beyond a joint has mass or inertia, and no joint there has armature."""
     beyond = list(model.subtrees[joint])
     dofs = [i for j in beyond for i in range(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])]
@@ -196,7 +196,7 @@ def _reduced(
     return q, v
 
 
-def still_moves(model: Model, constraint: Any, where: str) -> bool:
+def has_joints(model: Model, constraint: Any, where: str) -> bool:
     """Check if the joints of a constraint in the robot's file still exist; without them it is satisfied.
 
     Args:

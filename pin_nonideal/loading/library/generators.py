@@ -13,7 +13,7 @@ from pin_nonideal.types import GeometryModel, Model, Placement
 from pin_nonideal.validation import count, nonnegative, number, positive
 
 THICKNESS = 0.03  # radius of a drawn rod, relative to its length
-MOST_WINDOWS = 10_000  # more joints would take Pinocchio minutes to add
+MAX_WINDOWS = 10_000  # more joints would take Pinocchio minutes to add
 
 
 def n_four_bar(
@@ -42,7 +42,7 @@ def n_four_bar(
     Source:
         IFToMM benchmark A02; Bayo and Avello, Nonlinear Dynamics 5 (1994) 209-231.
     """
-    N = count("n_four_bar: N", N, least=1, most=MOST_WINDOWS)
+    N = count("n_four_bar: N", N, least=1, most=MAX_WINDOWS)
     m, L = positive("n_four_bar: m", m), positive("n_four_bar: L", L)
     g, speed = nonnegative("n_four_bar: g", g), number("n_four_bar: speed", speed)
     model, visual = pin.Model(), pin.GeometryModel()

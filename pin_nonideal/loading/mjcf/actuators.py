@@ -18,7 +18,7 @@ from .tree import Tree
 
 NO_DYNAMICS, INTEGRATOR, FILTER, FILTER_EXACT = range(4)  # MuJoCo's mjtDyn
 FIXED, AFFINE = 0, 1  # MuJoCo's mjtGain; in mjtBias the same values mean none and affine
-LEAST_TIME = 1e-15  # minimum time constant of a filter [s], MuJoCo's mjMINVAL
+MIN_TIME_CONSTANT = 1e-15  # minimum time constant of a filter [s], MuJoCo's mjMINVAL
 
 Control = Array | Sequence[float] | Mapping[str, float] | Callable[..., object] | None
 
@@ -33,7 +33,7 @@ class Actuators:
 
     Args:
         tree: compiled model and its tree.
-        carried: index and transmission of each supported actuator.
+        supported: index and transmission of each supported actuator.
         compensation: generalized force of gravity compensation that acts through the drives of joints, (t, q,
             v) -> (nv,), or None.
         clamp: whether controls are clamped to their ranges.
@@ -47,19 +47,19 @@ class Actuators:
     def __init__(
         self,
         tree: Tree,
-        carried: list[tuple[int, Transmission]],
+        supported: list[tuple[int, Transmission]],
         compensation: Callable[[float, Array, Array], Array] | None,
         clamp: bool,
     ) -> None:
         m = self._m = tree.compiled
-        self._indices = np.array([i for i, _ in carried], dtype=int)
-        self._transmissions = [transmission for _, transmission in carried]
+        self._indices = np.array([i for i, _ in supported], dtype=int)
+        self._transmissions = [transmission for _, transmission in supported]
         self._compensation, self._clamp = compensation, clamp
         self.names = _control_names(m)
         self.ctrl: Array | Callable[..., object] = np.zeros(m.nu)
         self.act = np.zeros(m.na)
-        self._arms = np.zeros((len(carried), tree.model.nv))
-        self._lengths = np.zeros((len(carried), tree.model.nq))
+        self._arms = np.zeros((len(supported), tree.model.nv))
+        self._lengths = np.zeros((len(supported), tree.model.nq))
         self._curved = []
         for k, transmission in enumerate(self._transmissions):
             if isinstance(transmission, Geared) and isinstance(transmission.tendon, FixedTendon):
@@ -67,7 +67,7 @@ class Actuators:
                 self._lengths[k] = transmission.gear * transmission.tendon.coefficients
             else:
                 self._curved.append(k)
-        self._periods = [_period(m, i, t) for i, t in carried]
+        self._periods = [_period(m, i, t) for i, t in supported]
         joints = [j for j in range(m.njnt) if m.jnt_actfrclimited[j] and m.jnt_type[j] > 1]
         self._limited = np.array([m.jnt_dofadr[j] for j in joints], dtype=int)
         self._limits = np.array([m.jnt_actfrcrange[j] for j in joints]).reshape(-1, 2)
@@ -137,7 +137,7 @@ class Actuators:
             if kind == INTEGRATOR:
                 inputs[k] = self.act[start] + inputs[k] * t
             elif kind in (FILTER, FILTER_EXACT):
-                decay = math.exp(-t / max(LEAST_TIME, m.actuator_dynprm[i, 0]))
+                decay = math.exp(-t / max(MIN_TIME_CONSTANT, m.actuator_dynprm[i, 0]))
                 inputs[k] += (self.act[start] - inputs[k]) * decay
             if kind != NO_DYNAMICS and m.actuator_actlimited[i]:
                 inputs[k] = np.clip(inputs[k], *m.actuator_actrange[i])
@@ -212,7 +212,7 @@ def _period(m: Any, actuator: int, transmission: Transmission) -> float:
     return 0.0
 
 
-def acts(m: Any, actuator: int) -> bool:
+def can_produce_force(m: Any, actuator: int) -> bool:
     """Check if an actuator can produce a force.
 
     Args:
@@ -227,7 +227,7 @@ def acts(m: Any, actuator: int) -> bool:
     return not plain or bool(gains.any() or biases.any())
 
 
-def carriable(m: Any, actuator: int) -> bool:
+def is_supported(m: Any, actuator: int) -> bool:
     """Check if the force of an actuator depends on its control, length and rate only.
 
     Args:

@@ -15,9 +15,9 @@ import numpy as np
 from pin_nonideal.errors import LoadingError
 from pin_nonideal.loading.urdf.xml import read_text
 
-from .fields import CARRIED, CARRIED_OPTIONS
+from .fields import CONVERTED, CONVERTED_OPTIONS
 
-OLDEST = 4  # oldest supported major version of MuJoCo, because the fields of compiled models differ
+MIN_VERSION = 4  # oldest supported major version of MuJoCo, because the fields of compiled models differ
 PLACEHOLDER = 1e-3  # radius of the sphere that replaces a shape that is not read [m]
 
 
@@ -50,9 +50,9 @@ def mujoco_module(path: Path) -> Any:
             f'"{path}" is an MJCF file, which MuJoCo compiles, and mujoco cannot be imported ({error}); '
             "pip install 'pin-nonideal[mjcf]'"
         ) from None
-    if int(mujoco.__version__.split(".")[0]) < OLDEST:
+    if int(mujoco.__version__.split(".")[0]) < MIN_VERSION:
         raise LoadingError(
-            f'"{path}" needs mujoco {OLDEST} or newer; got {mujoco.__version__}; '
+            f'"{path}" needs mujoco {MIN_VERSION} or newer; got {mujoco.__version__}; '
             "pip install --upgrade 'pin-nonideal[mjcf]'"
         )
     return mujoco
@@ -69,21 +69,21 @@ def compile_mjcf(path: Path, *, meshes: bool = False) -> Compiled:
         LoadingError: the file is malformed, MuJoCo rejects it, or a mesh with mass is missing.
     """
     mujoco = mujoco_module(path)
-    _require_root(path)
+    _check_root(path)
     try:
         compiled = _compile(mujoco, path, meshes, probe=False)
     except LoadingError:
         if not meshes:
             raise
         compiled = _compile(mujoco, path, meshes, probe=True)
-    _require_numbers(compiled.model, path)
+    _check_finite(compiled.model, path)
     return compiled
 
 
 def _compile(mujoco: Any, path: Path, meshes: bool, *, probe: bool) -> Compiled:
     """Compile a file; with `probe`, also without the massless meshes that MuJoCo cannot read."""
     notes: list[str] = []
-    with warnings.catch_warnings(record=True) as caught, _heard(mujoco) as told:
+    with warnings.catch_warnings(record=True) as caught, _collected_warnings(mujoco) as messages:
         warnings.simplefilter("always")
         try:
             spec = mujoco.MjSpec.from_file(str(path))
@@ -94,34 +94,34 @@ def _compile(mujoco: Any, path: Path, meshes: bool, *, probe: bool) -> Compiled:
             model = spec.compile()
         except ValueError as error:
             raise LoadingError(f'"{path}" cannot be compiled by MuJoCo: {_one_line(error)}') from None
-    words = [" ".join(text.split()) for text in (*(str(one.message) for one in caught), *told)]
+    words = [" ".join(text.split()) for text in (*(str(one.message) for one in caught), *messages)]
     notes += [f"MuJoCo: {text}" for text in dict.fromkeys(words)]
     identities = [frozenset(int(g.id) for g in geoms) for geoms in (absent, unread)]
     return Compiled(model, identities[0], identities[1], notes)
 
 
 @contextmanager
-def _heard(mujoco: Any) -> Iterator[list[str]]:
+def _collected_warnings(mujoco: Any) -> Iterator[list[str]]:
     """Collect MuJoCo's warnings, which are otherwise printed and written to the working directory."""
-    told: list[str] = []
+    messages: list[str] = []
     before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(told.append)
+    mujoco.set_mju_user_warning(messages.append)
     try:
-        yield told
+        yield messages
     finally:
         mujoco.set_mju_user_warning(before)
 
 
-def _require_numbers(model: Any, path: Path) -> None:
+def _check_finite(model: Any, path: Path) -> None:
     """Check that a model contains no NaN, which MuJoCo accepts with a warning and treats as no range."""
-    fields = {f"option {name}": getattr(model.opt, name) for name in CARRIED_OPTIONS.split()}
-    fields |= {name: getattr(model, name) for name in CARRIED.split() if name != "opt"}
+    fields = {f"option {name}": getattr(model.opt, name) for name in CONVERTED_OPTIONS.split()}
+    fields |= {name: getattr(model, name) for name in CONVERTED.split() if name != "opt"}
     bad = [name for name, values in fields.items() if np.isnan(np.asarray(values, dtype=float)).any()]
     if bad:
         raise LoadingError(f'"{path}" must hold finite numbers; MuJoCo finds NaN in {", ".join(bad)}')
 
 
-def _require_root(path: Path) -> None:
+def _check_root(path: Path) -> None:
     """Check that an XML file is MJCF, because MuJoCo also reads URDF by other rules."""
     text = re.sub(r"<!--.*?(-->|\Z)|<\?.*?\?>", "", read_text(path), flags=re.DOTALL)
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
@@ -162,7 +162,7 @@ def _assets(
     broken = {_shape(a) for a in assets if probe and not _is_readable(mujoco, a, places.get(_shape(a)))}
     files = {_shape(asset): asset.file for asset in assets}
     absent, unread = [], []
-    wrapping = _wrapping(mujoco, spec)
+    wrapping = _wrapped_geoms(mujoco, spec)
     for geom in spec.geoms:
         shape = geom.meshname or geom.hfieldname
         if not shape:
@@ -251,7 +251,7 @@ def _homes(path: Path) -> list[Path]:
     return list(homes)
 
 
-def _wrapping(mujoco: Any, spec: Any) -> set[str]:
+def _wrapped_geoms(mujoco: Any, spec: Any) -> set[str]:
     """Return the names of the geoms that tendons wrap around; missing geoms are ignored."""
     around = (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER)
     wraps = [w for tendon in spec.tendons for w in tendon.path if w.type in around]

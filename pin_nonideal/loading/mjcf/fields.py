@@ -6,7 +6,7 @@ them.
 
 from __future__ import annotations
 
-CARRIED = """
+CONVERTED = """
 opt qpos0 qpos_spring body_parentid body_jntnum body_jntadr body_pos body_quat body_ipos body_iquat
 body_mass body_inertia body_gravcomp jnt_type jnt_qposadr jnt_dofadr jnt_bodyid jnt_actuatorid jnt_limited
 jnt_range jnt_pos jnt_axis jnt_stiffness jnt_stiffnesspoly jnt_actfrclimited jnt_actfrcrange jnt_actgravcomp
@@ -23,7 +23,7 @@ actuator_ctrllimited actuator_ctrlrange actuator_gear key_qpos key_qvel key_act 
 pair_geom2 exclude_signature nq nv nu nactuator na nbody njnt ngeom nsite neq ntendon nkey npair nexclude
 nout nwrap
 """
-TOLD = """
+REPORTED = """
 body_mocapid body_plugin jnt_plasticadr jnt_springyield tree_sleep_policy geom_plugin geom_surfacevel
 geom_adhesion geom_margin geom_gap geom_condim geom_priority geom_solmix geom_solref geom_solimp jnt_solref
 jnt_solimp jnt_margin dof_solref dof_solimp eq_solref eq_solimp pair_dim pair_solref pair_solreffriction
@@ -36,7 +36,7 @@ flg_adhesion flg_surfacevel nsensor
 """
 # Prefixes of fields: of flexes, which are reported as a whole, and of fields for display or measurement only.
 FLEX = ("flex_", "flexedge_", "nflex", "efm0", "efmC", "nefm")
-IDLE = """
+IGNORED = """
 cam light mat mesh skin tex text tuple numeric sensor bvh oct vis stat hfield name names paths key_time
 nuser nname npath ncam nlight nmat nmesh nskin ntex ntuple nnumeric nsensor nbvh noct nhfield nplugin
 nhistory geom_rgba geom_group geom_matid geom_user geom_castshadow site_type site_size site_rgba site_group
@@ -54,15 +54,15 @@ tree_bodynum tree_dofadr tree_dofnum geom_sameframe geom_aabb geom_rbound site_s
 tendon_treeid ten_J_rownnz ten_J_rowadr ten_J_colind tendon_invweight0 actuator_outnum actuator_historyadr
 actuator_length0 pair_signature flg_gravcomp ngravcomp
 """
-CARRIED_OPTIONS = "gravity wind density viscosity disableflags disableactuator"
-TOLD_OPTIONS = "enableflags o_friction o_margin o_solimp o_solref impratio cone timestep integrator"
-IDLE_OPTIONS = """
+CONVERTED_OPTIONS = "gravity wind density viscosity disableflags disableactuator"
+REPORTED_OPTIONS = "enableflags o_friction o_margin o_solimp o_solref impratio cone timestep integrator"
+IGNORED_OPTIONS = """
 magnetic tolerance ls_tolerance noslip_tolerance ccd_tolerance sleep_tolerance jacobian solver iterations
 ls_iterations noslip_iterations ccd_iterations sdf_initpoints sdf_iterations
 """
 
 
-def known(field: str) -> bool:
+def is_listed(field: str) -> bool:
     """Check if a field of mjModel is in one of the lists."""
-    listed = {*CARRIED.split(), *TOLD.split(), *DERIVED.split()}
-    return field in listed or field.startswith((*FLEX, *IDLE.split()))
+    listed = {*CONVERTED.split(), *REPORTED.split(), *DERIVED.split()}
+    return field in listed or field.startswith((*FLEX, *IGNORED.split()))

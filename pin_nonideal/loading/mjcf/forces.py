@@ -14,10 +14,10 @@ from pin_nonideal.description.laws import JointFriction, UserFriction, UserLaw
 from pin_nonideal.types import Array, Placement
 
 from .motion import Motion
-from .tendons import Level, polynomial
+from .tendons import ConstantForce, polynomial
 from .tree import BALL, FREE, Tree, actuator_share, placement, translation
 
-LEAST_MASS = 1e-15  # [kg] and [kg m^2]: MuJoCo's mjMINVAL; its fluid model ignores lighter bodies
+MIN_MASS = 1e-15  # [kg] and [kg m^2]: MuJoCo's mjMINVAL; its fluid model ignores lighter bodies
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,13 +222,13 @@ def joint_resistance(tree: Tree, *, dampers: bool, friction: bool) -> list[Any]:
             if kind == FREE:
                 rest.floating.append((int(m.jnt_qposadr[j]) + 3, first))
         if kind <= BALL:
-            laws += _dry_freedoms(tree, j, dofs, dry)
+            laws += _dof_friction(tree, j, dofs, dry)
     if rest.dofs:
         laws.append(UserLaw(rest, reaction=None, name="damping"))
     return laws
 
 
-def _dry_freedoms(tree: Tree, j: int, dofs: range, dry: list[float]) -> list[Any]:
+def _dof_friction(tree: Tree, j: int, dofs: range, dry: list[float]) -> list[Any]:
     """Return separate dry friction for each degree of freedom of a ball or free joint, as in MuJoCo."""
     at = int(tree.compiled.jnt_qposadr[j]) + 3
     laws = []
@@ -236,7 +236,9 @@ def _dry_freedoms(tree: Tree, j: int, dofs: range, dry: list[float]) -> list[Any
         if level > 0.0:
             world = len(dofs) == 6 and k < 3
             direction = DofDirection(dof, dofs[0] if world else -1, at, tree.model.nv)
-            laws.append(UserFriction(direction, Level(level), name=f"{tree.joint_name(j)} friction {k}"))
+            laws.append(
+                UserFriction(direction, ConstantForce(level), name=f"{tree.joint_name(j)} friction {k}")
+            )
     return laws
 
 
@@ -306,9 +308,9 @@ def fluid_forces(tree: Tree) -> list[Any]:
     boxes = []
     for body in range(1, m.nbody):
         mass, moments = float(m.body_mass[body]), np.array(m.body_inertia[body])
-        if mass < LEAST_MASS or body in elliptic or tree.bodies[body][0] == 0:
+        if mass < MIN_MASS or body in elliptic or tree.bodies[body][0] == 0:
             continue
-        edges = np.sqrt(np.maximum(LEAST_MASS, moments.sum() - 2.0 * moments) / mass * 6.0)
+        edges = np.sqrt(np.maximum(MIN_MASS, moments.sum() - 2.0 * moments) / mass * 6.0)
         boxes.append((*tree.on_body(body, placement(m.body_ipos[body], m.body_iquat[body])), edges))
     law = Fluid(tree.motion, boxes, float(m.opt.density), float(m.opt.viscosity), np.array(m.opt.wind))
     return [UserLaw(law, reaction=None, name="fluid")] if boxes else []

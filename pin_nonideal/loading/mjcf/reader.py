@@ -16,7 +16,7 @@ from pin_nonideal.loading.urdf.geometry_sources import Shapes
 from pin_nonideal.loading.urdf.reader import Keyframe, RobotFile
 from pin_nonideal.types import GeometryModel
 
-from .actuators import Actuators, Control, acts, carriable
+from .actuators import Actuators, Control, can_produce_force, is_supported
 from .compile import compile_mjcf, mujoco_module
 from .equality import read_equality
 from .forces import (
@@ -32,7 +32,7 @@ from .shapes import geom_names, read_shapes
 from .tendons import read_tendons, tendon_forces
 from .transmissions import read_transmission
 from .tree import Tree, build_tree
-from .unsupported import Told, tell
+from .unsupported import UnsupportedFeatures, report_unsupported
 
 
 def read_mjcf(path: Path, *, allow: Collection[str] = (), ctrl: Control = None) -> RobotFile:
@@ -49,9 +49,9 @@ def read_mjcf(path: Path, *, allow: Collection[str] = (), ctrl: Control = None) 
     """
     mujoco = mujoco_module(path)
     compiled, absent, _, notes = compile_mjcf(path)
-    told = Told(f'"{path}"', allow, notes)
-    robot, tree = translate(mujoco, compiled, path.stem, told)
-    told.require()
+    unsupported = UnsupportedFeatures(f'"{path}"', allow, notes)
+    robot, tree = translate(mujoco, compiled, path.stem, unsupported)
+    unsupported.raise_if_active()
     later: list[str] = []
     again = cache(partial(_with_meshes, path, later))
     drawn, solid = (cache(partial(_shapes, mujoco, again, absent, visual=kind)) for kind in (True, False))
@@ -65,23 +65,25 @@ def read_mjcf(path: Path, *, allow: Collection[str] = (), ctrl: Control = None) 
     return robot
 
 
-def translate(mujoco: Any, compiled: Any, name: str, told: Told) -> tuple[RobotFile, Tree]:
+def translate(
+    mujoco: Any, compiled: Any, name: str, unsupported: UnsupportedFeatures
+) -> tuple[RobotFile, Tree]:
     """Return a compiled model as a robot.
 
     Args:
         mujoco: Python package.
         compiled: mujoco.MjModel.
         name: name of a model without a name.
-        told: receives the unsupported features.
+        unsupported: receives the unsupported features.
     """
     flags, off = int(compiled.opt.disableflags), mujoco.mjtDisableBit
     springs, dampers = not flags & off.mjDSBL_SPRING, not flags & off.mjDSBL_DAMPER
     friction = not flags & (off.mjDSBL_FRICTIONLOSS | off.mjDSBL_CONSTRAINT)
     tree = build_tree(mujoco, compiled, name)
     tendons = read_tendons(tree)
-    tell(mujoco, tree, tendons, told)
+    report_unsupported(mujoco, tree, tendons, unsupported)
     laws, forces = tendon_forces(tree, tendons, springs=springs, dampers=dampers, friction=friction)
-    robot = RobotFile(tree.model, notes=told.notes, q0=tree.q(compiled.qpos0))
+    robot = RobotFile(tree.model, notes=unsupported.notes, q0=tree.q(compiled.qpos0))
     robot.laws = [*joint_resistance(tree, dampers=dampers, friction=friction), *laws]
     robot.forces = [*(joint_springs(tree) if springs else ()), *forces, *floating_armature(tree)]
     through_drives = None
@@ -93,7 +95,7 @@ def translate(mujoco: Any, compiled: Any, name: str, told: Told) -> tuple[RobotF
         rows = [read_equality(tree, i, tendons) for i in np.flatnonzero(compiled.eq_active0).tolist()]
         robot.constraints = [row for row in rows if row is not None]
     elif compiled.neq:
-        told.note("the file's flags switch its equalities off")
+        unsupported.add_note("the file's flags switch its equalities off")
     if compiled.nactuator and not flags & off.mjDSBL_ACTUATION:
         robot.actuation = _actuators(tree, tendons, through_drives, not flags & off.mjDSBL_CLAMPCTRL)
     robot.to_float = "give a body a <freejoint/>"
@@ -108,7 +110,7 @@ def _actuators(
     tree: Tree, tendons: list[Tendon | None], compensation: GravityCompensation | None, clamp: bool
 ) -> Actuators:
     m = tree.compiled
-    working = [a for a in range(m.nactuator) if acts(m, a) and carriable(m, a)]
+    working = [a for a in range(m.nactuator) if can_produce_force(m, a) and is_supported(m, a)]
     carried = [(a, read_transmission(tree, a, tendons)) for a in working]
     return Actuators(tree, [(a, t) for a, t in carried if t is not None], compensation, clamp)
 

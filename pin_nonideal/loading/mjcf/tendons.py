@@ -110,7 +110,7 @@ class TendonDirection:
 
 
 @dataclass(frozen=True)
-class Level:
+class ConstantForce:
     """Constant friction force."""
 
     value: float
@@ -160,7 +160,7 @@ def tendon_forces(
             damper = TendonDamper(tendon, damping, np.array(damp_poly))
             laws.append(UserLaw(damper, reaction=None, name=f"{name} damping"))
         if friction and m.tendon_frictionloss[i] > 0.0:
-            level = Level(float(m.tendon_frictionloss[i]))
+            level = ConstantForce(float(m.tendon_frictionloss[i]))
             laws.append(UserFriction(TendonDirection(tendon), level, name=f"{name} friction"))
     return laws, forces
 

@@ -162,7 +162,9 @@ def _add_body(tree: Tree, body: int, joint_names: list[str]) -> tuple[int, Place
         anchor = translation(m.jnt_pos[j])
         if m.jnt_type[j] == FREE:  # its coordinates are the body's pose in the world
             place, anchor = pin.SE3.Identity(), pin.SE3.Identity()
-        carrier = model.addJoint(carrier, _joint(m, j), place * anchor * _back_to_zero(m, j), joint_names[j])
+        carrier = model.addJoint(
+            carrier, _joint(m, j), place * anchor * _reference_offset(m, j), joint_names[j]
+        )
         model.addJointFrame(carrier)
         place = anchor.inverse()
         _set_limits(model, m, j, carrier)
@@ -186,7 +188,7 @@ def _joint(m: Any, j: int) -> JointModel:
     return (pin.JointModelRevoluteUnaligned if kind == HINGE else pin.JointModelPrismaticUnaligned)(axis)
 
 
-def _back_to_zero(m: Any, j: int) -> Placement:
+def _reference_offset(m: Any, j: int) -> Placement:
     """Return the placement from the reference pose of the file to the pose at coordinate zero."""
     axis, reference = np.array(m.jnt_axis[j]), float(m.qpos0[m.jnt_qposadr[j]])
     if m.jnt_type[j] == HINGE:

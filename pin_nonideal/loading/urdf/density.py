@@ -13,10 +13,10 @@ from .xml import listed, numbers
 
 # Minimum volume of a closed mesh, relative to its bounding box. Meshes with less volume are replaced by the
 # box.
-CLOSED_PART = 1e-3
+MIN_CLOSED_VOLUME = 1e-3
 
 
-def without_inertia(root: ElementTree.Element) -> list[str]:
+def links_without_inertia(root: ElementTree.Element) -> list[str]:
     """Return the names of moving links with a shape and without an inertia.
 
     Args:
@@ -40,7 +40,7 @@ def add_inertias(root: ElementTree.Element, density: float, notes: list[str]) ->
         density: density of these links [kg/m^3].
         notes: receives notes on the links.
     """
-    names = without_inertia(root)
+    names = links_without_inertia(root)
     boxes: list[str] = []
     for link in root.findall("link"):
         name = str(link.get("name"))
@@ -98,7 +98,7 @@ def _mesh(element: ElementTree.Element, where: str, boxes: list[str], link: str)
     moments = solid.computeMomentofInertiaRelatedToCOM()
     if volume < 0.0:  # mesh with inverted orientation
         volume, moments = -volume, -moments
-    if volume > CLOSED_PART * box.computeVolume() and np.linalg.eigvalsh(moments)[0] > 0.0:
+    if volume > MIN_CLOSED_VOLUME * box.computeVolume() and np.linalg.eigvalsh(moments)[0] > 0.0:
         return volume, center, moments
     boxes.append(link)
     return box.computeVolume(), (low + high) / 2.0, box.computeMomentofInertiaRelatedToCOM()

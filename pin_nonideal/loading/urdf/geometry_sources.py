@@ -11,7 +11,7 @@ from typing import Any
 from pin_nonideal.types import GeometryModel
 
 # Maximum number of models and shapes that stay cached for the next robot from the same files.
-MOST_KEPT = 8
+MAX_CACHED = 8
 
 
 class Shapes:
@@ -38,7 +38,7 @@ class Shapes:
         return Shapes(lambda: edit(self._read()), self.notes)
 
 
-class Kept:
+class FileCache:
     """Cache of data from files by their content, without the least recently used entries."""
 
     def __init__(self) -> None:
@@ -59,15 +59,15 @@ class Kept:
         found = read()
         with self._lock:
             self._found[content] = found
-            while len(self._found) > MOST_KEPT:
+            while len(self._found) > MAX_CACHED:
                 self._found.popitem(last=False)
         return found
 
 
-kept_models, kept_shapes = Kept(), Kept()
+cached_models, cached_shapes = FileCache(), FileCache()
 
 
-def stamps(files: Iterable[str | os.PathLike[str]]) -> tuple[tuple[str, int, int], ...]:
+def file_stamps(files: Iterable[str | os.PathLike[str]]) -> tuple[tuple[str, int, int], ...]:
     """Return name, modification time and size of files, as a key of their content.
 
     Args:

@@ -24,15 +24,15 @@ from pin_nonideal.types import Array, Model
 # Rounding error of rows of A, and of singular values of its rows at unit length. Values between this bound
 # and the assembly tolerance result from rounded frames.
 ROUNDING = 1e-11
-MOST_ROWS = 200  # for the rank decision on a dense matrix
-PROBES = 3  # closed configurations at which the rank is computed, since a single one can be singular
+MAX_ROWS = 200  # for the rank decision on a dense matrix
+MAX_PROBES = 3  # closed configurations at which the rank is computed, since a single one can be singular
 # larger singular values need no note; values between the tolerance and this bound indicate links of nearly
 # equal length
-TOLD = 1e-4
-REACH = 0.2  # range of the probes [m or rad]
+MAX_NOTED = 1e-4
+PROBE_RANGE = 0.2  # range of the probes [m or rad]
 
 
-class Relaxed(NamedTuple):
+class IndependentRows(NamedTuple):
     """Constraints of a scene without the rows that depend on others within the assembly tolerance.
 
     Attributes:
@@ -54,7 +54,7 @@ class Relaxed(NamedTuple):
 _Points = tuple[PointAnchor, ...]
 
 
-def relaxed(scene: Scene, tolerance: float) -> Relaxed | None:
+def remove_dependent_rows(scene: Scene, tolerance: float) -> IndependentRows | None:
     """Return the constraints of a scene with rounded loops, or None if no row depends on rounding.
 
     Args:
@@ -65,35 +65,30 @@ def relaxed(scene: Scene, tolerance: float) -> Relaxed | None:
     program = compiled_scene(scene).program
     holonomic = all(holds for c in program.constraints for holds in c.holonomic)
     looped = [isinstance(c, (PointAnchor, JointCoupling, FrameAnchor)) for c in constraints]
-    if (
-        sum(looped) < 2
-        or not holonomic
-        or len(program.constraints) != len(looped)
-        or program.rows > MOST_ROWS
-    ):
+    if sum(looped) < 2 or not holonomic or len(program.constraints) != len(looped) or program.rows > MAX_ROWS:
         return None
     kept, q, gap, nearly = _independent_rows(scene, program, tolerance)
     if kept is None:
-        return Relaxed(scene.model, constraints, scene.q0, nearly) if nearly else None
-    model, welds = _by_points(scene.model, constraints, [c.name for c in program.constraints])
+        return IndependentRows(scene.model, constraints, scene.q0, nearly) if nearly else None
+    model, welds = _split_welds(scene.model, constraints, [c.name for c in program.constraints])
     if welds:
         split = [part for c in constraints for part in (welds.get(id(c), (c,)))]
         scene = Scene(model, constraints=split, q0=scene.q0, assembly_tolerance=tolerance)
         program = compiled_scene(scene).program
         kept, q, gap, nearly = _independent_rows(scene, program, tolerance)
         if kept is None:
-            return Relaxed(model, constraints, scene.q0, nearly) if nearly else None
-    left, gone = _remaining(constraints, welds, program, kept)
+            return IndependentRows(model, constraints, scene.q0, nearly) if nearly else None
+    left, gone = _remaining_constraints(constraints, welds, program, kept)
     if not gone:
         return None
     note = (
         f"loops close to {gap:.1e} m or rad, within the tolerance of the assembly ({tolerance:g}): rows "
         f"{', '.join(gone)} depend on others and are left out"
     )
-    return Relaxed(model, left, q, "; ".join(filter(None, (note, nearly))))
+    return IndependentRows(model, left, q, "; ".join(filter(None, (note, nearly))))
 
 
-def _by_points(model: Model, constraints: list[Any], names: list[str]) -> tuple[Model, dict[int, _Points]]:
+def _split_welds(model: Model, constraints: list[Any], names: list[str]) -> tuple[Model, dict[int, _Points]]:
     """Return the model with frames for the points of all two-frame welds, and the points by the weld's id."""
     welds: dict[int, _Points] = {}
     model = model.copy()
@@ -113,7 +108,7 @@ def _by_points(model: Model, constraints: list[Any], names: list[str]) -> tuple[
     return model, welds
 
 
-def _remaining(
+def _remaining_constraints(
     constraints: list[Any], welds: dict[int, _Points], program: core.Program, kept: NDArray[np.bool_]
 ) -> tuple[list[Any], list[str]]:
     """Return the remaining constraints, and descriptions of removed rows; complete welds stay welds."""
@@ -128,7 +123,7 @@ def _remaining(
             rows = next(described)
             mine = kept[first : first + rows.count]
             first += rows.count
-            stays = part if mine.all() else _part(part, mine)
+            stays = part if mine.all() else _select_rows(part, mine)
             if stays is not None:
                 remaining.append(stays)
             if stays is not part:
@@ -137,7 +132,7 @@ def _remaining(
     return left, gone
 
 
-def _part(c: Any, kept: NDArray[np.bool_]) -> Any:
+def _select_rows(c: Any, kept: NDArray[np.bool_]) -> Any:
     """Return a constraint with some of its rows, or None without rows; unchanged if it cannot be divided."""
     if not kept.any():
         return None
@@ -161,11 +156,11 @@ def _independent_rows(
     generator = np.random.default_rng(5)
     independent, rank, rounded, least = _independent(model, runner, q, tolerance)
     nearest = [least]
-    for _ in range(PROBES):
+    for _ in range(MAX_PROBES):
         free = _null_space(model, runner, q, tolerance)
         if not free.shape[1]:
             break
-        step = free @ generator.uniform(-REACH, REACH, free.shape[1])
+        step = free @ generator.uniform(-PROBE_RANGE, PROBE_RANGE, free.shape[1])
         probe, apart = nearest_closure(model, program, runner, pin.integrate(model, q, step), tolerance)
         if apart <= tolerance:
             found = _independent(model, runner, probe, tolerance)
@@ -174,11 +169,11 @@ def _independent_rows(
             if found[1] > rank:
                 independent, rank = found[:2]
     nearly, apart = "", max(nearest)
-    if apart <= TOLD:
+    if apart <= MAX_NOTED:
         nearly = (
             f"rows of the loops depend on others to {apart:.1e} m or rad, beyond the tolerance of the "
             f"assembly ({tolerance:g}): they may lock what should move; "
-            f"load(..., assembly_tolerance={TOLD:g}) leaves such rows out"
+            f"load(..., assembly_tolerance={MAX_NOTED:g}) leaves such rows out"
         )
     return (independent if rounded or gap > CLOSURE_TOLERANCE else None), q, gap, nearly
 

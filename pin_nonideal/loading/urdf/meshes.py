@@ -15,10 +15,10 @@ from .xml import listed, numbers
 
 SCHEMES = ("package://", "model://")
 MESHES = "meshes"  # folder of a package in which meshes of broken paths are searched
-HIGHEST = 3  # maximum number of folders above the robot's file that are searched as its package
+MAX_PARENTS = 3  # maximum number of folders above the robot's file that are searched as its package
 
 
-class Found(NamedTuple):
+class FoundMesh(NamedTuple):
     """Path of a mesh file.
 
     Attributes:
@@ -59,7 +59,7 @@ def resolve_meshes(root: ElementTree.Element, path: Path, package_dirs: Sequence
                     link.remove(shape)
                     continue
                 mesh.set("filename", str(found.path))
-                meter = unit_of(found.path)
+                meter = mesh_unit(found.path)
                 if meter != 1.0:
                     scale = numbers(mesh, "scale", 3, (1, 1, 1), f'link "{link.get("name")}"')
                     mesh.set("scale", " ".join(repr(float(x)) for x in meter * scale))
@@ -79,7 +79,7 @@ def resolve_meshes(root: ElementTree.Element, path: Path, package_dirs: Sequence
     return notes
 
 
-def unit_of(path: Path) -> float:
+def mesh_unit(path: Path) -> float:
     """Return the unit of length of a mesh file [m]: from a COLLADA file as in RViz, else 1.
 
     The up axis of the file has no effect, as in RViz. The other formats state no unit.
@@ -104,7 +104,7 @@ def unit_of(path: Path) -> float:
 
 def find_mesh(
     filename: str, folder: Path, package_dirs: Sequence[str | Path], files: Callable[[Path], Sequence[Path]]
-) -> Found | None:
+) -> FoundMesh | None:
     """Return the path of a mesh, or None.
 
     Args:
@@ -122,20 +122,20 @@ def find_mesh(
     else:
         package, _, rest = inner.partition("/")
         rest = rest or inner
-        homes = _homes(home, package_dirs)
-        named = _named(home, package)
+        homes = _package_roots(home, package_dirs)
+        named = _named_packages(home, package)
         candidates = [folder / inner, folder / rest]
         candidates += [base / inner for base in homes]
         candidates += [base / rest for base in (*map(Path, package_dirs), *home.parents[:2], *named)]
         packages = [*(base / package for base in homes), *named]
     whole = next((c.resolve() for c in candidates if c.is_file()), None)
     if whole is not None:
-        return Found(whole, False)
-    for bases in (packages, (home, *home.parents[:HIGHEST])):
+        return FoundMesh(whole, False)
+    for bases in (packages, (home, *home.parents[:MAX_PARENTS])):
         meshes = next((base / MESHES for base in bases if (base / MESHES).is_dir()), None)
         ending = None if meshes is None else _by_ending(files(meshes), inner)
         if ending is not None:
-            return Found(ending, True)
+            return FoundMesh(ending, True)
     return None
 
 
@@ -148,16 +148,16 @@ def package_folder(name: str, folder: Path, package_dirs: Sequence[str | Path]) 
         package_dirs: additional folders that hold packages.
     """
     home = folder.resolve()
-    candidates = [*(base / name for base in _homes(home, package_dirs)), *_named(home, name)]
+    candidates = [*(base / name for base in _package_roots(home, package_dirs)), *_named_packages(home, name)]
     return next((c.resolve() for c in candidates if c.is_dir()), None)
 
 
-def _homes(home: Path, package_dirs: Sequence[str | Path]) -> list[Path]:
+def _package_roots(home: Path, package_dirs: Sequence[str | Path]) -> list[Path]:
     """Return the folders that can hold packages by their names."""
     return [*map(Path, package_dirs), *_ros_folders(), *home.parents]
 
 
-def _named(home: Path, package: str) -> list[Path]:
+def _named_packages(home: Path, package: str) -> list[Path]:
     """Return the folders above a robot's file that are a package, independent of their own names."""
     return [base for base in (home, *home.parents) if _is_package(base, package)]
 

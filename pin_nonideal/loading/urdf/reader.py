@@ -20,10 +20,10 @@ from pin_nonideal.description.time_functions import Constant
 from pin_nonideal.errors import LoadingError, nearest
 from pin_nonideal.types import Array, GeometryModel, Model
 
-from .density import add_inertias, without_inertia
-from .geometry_sources import Shapes, kept_models, kept_shapes, stamps
+from .density import add_inertias, links_without_inertia
+from .geometry_sources import Shapes, cached_models, cached_shapes, file_stamps
 from .meshes import resolve_meshes
-from .repair import tidy
+from .repair import repair_urdf
 from .validation import check_urdf
 from .xacro import urdf_text
 from .xml import listed, numbers, parse_xml, read_text
@@ -106,21 +106,21 @@ def read_urdf(
     root = parse_xml(urdf_text(path, package_dirs), path, "robot")
     name = root.get("name") or path.parent.name
     root.set("name", name)
-    notes = tidy(root)
+    notes = repair_urdf(root)
     check_urdf(root, path, ("universe", "root_joint") if free_flyer else ("universe",))
-    shaped = without_inertia(root)
+    shaped = links_without_inertia(root)
     notes += resolve_meshes(root, path, package_dirs)
-    bare = without_inertia(root)
+    bare = links_without_inertia(root)
     if density is not None:
         add_inertias(root, density, notes)
     xml = ElementTree.tostring(root, encoding="unicode")
     try:
-        model = kept_models((xml, free_flyer), lambda: _model(xml, free_flyer)).copy()
+        model = cached_models((xml, free_flyer), lambda: _model(xml, free_flyer)).copy()
     except (ValueError, RuntimeError) as error:
         raise LoadingError(f'"{path}" cannot be read by Pinocchio: {error}') from None
-    _keep_dynamics(model, root, path)
-    _turn_planes(model, root, path, notes)
-    notes += _unused(root)
+    _set_dynamics(model, root, path)
+    _rotate_planar_joints(model, root, path, notes)
+    notes += _unused_notes(root)
     visual, collision = (
         _shapes(model.copy(), root, path, kind, free_flyer) for kind in ("visual", "collision")
     )
@@ -154,15 +154,15 @@ def _shapes(model: Model, root: ElementTree.Element, path: Path, kind: str, free
     @cache
     def shapes() -> GeometryModel:
         meshes = (mesh.get("filename", "") for mesh in root.iter("mesh"))
-        content = (ElementTree.tostring(root), free_flyer, kind, stamps(meshes))
-        geometry, dropped = kept_shapes(content, read)
+        content = (ElementTree.tostring(root), free_flyer, kind, file_stamps(meshes))
+        geometry, dropped = cached_shapes(content, read)
         notes.extend(dropped)
         return geometry.copy()
 
     return Shapes(shapes, notes)
 
 
-def _keep_dynamics(model: Model, root: ElementTree.Element, path: Path) -> None:
+def _set_dynamics(model: Model, root: ElementTree.Element, path: Path) -> None:
     """Set damping and friction of planar and floating joints, which Pinocchio's reader ignores."""
     for joint in root.findall("joint"):
         dynamics, name = joint.find("dynamics"), joint.get("name", "")
@@ -175,7 +175,7 @@ def _keep_dynamics(model: Model, root: ElementTree.Element, path: Path) -> None:
         model.upperDryFrictionLimit[dofs], model.lowerDryFrictionLimit[dofs] = friction, -friction
 
 
-def _turn_planes(model: Model, root: ElementTree.Element, path: Path, notes: list[str]) -> None:
+def _rotate_planar_joints(model: Model, root: ElementTree.Element, path: Path, notes: list[str]) -> None:
     """Rotate planar joints into the plane normal to their axis; Pinocchio's reader uses x-y for all."""
     up = np.array([0.0, 0.0, 1.0])
     for joint in root.findall("joint"):
@@ -203,17 +203,17 @@ def _turn_planes(model: Model, root: ElementTree.Element, path: Path, notes: lis
         )
 
 
-def _unused(root: ElementTree.Element) -> list[str]:
+def _unused_notes(root: ElementTree.Element) -> list[str]:
     """Return notes on limits of effort and velocity, and on transmission ratios."""
     notes = []
     limits = [j.find("limit") for j in root.findall("joint") if j.get("type") != "fixed"]
-    told = []
+    limited = []
     for key in ("effort", "velocity"):
         bounded = sum(float(numbers(limit, key, 1, (0,), "limit")[0]) > 0.0 for limit in limits)
         if bounded:
-            told.append(f"the {key} of {bounded} joints (scene.model.upper{key.capitalize()}Limit)")
-    if told:
-        notes.append(f"bounds of {' and '.join(told)} are not enforced")
+            limited.append(f"the {key} of {bounded} joints (scene.model.upper{key.capitalize()}Limit)")
+    if limited:
+        notes.append(f"bounds of {' and '.join(limited)} are not enforced")
     geared = [
         str(t.get("name"))
         for t in root.findall("transmission")

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from .unread_tags import tell_unread
+from .unread_tags import unread_notes
 from .validation import SHAPES
 from .xml import listed
 
@@ -17,14 +17,14 @@ ROBOT = ("link", "joint", "material", "transmission")
 VERSION = "1.1"  # version of URDF; without it, Pinocchio's parser ignores capsules and quaternions
 WORLD = "world"  # link that many files use without declaring it
 INFINITE = ("inf", "-inf", "+inf", "infinity", "-infinity", "+infinity")  # limits without a bound
-LEFT_OUT = "{"  # beginning of tags with a namespace
+NAMESPACE_MARK = "{"  # beginning of tags with a namespace
 # Maximum rounding error of principal moments, relative to the mass times (1 m)^2.
-LEAST_INERTIA = 1e-12
+INERTIA_ROUNDING = 1e-12
 # tolerance by which a principal moment may exceed the sum of the others, since files round them
-UNBALANCED = 1e-2
+INERTIA_TOLERANCE = 1e-2
 
 
-def tidy(root: ElementTree.Element) -> list[str]:
+def repair_urdf(root: ElementTree.Element) -> list[str]:
     """Correct defects of a URDF file that do not affect the motion.
 
     Args:
@@ -33,7 +33,7 @@ def tidy(root: ElementTree.Element) -> list[str]:
     Returns:
         Notes on the corrections.
     """
-    notes = [*_foreign(root), *_stray_shapes(root), *tell_unread(root), *_world(root)]
+    notes = [*_remove_foreign(root), *_remove_stray_shapes(root), *unread_notes(root), *_world(root)]
     root.set("version", VERSION)
     for number, material in enumerate(root.iter("material")):
         if not material.get("name"):
@@ -53,7 +53,7 @@ def tidy(root: ElementTree.Element) -> list[str]:
     return notes + _inertias(root) + _limits(root)
 
 
-def _foreign(root: ElementTree.Element) -> list[str]:
+def _remove_foreign(root: ElementTree.Element) -> list[str]:
     """Remove elements of other tools and of other namespaces."""
     found: dict[str, None] = {}
     for element in list(root):
@@ -61,17 +61,17 @@ def _foreign(root: ElementTree.Element) -> list[str]:
             found[str(element.tag).rpartition("}")[2]] = None
             root.remove(element)
     for parent in list(root.iter()):
-        for child in [c for c in parent if str(c.tag).startswith(LEFT_OUT)]:
+        for child in [c for c in parent if str(c.tag).startswith(NAMESPACE_MARK)]:
             found[str(child.tag).rpartition("}")[2]] = None
             parent.remove(child)
-        for key in [k for k in parent.attrib if k.startswith(LEFT_OUT)]:
+        for key in [k for k in parent.attrib if k.startswith(NAMESPACE_MARK)]:
             del parent.attrib[key]
     return (
         [f"elements of other tools are not read: {', '.join(f'<{tag}>' for tag in found)}"] if found else []
     )
 
 
-def _stray_shapes(root: ElementTree.Element) -> list[str]:
+def _remove_stray_shapes(root: ElementTree.Element) -> list[str]:
     """Remove elements of a `<geometry>` other than its shape."""
     lost: dict[str, None] = {}
     for link in root.findall("link"):
@@ -177,12 +177,12 @@ def _inertias(root: ElementTree.Element) -> list[str]:
         if not np.isfinite(moments).all():
             continue
         values, axes = np.linalg.eigh(moments)
-        if -LEAST_INERTIA * max(scale, values[2]) <= values[0] < 0.0:
+        if -INERTIA_ROUNDING * max(scale, values[2]) <= values[0] < 0.0:
             moments = axes @ np.diag(np.maximum(values, 0.0)) @ axes.T
             for key, value in zip(keys, moments[np.triu_indices(3)], strict=True):
                 element.set(key, repr(float(value)))
             rounded.append(str(link.get("name")))
-        elif values[0] >= 0.0 and values[2] > (1.0 + UNBALANCED) * (values[0] + values[1]):
+        elif values[0] >= 0.0 and values[2] > (1.0 + INERTIA_TOLERANCE) * (values[0] + values[1]):
             unbalanced.append(str(link.get("name")))
     notes = []
     if rounded:

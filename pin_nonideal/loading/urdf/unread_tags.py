@@ -29,7 +29,7 @@ SEVERAL = ("visual", "collision", "material")
 TRANSPOSED = {"iyx": "ixy", "izx": "ixz", "izy": "iyz"}  # equal to the symmetric entry, written by some tools
 
 
-def tell_unread(root: ElementTree.Element) -> list[str]:
+def unread_notes(root: ElementTree.Element) -> list[str]:
     """Return notes on elements and attributes of links and joints that have no effect.
 
     Args:

@@ -43,7 +43,7 @@ def parse_xml(text: str, path: Path, root: str) -> ElementTree.Element:
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise LoadingError(f'"{path}" must not declare a DOCTYPE or entities; remove them')
     try:
-        element = ElementTree.fromstring(_bound(text, root))
+        element = ElementTree.fromstring(_declare_prefixes(text, root))
     except ElementTree.ParseError as error:
         raise LoadingError(f'"{path}" is truncated or not XML: {error}; export it again') from None
     if element.tag != root:
@@ -51,7 +51,7 @@ def parse_xml(text: str, path: Path, root: str) -> ElementTree.Element:
     return element
 
 
-def _bound(text: str, root: str) -> str:
+def _declare_prefixes(text: str, root: str) -> str:
     """Declare all undeclared prefixes of tags and attributes, which some tools write, in the root element."""
     used = set(re.findall(r"</?([\w.-]+):[\w.-]", text)) | set(re.findall(r"\s([\w.-]+):[\w.-]+\s*=", text))
     declared = set(re.findall(r"xmlns:([\w.-]+)\s*=", text))

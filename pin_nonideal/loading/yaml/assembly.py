@@ -9,14 +9,14 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.errors import SingularMassError
-from pin_nonideal.loading.edit.tree import exchange_joints, fix_idle, lock, place_base, still_moves
+from pin_nonideal.loading.edit.tree import exchange_joints, fix_massless, has_joints, lock, place_base
 from pin_nonideal.loading.urdf.damping_friction import dissipation
 from pin_nonideal.loading.urdf.inertia import require_positive_mass
 from pin_nonideal.loading.urdf.reader import RobotFile
 from pin_nonideal.states.joint_order import remember_order
 from pin_nonideal.types import Table
 
-from .initial_state import Start, asked_start, initial_state, joint_index, vector
+from .initial_state import Start, initial_state, joint_index, requested_state, vector
 from .motors import actuation_of
 from .robot import (
     CONSTRAINTS,
@@ -70,10 +70,10 @@ def scene_arguments(
     remember_order(robot.model, robot.joint_order)
     q0, v0 = initial_state(robot, table.get("initial"), where, notes)
     q0, v0 = lock(robot, table, q0, v0, where)
-    q0, v0 = fix_idle(robot, names_in(table), q0, v0, notes)
+    q0, v0 = fix_massless(robot, names_in(table), q0, v0, notes)
     remember_order(robot.model, robot.joint_order)  # for the remaining model
-    q0, v0 = asked_start(robot, q0, v0, start, speed)
-    robot.constraints = [c for c in robot.constraints if still_moves(robot.model, c, where)]
+    q0, v0 = requested_state(robot, q0, v0, start, speed)
+    robot.constraints = [c for c in robot.constraints if has_joints(robot.model, c, where)]
     motors = strings(table, "name_mot", where) or [m for m in robot.motors if robot.model.existJointName(m)]
     for motor in motors:
         joint_index(robot.model, motor, f"{where}: name_mot")

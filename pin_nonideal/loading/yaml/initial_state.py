@@ -96,20 +96,20 @@ def initial_state(
     try:
         if "reference" in initial:
             q0 = named_configuration(model, str(initial["reference"]), q0, where)
-        q0 = _written(model, initial.get("q"), q0, f"{where}: q", named_configuration)
-        return q0, _written(model, initial.get("v"), v0, f"{where}: v", named_velocity)
+        q0 = _file_state(model, initial.get("q"), q0, f"{where}: q", named_configuration)
+        return q0, _file_state(model, initial.get("v"), v0, f"{where}: v", named_velocity)
     except (InputError, UnknownNameError) as error:
         raise LoadingError(str(error)) from None
 
 
-def _written(model: Model, given: Any, base: NDArray[np.float64], where: str, parse: Any) -> Any:
+def _file_state(model: Model, given: Any, base: NDArray[np.float64], where: str, parse: Any) -> Any:
     """Return a state of a file: a table by name, a list, or the base state."""
     if isinstance(given, list) and parse is named_configuration:
         return with_unit_lengths(model, np.array(array(where, given, (model.nq,))), where)
     return parse(model, np.asarray(given) if isinstance(given, list) else given or {}, base, where)
 
 
-def asked_start(
+def requested_state(
     robot: RobotFile, q0: NDArray[np.float64], v0: NDArray[np.float64], start: Start, speed: Start
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the state with the arguments of `load`, and with the velocity of a keyframe.
@@ -129,13 +129,13 @@ def asked_start(
         keyframe.apply()
         q0, v0 = np.array(keyframe.q), np.array(keyframe.v)
     elif start is not None:
-        q0 = _asked(robot.model, start, q0)
+        q0 = _requested_configuration(robot.model, start, q0)
     if speed is not None:
         v0 = named_velocity(robot.model, speed, v0, "load: v0")
     return q0, v0
 
 
-def held_start(robot: RobotFile, table: Mapping[str, Any], start: Start, speed: Start) -> Held:
+def held_entries(robot: RobotFile, table: Mapping[str, Any], start: Start, speed: Start) -> Held:
     """Return the entries that the arguments of `load` name, or else the tables of the file.
 
     Args:
@@ -165,7 +165,7 @@ def _moves(model: Model, name: Any) -> bool:
     return True
 
 
-def _asked(model: Model, start: Any, q0: NDArray[np.float64]) -> NDArray[np.float64]:
+def _requested_configuration(model: Model, start: Any, q0: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a configuration from a name, a table, or numbers in the order of the model."""
     if isinstance(start, (str, Mapping)):
         return named_configuration(model, start, q0, "load: q0")
