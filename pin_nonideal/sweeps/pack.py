@@ -67,7 +67,7 @@ class Pack:
         return record | {"at": [self.path.name, at, len(content)]}
 
 
-def runs_in(path: Path, start: int) -> Iterator[Table]:
+def read_records(path: Path, start: int) -> Iterator[Table]:
     """Yield the records of the completely written runs of a file, with their positions.
 
     Args:
@@ -89,7 +89,7 @@ def runs_in(path: Path, start: int) -> Iterator[Table]:
             stream.seek(at + size)
 
 
-def archive_of(folder: Path, place: tuple[str, int, int]) -> bytes:
+def read_archive(folder: Path, place: tuple[str, int, int]) -> bytes:
     """Return the archive of a run.
 
     Args:

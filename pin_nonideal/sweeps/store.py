@@ -20,7 +20,7 @@ from pin_nonideal.trajectory.file import read_from
 from pin_nonideal.trajectory.trajectory import Trajectory, restored
 from pin_nonideal.types import Table
 
-from .pack import SUFFIX, archive_of, runs_in
+from .pack import SUFFIX, read_archive, read_records
 
 FORMAT = 2
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
@@ -53,20 +53,20 @@ class Sweep(Sequence[Trajectory]):
                 self._places: list[tuple[str, int, int] | None] = [None] * len(self.records)
                 for line in lines:
                     if line.endswith("\n"):  # complete: no kill truncated the line
-                        self._take(json.loads(line))
-            self._unlisted = list(self._found())
+                        self._add_record(json.loads(line))
+            self._unindexed = list(self._unindexed_runs())
         except (OSError, ValueError, LookupError, TypeError, StopIteration) as error:
             raise LoadingError(
                 f'"{self.folder}" holds no sweep: {type(error).__name__}: {error}; it must be a folder that '
                 "sweep(..., store=folder) made"
             ) from error
 
-    def _take(self, record: Table) -> None:
+    def _add_record(self, record: Table) -> None:
         name, at, size = record.pop("at")
         k = record.pop("run")
         self.records[k], self._places[k] = record, (str(name), int(at), int(size))
 
-    def _found(self) -> Iterator[Table]:
+    def _unindexed_runs(self) -> Iterator[Table]:
         """Yield runs that were written before a kill but are missing in the index."""
         ends: dict[str, int] = {}
         for place in self._places:
@@ -74,8 +74,8 @@ class Sweep(Sequence[Trajectory]):
                 ends[place[0]] = max(ends.get(place[0], 0), place[1] + place[2])
         for entry in sorted(os.scandir(self.folder), key=lambda each: each.name):
             if entry.name.endswith(SUFFIX) and entry.stat().st_size > ends.get(entry.name, 0):
-                for record in runs_in(Path(entry.path), ends.get(entry.name, 0)):
-                    self._take(dict(record))
+                for record in read_records(Path(entry.path), ends.get(entry.name, 0)):
+                    self._add_record(dict(record))
                     yield record
 
     def __len__(self) -> int:
@@ -105,7 +105,7 @@ class Sweep(Sequence[Trajectory]):
             raise LoadingError(f"run {k} of the {self} has no samples; it failed: {record['error']}")
         path = self.folder / place[0]
         try:
-            content = archive_of(self.folder, place)
+            content = read_archive(self.folder, place)
         except OSError as error:
             raise LoadingError(f'cannot read run {k} from "{path}": {error.strerror or error}') from error
         return restored(*read_from(io.BytesIO(content), path), path, scene)
@@ -149,7 +149,7 @@ class Sweep(Sequence[Trajectory]):
         return table
 
 
-def opened_store(folder: Path, digest: str, runs: int) -> list[int]:
+def open_store(folder: Path, digest: str, runs: int) -> list[int]:
     """Start or continue a sweep in a folder, and return the numbers of the missing runs.
 
     Args:
@@ -169,8 +169,8 @@ def opened_store(folder: Path, digest: str, runs: int) -> list[int]:
                 f'sweep: store "{folder}" holds another sweep: its parameters, duration or options differ; '
                 "name another folder"
             )
-        if held._unlisted:
-            note(folder, held._unlisted)
+        if held._unindexed:
+            append_records(folder, held._unindexed)
         return held.missing
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -185,7 +185,7 @@ def opened_store(folder: Path, digest: str, runs: int) -> list[int]:
     return list(range(runs))
 
 
-def note(folder: Path, records: Sequence[Table]) -> None:
+def append_records(folder: Path, records: Sequence[Table]) -> None:
     """Append the results of some runs to the index.
 
     Args:
@@ -251,27 +251,27 @@ def digest_of(make: Any, parameters: Sequence[Mapping[str, Any]], duration: floa
         duration: duration of each run [s].
         options: options of `simulate`.
     """
-    said = [_said(make), [dict(p) for p in parameters], duration, sorted(options.items())]
-    return hashlib.sha256(json.dumps(said, default=_said).encode()).hexdigest()
+    content = [_canonical(make), [dict(p) for p in parameters], duration, sorted(options.items())]
+    return hashlib.sha256(json.dumps(content, default=_canonical).encode()).hexdigest()
 
 
-def _said(value: Any) -> Any:
+def _canonical(value: Any) -> Any:
     """Return a representation that is equal in all processes, for a value that JSON cannot encode."""
     if isinstance(value, partial):
-        return [_said(value.func), value.args, value.keywords]
+        return [_canonical(value.func), value.args, value.keywords]
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     if hasattr(value, "__qualname__"):
         return f"{value.__module__}.{value.__qualname__}"
-    if " at 0x" not in (told := repr(value)):
-        return told
+    if " at 0x" not in (text := repr(value)):
+        return text
     try:  # an address differs between processes
-        return [type(value).__qualname__, json.dumps(vars(value), default=_said)]
+        return [type(value).__qualname__, json.dumps(vars(value), default=_canonical)]
     except (TypeError, ValueError, RecursionError):
         return type(value).__qualname__
 
 
-def failed_run(error: RunError) -> Trajectory | None:
+def partial_trajectory(error: RunError) -> Trajectory | None:
     """Return the samples before the failure of a run, or None.
 
     Args:

@@ -28,12 +28,12 @@ from pin_nonideal.types import Table
 from pin_nonideal.validation import choice, count, function, number, positive, sequence
 
 from .pack import Pack
-from .store import Sweep, digest_of, failed_run, note, opened_store, record_of
+from .store import Sweep, append_records, digest_of, open_store, partial_trajectory, record_of
 
-MOST_JOBS = 100_000  # also of negative numbers: -n leaves n - 1 processors free
+MAX_JOBS = 100_000  # also of negative numbers: -n leaves n - 1 processors free
 # Maximum number of runs in one task of a worker, and number of tasks for each worker. Large tasks reduce the
 # overhead; many tasks balance the load.
-MOST_AT_ONCE, SHARES = 200, 16
+MAX_TASK_RUNS, TASKS_PER_WORKER = 200, 16
 
 
 def sweep(
@@ -88,7 +88,7 @@ def sweep(
         if not isinstance(entry, Mapping) or not all(isinstance(key, str) for key in entry):
             raise InputError(f"sweep: parameters must hold mappings of keyword arguments; got {entry!r}")
     length = positive("sweep: duration", duration)
-    if jobs is not None and count("sweep: jobs", jobs, least=-MOST_JOBS, most=MOST_JOBS) == 0:
+    if jobs is not None and count("sweep: jobs", jobs, least=-MAX_JOBS, most=MAX_JOBS) == 0:
         raise InputError("sweep: jobs must not be zero; leave it out for joblib's choice")
     if options.get("checkpoint") is not None:
         raise InputError("sweep: checkpoint is the file of one run; its runs would overwrite one another's")
@@ -101,21 +101,21 @@ def sweep(
     folder = None if store is None else file_path("sweep: store", store)
     numbers = list(range(len(table)))
     if folder is not None:
-        numbers = opened_store(folder, digest_of(make, table, length, options), len(table))
+        numbers = open_store(folder, digest_of(make, table, length, options), len(table))
     work = _Work(make, length, options, folder, keep, measure)
-    found: list[Any] = [None] * (len(table) if folder is None else 0)
-    for part in _carried(work, [(k, dict(table[k])) for k in numbers], jobs, show):
+    results: list[Any] = [None] * (len(table) if folder is None else 0)
+    for part in _results(work, [(k, dict(table[k])) for k in numbers], jobs, show):
         for k, result in part:
             if isinstance(result, PinNonidealError) and not (keep and folder is None):
                 raise result
             if folder is None:
-                found[k] = result
+                results[k] = result
         if folder is not None:
-            note(folder, [record for _, record in part])
-    return found if folder is None else Sweep(folder)
+            append_records(folder, [record for _, record in part])
+    return results if folder is None else Sweep(folder)
 
 
-def _carried(
+def _results(
     work: _Work, runs: list[Any], jobs: int | None, show: bool | None
 ) -> Iterator[list[tuple[int, Any]]]:
     """Yield the results of joblib's workers by task, in order of completion."""
@@ -124,32 +124,32 @@ def _carried(
     from tqdm import tqdm
 
     backend, configured = get_active_backend()
-    asked = jobs if jobs is not None else configured
-    workers = max(1, backend.effective_n_jobs(asked if asked is not None else 1))
-    size = max(1, min(MOST_AT_ONCE, len(runs) // (SHARES * workers) + 1))
-    parts = [runs[i : i + size] for i in range(0, len(runs), size)]
+    requested = jobs if jobs is not None else configured
+    workers = max(1, backend.effective_n_jobs(requested if requested is not None else 1))
+    size = max(1, min(MAX_TASK_RUNS, len(runs) // (TASKS_PER_WORKER * workers) + 1))
+    tasks = [runs[i : i + size] for i in range(0, len(runs), size)]
     lazy = getattr(backend, "supports_return_generator", False)
     parallel = Parallel(n_jobs=jobs, batch_size=1, return_as="generator_unordered" if lazy else "list")
     shown = sys.stderr.isatty() if show is None else choice("sweep: show", show, (True, False, None))
     try:
         with tqdm(total=len(runs), unit="run", disable=not shown) as bar:
-            for part in parallel(delayed(work)(each) for each in parts):
+            for part in parallel(delayed(work)(each) for each in tasks):
                 bar.update(len(part))
                 yield part
     except (pickle.PicklingError, TypeError, AttributeError) as error:
         if "pickle" not in str(error):
             raise
-        raise InputError(f"sweep: {_unsendable(work, runs)}") from error
+        raise InputError(f"sweep: {_pickling_message(work, runs)}") from error
 
 
-def _unsendable(work: _Work, runs: list[Any]) -> str:
+def _pickling_message(work: _Work, runs: list[Any]) -> str:
     """Return a message that names the first part of a sweep that cannot be serialized, and the reason."""
     try:
         import cloudpickle
     except ImportError:  # joblib before 1.6 includes a copy
         from joblib.externals import cloudpickle
-    parts = [("make", work.make), ("measure", work.measure), *work.options.items()]
-    for name, value in [*parts, *((f"parameters[{k}]", entry) for k, entry in runs)]:
+    items = [("make", work.make), ("measure", work.measure), *work.options.items()]
+    for name, value in [*items, *((f"parameters[{k}]", entry) for k, entry in runs)]:
         try:
             cloudpickle.dumps(value)
         except Exception as error:  # any error of the object's own methods
@@ -169,25 +169,25 @@ class _Work:
     def __call__(self, runs: list[tuple[int, Table]]) -> list[tuple[int, Any]]:
         """Return the number of each run with its trajectory, its record in the store, or its error."""
         if self.folder is None:
-            return [(k, self._bare(k, entry)) for k, entry in runs]
+            return [(k, self._run_in_memory(k, entry)) for k, entry in runs]
         with Pack(self.folder, runs[0][0]) as pack:
-            return [(k, self._kept(k, entry, pack)) for k, entry in runs]
+            return [(k, self._run_in_store(k, entry, pack)) for k, entry in runs]
 
-    def _bare(self, k: int, entry: Table) -> Any:
+    def _run_in_memory(self, k: int, entry: Table) -> Any:
         """Return the trajectory of a run without its scene, or the error that stopped the run."""
-        run, stopped = self._one(k, entry)
+        run, stopped = self._simulate(k, entry)
         return stopped or replace(run, scene=None)
 
-    def _kept(self, k: int, entry: Table, pack: Pack) -> Any:
+    def _run_in_store(self, k: int, entry: Table, pack: Pack) -> Any:
         """Return the record of a run in the store, or its error if an error stops the sweep."""
-        run, stopped = self._one(k, entry)
+        run, stopped = self._simulate(k, entry)
         if stopped is not None and not self.keep:
             return stopped
         more = self._measured(run) if self.measure is not None and stopped is None else {}
         error = None if stopped is None else f"{type(stopped).__name__}: {stopped}"
         return pack.add(record_of(k, entry, run, error, more), b"" if run is None else to_bytes(run))
 
-    def _one(self, k: int, entry: Table) -> Any:
+    def _simulate(self, k: int, entry: Table) -> Any:
         """Return a run and the error that stopped it; either can be None."""
         try:
             return simulate(self._scene(entry), self.duration, **self.options), None
@@ -197,7 +197,7 @@ class _Work:
             run = None
             if isinstance(error, RunError):
                 error.index = k
-                run = failed_run(error)
+                run = partial_trajectory(error)
                 error.trajectory = None if run is None else replace(run, scene=None)
             return run, error
 
@@ -215,7 +215,7 @@ class _Work:
         return scene
 
     def _measured(self, run: Trajectory) -> Table:
-        found = named(self.measure, "sweep: measure")(run)
-        if not isinstance(found, Mapping):
-            raise UserFunctionError(f"sweep: measure must return numbers by name; got {found!r}")
-        return {str(name): number(f'sweep: measure: "{name}"', x) for name, x in found.items()}
+        results = named(self.measure, "sweep: measure")(run)
+        if not isinstance(results, Mapping):
+            raise UserFunctionError(f"sweep: measure must return numbers by name; got {results!r}")
+        return {str(name): number(f'sweep: measure: "{name}"', x) for name, x in results.items()}
