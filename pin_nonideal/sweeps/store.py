@@ -17,7 +17,7 @@ from pin_nonideal.atomic_files import file_path
 from pin_nonideal.errors import InputError, LoadingError, OutputError, RunError
 from pin_nonideal.scene.scene import Scene
 from pin_nonideal.trajectory.file import read_from
-from pin_nonideal.trajectory.trajectory import Trajectory, restored
+from pin_nonideal.trajectory.trajectory import Trajectory, restore_trajectory
 from pin_nonideal.types import Table
 
 from .pack import SUFFIX, read_archive, read_records
@@ -108,7 +108,7 @@ class Sweep(Sequence[Trajectory]):
             content = read_archive(self.folder, place)
         except OSError as error:
             raise LoadingError(f'cannot read run {k} from "{path}": {error.strerror or error}') from error
-        return restored(*read_from(io.BytesIO(content), path), path, scene)
+        return restore_trajectory(*read_from(io.BytesIO(content), path), path, scene)
 
     def __iter__(self) -> Iterator[Trajectory]:
         return (self[k] for k in range(len(self)))

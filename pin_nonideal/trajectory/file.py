@@ -28,7 +28,7 @@ from .records import LEDGER, Event, Stats, UserEventRecord
 FORMAT = 1
 # Files up to this size [bytes] are compressed, in less than a tenth of a second. Compression of
 # full-precision motions would save a tenth of the size and take ten to thirty times as long as writing.
-PACKED_BYTES = 1_000_000
+MAX_COMPRESSED_BYTES = 1_000_000
 # Errors of NumPy, zip archives and JSON for damaged files or files of another format.
 UNREADABLE: tuple[type[Exception], ...] = (OSError, ValueError, LookupError, TypeError, AttributeError)
 UNREADABLE += (EOFError, RuntimeError, tokenize.TokenError, zipfile.BadZipFile, zlib.error)
@@ -61,7 +61,7 @@ def write(run: Any, path: str | os.PathLike[str]) -> Path:
     arrays = _arrays(run)
     size = sum(np.asarray(x).nbytes for x in arrays.values())
     with whole_file(target, "the trajectory") as stream:
-        (np.savez_compressed if size <= PACKED_BYTES else np.savez)(stream, **arrays)
+        (np.savez_compressed if size <= MAX_COMPRESSED_BYTES else np.savez)(stream, **arrays)
     return target
 
 
@@ -96,11 +96,11 @@ def _arrays(run: Any) -> Table:
     }
     header |= {key: getattr(run, key) for key in (*LISTS, "joints", "rows")}
     header |= {group: None if table is None else list(table) for group, table in tables.items()}
-    arrays |= {f"loose/{key}": x for key, x in _loose(run).items()}
+    arrays |= {f"loose/{key}": x for key, x in _extra_arrays(run).items()}
     header["user_events"] = [record.name for record in run.user_events]
     if run.dense is not None:
-        asked = vars(run.dense.options)
-        header["dense"] = {**asked, "atol": asked["atol"].tolist()}
+        options = vars(run.dense.options)
+        header["dense"] = {**options, "atol": options["atol"].tolist()}
     arrays["header"] = np.array(json.dumps(header))
     return arrays
 
@@ -156,16 +156,16 @@ def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
         fields["rows"] = {
             str(n): (int(first), int(end), bool(c)) for n, (first, end, c) in header.get("rows", {}).items()
         }
-        whole = {
+        result = {
             **fields,
-            **_from_loose(loose, header, len(arrays["t"])),
+            **_extra_fields(loose, header, len(arrays["t"])),
             "events": events,
             "stats": Stats(**header["stats"]),
             "name": str(header["name"]),
             "notes": [str(note) for note in header.get("notes", [])],
             "failure": None if header.get("failure") is None else str(header["failure"]),
         }
-        return whole, header.get("origin")
+        return result, header.get("origin")
     except LoadingError:
         raise
     except UNREADABLE as error:
@@ -175,7 +175,7 @@ def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
         ) from error
 
 
-def fits(scene: Scene, joints: Sequence[JointPlace], rows: Table) -> bool:
+def matches_scene(scene: Scene, joints: Sequence[JointPlace], rows: Table) -> bool:
     """Check if a scene has the joints and rows of a run.
 
     Args:
@@ -186,7 +186,7 @@ def fits(scene: Scene, joints: Sequence[JointPlace], rows: Table) -> bool:
     return compiled_scene(scene).joints == list(joints) and compiled_scene(scene).rows == rows
 
 
-def scene_again(origin: Any, joints: Sequence[JointPlace], rows: Table, notes: list[str]) -> Scene | None:
+def reload_scene(origin: Any, joints: Sequence[JointPlace], rows: Table, notes: list[str]) -> Scene | None:
     """Reload the scene of a saved run; return None and add a note if the scene is missing or has changed.
 
     Args:
@@ -202,7 +202,7 @@ def scene_again(origin: Any, joints: Sequence[JointPlace], rows: Table, notes: l
     except (PinNonidealError, OSError, ValueError, LookupError, TypeError, AttributeError) as error:
         notes.append(f"the scene of the run cannot be loaded again: {error}")
         return None
-    if fits(scene, joints, rows):
+    if matches_scene(scene, joints, rows):
         return scene
     notes.append(f'the robot "{origin["name"]}" is no longer the one of the run; its scene is left out')
     return None
@@ -224,7 +224,7 @@ def _event(t: float, kind: str, element: str, change: float = 0.0, *vectors: Seq
     return Event(float(t), str(kind), str(element), impulse, float(change), before, after)
 
 
-def _loose(run: Any) -> Table:
+def _extra_arrays(run: Any) -> Table:
     """Return the arrays without a row for each sample, by name."""
     found: Table = {} if run.grid is None else {"grid": run.grid.astype(np.int8)}
     for k, record in enumerate(run.user_events):
@@ -234,7 +234,7 @@ def _loose(run: Any) -> Table:
     return found
 
 
-def _from_loose(loose: Table, header: Table, samples: int) -> Table:
+def _extra_fields(loose: Table, header: Table, samples: int) -> Table:
     """Return the fields that consist of such arrays; invalid arrays raise an error listed in `UNREADABLE`."""
     fields: Table = {}
     if "loose/grid" in loose:

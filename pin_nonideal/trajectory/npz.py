@@ -18,7 +18,7 @@ CENTRAL = struct.Struct("<4s6H3I5H2I")
 END = struct.Struct("<4s4H2IH")
 VERSION, STORED, UTF8 = 20, 0, 0x800
 TIME, DATE = 0, (1 << 5) | 1  # 1980-01-01, so that archives of equal arrays are equal
-MOST_BYTES = 1_000_000_000  # larger archives need 64-bit fields, which np.savez writes
+MAX_BYTES = 1_000_000_000  # larger archives need 64-bit fields, which np.savez writes
 
 
 def npz_bytes(arrays: Mapping[str, Array]) -> bytes:
@@ -27,7 +27,7 @@ def npz_bytes(arrays: Mapping[str, Array]) -> bytes:
     Args:
         arrays: arrays of numbers or text, by name.
     """
-    if sum(x.nbytes for x in arrays.values()) > MOST_BYTES:
+    if sum(x.nbytes for x in arrays.values()) > MAX_BYTES:
         stream = io.BytesIO()
         np.savez(stream, **dict(arrays))  # type: ignore[arg-type]
         return stream.getvalue()

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 # If there are more energy terms than this, only nonzero terms are shown.
-FEW = 20
+MAX_TERMS = 20
 
 
 def summary(run: Any) -> str:
@@ -31,7 +31,7 @@ def summary(run: Any) -> str:
         )
     if run.energy is not None and len(run.t):
         at_end = {k: x[-1] for k, x in run.energy.items() if k != "balance"}
-        shown = ", ".join(f"{k} {x:.6g}" for k, x in at_end.items() if x != 0.0 or len(at_end) <= FEW)
+        shown = ", ".join(f"{k} {x:.6g}" for k, x in at_end.items() if x != 0.0 or len(at_end) <= MAX_TERMS)
         lines.append(f"  energy [J]: {shown}; balance {np.abs(run.energy['balance']).max():.1e}")
     if run.events:
         kinds = sorted({e.kind for e in run.events})

@@ -324,7 +324,7 @@ class Trajectory(MadeLater):
         """
         from .file import read
 
-        return restored(*read(path), path, scene)
+        return restore_trajectory(*read(path), path, scene)
 
 
 _DEFAULTS: Table = {}
@@ -344,7 +344,7 @@ def with_defaults(fields: Table) -> Table:
     return {**_DEFAULTS, **made, **fields}
 
 
-def restored(fields: Table, origin: Any, path: Any, scene: Scene | str | None) -> Trajectory:
+def restore_trajectory(fields: Table, origin: Any, path: Any, scene: Scene | str | None) -> Trajectory:
     """Return a Trajectory from the content of a file, with its scene.
 
     Args:
@@ -357,12 +357,12 @@ def restored(fields: Table, origin: Any, path: Any, scene: Scene | str | None) -
         InputError: the scene is not the scene of the run.
         LoadingError: the scene cannot be reloaded.
     """
-    from .file import fits, scene_again
+    from .file import matches_scene, reload_scene
 
     run = Trajectory(**fields)
     if scene == "source":
-        return dataclasses.replace(run, scene=scene_again(origin, run.joints, run.rows, run.notes))
-    if scene is not None and not (isinstance(scene, Scene) and fits(scene, run.joints, run.rows)):
+        return dataclasses.replace(run, scene=reload_scene(origin, run.joints, run.rows, run.notes))
+    if scene is not None and not (isinstance(scene, Scene) and matches_scene(scene, run.joints, run.rows)):
         name = scene.name if isinstance(scene, Scene) else scene
         raise InputError(f'Trajectory.load: the scene "{name}" is not the one of the run in "{path}"')
     return dataclasses.replace(run, scene=scene)
