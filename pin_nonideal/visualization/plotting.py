@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from pin_nonideal.atomic_files import file_path, whole_file
 from pin_nonideal.errors import InputError, OutputError
 from pin_nonideal.visualization.page.figure_styles import Style
-from pin_nonideal.visualization.page.mode_timeline import bands_of, opens
-from pin_nonideal.visualization.page.signals import Plot, plots_of, several, wanted
+from pin_nonideal.visualization.page.mode_timeline import bands_of, has_open_contact
+from pin_nonideal.visualization.page.signals import Plot, parse_plots, plots_of, runs_and_names
 from pin_nonideal.visualization.page.style import MODES, UNKNOWN_MODE
 from pin_nonideal.visualization.page.xy_plots import Relation, friction_joints, is_relation, relations_of
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 EVENT_STYLES = ((0, ()), (0, (4, 2)), (0, (1, 2)), (0, (4, 2, 1, 2)))
 # Number of events above which their lines become thin, and above which they are drawn as a density.
-CROWD, CLOUD = 40, 400
+MAX_THICK_EVENTS, MAX_EVENT_LINES = 40, 400
 HATCHES = {1: "////", -1: "\\\\\\\\", 0: "", 2: "....", 3: "xxxx"}  # hatches of modes in print
 
 
@@ -71,11 +71,11 @@ def plot(
     """
     import matplotlib as mpl
 
-    runs, labels = several(run, names, "a figure")
+    runs, labels = runs_and_names(run, names, "a figure")
     look = Style(columns, style)
     if title is not None and not isinstance(title, str):
         raise InputError(f"plot: title must be a string or None; got {title!r}")
-    drawn = _asked(runs, usual(runs) if what is None else what)
+    drawn = _requested_plots(runs, default_plots(runs) if what is None else what)
     if ax is not None and len(drawn) != 1:
         raise InputError(f"plot: ax takes one plot; what asks for {len(drawn)}")
     settings: Any = look.settings
@@ -91,7 +91,7 @@ def plot(
     return figure
 
 
-def usual(runs: Sequence[Trajectory]) -> list[str]:
+def default_plots(runs: Sequence[Trajectory]) -> list[str]:
     """Return the default plots of a scene for which its runs have recorded fields.
 
     Args:
@@ -101,7 +101,7 @@ def usual(runs: Sequence[Trajectory]) -> list[str]:
     found = ["q", "v", *(["energy"] if first.energy else [])]
     if first.scene.contacts and first.lam is not None:
         found.append("contacts")
-    if opens(first):
+    if has_open_contact(first):
         found.append("gaps")
     if first.scene.constraint_slices:
         found.append("violation")
@@ -113,9 +113,9 @@ def usual(runs: Sequence[Trajectory]) -> list[str]:
 Drawn = tuple[str, list[Any]]
 
 
-def _asked(runs: Sequence[Trajectory], what: Any) -> list[Drawn]:
+def _requested_plots(runs: Sequence[Trajectory], what: Any) -> list[Drawn]:
     """Return each plot as its kind and its data of each run."""
-    items = wanted("plot: what", what)
+    items = parse_plots("plot: what", what)
     if not items:
         raise InputError("plot: what must name at least one plot; got none")
     found: list[Drawn] = []
@@ -225,7 +225,7 @@ def _finish(axes: Axes, look: Style) -> None:
 def _mark_events(axes: Axes, run: Trajectory, look: Style, legend: bool) -> None:
     """Mark each event by a vertical line whose style shows its kind, or many events by their density."""
     kinds = list(dict.fromkeys(str(event.kind) for event in run.events))
-    if len(run.events) > CLOUD:
+    if len(run.events) > MAX_EVENT_LINES:
         counts, edges = np.histogram([float(event.time) for event in run.events], bins=200)
         shade = counts / counts.max()
         colors = [(0.58, 0.64, 0.72, 0.6 * s) for s in shade]
@@ -235,7 +235,7 @@ def _mark_events(axes: Axes, run: Trajectory, look: Style, legend: bool) -> None
             axes.plot([], [], color="#94a3b8", lw=3.0, label=f"{len(run.events)} events, by density")
             axes.legend(**look.legend())
         return
-    width = 0.8 if len(run.events) <= CROWD else 0.3
+    width = 0.8 if len(run.events) <= MAX_THICK_EVENTS else 0.3
     for event in run.events:
         style = EVENT_STYLES[kinds.index(str(event.kind)) % len(EVENT_STYLES)]
         axes.axvline(float(event.time), color="#cbd5e1", lw=width, ls=style, zorder=0.5)

@@ -18,7 +18,7 @@ from pin_nonideal.errors import InputError, OutputError
 from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.validation import count, number, positive
 
-from .headless_browser import opened
+from .headless_browser import open_page
 from .replay import ReplayPage, replay
 
 ENDINGS = (".png", ".gif", ".webm", ".mp4")
@@ -30,11 +30,11 @@ CODECS = {
 COLORS = ["-vf", "scale=out_range=tv:out_color_matrix=bt709", "-pix_fmt", "yuv420p", "-color_range", "tv"]
 COLORS += ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"]
 # maximum side in browsers [pixels]; one hour at 25 pictures per second
-LARGEST, MOST_PICTURES = 16384, 100_000
-LEAST_FPS = 0.01  # limit of the GIF format
-AT_ONCE = 8_000_000  # maximum number of pixels of the pictures in one request to the browser
+MAX_SIDE, MAX_PICTURES = 16384, 100_000
+MIN_FPS = 0.01  # limit of the GIF format
+MAX_PIXELS_AT_ONCE = 8_000_000  # maximum number of pixels of the pictures in one request to the browser
 # Hides everything on the page except the view, which fills the window.
-ALONE = """(() => {
+HIDE_CONTROLS = """(() => {
   const style = document.createElement("style");
   style.textContent = "#dock, #tools, #forces, #heading { display: none !important }"
     + "#stage { min-height: 0 }";
@@ -80,17 +80,17 @@ def render(
     if ending not in ENDINGS:
         raise OutputError(f'render: "{target}" must end in one of {", ".join(ENDINGS)}')
     size = [
-        count(f"render: {what}", x, least=1, most=LARGEST)
+        count(f"render: {what}", x, least=1, most=MAX_SIDE)
         for what, x in (("width", width), ("height", height))
     ]
     seconds, fps = positive("render: seconds", seconds), positive("render: fps", fps)
     encoder = _ffmpeg(ending) if ending in CODECS else ""
     start, length = float(run.t[0]), float(run.t[-1] - run.t[0])
-    if fps < LEAST_FPS:
-        raise InputError(f"render: fps must be at least {LEAST_FPS}; got {fps:g}")
-    if seconds * fps > MOST_PICTURES:
+    if fps < MIN_FPS:
+        raise InputError(f"render: fps must be at least {MIN_FPS}; got {fps:g}")
+    if seconds * fps > MAX_PICTURES:
         raise InputError(
-            f"render: seconds times fps must be at most {MOST_PICTURES} pictures; got {seconds * fps:g}"
+            f"render: seconds times fps must be at most {MAX_PICTURES} pictures; got {seconds * fps:g}"
         )
     frames = max(2, round(seconds * fps))
     times = [start + length * k / (frames - 1) for k in range(frames)]
@@ -116,8 +116,8 @@ async def _pictures(text: str, size: list[int], times: list[float], kind: str) -
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "replay.html"
         page.write_text(text, encoding="utf-8")
-        async with opened(Path(folder), page.as_uri() + "#paused", size) as ask:
-            await ask(ALONE)
+        async with open_page(Path(folder), page.as_uri() + "#paused", size) as ask:
+            await ask(HIDE_CONTROLS)
             await ask("new Promise((done) => setTimeout(done, 200))")
             await ask("(replay.showForces(true), replay.resetView())")  # small pages start without arrows
             return [
@@ -129,7 +129,7 @@ async def _pictures(text: str, size: list[int], times: list[float], kind: str) -
 
 def _parts(times: list[float], size: list[int]) -> list[list[float]]:
     """Return groups of times whose pictures are requested together, because the page is blocked meanwhile."""
-    together = max(1, AT_ONCE // (size[0] * size[1]))
+    together = max(1, MAX_PIXELS_AT_ONCE // (size[0] * size[1]))
     return [times[k : k + together] for k in range(0, len(times), together)]
 
 

@@ -26,7 +26,7 @@ from pin_nonideal.errors import InputError, OutputError
 from pin_nonideal.validation import choice, positive
 from pin_nonideal.visualization.page.meshcat_window import show
 from pin_nonideal.visualization.page.payload import packed_runs
-from pin_nonideal.visualization.page.signals import Chosen, several
+from pin_nonideal.visualization.page.signals import Chosen, runs_and_names
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
@@ -143,7 +143,7 @@ def replay(
         raise InputError(f"replay: title must be a string or None; got {title!r}")
     choice("replay: compress", compress, (True, False))
     choice("replay: forces", forces, (True, False))
-    runs, labels = several(run, names, "a replay")
+    runs, labels = runs_and_names(run, names, "a replay")
     if viewer is not None:
         if path is not None or len(runs) > 1:
             raise InputError("replay: viewer takes one run and no path")

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 
-def given_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]:
+def applied_force_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]:
     """Return the arrows of the springs, wrenches and drag laws of a scene, at their points of action.
 
     Args:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # Number of frames from which the bounding box of the motion is computed.
 BOX_FRAMES = 200
 # Bodies with a longer travel than this multiple of the model's size leave a fixed view.
-FAR = 4.0
+MAX_FIXED_TRAVEL = 4.0
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def view(
     clouds += [(v.joint, cloud) for v in visuals if v.joint for cloud in _corners(coarse, v)]
     clouds = clouds or [(0, np.zeros((len(coarse.times), 3)))]
     size = max(_diagonal(np.array([cloud[0] for _, cloud in clouds])), motion.size)
-    stays, follow = _traveling(model.njoints, clouds, size)
+    stays, follow = _joints_in_view(model.njoints, clouds, size)
     if not all(stays):
         size = _diagonal(np.array([cloud[0] for joint, cloud in clouds if stays[joint]]))
     points = np.array([cloud for joint, cloud in clouds if stays[joint]])
@@ -88,7 +88,7 @@ def view(
     return View(
         up=up,
         direction=_direction(points, up, 0.25 if not len(shown) else 0.6),
-        outline=_outermost(beside),
+        outline=_extreme_points(beside),
         size=max(size, 0.05 * _diagonal(points)),
         link=link_length(model, marks, max(size, 0.05 * _diagonal(points))),
         ground=_ground(scene, visuals, points, size, up, follow),
@@ -125,12 +125,12 @@ def link_length(model: pin.Model, marks: list[tuple[int, Array]], size: float) -
     return min(float(np.median(real)) * 2.0, size) if real else size
 
 
-def _traveling(njoints: int, clouds: list[tuple[int, Array]], size: float) -> tuple[list[bool], bool]:
+def _joints_in_view(njoints: int, clouds: list[tuple[int, Array]], size: float) -> tuple[list[bool], bool]:
     """Return the joints that stay in view, and whether the camera must follow."""
     travel = np.zeros(njoints)
     for joint, cloud in clouds:
         travel[joint] = max(travel[joint], _diagonal(cloud))
-    far = travel > FAR * size
+    far = travel > MAX_FIXED_TRAVEL * size
     if not far[1:].any():
         return [True] * njoints, False
     if np.count_nonzero(far[1:]) * 2 <= njoints - 1:
@@ -165,7 +165,7 @@ def _diagonal(points: Array) -> float:
     return max(float(np.linalg.norm(np.ptp(points.reshape(-1, 3), axis=0))), 1e-9)
 
 
-def _outermost(points: Array) -> Array:
+def _extreme_points(points: Array) -> Array:
     """Return the extreme points of a cloud in 98 directions [m], (k, 3)."""
     cloud = points.reshape(-1, 3)
     grid = np.array(list(product((-1.0, -0.5, 0.0, 0.5, 1.0), repeat=3)))
@@ -191,7 +191,7 @@ def _direction(points: Array, up: Array, aslant: float) -> Array:
     return np.asarray(front / np.linalg.norm(front))
 
 
-def treads(motion: Motion, visuals: list[Visual], axes: dict[int, Array]) -> dict[int, float]:
+def pattern_spacings(motion: Motion, visuals: list[Visual], axes: dict[int, Array]) -> dict[int, float]:
     """Return the pattern spacing of visuals that slide with a joint farther than their own extent [m].
 
     A belt with evenly spaced ribs looks the same after a shift by one spacing, and the shifted belt stays on

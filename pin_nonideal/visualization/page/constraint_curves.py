@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 # Steps of a curve over the extent of the path, maximum extents in each direction, and steps across a surface.
 ALONG, EXTENTS, ACROSS = 60, 16, 6
 # Tolerance of A = N J, relative to A.
-EXPLAINED = 1e-6
+POINT_TOLERANCE = 1e-6
 # Step of difference quotients of placements; their error is near 1e-9.
 NUDGE = 1e-6
 # Maximum number of degrees of freedom for which points are searched.
-MOST_DOFS = 30
+MAX_DOFS = 30
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def guides_of(run: Trajectory, motion: Motion) -> list[Guide]:
     """Return a guide for each user constraint that restricts one point."""
     scene, found = run.scene, []
     items = [(name, c) for name, c in zip(scene.constraint_slices, scene.constraints, strict=False)]
-    if scene.model.nv > MOST_DOFS:
+    if scene.model.nv > MAX_DOFS:
         return []
     for name, item in items:
         if isinstance(item, UserConstraint):
@@ -114,7 +114,7 @@ class _Tracer:
         J = self.jacobian(q)
         N = A @ np.linalg.pinv(J, rcond=1e-8)
         off = np.abs(A - N @ J).max(initial=0.0)
-        return (N, J) if off <= EXPLAINED * np.abs(A).max(initial=1e-300) else None
+        return (N, J) if off <= POINT_TOLERANCE * np.abs(A).max(initial=1e-300) else None
 
     def guide(self) -> Guide | None:
         q, t = np.asarray(self.run.q[0]), float(self.run.t[0])

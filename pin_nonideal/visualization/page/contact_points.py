@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Touch:
+class ContactPoint:
     """Contact between two frames at the frames of a replay.
 
     Attributes:
@@ -47,7 +47,7 @@ class Touch:
         return hasattr(self.item, "plane")
 
 
-def touches_of(run: Trajectory, motion: Motion) -> list[Touch]:
+def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
     """Return the contacts between two frames: all contacts with planes, and others that were closed.
 
     The state of a contact holds from a sample to the next. Impacts between two samples are found from their
@@ -66,9 +66,9 @@ def touches_of(run: Trajectory, motion: Motion) -> list[Touch]:
         for k, name in enumerate(names)
         if hasattr(compiled.described[name], "plane") or name in struck or closed[name].any()
     ]
-    lines = _pressing_lines(run, motion, chosen)
+    lines = _action_lines(run, motion, chosen)
     return [
-        _touch(run, names[k], lines[:, column], closed[names[k]][motion.before])
+        _contact_point(run, names[k], lines[:, column], closed[names[k]][motion.before])
         for column, k in enumerate(chosen)
     ]
 
@@ -81,7 +81,7 @@ def _closed(run: Trajectory, name: str) -> NDArray[np.bool_]:
     return np.asarray(closed)[:, run.scene.contact_names.index(name)]
 
 
-def _pressing_lines(run: Trajectory, motion: Motion, chosen: list[int]) -> Array:
+def _action_lines(run: Trajectory, motion: Motion, chosen: list[int]) -> Array:
     """Return a point on the line of action of each contact, and its normal, at each frame, (n, k, 6)."""
     if not chosen:
         return np.zeros((len(motion.times), 0, 6))
@@ -90,16 +90,16 @@ def _pressing_lines(run: Trajectory, motion: Motion, chosen: list[int]) -> Array
     return np.array([runner.pressing_lines(q, still, float(t)).reshape(-1, 6)[chosen] for q, t in states])
 
 
-def _touch(run: Trajectory, name: str, line: Array, closed: NDArray[np.bool_]) -> Touch:
+def _contact_point(run: Trajectory, name: str, line: Array, closed: NDArray[np.bool_]) -> ContactPoint:
     """Return a contact on its line of action; a radius shifts the contact point from the point of the row."""
     item: Any = compiled_scene(run.scene).described[name]
     frames = (item.frame, item.plane) if hasattr(item, "plane") else (item.frame1, item.frame2)
     joint, other = (0 if frame is None else frame_on_joint(run.scene.model, frame)[0] for frame in frames)
     radius = getattr(item, "radius1", getattr(item, "radius", 0.0))
-    return Touch(name, item, joint, other, line[:, :3] - radius * line[:, 3:], line[:, 3:], closed)
+    return ContactPoint(name, item, joint, other, line[:, :3] - radius * line[:, 3:], line[:, 3:], closed)
 
 
-def touching_marks(touches: list[Touch], motion: Motion, marks: list[Mark]) -> list[Mark]:
+def contact_point_marks(touches: list[ContactPoint], motion: Motion, marks: list[Mark]) -> list[Mark]:
     """Return marks of contacts without a mark, because their points move over their bodies.
 
     Args:

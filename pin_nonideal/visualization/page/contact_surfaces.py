@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 # Margin of a patch beyond the contact points, and maximum distance from their median, in model sizes.
-BEYOND, FARTHEST = 0.25, 2.5
+PATCH_MARGIN, MAX_PATCH_REACH = 0.25, 2.5
 PATCH: Color = (0.66, 0.46, 0.24, 0.6)
 STOP: Color = (0.28, 0.33, 0.41, 1.0)
 
@@ -81,7 +81,7 @@ def ground_of(planes: list[Plane], up: Array) -> Plane | None:
     return min(level, key=lambda plane: float(plane.point @ up)) if level else None
 
 
-def touched_of(run: Trajectory, motion: Motion, visuals: list[Visual], up: Array) -> list[Visual]:
+def contact_surfaces(run: Trajectory, motion: Motion, visuals: list[Visual], up: Array) -> list[Visual]:
     """Return patches of planes without shapes, and the stops of joints with impacts.
 
     Args:
@@ -98,10 +98,10 @@ def touched_of(run: Trajectory, motion: Motion, visuals: list[Visual], up: Array
     patches = [
         _patch(number, plane, motion) for number, plane in enumerate(hidden) if 0 not in drawn or plane.joint
     ]
-    return patches + _stops(run, motion) + _rounds(run.scene)
+    return patches + _stops(run, motion) + _round_bodies(run.scene)
 
 
-def _rounds(scene: Scene) -> list[Visual]:
+def _round_bodies(scene: Scene) -> list[Visual]:
     """Return the spheres and capsules in contact with each other, for a scene without shapes."""
     if scene.visual_model is not None and len(scene.visual_model.geometryObjects):
         return []
@@ -138,9 +138,9 @@ def _patch(number: int, plane: Plane, motion: Motion) -> Visual:
     clouds = [motion.local(plane.joint, motion.point(joint, local)) for joint, local in plane.touching]
     cloud = np.concatenate(clouds) - plane.point
     along = np.column_stack([cloud @ t1, cloud @ t2])
-    middle, reach = np.median(along, axis=0), FARTHEST * motion.size
-    low = np.maximum(along.min(axis=0), middle - reach) - BEYOND * motion.size
-    high = np.minimum(along.max(axis=0), middle + reach) + BEYOND * motion.size
+    middle, reach = np.median(along, axis=0), MAX_PATCH_REACH * motion.size
+    low = np.maximum(along.min(axis=0), middle - reach) - PATCH_MARGIN * motion.size
+    high = np.minimum(along.max(axis=0), middle + reach) + PATCH_MARGIN * motion.size
     thick, center = 0.01 * motion.size, (low + high) / 2.0
     place = plane.point + center[0] * t1 + center[1] * t2 - 0.5 * thick * plane.normal
     turn = np.column_stack([t1, t2, plane.normal])

@@ -23,7 +23,7 @@ from pin_nonideal.states.rows import rows_at
 from pin_nonideal.types import Array
 from pin_nonideal.validation import axis_triad, unit_axis
 
-from .contact_points import Touch
+from .contact_points import ContactPoint
 from .frames import Motion
 from .markers import Side, constraints_of, side_of, sides_of
 from .visuals import joint_axis
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 # Minimum of drawn forces and moments relative to the largest one. The scale of moments is the larger of the
 # largest moment and the largest force times the length of a link.
-SMALLEST = 1e-9
+MIN_RELATIVE_SIZE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Arrow:
 
 
 def arrows_of(
-    run: Trajectory, motion: Motion, touches: Sequence[Touch], more: Sequence[Arrow] = ()
+    run: Trajectory, motion: Motion, touches: Sequence[ContactPoint], more: Sequence[Arrow] = ()
 ) -> list[Arrow]:
     """Return the arrows of the recorded forces that exceed rounding.
 
@@ -89,10 +89,10 @@ def arrows_of(
             if run.lam_ideal is not None:
                 ideal = motion.of(run.lam_ideal[:, rows])
                 rest = parts["total"] - ideal
-                acts = np.abs(rest).max(initial=0.0) > SMALLEST * np.abs(ideal).max(initial=0.0)
+                acts = np.abs(rest).max(initial=0.0) > MIN_RELATIVE_SIZE * np.abs(ideal).max(initial=0.0)
                 parts = {"ideal": ideal} | ({"nonideal": rest} if acts else {})
             if isinstance(item, UserContact):
-                arrows += _opening_the_gap(run, motion, name, motion.of(run.lam[:, rows]))
+                arrows += _user_gap_arrows(run, motion, name, motion.of(run.lam[:, rows]))
                 continue
             for kind, lam in parts.items():
                 arrows += _reaction(run.scene, motion, name, kind, item, shown, lam)
@@ -105,15 +105,18 @@ def arrows_of(
     for kind, force in drawn:
         if force is not None:
             arrows += _at_joints(run.scene.model, motion, kind, motion.of(force))
-    return _acting([*arrows, *more], run.scene.model, motion.size)
+    return _above_rounding([*arrows, *more], run.scene.model, motion.size)
 
 
-def _acting(arrows: list[Arrow], model: pin.Model, size: float) -> list[Arrow]:
+def _above_rounding(arrows: list[Arrow], model: pin.Model, size: float) -> list[Arrow]:
     """Return the arrows above rounding, relative to the largest arrows and to the weight of all bodies."""
     weight = sum(inertia.mass for inertia in model.inertias) * float(np.linalg.norm(model.gravity.linear))
     force = max([weight, *(arrow.largest() for arrow in arrows if arrow.unit == "N")])
     moment = max([weight * size, *(arrow.largest() for arrow in arrows if arrow.unit == "N m")])
-    least = {"N": SMALLEST * max(force, moment / size), "N m": SMALLEST * max(moment, force * size)}
+    least = {
+        "N": MIN_RELATIVE_SIZE * max(force, moment / size),
+        "N m": MIN_RELATIVE_SIZE * max(moment, force * size),
+    }
     return [arrow for arrow in arrows if arrow.largest() > least[arrow.unit]]
 
 
@@ -126,7 +129,7 @@ def _reaction(
         way = -1.0 if name.endswith(" upper") else 1.0
         return along(model, motion, name, kind, model.getJointId(item.joint), way * lam[:, 0])
     if shown in (core.Shown.anchor, core.Shown.rod):
-        return _between(scene, motion, name, kind, item, shown, lam)
+        return _connection_arrows(scene, motion, name, kind, item, shown, lam)
     if shown == core.Shown.rolling:
         body = side_of(model, item.frame)
         force, place = _rolling(model, motion, item, lam)
@@ -144,7 +147,7 @@ def _reaction(
     return []
 
 
-def _opening_the_gap(run: Trajectory, motion: Motion, name: str, lam: Array) -> list[Arrow]:
+def _user_gap_arrows(run: Trajectory, motion: Motion, name: str, lam: Array) -> list[Arrow]:
     """Return the arrows of the generalized force A^T lam of a user-defined gap, at the joints."""
     scene, runner = run.scene, compiled_scene(run.scene).program.runner()
     states = zip(motion.q, motion.of(run.v), motion.times, lam, strict=True)
@@ -154,7 +157,7 @@ def _opening_the_gap(run: Trajectory, motion: Motion, name: str, lam: Array) -> 
     return [replace(arrow, name=f"{name}, {arrow.name}") for arrow in found]
 
 
-def _between(
+def _connection_arrows(
     scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.Shown, lam: Array
 ) -> list[Arrow]:
     """Return the force on the first of two connected frames, and the moment if the constraint has one."""

@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 # Maximum number of frames that a browser can open: an hour at 50 frames per second.
 MAX_FRAMES = 200_000
 # Minimum number of frames, also for slow motions, and maximum number of values in all frames.
-LEAST_FRAMES, MOST_NUMBERS = 600, 400_000
+MIN_FRAMES, MAX_NUMBERS = 600, 400_000
 # Interpolation tolerance between frames, relative to the smallest link.
-CLOSE = 2e-3
+POSITION_TOLERANCE = 2e-3
 # Tolerance between the end rates and the displacement of an interval [rad, or relative to the size]. If the
 # difference or the projection onto the loops exceeds it, the sampling is too coarse to show the motion.
-TOLD = 0.3
+MAX_MISMATCH = 0.3
 # Rounds of bisection: up to 2^12 frames between two samples.
 ROUNDS = 12
 
@@ -102,7 +102,7 @@ def sample(run: Trajectory, fps: float | None = None, share: int = 1) -> Motion:
     Args:
         run: run of the replay.
         fps: frames per second; None for the samples of the run, and frames between them that keep the
-            interpolation of the page within `CLOSE` of the smallest link.
+            interpolation of the page within `POSITION_TOLERANCE` of the smallest link.
         share: number of runs that share a page.
 
     Raises:
@@ -126,19 +126,21 @@ class _Frames:
 
     def __init__(self, run: Trajectory, share: int) -> None:
         # Many ghosts have fewer frames each.
-        self.least = max(LEAST_FRAMES // max(share // 4, 1), 60)
-        self.most = MOST_NUMBERS // share
+        self.least = max(MIN_FRAMES // max(share // 4, 1), 60)
+        self.most = MAX_NUMBERS // share
         self.run, self.t = run, np.asarray(run.t, dtype=np.float64)
         self.tracks = Tracks(run.scene.model)
         start = self.tracks.placements(self.tracks.coordinates(run.q[:1]))[0]
         self.size, self.link = _sizes(run.scene.model, start)
         if self.size == 0.0:  # a particle is as large as its path
-            every = np.unique(np.linspace(0, len(self.t) - 1, LEAST_FRAMES).astype(int))
+            every = np.unique(np.linspace(0, len(self.t) - 1, MIN_FRAMES).astype(int))
             path = self.tracks.placements(self.tracks.coordinates(run.q[every]))[:, 1:, :3]
             self.size = self.link = float(np.linalg.norm(np.ptp(path.reshape(-1, 3), axis=0))) or 1.0
         self.reach = np.minimum(np.maximum(self.tracks.reaches(start), self.link), self.size)
         self.dense = getattr(run, "dense", None) is not None
-        self.told = np.ones(max(len(self.t) - 1, 0), dtype=bool) if self.dense else _told(run, self.size)
+        self.well_sampled = (
+            np.ones(max(len(self.t) - 1, 0), dtype=bool) if self.dense else _well_sampled(run, self.size)
+        )
         self.before, self.part = np.zeros(0, dtype=np.int64), np.zeros(0)
         self.q, self.rows = np.zeros((0, run.q.shape[1])), np.zeros((0, self.tracks.width))
 
@@ -180,7 +182,7 @@ class _Frames:
             blended = halfway(times, self.rows)[where]
             rows = self.tracks.near(self.tracks.coordinates(q), blended)
             gap = self.tracks.distance(rows, blended, self.reach)
-            wrong = (gap > CLOSE * self.link) | (np.diff(times)[where] > longest)
+            wrong = (gap > POSITION_TOLERANCE * self.link) | (np.diff(times)[where] > longest)
             new = np.flatnonzero(wrong)
             new = np.sort(new[np.argsort(-gap[new], kind="stable")[:room]])
             # Accurate intervals stay accurate; each new frame opens the two adjacent intervals.
@@ -196,9 +198,9 @@ class _Frames:
 
     def _divisible(self) -> NDArray[np.bool_]:
         """Return the intervals with a positive length and sufficient sampling."""
-        last = len(self.told) - 1
+        last = len(self.well_sampled) - 1
         alone = self.before[:-1] == np.where(self.part[1:] == 0.0, self.before[1:] - 1, self.before[1:])
-        told = ~alone | (self.told[np.clip(self.before[:-1], 0, last)] if last >= 0 else False)
+        told = ~alone | (self.well_sampled[np.clip(self.before[:-1], 0, last)] if last >= 0 else False)
         return np.asarray((np.diff(self.times()) > 1e-12 * (1.0 + abs(self.t[-1]))) & told)
 
     def _middle(self, where: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
@@ -232,10 +234,12 @@ class _Frames:
         try:
             closed, _ = project(q, (1.0 - s) * run.v[k] + s * run.v[k + 1], t)
         except PinNonidealError:
-            self.told[k] = False
+            self.well_sampled[k] = False
             return q
-        if np.abs(pin.difference(run.scene.model, q, closed)).max(initial=0.0) > TOLD * min(1.0, self.size):
-            self.told[k] = False
+        if np.abs(pin.difference(run.scene.model, q, closed)).max(initial=0.0) > MAX_MISMATCH * min(
+            1.0, self.size
+        ):
+            self.well_sampled[k] = False
         return np.asarray(closed)
 
     def motion(self) -> Motion:
@@ -244,8 +248,8 @@ class _Frames:
         turned_over = np.sum(poses[1:, :, 3:] * poses[:-1, :, 3:], axis=2) < 0.0
         poses[1:, :, 3:] *= np.cumprod(np.where(turned_over, -1.0, 1.0), axis=0)[:, :, None]
         held = np.zeros(max(len(self.before) - 1, 0), dtype=bool)
-        if len(self.told):
-            held = ~self.told[np.minimum(self.before[:-1], len(self.told) - 1)]
+        if len(self.well_sampled):
+            held = ~self.well_sampled[np.minimum(self.before[:-1], len(self.well_sampled) - 1)]
         return Motion(self.times(), poses, self.before, self.part, self.q, self.rows, held, self.size)
 
 
@@ -274,7 +278,7 @@ def cubic(run: Trajectory, k: int, s: float) -> tuple[Array, Array]:
     return np.asarray(xi), np.asarray(rate)
 
 
-def _told(run: Trajectory, size: float) -> NDArray[np.bool_]:
+def _well_sampled(run: Trajectory, size: float) -> NDArray[np.bool_]:
     """Return the intervals between samples that are sampled finely enough, (nt - 1,).
 
     In such an interval the displacement is the mean rate times the duration, up to the curvature. Continuous
@@ -288,7 +292,7 @@ def _told(run: Trajectory, size: float) -> NDArray[np.bool_]:
         q, v = run.q[:, joint.idx_q : joint.idx_q + 1], run.v[:, joint.idx_v : joint.idx_v + 1]
         mean = h * (v[1:] + v[:-1]) / 2.0
         scale = 1.0 if "P" not in joint.shortname().removeprefix("JointModel")[:1] else size
-        told &= (np.abs(np.diff(q, axis=0) - mean) < TOLD * scale)[:, 0]
+        told &= (np.abs(np.diff(q, axis=0) - mean) < MAX_MISMATCH * scale)[:, 0]
     # Among coarse intervals, some agree by chance.
     beside = np.convolve(~told, np.ones(7), mode="same") if len(told) else np.zeros(0)
     return np.asarray(beside[: len(told)] == 0.0 if len(told) >= 7 else np.full(len(told), told.all()))

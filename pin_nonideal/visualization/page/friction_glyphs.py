@@ -12,7 +12,7 @@ from pin_nonideal.states.kinematics import frame_on_joint
 from pin_nonideal.types import Array
 from pin_nonideal.validation import unit_axis
 
-from .contact_points import Touch
+from .contact_points import ContactPoint
 from .frames import Motion
 from .markers import Mark
 from .mode_timeline import bands_of
@@ -53,7 +53,7 @@ class Element:
 
 
 def elements_of(
-    run: Trajectory, motion: Motion, marks: list[Mark], touches: Sequence[Touch] = ()
+    run: Trajectory, motion: Motion, marks: list[Mark], touches: Sequence[ContactPoint] = ()
 ) -> list[Element]:
     """Return the elements with a position: friction in joints and at anchors, and contacts.
 
@@ -112,7 +112,9 @@ def _part(size: Array, limit: Array) -> Array:
     return np.clip(np.divide(size, limit, out=np.zeros_like(size), where=limit > 0.0), 0.0, 1.0)
 
 
-def _contact(run: Trajectory, motion: Motion, name: str, band: int, touch: Touch, whole: bool) -> Element:
+def _contact(
+    run: Trajectory, motion: Motion, name: str, band: int, touch: ContactPoint, whole: bool
+) -> Element:
     """Return a contact with its cone, and with the friction over its limit if forces were recorded."""
     share = pressing = None
     mu = float(getattr(touch.item, "mu", 0.0)) if whole or name == touch.name else 0.0

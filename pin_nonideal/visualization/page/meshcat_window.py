@@ -10,7 +10,7 @@ import pinocchio as pin
 from pin_nonideal.types import Array
 
 from .camera import link_length
-from .contact_points import touches_of
+from .contact_points import contact_points
 from .force_arrows import Arrow, arrows_of
 from .frames import Motion, sample
 from .style import FORCES
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 RATE = 30  # frames per second of the stored animation
-LONGEST = 20.0  # maximum duration of the animation [s]
+MAX_DURATION = 20.0  # maximum duration of the animation [s]
 
 
 def show(run: Trajectory, viewer: Any, name: str, forces: bool) -> Any:
@@ -42,9 +42,11 @@ def show(run: Trajectory, viewer: Any, name: str, forces: bool) -> Any:
     shown.initViewer(viewer=viewer)
     shown.loadViewerModel(rootNodeName=name)
     length = float(run.t[-1] - run.t[0])
-    count = int(np.clip(RATE * length, 2, RATE * LONGEST)) if length > 0.0 else 1
+    count = int(np.clip(RATE * length, 2, RATE * MAX_DURATION)) if length > 0.0 else 1
     motion = sample(run, (count - 1) / length if length > 0.0 else 1.0)
-    arrows = [a for a in arrows_of(run, motion, touches_of(run, motion)) if a.unit == "N"] if forces else []
+    arrows = (
+        [a for a in arrows_of(run, motion, contact_points(run, motion)) if a.unit == "N"] if forces else []
+    )
     scale = _add_arrows(viewer[name]["forces"], arrows, 0.3 * link_length(scene.model, [], motion.size))
     animation = meshcat.animation.Animation(default_framerate=RATE)
     for frame in range(len(motion.times)):

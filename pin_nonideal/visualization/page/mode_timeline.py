@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 # Maximum number of samples at which gaps are computed.
-MOST_GAPS = 5000
+MAX_GAP_SAMPLES = 5000
 
 Bands = list[tuple[float, float, int]]
 
@@ -62,7 +62,7 @@ def bands_of(run: Trajectory) -> list[tuple[str, Bands]]:
     return found
 
 
-def opens(run: Trajectory) -> bool:
+def has_open_contact(run: Trajectory) -> bool:
     """Check if a contact of the run was ever open.
 
     Args:
@@ -79,7 +79,7 @@ def gaps_of(run: Trajectory) -> tuple[Array, dict[str, Array]]:
         run: run of the replay.
     """
     t = np.asarray(run.t)
-    chosen = np.unique(np.linspace(0, len(t) - 1, min(len(t), MOST_GAPS)).astype(int))
+    chosen = np.unique(np.linspace(0, len(t) - 1, min(len(t), MAX_GAP_SAMPLES)).astype(int))
     runner = compiled_scene(run.scene).program.runner()
     residuals = np.array([rows_at(runner, run.q[k], run.v[k], float(t[k]))[2] for k in chosen])
     slices = run.scene.constraint_slices

@@ -11,22 +11,22 @@ import pinocchio as pin
 
 from pin_nonideal.types import Array, Table
 
-from .applied_forces import given_arrows
+from .applied_forces import applied_force_arrows
 from .binary import Payload, Shapes
-from .camera import link_length, treads, upward, view
+from .camera import link_length, pattern_spacings, upward, view
 from .constraint_curves import Guide, guides_of
-from .contact_points import touches_of, touching_marks
-from .contact_surfaces import touched_of
+from .contact_points import contact_point_marks, contact_points
+from .contact_surfaces import contact_surfaces
 from .force_arrows import Arrow, arrows_of
 from .frames import Motion, sample
 from .friction_glyphs import Element, elements_of
 from .joint_tracks import Tracks
 from .markers import Mark, marks_of
 from .mode_timeline import bands_of
-from .resampling import between
+from .resampling import resample
 from .signal_list import collisions_of, inertia_box, signals_of
-from .signals import Chosen, Plot, plots_of, usual_plots, wanted
-from .stick_figure import sticks
+from .signals import Chosen, Plot, default_plot_names, parse_plots, plots_of
+from .stick_figure import link_bars
 from .style import table
 from .visuals import LINK_COLORS, Visual, joint_axis, visuals_of
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 # Maximum number of runs with plotted curves; all runs are drawn.
-MOST_PLOTTED = 8
+MAX_PLOTTED = 8
 
 
 def packed_runs(
@@ -59,18 +59,18 @@ def packed_runs(
     run, payload = runs[0], Payload()
     scene, marks = run.scene, marks_of(run.scene)
     motions = [sample(one, fps, share=len(runs)) for one in runs]
-    model, known = scene.model, [between(*pair) for pair in zip(runs, motions, strict=True)][:MOST_PLOTTED]
+    model, known = scene.model, [resample(*pair) for pair in zip(runs, motions, strict=True)][:MAX_PLOTTED]
     finer, motion = known[0]
     ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
     visuals, bare = _drawn(scene, motion, ends)
-    visuals = visuals + touched_of(finer, motion, visuals, upward(model))
+    visuals = visuals + contact_surfaces(finer, motion, visuals, upward(model))
     guides = guides_of(finer, motion)
     shapes = Shapes(payload)
     looking = view(scene, motion, visuals, ends, np.vstack([np.zeros((0, 3)), *(g.points for g in guides)]))
     drawn = shapes.add(visuals)
-    touches = touches_of(finer, motion)
-    arrows = arrows_of(finer, motion, touches, given_arrows(finer, motion, marks)) if forces else []
-    for number, spacing in treads(motion, visuals, _sliding_axes(model)).items():
+    touches = contact_points(finer, motion)
+    arrows = arrows_of(finer, motion, touches, applied_force_arrows(finer, motion, marks)) if forces else []
+    for number, spacing in pattern_spacings(motion, visuals, _sliding_axes(model)).items():
         drawn[number]["wrap"] = spacing
     header = {
         "title": title,
@@ -87,7 +87,8 @@ def packed_runs(
             _other(payload, shapes, *other) for other in zip(runs[1:], motions[1:], names[1:], strict=True)
         ],
         "marks": [
-            _stored_mark(payload, motion, mark) for mark in [*marks, *touching_marks(touches, motion, marks)]
+            _stored_mark(payload, motion, mark)
+            for mark in [*marks, *contact_point_marks(touches, motion, marks)]
         ],
         "guides": [_stored_guide(payload, guide) for guide in guides],
         "trails": [{"joint": j, "point": point} for j, point in _trails(model, guides, bare)],
@@ -116,7 +117,7 @@ def _drawn(scene: Scene, motion: Motion, ends: list[tuple[int, Array]]) -> tuple
     visuals = visuals or [_colored(shape) for shape in collisions_of(scene)]
     if visuals:
         return visuals, False
-    return sticks(scene.model, ends, link_length(scene.model, ends, motion.size)), True
+    return link_bars(scene.model, ends, link_length(scene.model, ends, motion.size)), True
 
 
 def _colored(visual: Visual) -> Visual:
@@ -142,7 +143,7 @@ def _curves(run: Trajectory, finer: Trajectory, chosen: Chosen | None) -> list[P
     """Return the plots of a run with interpolated curves; curves of the user have the samples of the run."""
     dense, items = (
         getattr(run, "dense", None) is not None,
-        wanted("plots", usual_plots(run) if chosen is None else chosen),
+        parse_plots("plots", default_plot_names(run) if chosen is None else chosen),
     )
     smooth = {"q", "v", "energy", "gaps", *run.scene.model.names}  # other curves are linear between samples
     return [
@@ -263,18 +264,20 @@ def _stored_arrow(payload: Payload, motion: Motion, arrow: Arrow) -> Table:
     stored = _plain(arrow)
     stored["values"] = payload.add(arrow.values)
     if arrow.origin is not None:
-        stored["origin"] = payload.add(_once(motion.local(arrow.joint, arrow.origin), motion.size))
+        stored["origin"] = payload.add(
+            _without_repetition(motion.local(arrow.joint, arrow.origin), motion.size)
+        )
     return stored
 
 
-def _once(vectors: Array, size: float) -> Array:
+def _without_repetition(vectors: Array, size: float) -> Array:
     """Return vectors at all frames, (n, 3), or one vector, (1, 3), if they are constant."""
     return vectors[:1] if np.abs(vectors - vectors[0]).max() < 1e-9 * size else vectors
 
 
 def _stored_mark(payload: Payload, motion: Motion, mark: Mark) -> Table:
     stored = _plain(mark)
-    stored["path"] = None if mark.path is None else payload.add(_once(mark.path, motion.size))
+    stored["path"] = None if mark.path is None else payload.add(_without_repetition(mark.path, motion.size))
     stored["closed"] = None if mark.closed is None else payload.add(mark.closed, "u1")
     return stored
 
@@ -282,7 +285,7 @@ def _stored_mark(payload: Payload, motion: Motion, mark: Mark) -> Table:
 def _stored_element(payload: Payload, motion: Motion, element: Element) -> Table:
     stored = _plain(element)
     for key, size in (("point", motion.size), ("axis", 1.0)):
-        stored[key] = payload.add(_once(np.atleast_2d(getattr(element, key)), size))
+        stored[key] = payload.add(_without_repetition(np.atleast_2d(getattr(element, key)), size))
     for key in ("share", "normal"):
         if stored[key] is not None:
             stored[key] = payload.add(getattr(element, key))

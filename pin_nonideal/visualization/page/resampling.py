@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pin_nonideal.types import Array
 
-from .frames import LEAST_FRAMES, Motion, cubic
+from .frames import MIN_FRAMES, Motion, cubic
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
@@ -21,7 +21,7 @@ SAMPLED = ("violation", "violation_rate", "a", "tau", "F_ideal", "F_nonideal", "
 NAMED = ("energy", "power", "law_forces", "reactions", "contact_forces")
 
 
-def between(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
+def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
     """Return the run resampled at the frames of its replay if it has too few samples, else unchanged.
 
     With record "dense" all values come from the interpolants of the steps. Otherwise q and v follow the drawn
@@ -32,7 +32,7 @@ def between(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
         run: run of the replay.
         motion: motion of the run.
     """
-    if len(run.t) >= LEAST_FRAMES or len(motion.times) <= len(run.t):
+    if len(run.t) >= MIN_FRAMES or len(motion.times) <= len(run.t):
         return run, motion
     inner = np.flatnonzero((motion.part > 0.0) & (motion.part < 1.0))
     dense = None

@@ -11,7 +11,7 @@ import pinocchio as pin
 from pin_nonideal.types import Array, Table
 
 from .coordinates import positions, velocities
-from .mode_timeline import opens
+from .mode_timeline import has_open_contact
 from .signals import Plot
 from .visuals import Visual, visuals_of
 
@@ -56,7 +56,7 @@ def signals_of(run: Trajectory, finer: Trajectory) -> list[Signal]:
         smooth.append((f"{item.label}, position", item.unit, item.values))
     for item in velocities(model, finer.v):
         smooth.append((f"{item.label}, velocity", item.unit, item.values))
-    for name, values in (run.contact_forces or {}).items() if opens(run) else ():
+    for name, values in (run.contact_forces or {}).items() if has_open_contact(run) else ():
         found.append((f"{name}, force", "N", np.linalg.norm(values, axis=1)))
     if run.a is not None:
         found += [(f"{x.label}, acceleration", x.unit, x.values) for x in velocities(model, run.a, "/s²")]

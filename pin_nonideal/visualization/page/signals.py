@@ -14,7 +14,7 @@ from pin_nonideal.types import Array
 from pin_nonideal.validation import sequence
 
 from .coordinates import Coordinate, positions, velocities
-from .mode_timeline import gaps_of, opens
+from .mode_timeline import gaps_of, has_open_contact
 from .visuals import joint_axis
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class Plot:
         return replace(self, t=self.t[index], curves={k: v[index] for k, v in self.curves.items()})
 
 
-def wanted(what: str, chosen: Any) -> list[Any]:
+def parse_plots(what: str, chosen: Any) -> list[Any]:
     """Return the requested plots, as a list of names and of pairs of a title and curves by label.
 
     Args:
@@ -103,12 +103,12 @@ def plots_of(run: Trajectory, chosen: Chosen | None) -> list[Plot]:
             invalid.
     """
     plots: list[Plot] = []
-    for item in wanted("plots", usual_plots(run) if chosen is None else chosen):
+    for item in parse_plots("plots", default_plot_names(run) if chosen is None else chosen):
         plots += _plot(run, item) if isinstance(item, str) else [_given(run, *item)]
     return plots
 
 
-def usual_plots(run: Trajectory) -> list[str]:
+def default_plot_names(run: Trajectory) -> list[str]:
     """Return the names of the default plots of a replay.
 
     Args:
@@ -127,7 +127,7 @@ def _recorded(run: Trajectory, name: str) -> bool:
     if name == "contacts":
         return run.lam is not None and bool(run.scene.contacts)
     if name == "gaps":
-        return opens(run)
+        return has_open_contact(run)
     if name in ("a", "tau", "power"):
         return getattr(run, name, None) is not None
     return True
@@ -159,16 +159,16 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
         return [Plot("Constraint violation", "m, rad", t, {"largest residual": run.violation}, log=True)]
     if name == "reactions" and run.lam is not None:
         size = {k: np.linalg.norm(run.lam[:, s], axis=1) for k, s in run.scene.constraint_slices.items()}
-        return [Plot("Reactions, |lam|", "N, N m", t, _largest(size), note=left_out(len(size)))]
+        return [Plot("Reactions, |lam|", "N, N m", t, _largest(size), note=omission_note(len(size)))]
     if name == "power":
-        return [Plot("Power", "W", t, _largest(run.power or {}), note=left_out(len(run.power or {})))]
+        return [Plot("Power", "W", t, _largest(run.power or {}), note=omission_note(len(run.power or {})))]
     if name == "contacts" and run.lam is not None:
         slices = list(run.scene.constraint_slices.items())[len(run.scene.constraints) :]
         normal = {key: run.lam[:, rows.stop - 1] for key, rows in slices}
-        return [Plot("Normal force", "N", t, _largest(normal), note=left_out(len(normal)))]
+        return [Plot("Normal force", "N", t, _largest(normal), note=omission_note(len(normal)))]
     if name == "gaps":
         times, gaps = gaps_of(run)
-        return [Plot("Gaps", "m, rad", times, _largest(gaps), note=left_out(len(gaps)))]
+        return [Plot("Gaps", "m, rad", times, _largest(gaps), note=omission_note(len(gaps)))]
     if name == "tau":
         return _torques(model, t, np.asarray(run.tau))
     if name == "q":
@@ -217,11 +217,11 @@ def _by_unit(title: str, t: Array, coordinates: list[Coordinate]) -> list[Plot]:
     plots = []
     for unit in dict.fromkeys(c.unit for c in coordinates):
         every = {c.label: c.values for c in coordinates if c.unit == unit}
-        plots.append(Plot(title, unit, t, _largest(every), note=left_out(len(every))))
+        plots.append(Plot(title, unit, t, _largest(every), note=omission_note(len(every))))
     return plots
 
 
-def left_out(count: int) -> str:
+def omission_note(count: int) -> str:
     """Return the note of a plot on the curves that it omits.
 
     Args:
@@ -236,7 +236,7 @@ def _largest(curves: dict[str, Array]) -> dict[str, Array]:
     return {label: values for label, values in curves.items() if label in rank}
 
 
-def several(run: Any, names: Sequence[str] | None, what: str) -> tuple[list[Trajectory], list[str]]:
+def runs_and_names(run: Any, names: Sequence[str] | None, what: str) -> tuple[list[Trajectory], list[str]]:
     """Return runs and their names.
 
     Args:

@@ -10,7 +10,7 @@ from pin_nonideal.types import Array
 from .visuals import JOINT_COLOR, LINK_COLORS, Shape, Visual, joint_axis
 
 
-def sticks(model: pin.Model, ends: list[tuple[int, Array]], size: float) -> list[Visual]:
+def link_bars(model: pin.Model, ends: list[tuple[int, Array]], size: float) -> list[Visual]:
     """Return visuals for a model without geometry: bars between joints, hubs at joints, point masses.
 
     Args:

@@ -11,7 +11,7 @@ from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.types import Array
 
 from .coordinates import positions, velocities
-from .signals import MAX_CURVES, left_out
+from .signals import MAX_CURVES, omission_note
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
@@ -84,7 +84,9 @@ def _phases(run: Trajectory, name: str) -> list[Relation]:
         kept = {label: pair for label, pair in curves.items() if label in rank}
         title = "Phase plane" if len(kept) > 1 else next(iter(kept))
         relations.append(
-            Relation(title, f"position [{unit}]", f"velocity [{unit}/s]", kept, note=left_out(len(curves)))
+            Relation(
+                title, f"position [{unit}]", f"velocity [{unit}/s]", kept, note=omission_note(len(curves))
+            )
         )
     return relations
 
