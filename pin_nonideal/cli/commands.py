@@ -115,15 +115,15 @@ def describe_robot(scene: Scene, as_json: bool) -> int:
         print(scene.report())
         return 0
     q, v = scene.initial_state()
-    told = scene.describe().to_dict()
-    told |= {"source": scene.source, "licence": scene.licence, "notes": scene.notes}
-    told |= {"nq": scene.model.nq, "nv": scene.model.nv, "q0": q.tolist(), "v0": v.tolist()}
-    told["dropped"] = [list(each) for each in scene.dropped]
-    print(json.dumps(told, indent=2))
+    data = scene.describe().to_dict()
+    data |= {"source": scene.source, "licence": scene.licence, "notes": scene.notes}
+    data |= {"nq": scene.model.nq, "nv": scene.model.nv, "q0": q.tolist(), "v0": v.tolist()}
+    data["dropped"] = [list(each) for each in scene.dropped]
+    print(json.dumps(data, indent=2))
     return 0
 
 
-def rest_robot(scene: Scene, q0: Any, as_json: bool) -> int:
+def print_equilibrium(scene: Scene, q0: Any, as_json: bool) -> int:
     """Print an equilibrium of a robot.
 
     Args:
@@ -135,8 +135,8 @@ def rest_robot(scene: Scene, q0: Any, as_json: bool) -> int:
     places = compiled_scene(scene).joints
     values = {p.name: found.q[p.q_first : p.q_first + p.nq].tolist() for p in places}
     if as_json:
-        told = {"q": values, "stable": found.stable, "left": found.left, "rates": found.rates.real.tolist()}
-        print(json.dumps(told, indent=2))
+        data = {"q": values, "stable": found.stable, "left": found.left, "rates": found.rates.real.tolist()}
+        print(json.dumps(data, indent=2))
         return 0
     print({True: "stable", False: "unstable", None: "neutral"}[found.stable])
     width = max(len(name) for name in values)
@@ -168,10 +168,10 @@ def sweep_file(options: argparse.Namespace) -> int:
     keep = str(table.get("failures", "keep"))
     kept: Any = sweep(make, points, table["duration"], jobs=jobs, store=store, failures=keep, **settings)
     print(kept)
-    for name, told in kept.summary().items():
-        q = told["quantiles"]
+    for name, data in kept.summary().items():
+        q = data["quantiles"]
         print(
-            f"  {name}: mean {told['mean']:.6g}, median {q[0.5]:.6g}, 90 % in {q[0.05]:.6g} to {q[0.95]:.6g}"
+            f"  {name}: mean {data['mean']:.6g}, median {q[0.5]:.6g}, 90 % in {q[0.05]:.6g} to {q[0.95]:.6g}"
         )
     for k, error in list(kept.failures.items())[:10]:
         print(f"  run {k} {kept.records[k]['parameters']}: {error}")
@@ -209,10 +209,10 @@ def _points(table: Table, path: Path) -> list[Table]:
         raise LoadingError(f'"{path}" must have one of the keys grid and samples')
     if table.get("grid"):
         return sweep_grid(**table["grid"])
-    said = dict(table["samples"])
-    check_keys(said, ("n", "kind", "seed", "ranges"), f'"{path}": samples')
-    ranges = said.pop("ranges", None) or {}
-    return sweep_samples(said.pop("n", 0), **said, **ranges)
+    samples = dict(table["samples"])
+    check_keys(samples, ("n", "kind", "seed", "ranges"), f'"{path}": samples')
+    ranges = samples.pop("ranges", None) or {}
+    return sweep_samples(samples.pop("n", 0), **samples, **ranges)
 
 
 def completion(parser: argparse.ArgumentParser, shell: str, robots: Sequence[str]) -> str:
@@ -251,7 +251,7 @@ def _options(parser: argparse.ArgumentParser) -> list[str]:
     return [option for a in parser._actions for option in a.option_strings if option.startswith("--")]
 
 
-def events_told(run: Trajectory) -> str:
+def format_events(run: Trajectory) -> str:
     """Return the events of a run as text, one line for each event.
 
     Args:

@@ -26,14 +26,14 @@ from .commands import (
     completion,
     describe_robot,
     named_values,
+    print_equilibrium,
     replay_file,
-    rest_robot,
     sweep_file,
 )
 from .run import parameters, resume_run, run_robot
 
 EXIT_ERROR = 2
-EXIT_UNREAD = 141  # 128 + SIGPIPE, as shells report it
+EXIT_BROKEN_PIPE = 141  # 128 + SIGPIPE, as shells report it
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 
 
@@ -62,18 +62,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("pin-nonideal: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:  # the reader of the output, such as `head`, has closed the pipe
-        _print_no_more()
-        return EXIT_UNREAD
+        _discard_output()
+        return EXIT_BROKEN_PIPE
     except PinNonidealError as error:
         print(f"pin-nonideal: error: {error}", file=sys.stderr)
         return EXIT_ERROR
     except OSError as error:  # a full disk, or a closed terminal
         print(f"pin-nonideal: error: cannot print: {error.strerror or error}", file=sys.stderr)
-        _print_no_more()
+        _discard_output()
         return EXIT_ERROR
 
 
-def _print_no_more() -> None:
+def _discard_output() -> None:
     """Redirect standard output to the null device, so that the interpreter does not flush it at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
@@ -214,7 +214,7 @@ def _add_writers(parser: argparse.ArgumentParser) -> None:
 
 def _equilibrium(options: argparse.Namespace) -> int:
     scene = pn.load(options.robot, **parameters(options.settings))
-    return rest_robot(scene, named_values(options.q0, "--q0"), options.json)
+    return print_equilibrium(scene, named_values(options.q0, "--q0"), options.json)
 
 
 def _complete(options: argparse.Namespace) -> int:

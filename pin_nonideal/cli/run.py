@@ -15,7 +15,7 @@ from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.types import Table
 from pin_nonideal.visualization.plotting import picture_format
 
-from .commands import events_told, named_values, plain_value
+from .commands import format_events, named_values, plain_value
 
 Writer = tuple[Path, Callable[[Trajectory, Path], Path]]
 
@@ -33,7 +33,9 @@ def run_robot(options: argparse.Namespace) -> int:
     q, v = named_values(options.q0, "--q0"), named_values(options.v0, "--v0")
     scene = pn.load(options.robot, **parameters(options.settings))
     settings = _simulation_settings(options)
-    return _finished(lambda: pn.simulate(scene, options.duration, q=q, v=v, **settings), options, writers)
+    return _run_and_write(
+        lambda: pn.simulate(scene, options.duration, q=q, v=v, **settings), options, writers
+    )
 
 
 def resume_run(options: argparse.Namespace) -> int:
@@ -43,10 +45,10 @@ def resume_run(options: argparse.Namespace) -> int:
         options: options of `resume`.
     """
     writers = _writers(options)
-    return _finished(lambda: pn.resume(options.file), options, writers)
+    return _run_and_write(lambda: pn.resume(options.file), options, writers)
 
 
-def _finished(run: Callable[[], Trajectory], options: argparse.Namespace, writers: list[Writer]) -> int:
+def _run_and_write(run: Callable[[], Trajectory], options: argparse.Namespace, writers: list[Writer]) -> int:
     """Run, print and write; after a failure, write the samples before it."""
     try:
         with warnings.catch_warnings():
@@ -55,17 +57,17 @@ def _finished(run: Callable[[], Trajectory], options: argparse.Namespace, writer
             done = run()
     except RunError as error:
         if error.trajectory is not None:
-            _told(error.trajectory, options, writers)
+            _print_and_write(error.trajectory, options, writers)
         raise
-    _told(done, options, writers)
+    _print_and_write(done, options, writers)
     return 0
 
 
-def _told(run: Trajectory, options: argparse.Namespace, writers: list[Writer]) -> None:
+def _print_and_write(run: Trajectory, options: argparse.Namespace, writers: list[Writer]) -> None:
     if not options.quiet:
         print(run)
     if options.events:
-        print(events_told(run))
+        print(format_events(run))
     for path, writer in writers:
         written = writer(run, path)
         if not options.quiet:
