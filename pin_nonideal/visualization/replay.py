@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 # Scripts that unpack the others; they are stored uncompressed.
-BOOT = ("payload.js", "boot.js")
+BOOT = ("payload.js", "main.js")
 SCRIPTS = (
     "numbers.js",
     "kinematics.js",
@@ -52,10 +52,10 @@ SCRIPTS = (
     "timeline.js",
     "table.js",
     "panel.js",
-    "address.js",
+    "url_state.js",
     "capture.js",
     "player.js",
-    "door.js",
+    "api.js",
 )
 COMPRESSION = 6  # gzip level; 9 takes several times as long and saves a few percent
 INLINE_HEIGHT = 640  # height of the page in a notebook [pixels]

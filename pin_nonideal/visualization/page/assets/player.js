@@ -26,7 +26,7 @@ class Player {
     this.resize();
     this.stage.resetView();
     this.panel = new Panel(this);
-    this.address = new Address(this);
+    this.address = new UrlState(this);
     this.capture = new Capture(this);
   }
 

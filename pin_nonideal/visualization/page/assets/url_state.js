@@ -1,6 +1,6 @@
 // State of the page in its address: #t=1.5&cam=azimuth,elevation,distance,x,y,z&speed=0.1&span=0,2
 
-class Address {
+class UrlState {
   constructor(player) {
     this.player = player;
     this.last = "";
