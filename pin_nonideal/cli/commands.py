@@ -31,7 +31,7 @@ def plain_value(text: str) -> Any:
     """Return a word as an integer, a number or a truth value, else as text.
 
     Args:
-        text: a word of the command line.
+        text: word of the command line.
     """
     for kind in (int, float):
         try:
@@ -46,10 +46,10 @@ def named_values(words: Sequence[str], option: str) -> dict[str, Any] | None:
 
     Args:
         words: words of the command line.
-        option: its name, for messages.
+        option: name of the option, for messages.
 
     Raises:
-        InputError: a word is something else.
+        InputError: a word has another form.
     """
     table: dict[str, Any] = {}
     for word in words:
@@ -76,11 +76,11 @@ def replay_file(options: argparse.Namespace) -> int:
     """Write the replay of a saved run.
 
     Args:
-        options: run and page, paths; number of the run where that is a sweep's folder; robot, whose scene it
-            is, or None.
+        options: run and page, paths; number of the run if the path is the folder of a sweep; robot, name or
+            path of the run's robot, or None.
 
     Raises:
-        InputError: there is a number and no folder, or a folder and no number, or no robot.
+        InputError: a number is given without a folder, a folder without a number, or the robot is unknown.
     """
     if options.page is not None:
         check_writable(file_path("PAGE.html", options.page), "the replay")
@@ -118,15 +118,15 @@ def describe_robot(scene: Scene, as_json: bool) -> int:
         print(scene.report())
         return 0
     q, v = scene.initial_state()
-    told = scene.describe().to_dict()
-    told |= {"source": scene.source, "licence": scene.licence, "notes": scene.notes}
-    told |= {"nq": scene.model.nq, "nv": scene.model.nv, "q0": q.tolist(), "v0": v.tolist()}
-    told["dropped"] = [list(each) for each in scene.dropped]
-    print(json.dumps(told, indent=2))
+    data = scene.describe().to_dict()
+    data |= {"source": scene.source, "licence": scene.licence, "notes": scene.notes}
+    data |= {"nq": scene.model.nq, "nv": scene.model.nv, "q0": q.tolist(), "v0": v.tolist()}
+    data["dropped"] = [list(each) for each in scene.dropped]
+    print(json.dumps(data, indent=2))
     return 0
 
 
-def rest_robot(scene: Scene, q: Any, as_json: bool) -> int:
+def print_equilibrium(scene: Scene, q: Any, as_json: bool) -> int:
     """Print a state of rest.
 
     Args:
@@ -138,8 +138,8 @@ def rest_robot(scene: Scene, q: Any, as_json: bool) -> int:
     places = compiled_scene(scene).joints
     values = {p.name: found.q[p.q_first : p.q_first + p.nq].tolist() for p in places}
     if as_json:
-        told = {"q": values, "stable": found.stable, "left": found.left, "rates": found.rates.real.tolist()}
-        print(json.dumps(told, indent=2))
+        data = {"q": values, "stable": found.stable, "left": found.left, "rates": found.rates.real.tolist()}
+        print(json.dumps(data, indent=2))
         return 0
     print({True: "stable", False: "unstable", None: "neutral"}[found.stable])
     width = max(len(name) for name in values)
@@ -171,10 +171,10 @@ def sweep_file(options: argparse.Namespace) -> int:
     keep = str(table.get("failures", "keep"))
     kept: Any = sweep(make, points, table["duration"], jobs=jobs, store=store, failures=keep, **settings)
     print(kept)
-    for name, told in kept.summary().items():
-        q = told["quantiles"]
+    for name, data in kept.summary().items():
+        q = data["quantiles"]
         print(
-            f"  {name}: mean {told['mean']:.6g}, median {q[0.5]:.6g}, 90 % in {q[0.05]:.6g} to {q[0.95]:.6g}"
+            f"  {name}: mean {data['mean']:.6g}, median {q[0.5]:.6g}, 90 % in {q[0.05]:.6g} to {q[0.95]:.6g}"
         )
     for k, error in list(kept.failures.items())[:10]:
         print(f"  run {k} {kept.records[k]['parameters']}: {error}")
@@ -182,13 +182,13 @@ def sweep_file(options: argparse.Namespace) -> int:
 
 
 class _Robot:
-    """Loader of a robot with the parameters of one run; other processes can import it."""
+    """Loader of a robot with the parameters of one run; defined in a module, so that it can be serialized."""
 
     def __init__(self, robot: str, fixed: Mapping[str, Any]) -> None:
         self.robot, self.fixed = robot, dict(fixed)
 
     def __call__(self, **parameters: Any) -> Scene:
-        """The robot's scene."""
+        """Return the scene of the robot."""
         return load(self.robot, **{**self.fixed, **parameters})
 
 
@@ -212,10 +212,10 @@ def _points(table: Table, path: Path) -> list[Table]:
         raise LoadingError(f'"{path}" must have one of the keys grid and samples')
     if table.get("grid"):
         return sweep_grid(**table["grid"])
-    said = dict(table["samples"])
-    check_keys(said, ("n", "kind", "seed", "ranges"), f'"{path}": samples')
-    ranges = said.pop("ranges", None) or {}
-    return sweep_samples(said.pop("n", 0), **said, **ranges)
+    samples = dict(table["samples"])
+    check_keys(samples, ("n", "kind", "seed", "ranges"), f'"{path}": samples')
+    ranges = samples.pop("ranges", None) or {}
+    return sweep_samples(samples.pop("n", 0), **samples, **ranges)
 
 
 def completion(
@@ -260,10 +260,10 @@ def _options(parser: argparse.ArgumentParser) -> list[str]:
     return [option for a in parser._actions for option in a.option_strings if option.startswith("--")]
 
 
-def events_told(run: Trajectory) -> str:
+def format_events(run: Trajectory) -> str:
     """Return the events of a run, one line each.
 
     Args:
-        run: the run.
+        run: trajectory of the run.
     """
     return "\n".join(f"{e.time:.9g} s  {e.kind}  {e.element}" for e in run.events) or "no events"

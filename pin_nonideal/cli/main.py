@@ -26,15 +26,15 @@ from .commands import (
     completion,
     describe_robot,
     named_values,
+    print_equilibrium,
     replay_file,
-    rest_robot,
     sweep_file,
 )
 from .examples import examples, run_example
 from .run import parameters, resume_run, run_robot
 
 EXIT_ERROR = 2
-EXIT_UNREAD = 141  # 128 and the number of SIGPIPE, as shells show it
+EXIT_BROKEN_PIPE = 141  # 128 + SIGPIPE, as shells report it
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 
 
@@ -42,10 +42,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
     Args:
-        arguments: the words after the command's name; those of the process when None.
+        arguments: words after the name of the command; None selects those of the process.
 
     Returns:
-        The exit code.
+        Exit code.
     """
     options, rest = _parser().parse_known_args(arguments)
     if rest and options.command is not _bench:
@@ -53,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options.rest = rest
     try:
         code = int(options.command(options))
-        if sys.stdout is not None:  # which a shell may have closed
+        if sys.stdout is not None:  # the shell may have closed the output
             sys.stdout.flush()
         return code
     except RunInterrupted as error:
@@ -62,20 +62,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("pin-nonideal: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
-    except BrokenPipeError:  # the reader of the output, such as `head`, has had enough
-        _print_no_more()
-        return EXIT_UNREAD
+    except BrokenPipeError:  # the reader of the output, such as `head`, has closed the pipe
+        _discard_output()
+        return EXIT_BROKEN_PIPE
     except PinNonidealError as error:
         print(f"pin-nonideal: error: {error}", file=sys.stderr)
         return EXIT_ERROR
-    except OSError as error:  # a disk that is full, or a terminal that went away
+    except OSError as error:  # a full disk, or a closed terminal
         print(f"pin-nonideal: error: cannot print: {error.strerror or error}", file=sys.stderr)
-        _print_no_more()
+        _discard_output()
         return EXIT_ERROR
 
 
-def _print_no_more() -> None:
-    """Redirect standard output to the null device, so that the interpreter does not flush it at its end."""
+def _discard_output() -> None:
+    """Redirect standard output to the null device, so that the interpreter does not flush it at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -202,7 +202,7 @@ def _add_robot(parser: argparse.ArgumentParser) -> None:
 
 
 def _start(what: str) -> Table:
-    """Return the settings of an option for a state by joint name."""
+    """Return the settings of an option that gives a state by joint name."""
     return {
         "action": "append",
         "default": [],
@@ -226,7 +226,7 @@ def _add_writers(parser: argparse.ArgumentParser) -> None:
 
 def _equilibrium(options: argparse.Namespace) -> int:
     scene = pn.load(options.robot, **parameters(options.settings))
-    return rest_robot(scene, named_values(options.q, "--q"), options.json)
+    return print_equilibrium(scene, named_values(options.q, "--q"), options.json)
 
 
 def _complete(options: argparse.Namespace) -> int:
@@ -266,7 +266,7 @@ def _render(options: argparse.Namespace) -> int:
 
 
 def _bench(options: argparse.Namespace) -> int:
-    """Run the folder `benchmarks` of the checkout: benchmarks are no part of the installed package."""
+    """Run the folder `benchmarks` of the checkout; the installed package does not contain benchmarks."""
     places = [Path.cwd(), Path(__file__).resolve().parent.parent.parent]
     for place in places:
         folder = place / "benchmarks"

@@ -15,7 +15,7 @@ from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.types import Table
 from pin_nonideal.visualization.plotting import picture_format
 
-from .commands import events_told, named_values, plain_value
+from .commands import format_events, named_values, plain_value
 
 Writer = tuple[Path, Callable[[Trajectory, Path], Path]]
 
@@ -33,7 +33,9 @@ def run_robot(options: argparse.Namespace) -> int:
     q, v = named_values(options.q, "--q"), named_values(options.v, "--v")
     scene = pn.load(options.robot, **parameters(options.settings))
     settings = _simulation_settings(options)
-    return _finished(lambda: pn.simulate(scene, options.duration, q=q, v=v, **settings), options, writers)
+    return _run_and_write(
+        lambda: pn.simulate(scene, options.duration, q=q, v=v, **settings), options, writers
+    )
 
 
 def resume_run(options: argparse.Namespace) -> int:
@@ -43,28 +45,29 @@ def resume_run(options: argparse.Namespace) -> int:
         options: options of `resume`.
     """
     writers = _writers(options)
-    return _finished(lambda: pn.resume(options.file), options, writers)
+    return _run_and_write(lambda: pn.resume(options.file), options, writers)
 
 
-def _finished(run: Callable[[], Trajectory], options: argparse.Namespace, writers: list[Writer]) -> int:
+def _run_and_write(run: Callable[[], Trajectory], options: argparse.Namespace, writers: list[Writer]) -> int:
     """Run, print and write; a failed run writes the samples before its failure."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # the run's notes say the same, and are printed
+            # the printed notes of the run contain the same messages
+            warnings.simplefilter("ignore", RuntimeWarning)
             done = run()
     except RunError as error:
         if error.trajectory is not None:
-            _told(error.trajectory, options, writers)
+            _print_and_write(error.trajectory, options, writers)
         raise
-    _told(done, options, writers)
+    _print_and_write(done, options, writers)
     return 0
 
 
-def _told(run: Trajectory, options: argparse.Namespace, writers: list[Writer]) -> None:
+def _print_and_write(run: Trajectory, options: argparse.Namespace, writers: list[Writer]) -> None:
     if not options.quiet:
         print(run)
     if options.events:
-        print(events_told(run))
+        print(format_events(run))
     for path, writer in writers:
         written = writer(run, path)
         if not options.quiet:
@@ -128,7 +131,7 @@ def parameters(settings: Sequence[str]) -> Table:
         settings: words of the command line.
 
     Raises:
-        InputError: one of them has another form.
+        InputError: a word has another form.
     """
     parameters: Table = {}
     for word in settings:

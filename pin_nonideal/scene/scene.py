@@ -21,7 +21,7 @@ from pin_nonideal.description.forces import Force
 from pin_nonideal.description.laws import Law
 from pin_nonideal.equation import Solution
 from pin_nonideal.errors import InputError
-from pin_nonideal.geometry.from_model import GeometryContact, with_geometry
+from pin_nonideal.geometry.from_model import GeometryContact, expand_geometry_contacts
 from pin_nonideal.html_tables import names, table
 from pin_nonideal.states.held import Held
 from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
@@ -141,7 +141,7 @@ class Scene:
         self.model = model
         self.name = optional_text("Scene: name", name) or model.name or "scene"
         self.constraints, self.laws = sequence("constraints", constraints), sequence("laws", laws)
-        self.contacts = with_geometry(sequence("contacts", contacts), model, collision_model)
+        self.contacts = expand_geometry_contacts(sequence("contacts", contacts), model, collision_model)
         self.forces = sequence("forces", forces)
         self.actuation, self.terms = given_actuation(actuation), choice("Scene: terms", terms, TERMS)
         self.impact = choice("Scene: impact", impact, IMPACTS)

@@ -18,7 +18,7 @@ from .records import FrameRecord, JointRecord, LawRecord, angles
 
 
 def joint_record(run: Any, name: str) -> JointRecord:
-    """Record of one joint, see `Trajectory.joint`."""
+    """Return the record of one joint; see `Trajectory.joint`."""
     name = text("joint: name", name)
     floating = [place for place in run.joints if place.kind == "JointModelFreeFlyer"]
     known = {"base": floating[0]} if len(floating) == 1 else {}
@@ -38,7 +38,7 @@ def joint_record(run: Any, name: str) -> JointRecord:
 
 
 def frame_record(run: Any, name: str) -> FrameRecord:
-    """Record of one frame, see `Trajectory.frame`."""
+    """Return the record of one frame; see `Trajectory.frame`."""
     name = text("frame: name", name)
     if run.scene is None:
         raise InputError(f'frame("{name}") needs the scene of the run, which this one has lost')
@@ -50,7 +50,7 @@ def frame_record(run: Any, name: str) -> FrameRecord:
 
 
 def force_of(run: Any, name: str) -> Array:
-    """Force of one constraint or contact, see `Trajectory.force`."""
+    """Return the force of one constraint or contact; see `Trajectory.force`."""
     name = text("force: name", name)
     if name not in run.rows:
         raise UnknownNameError(f'no constraint or contact "{name}" in this run{nearest(name, run.rows)}')
@@ -65,7 +65,7 @@ def force_of(run: Any, name: str) -> Array:
 
 
 def law_record(run: Any, name: str) -> LawRecord:
-    """Record of one law, see `Trajectory.law`."""
+    """Return the record of one law; see `Trajectory.law`."""
     name = text("law: name", name)
     if name not in run.law_names:
         raise UnknownNameError(f'no law "{name}" in this run{nearest(name, run.law_names)}')
@@ -84,7 +84,7 @@ def law_record(run: Any, name: str) -> LawRecord:
 
 
 def reaction_of(run: Any, name: str, axes: str) -> Array:
-    """Wrench of a joint, anchor or contact, see `Trajectory.reaction`."""
+    """Return the wrench of a joint, anchor or contact; see `Trajectory.reaction`."""
     name = text("reaction: name", name)
     if not run.reactions.recorded:
         raise InputError(f'reaction("{name}") needs a run with record="reactions"')

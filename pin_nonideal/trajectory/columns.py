@@ -1,4 +1,4 @@
-"""A trajectory as a table of named columns with units."""
+"""Trajectories as tables of named columns with units."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ EITHER_FORCE = (
 
 
 def columns(run: Any) -> dict[str, Array]:
-    """All that was recorded as named columns, (nt,) each.
+    """Return all recorded values as named columns, (nt,) each.
 
     Args:
-        run: the Trajectory.
+        run: trajectory of the run.
     """
     return {name: values for name, (values, _) in _with_units(run).items()}
 
@@ -105,7 +105,7 @@ def _motion(place: Any) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def _by_dof(run: Any) -> Iterator[tuple[str, Array]]:
-    """Fields with a column for each degree of freedom."""
+    """Yield the fields that have a column for each degree of freedom."""
     for field in ("F_ideal", "F_nonideal"):
         if getattr(run, field) is not None:
             yield field, getattr(run, field)
@@ -116,7 +116,7 @@ def _by_dof(run: Any) -> Iterator[tuple[str, Array]]:
 
 
 def _numbered(name: str, values: Array | None, units: Any) -> Iterator[tuple[str, Array, str]]:
-    """One column under the name itself, several under the name and their number; none of nothing."""
+    """Return one column under the given name, several columns under numbered names, or none for None."""
     if values is None:
         return
     if values.ndim == 1:

@@ -1,8 +1,8 @@
-"""One self-contained HTML file that replays a run: no server, no network, nothing to install for the viewer.
+"""Replay of a run as one self-contained HTML file, without server, network or installation for the viewer.
 
-The page carries the viewer library that the meshcat package ships (three.js inside), the run as typed arrays
-and a few scripts of its own.  Poses are exact at the frames: at a frame's time the page shows the placements
-that Pinocchio computes from the run's configuration there.
+The page contains the viewer library of the meshcat package (with three.js), the run as typed arrays, and
+scripts. Poses are exact at the frames: at the time of a frame the page shows the placements that Pinocchio
+computes for the configuration.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from pin_nonideal.errors import InputError, OutputError, short_repr
 from pin_nonideal.validation import choice, positive
 from pin_nonideal.visualization.page.payload import STAGES, packed_runs
 from pin_nonideal.visualization.page.relations import is_asked
-from pin_nonideal.visualization.page.signals import Chosen, plots_of, several, wanted
+from pin_nonideal.visualization.page.signals import Chosen, parse_plots, plots_of, runs_and_names
 from pin_nonideal.visualization.page.xy_plots import relations_of
 from pin_nonideal.visualization.progress import stages
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-# What unpacks the others is read by the browser as it is.
-BOOT = ("payload.js", "boot.js")
+# Scripts that unpack the others; they are stored uncompressed.
+BOOT = ("payload.js", "main.js")
 SCRIPTS = (
     "numbers.js",
     "kinematics.js",
@@ -56,21 +56,21 @@ SCRIPTS = (
     "timeline.js",
     "table.js",
     "panel.js",
-    "address.js",
+    "url_state.js",
     "capture.js",
     "player.js",
-    "door.js",
+    "api.js",
 )
-COMPRESSION = 6  # gzip level; 9 takes several times as long for a few percent
+COMPRESSION = 6  # gzip level; 9 takes several times as long and saves a few percent
 INLINE_HEIGHT = 640  # height of the page in a notebook [pixels]
 
 
 @dataclass(frozen=True)
 class ReplayPage:
-    """A replay that a notebook shows in place.
+    """Replay that a notebook displays.
 
     Attributes:
-        text: the whole page.
+        text: HTML text of the page.
         height: height in the notebook [pixels].
     """
 
@@ -78,16 +78,16 @@ class ReplayPage:
     height: int = INLINE_HEIGHT
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Writes the page to a file, whole or not at all.
+        """Write the page to a file, completely or not at all.
 
         Args:
-            path: the file.
+            path: path of the file.
 
         Returns:
-            The path written.
+            Path of the written file.
 
         Raises:
-            InputError: `path` is no name of a file.
+            InputError: `path` is not the name of a file.
             OutputError: the file cannot be written.
         """
         target = file_path("replay: path", path)
@@ -113,37 +113,38 @@ def replay(
     viewer: Any = None,
     progress: bool | None = None,
 ) -> Any:
-    """Writes a run as one HTML file that replays it offline, or shows it in a notebook.
+    """Write a run as one HTML file that replays it offline, or show it in a notebook.
 
-    Between the run's samples the page shows the cubic through their q and v, its loops closed.
+    Between the samples of the run the page shows the cubic through q and v of adjacent samples, projected
+    onto the constraints.
 
     Args:
-        run: what `simulate` returned; with record=("forces", "energy") there are arrows and an energy plot.
-            Of a list the first is shown, and the others as ghosts over it or side by side, on one time line.
-        path: file to write; None for a page that a notebook shows in place.
-        names: names of several runs; their numbers when None.
-        fps: frames of the replay a second of simulated time; None for frames that follow the motion, close
-            together where it is fast.
-        title: heading of the page; the scene's name when None.
-        plots: what is plotted: "energy", "work", "power", "violation", "reactions", "contacts", "gaps",
-            "tau", "F_nonideal" (friction in joints), "q", "v", "a", names of joints, or pairs of a title
-            "what [unit]" and curves by label, (nt,) each; of one quantity over another "phase",
-            "phase JOINT", "friction", "friction LAW", "load" and "load LAW", as for `plot`. None: of a driven
-            robot tau and F_nonideal, then energy, gaps, violation, reactions and q, as far as recorded.
-        compress: False for a page that also opens in browsers older than 2023, three times as large.
-        forces: False for a page without arrows of forces.
-        viewer: a `meshcat.Visualizer` whose window is open: it is filled with robot, animation and arrows of
-            forces, and nothing is written.
-        progress: progress bar on standard error where the page takes longer than a second; None shows it on a
+        run: trajectory of `simulate`; record=("forces", "energy") adds arrows and an energy plot. The first
+            run of a list is shown, the others as ghosts over it or side by side, on one time axis.
+        path: file to write; None for a page that a notebook displays.
+        names: names of several runs; None for their numbers.
+        fps: frames per second of simulated time; None for frames by the motion, closer together if it is
+            fast.
+        title: heading of the page; None for the name of the scene.
+        plots: names of plots: "energy", "work", "power", "violation", "reactions", "contacts", "gaps", "tau",
+            "F_nonideal" (friction in joints), "q", "v", "a", names of joints, or pairs of a title
+            "name [unit]" and curves by label, (nt,) each; and of one quantity over another "phase",
+            "phase JOINT", "friction", "friction LAW", "load" and "load LAW", as in `plot`. None selects tau
+            and F_nonideal of a driven robot, then energy, gaps, violation, reactions and q, if recorded.
+        compress: False for a page that also opens in browsers older than 2023, and is three times as large.
+        forces: whether the page shows force arrows.
+        viewer: `meshcat.Visualizer` with an open window. The window receives the robot, the animation and the
+            force arrows, and no file is written.
+        progress: progress bar on standard error if the page takes longer than a second; None shows it on a
             terminal only.
 
     Returns:
-        The path of the file, or the page, a `ReplayPage`; with `viewer` Pinocchio's MeshcatVisualizer.
+        Path of the file, or a `ReplayPage`; with `viewer`, Pinocchio's MeshcatVisualizer.
 
     Raises:
-        InputError: fps is not positive, a plot was not recorded, `viewer` comes with a path or several runs,
-            or the run is empty, not finite or without its scene.
-        UnknownNameError: a name in `plots` is none of the above.
+        InputError: fps is not positive, a plot was not recorded, `viewer` is combined with a path or several
+            runs, or the run is empty, not finite or without its scene.
+        UnknownNameError: a name in `plots` is unknown.
         OutputError: the file cannot be written.
     """
     fps = None if fps is None else positive("replay: fps", fps)
@@ -153,7 +154,7 @@ def replay(
     choice("replay: forces", forces, (True, False))
     choice("replay: progress", progress, (True, False, None))
     target = None if path is None else file_path("replay: path", path)
-    runs, labels = several(run, names, "a replay")
+    runs, labels = runs_and_names(run, names, "a replay")
     if viewer is not None:
         if path is not None or len(runs) > 1:
             raise InputError("replay: viewer takes one run and no path")
@@ -177,7 +178,7 @@ def replay(
 
 def _check_plots(runs: Sequence[Trajectory], plots: Chosen) -> None:
     """Check the chosen plots before work on the page begins."""
-    items = wanted("plots", plots)
+    items = parse_plots("plots", plots)
     relations = [item for item in items if is_asked(runs[0], item)]
     for run in runs:
         plots_of(run, [item for item in items if item not in relations])
@@ -186,7 +187,7 @@ def _check_plots(runs: Sequence[Trajectory], plots: Chosen) -> None:
 
 
 def _page(content: bytes, title: str, compress: bool) -> str:
-    """The whole page around the packed runs."""
+    """Return the page with the packed runs."""
     library, notices = viewer_library()
     folder = Path(__file__).parent / "page" / "assets"
 

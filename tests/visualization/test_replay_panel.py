@@ -12,7 +12,7 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.visualization.page.body_overlays import inertia_box
 from pin_nonideal.visualization.page.signal_list import rounding_of, signals_of, without_rounding
-from pin_nonideal.visualization.page.signals import usual_plots
+from pin_nonideal.visualization.page.signals import default_plot_names
 
 from ..support.replay_browser import Watched, changed, headless_browser
 from ..support.replay_runs import four_bar
@@ -323,9 +323,9 @@ def test_every_column_is_a_signal(name: str) -> None:
 
 def test_a_driven_robot_shows_torques_first() -> None:
     driven = pn.simulate(pn.load("solo12_standing"), 0.02, record=("forces", "energy"))
-    assert usual_plots(driven)[0] == "tau"
+    assert default_plot_names(driven)[0] == "tau"
     passive = pn.simulate(pn.load("rough_four_bar"), 0.02, record=("forces", "energy"))
-    assert usual_plots(passive)[0] == "energy"
+    assert default_plot_names(passive)[0] == "energy"
 
 
 def test_values_below_rounding_are_zero() -> None:

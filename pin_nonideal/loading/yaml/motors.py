@@ -1,4 +1,4 @@
-"""Actuation as a robot.yaml table states it: torques and gains by joint name."""
+"""Actuation of a robot.yaml table: torques and gains by joint name."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from .robot import ACTUATION, build, one_entry
 
 
 def actuation_of(model: Model, entry: Any, motors: Sequence[str], where: str) -> Any:
-    """Torques from the table: `torques` by joint name, HoldPosition or Table, or a list of such drives.
+    """Return the actuation of a table: `torques` by joint name, HoldPosition or Table, or a list of drives.
 
     Drives of a list keep their values by joint name, since they command the joints that they name.
 
     Args:
         model: pinocchio.Model.
-        entry: of the table, None for no actuation.
-        motors: names of the joints that are driven; of all when there are none.
-        where: names the entry in messages.
+        entry: entry of the table, None for no actuation.
+        motors: names of actuated joints; empty for all joints.
+        where: prefix of error messages that names the entry.
 
     Raises:
-        LoadingError: the entry is of no known kind, or a value is refused.
+        LoadingError: the kind of the entry is unknown, or a value is invalid.
     """
     if isinstance(entry, list):
         return [_drive(model, drive, motors, f"{where}[{k}]", True) for k, drive in enumerate(entry)]
@@ -59,7 +59,7 @@ def _drive(model: Model, entry: Any, motors: Sequence[str], where: str, listed: 
 
 
 def _gain(model: Model, gain: Any, motors: Sequence[str], where: str, listed: bool) -> Any:
-    """A gain by joint name, or one number for the motors (for all joints when no motor is named)."""
+    """Return a gain by joint name, or one number for all actuated joints (all joints if none is named)."""
     if motors and not isinstance(gain, (dict, list)):
         gain = dict.fromkeys(motors, gain)
     if not isinstance(gain, dict):
@@ -69,7 +69,7 @@ def _gain(model: Model, gain: Any, motors: Sequence[str], where: str, listed: bo
 
 
 def _checked(model: Model, table: Mapping[Any, Any], where: str, *, signed: bool) -> dict[str, float]:
-    """Numbers by joint name.
+    """Return numbers by joint name.
 
     Raises:
         LoadingError: there is no such joint, or a value is refused.

@@ -1,7 +1,7 @@
-"""robot.yaml: what a URDF cannot say, as a table of plain values that becomes descriptions.
+"""robot.yaml: data that URDF cannot express, as a table of plain values that is converted to descriptions.
 
-A superset of what community closed-loop robots keep beside their URDF.  Only data: nothing in the file is
-ever executed.
+The keys are a superset of the keys in community repositories of closed-loop robots. The file contains data
+only; no content is executed.
 """
 
 from __future__ import annotations
@@ -63,14 +63,14 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
 
 
 def read_yaml(path: Path) -> Table:
-    """The table in a robot.yaml, keys checked.
+    """Return the table of a robot.yaml, with checked keys.
 
     Raises:
-        LoadingError: the file is truncated or malformed, holds tags that name code, anchors, a key twice, or
-            a key that is not known.
+        LoadingError: the file is truncated or malformed, or has a tag, an anchor, a repeated key, or an
+            unknown key.
     """
     table = plain_yaml(path)
-    if table is None:  # an empty file: a robot without extras
+    if table is None:  # an empty file is a robot without further data
         table = {}
     if not isinstance(table, dict):
         raise LoadingError(f'"{path}" must be a table of keys; got {_kind(table)}')
@@ -80,7 +80,7 @@ def read_yaml(path: Path) -> Table:
 
 
 def _check_numbers(value: Any, where: str) -> None:
-    """Raises where true or false, which YAML also writes yes and no, stands among numbers."""
+    """Check that no list of numbers contains true or false, which YAML also writes as yes and no."""
     parts = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, part in parts:
         _check_numbers(part, f"{where}: {key}")
@@ -95,10 +95,10 @@ def _kind(value: object) -> str:
 
 
 def check_keys(table: Mapping[Any, Any], known: Iterable[str], where: str) -> None:
-    """Raises on the first key that is not known, naming the nearest that is.
+    """Check that all keys are known.
 
     Raises:
-        LoadingError: see above.
+        LoadingError: a key is unknown; the message has the nearest known key.
     """
     known = list(known)
     for key in table:
@@ -107,15 +107,15 @@ def check_keys(table: Mapping[Any, Any], known: Iterable[str], where: str) -> No
 
 
 def build(kind: type, values: Any, where: str) -> Any:
-    """One description from a table of its arguments.
+    """Return one description from a table of its arguments.
 
     Args:
-        kind: a description's class.
+        kind: class of the description.
         values: table of arguments.
-        where: words for messages.
+        where: prefix of error messages.
 
     Raises:
-        LoadingError: unknown or missing arguments, or values the description refuses.
+        LoadingError: arguments are unknown or missing, or the description rejects a value.
     """
     if not isinstance(values, dict):
         raise LoadingError(f"{where}: {kind.__name__} must be a table of arguments; got {_kind(values)}")
@@ -137,10 +137,10 @@ def build(kind: type, values: Any, where: str) -> Any:
 
 
 def time_function(table: Table, where: str) -> Any:
-    """`{sinusoid: {amplitude: 1, omega: 2}}` and its like.
+    """Return a function of time from a table such as `{sinusoid: {amplitude: 1, omega: 2}}`.
 
     Raises:
-        LoadingError: not one known function with its arguments.
+        LoadingError: the table is not one known function with its arguments.
     """
     name, values = one_entry(table, where)
     if name not in FUNCTIONS:
@@ -149,10 +149,10 @@ def time_function(table: Table, where: str) -> Any:
 
 
 def one_entry(table: Any, where: str) -> tuple[str, Any]:
-    """The only key of a table, and its value.
+    """Return the only key of a table, and its value.
 
     Raises:
-        LoadingError: no table, or not one key.
+        LoadingError: the value is not a table with one key.
     """
     if not isinstance(table, dict) or len(table) != 1:
         raise LoadingError(
@@ -164,10 +164,10 @@ def one_entry(table: Any, where: str) -> tuple[str, Any]:
 
 
 def descriptions(entries: Any, kinds: Mapping[str, type], where: str) -> list[Any]:
-    """A list of descriptions from a list of one-key tables `{Kind: {argument: value}}`.
+    """Return a list of descriptions from a list of one-key tables `{Kind: {argument: value}}`.
 
     Raises:
-        LoadingError: no list, an unknown kind, or arguments that are refused.
+        LoadingError: the value is not a list, a kind is unknown, or arguments are invalid.
     """
     if entries is None:
         return []
@@ -188,10 +188,10 @@ def descriptions(entries: Any, kinds: Mapping[str, type], where: str) -> list[An
 
 
 def strings(table: Table, key: str, where: str) -> list[str]:
-    """A list of names under a key, empty when the key is absent.
+    """Return a list of names under a key, or an empty list if the key is missing.
 
     Raises:
-        LoadingError: something else is there.
+        LoadingError: the value is not a list of names.
     """
     value = table.get(key)
     if value is None:
@@ -202,10 +202,10 @@ def strings(table: Table, key: str, where: str) -> list[str]:
 
 
 def optional_string(table: Table, key: str, where: str) -> str | None:
-    """A text under a key, or None.
+    """Return a string under a key, or None.
 
     Raises:
-        LoadingError: something else is there.
+        LoadingError: the value is not a string.
     """
     value = table.get(key)
     if value is not None and not isinstance(value, str):
@@ -214,10 +214,10 @@ def optional_string(table: Table, key: str, where: str) -> str | None:
 
 
 def loops(table: Table, where: str) -> list[Any]:
-    """Anchors from the community's `closed_loop` and `type` (6d where `type` is absent).
+    """Return anchors from the community keys `closed_loop` and `type` (6d without `type`).
 
     Raises:
-        LoadingError: pairs or types are malformed, or their counts differ.
+        LoadingError: pairs or types are malformed, or their numbers differ.
     """
     pairs = table.get("closed_loop")
     types = table.get("type")
@@ -250,7 +250,7 @@ def loops(table: Table, where: str) -> list[Any]:
 
 
 def joint_types(table: Table, where: str) -> dict[str, str]:
-    """Joints whose type is exchanged, from the community's `joint_name` and `joint_type`.
+    """Return the new joint types by joint name, from the community keys `joint_name` and `joint_type`.
 
     Raises:
         LoadingError: the two lists differ in length.
@@ -264,10 +264,10 @@ def joint_types(table: Table, where: str) -> dict[str, str]:
 
 
 def pitches(table: Table, where: str) -> dict[str, float]:
-    """Joints that are screws, and their rise per radian [m/rad], from `model: {helical: {joint: pitch}}`.
+    """Return the rise per radian [m/rad] of screw joints by name, from `model: {helical: {joint: pitch}}`.
 
     Raises:
-        LoadingError: no table of numbers other than zero.
+        LoadingError: the value is not a table of nonzero numbers.
     """
     given = (table.get("model") or {}).get("helical") or {}
     if not isinstance(given, dict):
@@ -285,7 +285,7 @@ def pitches(table: Table, where: str) -> dict[str, float]:
 
 
 def names_in(value: object) -> set[str]:
-    """Every text anywhere in a table: what the file may refer to."""
+    """Return every string in a table, as a superset of the names that it refers to."""
     if isinstance(value, str):
         return {value}
     if isinstance(value, dict):

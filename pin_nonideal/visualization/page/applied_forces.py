@@ -1,4 +1,4 @@
-"""Arrows of what acts where it is said: springs, wrenches and drag."""
+"""Arrows of applied forces at their points of action: springs, wrenches and drag."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 
-def given_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]:
-    """Arrows of the springs, wrenches and laws of drag of a scene, where they act.
+def applied_force_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]:
+    """Return the arrows of the springs, wrenches and drag laws of a scene, at their points of action.
 
     Args:
-        run: the run.
-        motion: its motion.
-        marks: of the scene, for the ends of springs.
+        run: run of the replay.
+        motion: motion of the run.
+        marks: marks of the scene, for the ends of springs.
     """
     ends, twists = {mark.name: mark for mark in marks if mark.kind == "spring"}, _Twists(run, motion)
     found: list[Arrow] = []
@@ -61,7 +61,7 @@ def given_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arr
 
 
 def _spring(motion: Motion, twists: _Twists, item: SpringDamper, mark: Mark) -> Arrow:
-    """The force on the body of its first frame."""
+    """Return the arrow of the force on the body of the spring's first frame."""
     first, second = motion.point(mark.joint1, mark.point1), motion.point(mark.joint2, mark.point2)
     length = np.linalg.norm(first - second, axis=1, keepdims=True)
     way = np.divide(first - second, length, out=np.zeros_like(first), where=length > 0.0)
@@ -84,7 +84,7 @@ def _wrench(run: Trajectory, motion: Motion, item: Wrench) -> list[Arrow]:
 
 
 class _Twists:
-    """Velocities of all joints at the frames, computed when the first is asked for."""
+    """Velocities of all joints at the frames, computed on first access."""
 
     def __init__(self, run: Trajectory, motion: Motion) -> None:
         self.run, self.motion = run, motion
@@ -102,7 +102,7 @@ class _Twists:
         return found
 
     def velocity(self, joint: int, point: Array) -> Array:
-        """Velocity of a point that a joint carries at each frame, in world axes [m/s], (n, 3)."""
+        """Return the velocity of a point on a joint at each frame, in world axes [m/s], (n, 3)."""
         if not joint:
             return np.zeros((len(self.motion.times), 3))
         linear, angular = np.split(self.own[:, joint], 2, axis=1)

@@ -1,4 +1,4 @@
-"""Every recorded number of a run as a signal that a reader of a replay can search and plot."""
+"""Signals of a replay: each recorded quantity of a run, for search and plots."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from pin_nonideal.trajectory.columns import columns
 from pin_nonideal.types import Array
 
 from .coordinates import positions, velocities
-from .mode_timeline import opens
+from .mode_timeline import has_open_contact
 from .signals import Plot
 from .visuals import joint_axis
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-# Points of all signals together, at least and at most so many of each.
+# Number of points of all signals, and minimum and maximum number of points of one signal.
 POINTS, LEAST, MOST = 120_000, 100, 800
-# Sections of the list, in its order.
+# Sections of the list, in order.
 TORQUES, FRICTION, REACTIONS = "Torques of the actuation", "Friction", "Reactions and loads"
 ENERGY, MOTION, OTHERS = "Energy and power", "Positions, velocities, accelerations", "Violation and states"
 SECTIONS = (TORQUES, FRICTION, REACTIONS, ENERGY, MOTION, OTHERS)
-# Fields whose values run along a curve between samples; all else runs straight.
+# Fields with smooth curves between samples; other fields are linear.
 SMOOTH = ("q", "v", "energy")
 FORCES = ("N", "N m", "N, N m")
 WRENCH = ("force x", "force y", "force z", "moment x", "moment y", "moment z")
@@ -34,15 +34,15 @@ WRENCH = ("force x", "force y", "force z", "moment x", "moment y", "moment z")
 
 @dataclass(frozen=True)
 class Signal:
-    """A curve that can be plotted.
+    """Curve that can be plotted.
 
     Attributes:
-        label: its name.
-        unit: its unit.
-        section: of the list that it stands in.
-        words: what else a search finds it by, its name in `Trajectory.columns` among them.
+        label: name of the curve.
+        unit: unit of the curve.
+        section: section of the list.
+        words: further words for the search, such as the name in `Trajectory.columns`.
         t: times [s], (k,).
-        values: (k,).
+        values: values of the curve, (k,).
     """
 
     label: str
@@ -66,13 +66,13 @@ class _Found:
 
 
 def signals_of(run: Trajectory, finer: Trajectory) -> list[Signal]:
-    """All numbers of a run that can be plotted one by one, thinned so that extremes stay.
+    """Return all scalars of a run that can be plotted, thinned with their extremes.
 
     Every column of `Trajectory.columns` is one of them, or the angle or rate that it holds is.
 
     Args:
-        run: the run.
-        finer: the same with more samples, for what does not run straight between those of the run.
+        run: run of the replay.
+        finer: the same run with more samples, for curves that are not linear between samples.
     """
     if getattr(run, "dense", None) is not None:
         run = finer
@@ -94,7 +94,7 @@ def signals_of(run: Trajectory, finer: Trajectory) -> list[Signal]:
 
 
 def _labelled(run: Trajectory, finer: Trajectory) -> Iterator[_Found]:
-    """Positions, velocities and accelerations by the names of their components."""
+    """Return positions, velocities and accelerations by the names of their components."""
     model = run.scene.model
     for kind, field, own, items in (
         ("position", "q", True, positions(model, finer.q)),
@@ -106,18 +106,18 @@ def _labelled(run: Trajectory, finer: Trajectory) -> Iterator[_Found]:
             joint = model.joints[model.getJointId(item.joint)]
             place = counts[item.joint] = counts.get(item.joint, -1) + 1
             column = f"{item.joint}.{field}" + (f".{place}" if joint.nv > 1 else "")
-            if field == "q" and joint.nv > 1 and place > 2:  # the angle of a plane, whose column is another
+            if field == "q" and joint.nv > 1 and place > 2:  # the angle of a planar joint has another column
                 column = f"{item.joint} angle"
             yield _Found(f"{item.label}, {kind}", item.unit, MOTION, f"{column}\n{field}", item.values, own)
 
 
 def _loads(run: Trajectory) -> Iterator[_Found]:
-    """Sizes of forces: multipliers of constraints, forces of contacts, what bearings carry."""
+    """Return sizes of forces: multipliers of constraints, forces of contacts, loads of bearings."""
     if run.lam is not None:
         for name, rows in run.scene.constraint_slices.items():
             size = np.linalg.norm(run.lam[:, rows], axis=1)
             yield _Found(f"{name}, |lam|", "N, N m", REACTIONS, "reaction load multipliers", size)
-    for name, values in (run.contact_forces or {}).items() if opens(run) else ():
+    for name, values in (run.contact_forces or {}).items() if has_open_contact(run) else ():
         size = np.linalg.norm(values, axis=1)
         yield _Found(f"{name}, force", "N", REACTIONS, "contact reaction load", size)
     for name, wrench in (getattr(run, "reactions", None) or {}).items():
@@ -127,18 +127,18 @@ def _loads(run: Trajectory) -> Iterator[_Found]:
 
 
 class _Column:
-    """What a column of a run holds.
+    """Content of a column of a run.
 
     Args:
-        run: the run.
-        name: of the column.
+        run: run of the replay.
+        name: name of the column.
     """
 
     def __init__(self, run: Trajectory, name: str) -> None:
         self.run, self.name = run, name
 
     def signal(self, values: Array) -> _Found:
-        """The signal of the column; its words end with the field."""
+        """Return the signal of the column; its words end with the field."""
         for field, unit, words in (("energy", "J", "work"), ("power", "W", "")):
             own = self.name.removeprefix(f"{field}.")
             if own in (getattr(self.run, field, None) or {}):
@@ -181,7 +181,7 @@ class _Column:
         return _Found(label, unit, section, f"{self.name}\n{words}\n{field}", np.asarray(values, dtype=float))
 
     def _unit(self, joint: str, number: str) -> str:
-        """Unit of a generalized force in a joint; of one of its components."""
+        """Return the unit of a generalized force in a joint, or of one component."""
         model = self.run.scene.model
         if not model.existJointName(joint):
             return "N, N m"
@@ -195,7 +195,7 @@ class _Column:
 
 
 def _thinned(item: _Found, t: Array, points: int) -> Signal:
-    """The signal with few points, two where its value never changes."""
+    """Return the signal with few points; two points if its value is constant."""
     values, label = item.values, item.label
     if len(t) > 2 and (values == values[0]).all():
         t, values = t[[0, -1]], values[[0, -1]]
@@ -205,13 +205,13 @@ def _thinned(item: _Found, t: Array, points: int) -> Signal:
 
 
 def rounding_of(pairs: Iterator[tuple[str, Array]]) -> dict[str, float]:
-    """Size below which a value of a unit is rounding.
+    """Return the size of rounding for each unit.
 
     Args:
         pairs: units and values in them.
 
     Returns:
-        By unit 1e-9 of the largest value of a force or moment, and 1e-12 of that of anything else.
+        By unit 1e-9 of the largest value of forces and moments, and 1e-12 of other largest values.
     """
     largest: dict[str, float] = {}
     for unit, values in pairs:
@@ -221,10 +221,10 @@ def rounding_of(pairs: Iterator[tuple[str, Array]]) -> dict[str, float]:
 
 
 def without_rounding(values: Array, level: float) -> Array:
-    """Values with zero in place of those below a level.
+    """Return values with zeros in place of values below a level.
 
     Args:
-        values: of a curve.
-        level: as `rounding_of` gives it.
+        values: values of a curve.
+        level: size of rounding, see `rounding_of`.
     """
     return np.where(np.abs(values) < level, 0.0, values)

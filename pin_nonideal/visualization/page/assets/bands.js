@@ -1,6 +1,6 @@
-// A band for each element that sticks or slips, colored by its mode; pieces thinner than a pixel are drawn by their shares.
+// Band for each frictional element, colored by its mode; intervals shorter than a pixel are drawn by their shares.
 
-const OPEN = 2; // the mode of a contact without a force
+const OPEN = 2; // mode of an open contact
 const BAND = 13; // height of a band with its gap [pixels]
 // Where the bar of a mode begins below the top of its band, and how tall it is: slip + is above, slip - below, stick between them.
 const SHAPES = { 1: [0, 0.5], [-1]: [0.5, 0.5], 0: [0.3, 0.4], 2: [0.45, 0.1], 3: [0, 1] };
@@ -32,7 +32,7 @@ class Bands {
     placeTip(this.tip, event.clientX, this.canvas.parentElement.getBoundingClientRect().top - 8 - this.tip.offsetHeight);
   }
 
-  /** Room that the names take at the left. */
+  /** Width of the names at the left. */
   margin() {
     if (!this.bands.length) return 8;
     const c = this.canvas.getContext("2d");

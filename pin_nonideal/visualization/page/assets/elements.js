@@ -1,6 +1,6 @@
-// Friction where it acts: rings colored by mode, filled as far as the limit is used; cones of contacts; flashes of impacts.
+// Friction at its position: rings with the color of the mode and the used part of the limit, cones of contacts, flashes of impacts.
 
-const RING = 24; // pieces of a ring
+const RING = 24; // segments of a ring
 const FLASHES = 24;
 const SLIPPING = 0.12, STUCK = 0.26; // thickness of a ring, by its radius
 
@@ -53,13 +53,13 @@ class Elements {
     }
   }
 
-  /** Colors of the pieces of a ring, as in the style. */
+  /** Colors of the segments of a ring, in the notation of the style. */
   ringColors(i) {
     const color = new this.THREE.Color();
     return Array.from({ length: RING }, (_, k) => { this.rings.mesh.getColorAt(RING * i + k, color); return `#${color.convertLinearToSRGB().getHexString()}`; });
   }
 
-  /** Impacts of the last instants as spheres that shrink, the harder the larger. */
+  /** Draws recent impacts as shrinking spheres with a size by the impulse. */
   drawFlashes(time, radius) {
     this.flashing = 0;
     if (!this.flashes.count) return;

@@ -1,4 +1,4 @@
-// The panel: what is in the scene, to be searched, shown, hidden, isolated and followed; signals to be plotted; views.
+// Panel: content of the scene, to search, show, hide, isolate and follow; signals to plot; views.
 
 const VIEWS = { usual: null, front: [0, -1, 0.15], side: [1, 0, 0.15], top: [0, -0.02, 1] };
 
@@ -26,7 +26,7 @@ class Panel {
     if (!this.box.hidden) element("search").focus();
   }
 
-  /** A direction given for z upwards, where something else is up. */
+  /** Rotates a direction given for z upwards to the up direction of the scene. */
   upright(direction) {
     const { THREE, up } = this.stage, turn = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 0, 1), up);
     return new THREE.Vector3(...direction).applyQuaternion(turn).toArray();
@@ -55,7 +55,7 @@ class Panel {
     for (const group of ["bodies", "constraints", "elements", "arrows", "signals", "relations"]) element(`tree-${group}`).parentElement.hidden = !element(`tree-${group}`).children.length;
   }
 
-  /** A row of the tree: a box that shows or hides its items, a button that shows nothing else of its kind, and others. */
+  /** Adds a row of the tree: a box that shows or hides its items, a button that hides all others of the group, and other buttons. */
   addRow(group, name, depth, items, actions = []) {
     const row = document.createElement("li"), label = document.createElement("label"), input = document.createElement("input");
     input.type = "checkbox"; input.checked = true;
@@ -79,7 +79,7 @@ class Panel {
 
   follow(joint) { this.stage.follow(joint); this.player.showToggles(); }
 
-  /** Draws the path of a body's center of mass, or takes it away. */
+  /** Draws or removes the path of a body's center of mass. */
   path(joint) {
     const { guides } = this.stage, line = guides.trails.get(joint);
     if (line) line.mesh.visible = !line.mesh.visible; else { guides.addTrail(joint, this.player.run.joints[joint].lever); this.stage.resize(); }
@@ -113,7 +113,7 @@ class Panel {
     return list;
   }
 
-  /** Adds a signal to the plot of its unit, or takes it out; a plot that was made for it goes when it is empty. */
+  /** Adds a signal to the plot of its unit, or removes it; a plot that was made for it is removed when it is empty. */
   plot(signal, wanted) {
     const { player } = this;
     if (wanted) {

@@ -1,6 +1,6 @@
-// The start of the page, and what scripts and tests may use: window.replay.
+// Start of the page, and its interface for scripts and tests: window.replay.
 
-function door(player) {
+function publicApi(player) {
   return {
     ready: true,
     seek: (time) => { player.pause(); player.seek(time); player.stage.render(); },
@@ -42,7 +42,7 @@ async function main() {
   player.tick();
   loop();
   element("message").hidden = true;
-  window.replay = door(player);
+  window.replay = publicApi(player);
   window.replayDone = true;
   if (!/[#&]paused\b/.test(location.hash) && !matchMedia("(prefers-reduced-motion: reduce)").matches) player.play();
 }
