@@ -231,8 +231,8 @@ class Trajectory(MadeLater):
         link has no inertia there is massless.  The name of a link stands for the joint that carries it.
 
         Args:
-            name: name of a joint of the model, fixed or not, of a link, or of an anchor or contact, which takes
-                precedence over a joint of that name.
+            name: name of a joint of the model, also of a fixed joint or a link, or of an anchor or contact,
+                which takes precedence over a joint of that name.
             axes: "own" for the axes of the joint frame or of frame2, or "world".
 
         Raises:
