@@ -48,11 +48,20 @@ def units(run: Any) -> dict[str, str]:
     return {name: unit for name, (_, unit) in _with_units(run).items()}
 
 
+def column_name(name: str) -> str:
+    """Return a name as columns contain it: each space becomes "_".
+
+    Args:
+        name: name of a joint, constraint, law or ledger.
+    """
+    return "_".join(name.split())
+
+
 def _with_units(run: Any) -> dict[str, tuple[Array, str]]:
     """Columns and their units by name without spaces."""
     table: dict[str, tuple[Array, str]] = {}
     for given, values, unit in _all(run):
-        base = "_".join(given.split())
+        base = column_name(given)
         name, number = base, 1
         while name in table:
             number += 1

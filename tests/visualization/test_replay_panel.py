@@ -11,7 +11,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.visualization.page.body_overlays import inertia_box
-from pin_nonideal.visualization.page.signal_list import rounding_of, signals_of, without_rounding
+from pin_nonideal.visualization.page.signal_list import OTHERS, rounding_of, signals_of, without_rounding
 from pin_nonideal.visualization.page.signals import default_plot_names
 
 from ..support.replay_browser import Watched, changed, headless_browser
@@ -307,7 +307,7 @@ def test_signals_are_all_that_was_recorded_and_keep_their_peaks() -> None:
     assert len(found["coupler, velocity"].t) < 2000
 
 
-@pytest.mark.parametrize("name", ["rough_four_bar", "solo12_standing"])
+@pytest.mark.parametrize("name", ["four_bar", "rough_four_bar", "solo12_standing"])
 def test_every_column_is_a_signal(name: str) -> None:
     record = ("forces", "energy", "reactions", "power", "a")
     run = pn.simulate(pn.load(name), 0.02, record=record)
@@ -319,6 +319,8 @@ def test_every_column_is_a_signal(name: str) -> None:
     assert {"torque", "tau", "load", "reaction", "power"} <= words
     assert ("friction" in words) == (run.law_names != [])
     assert signals[0].section == "Torques of the actuation"
+    others = {signal.label for signal in signals if signal.section == OTHERS}
+    assert others == {"violation", "violation rate"}
 
 
 def test_a_driven_robot_shows_torques_first() -> None:

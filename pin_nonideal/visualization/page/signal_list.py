@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pin_nonideal.trajectory.columns import columns
+from pin_nonideal.trajectory.columns import column_name, columns
 from pin_nonideal.types import Array
 
 from .coordinates import positions, velocities
@@ -79,10 +79,11 @@ def signals_of(run: Trajectory, finer: Trajectory) -> list[Signal]:
     found = [*_labelled(run, finer), *_loads(run)]
     known = {word for item in found for word in item.words.split("\n")}
     fine = columns(finer)
+    names = {column_name(name): name for name in (*run.scene.model.names, *run.rows, *run.element_names)}
     for name, values in columns(run).items():
         if name == "t" or name in known:
             continue
-        item = _Column(run, name).signal(values)
+        item = _Column(run, name, names).signal(values)
         smooth = item.words.split("\n")[-1] in SMOOTH
         found.append(replace(item, values=fine[name] if smooth else item.values, smooth=smooth))
     order = {section: place for place, section in enumerate(SECTIONS)}
@@ -105,7 +106,7 @@ def _labelled(run: Trajectory, finer: Trajectory) -> Iterator[_Found]:
         for item in items:
             joint = model.joints[model.getJointId(item.joint)]
             place = counts[item.joint] = counts.get(item.joint, -1) + 1
-            column = f"{item.joint}.{field}" + (f".{place}" if joint.nv > 1 else "")
+            column = f"{column_name(item.joint)}.{field}" + (f".{place}" if joint.nv > 1 else "")
             if field == "q" and joint.nv > 1 and place > 2:  # the angle of a planar joint has another column
                 column = f"{item.joint} angle"
             yield _Found(f"{item.label}, {kind}", item.unit, MOTION, f"{column}\n{field}", item.values, own)
@@ -132,25 +133,27 @@ class _Column:
     Args:
         run: run of the replay.
         name: name of the column.
+        names: names of joints, constraints and elements by their names in columns.
     """
 
-    def __init__(self, run: Trajectory, name: str) -> None:
-        self.run, self.name = run, name
+    def __init__(self, run: Trajectory, name: str, names: Mapping[str, str]) -> None:
+        self.run, self.name, self.names = run, name, names
 
     def signal(self, values: Array) -> _Found:
         """Return the signal of the column; its words end with the field."""
         for field, unit, words in (("energy", "J", "work"), ("power", "W", "")):
-            own = self.name.removeprefix(f"{field}.")
-            if own in (getattr(self.run, field, None) or {}):
-                return self._found(f"{field}: {own}", unit, ENERGY, words, field, values)
+            for own in getattr(self.run, field, None) or {}:
+                if self.name == column_name(f"{field}.{own}"):
+                    return self._found(f"{field}: {own}", unit, ENERGY, words, field, values)
         for law in getattr(self.run, "law_forces", None) or {}:
-            owner, _, number = self.name.partition(f".C {law}")
+            owner, _, number = self.name.partition(f".C.{column_name(law)}")
             if owner != self.name and (not number or number[0] == "."):
+                owner = self.names.get(owner, owner)
                 label, unit = f"{law}, on {owner}{number.replace('.', ' ')}", self._unit(owner, number)
                 return self._found(label, unit, FRICTION, "friction force law torque", "C", values)
         number = (re.search(r"\.\d+$", self.name) or [""])[0]
         owner, _, field = self.name.removesuffix(number).rpartition(".")
-        return self._of_field(owner, field, number, values)
+        return self._of_field(self.names.get(owner, owner), field, number, values)
 
     def _of_field(self, owner: str, field: str, number: str, values: Array) -> _Found:
         part, unit = number.replace(".", " "), self._unit(owner, number)
