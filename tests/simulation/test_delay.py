@@ -141,7 +141,7 @@ def test_steppers_advance_in_turns_and_in_other_threads():
 def test_each_run_of_a_rollout_begins_without_samples(threads):
     made = scene(delay_samples=3, initial=[0.7])
     starts = np.linspace(-1.0, 1.0, 7)[:, None]
-    options = {"output_dt": PERIOD, "threads": threads}
+    options = {"output_dt": PERIOD, "jobs": threads}
     for _ in range(2):
         runs = pn.rollout(made, starts, -starts, STEPS * PERIOD, **options)
         arrays = pn.rollout(made, starts, -starts, STEPS * PERIOD, as_arrays=True, **options)
